@@ -1,0 +1,105 @@
+"""Every array of a store: its dimensions after the axes, type, unit and name. Store, docs and tests read it here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variable:
+    """One stored array; `dims` are those that follow the study's axes."""
+
+    name: str
+    role: str  # "waveform", "spectrum", "section", "scalar", "setting" or "flag"
+    dims: tuple[str, ...] = ()
+    dtype: str = "float64"
+    unit: str = "1"
+    long_name: str
+    flags: tuple[str, ...] = field(default=())  # meanings of 0, 1, 2, ...
+
+
+STATUS = ("missing", "done", "failed", "diverged")
+MISSING, DONE, FAILED, DIVERGED = range(4)
+REGIME = ("no_contact", "periodic", "quasi_periodic", "chaotic", "undecided")
+
+# The recorded signals: name, extra dimensions, unit, long name. Waveforms and spectra are stored in single precision.
+_SIGNALS = (
+    ("vertical", (), "m", "vertical displacement of the disc"),
+    ("horizontal", (), "m", "horizontal displacement of the disc"),
+    ("torsion", (), "rad", "torsional displacement of the disc"),
+    ("torsion_acceleration", (), "rad s-2", "torsional acceleration of the disc"),
+    ("stator_axial", ("stator",), "m", "axial displacement of the stator tip (positive when compressed)"),
+    ("stator_lateral", ("stator",), "m", "lateral displacement of the stator tip (positive with the rim)"),
+    ("contact_force", ("stator",), "N", "normal contact force (mean over the sample's interval)"),
+)
+SIGNAL_NAMES = tuple(name for name, *_ in _SIGNALS)
+SECTION_NAMES = ("vertical", "horizontal", "torsion")
+
+_WAVEFORMS = tuple(
+    Variable(name=n, role="waveform", dims=(*d, "sample"), dtype="float32", unit=u, long_name=t)
+    for n, d, u, t in _SIGNALS
+)
+_SPECTRA = tuple(
+    Variable(
+        name=f"spectrum_{n}",
+        role="spectrum",
+        dims=(*d, "order"),
+        dtype="float32",
+        unit=u,
+        long_name=f"amplitude (zero to peak) of the {t}",
+    )
+    for n, d, u, t in _SIGNALS
+)
+_SECTIONS = tuple(
+    Variable(
+        name=f"section_{n}",
+        role="section",
+        dims=(*d, "section"),
+        dtype="float64",
+        unit=u,
+        long_name=f"{t}, once a revolution",
+    )
+    for n, d, u, t in _SIGNALS
+    if n in SECTION_NAMES
+)
+
+
+def _scalar(name: str, unit: str, long_name: str, *dims: str, dtype: str = "float64") -> Variable:
+    return Variable(name=name, role="scalar", dims=dims, dtype=dtype, unit=unit, long_name=long_name)
+
+
+_SETTINGS = tuple(
+    Variable(name=n, role="setting", unit=u, long_name=t)
+    for n, u, t in (
+        ("spin_speed", "rad s-1", "spin speed"),
+        ("clearance", "m", "radial clearance at rest"),
+        ("contact_free_amplitude", "m", "steady amplitude without contact"),
+    )
+)
+_FLAGS = (
+    Variable(name="status", role="flag", dtype="int8", long_name="state of the case", flags=STATUS),
+    Variable(name="regime", role="flag", dtype="int8", long_name="regime of the motion", flags=REGIME),
+)
+_SCALARS = (
+    _scalar("period", "1", "period in revolutions (0: none up to 16)", dtype="int16"),
+    _scalar("contact_fraction", "1", "fraction of the time in contact", "stator"),
+    _scalar("contacts_per_revolution", "1", "contacts per revolution", "stator"),
+    _scalar("contact_duration", "s", "mean duration of a contact", "stator"),
+    _scalar("peak_contact_force", "N", "peak contact force", "stator"),
+    _scalar("contact_impulse", "N s", "contact impulse per revolution", "stator"),
+    _scalar("friction_work", "J", "work of friction per revolution", "stator"),
+    _scalar("minimum_slip_speed", "m s-1", "lowest slip speed in contact", "stator"),
+    _scalar("force_over_euler_load", "1", "peak contact force over the stator's Euler load", "stator"),
+    _scalar("tip_deflection_ratio", "1", "peak lateral tip deflection over the stator's length", "stator"),
+    _scalar("peak_torsion", "rad", "peak torsional displacement"),
+    _scalar("peak_to_peak_vertical", "m", "peak-to-peak vertical displacement"),
+    _scalar("peak_to_peak_horizontal", "m", "peak-to-peak horizontal displacement"),
+    _scalar("energy_residual", "1", "residual of the energy balance over the recorded revolutions"),
+    _scalar("steps", "1", "integration steps", dtype="int64"),
+    _scalar("wall_time", "s", "wall time of the case"),
+)
+
+VARIABLES: dict[str, Variable] = {
+    v.name: v for v in (*_WAVEFORMS, *_SPECTRA, *_SECTIONS, *_SETTINGS, *_FLAGS, *_SCALARS)
+}
+KEEPABLE = ("waveform", "spectrum", "section")  # what [record] keep may name; the rest is always stored
