@@ -1,0 +1,110 @@
+"""Linear response without contact: unbalance response, reference frequency, limit of the time step."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import eigvals
+
+from rubhpc.errors import InputError
+from rubhpc.fem.modes import EPS, KINDS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Body, Model
+
+
+def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
+    """Steady response of the rotor to its unbalance, no stator touching.
+
+    Parameters
+    ----------
+    model : Model
+    spin : float
+        rad/s.
+
+    Returns
+    -------
+    (n_dof,) complex
+        c of `u(t) = Re(c exp(i spin t))`, m and rad.
+
+    Raises
+    ------
+    InputError
+        If the response has no bound: the spin is a natural frequency of an undamped rotor.
+    """
+    rotor = model.rotor
+    lateral = [row for row, (_, name) in enumerate(rotor.degrees) if name in KINDS["lateral"]]
+    block = np.ix_(lateral, lateral)
+    response = np.zeros(rotor.n_dof, dtype=np.complex128)
+    if spin == 0.0:
+        return response
+    dynamic = (
+        rotor.stiffness - spin**2 * rotor.mass + 1j * spin * (rotor.damping + spin * rotor.gyroscopic)
+    )[block]
+    force = spin**2 * (model.unbalance_cosine - 1j * model.unbalance_sine)[lateral]
+    try:
+        response[lateral] = np.linalg.solve(dynamic, force)
+    except np.linalg.LinAlgError:
+        raise InputError(
+            f"speed {spin:.6g} rad/s: the undamped rotor resonates without bound; give it damping"
+        ) from None
+    return response
+
+
+def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -> float:
+    """Largest deflection `sqrt(v^2 + w^2)` in a revolution of the steady contact-free orbit, m.
+
+    `v + i w` is a forward circle of radius |F| and a backward one of radius |B|; they line up twice a
+    revolution, on the major axis of the ellipse: |F| + |B|.
+
+    Parameters
+    ----------
+    model : Model
+    spin : float
+        rad/s.
+    node : int, optional
+        Default: the model's output node.
+    """
+    node = model.output_node if node is None else node
+    response = steady_response(model, spin)
+    v, w = (response[model.rotor.index(node, name)] for name in ("v", "w"))
+    return float(abs(v + 1j * w) + abs(v - 1j * w)) / 2
+
+
+def first_lateral_frequency(model: Model) -> float:
+    """Lowest undamped lateral natural frequency of the rotor at standstill, rad/s: where `speed_ratio` is 1.
+
+    A rotor free to move sideways has it at its first bending mode, above those of the rigid body.
+    """
+    square = _natural_squares(model.rotor, "lateral")
+    # a frequency under this is zero but for rounding
+    floor = np.sqrt(10 * len(square) * EPS * np.abs(square).max())
+    omega = np.abs(np.sqrt(square).real)
+    return float(omega[omega > floor].min())
+
+
+def step_limit(model: Model) -> float:
+    """Longest stable step of the central difference, 2 / omega_max over all bodies, s.
+
+    omega_max^2 is the spectral radius of `M^-1 K`. Neither damping nor spin lowers the limit, because the
+    scheme takes `D + spin G` at the centre, with the velocity `(u_{n+1} - u_{n-1}) / 2h`. Multiplied by that
+    velocity, a step says that the discrete energy `d^T (M - h^2/4 K) d / 2h^2 + m^T K m / 2`, with d the
+    difference and m the mean of two successive displacements, falls by what D dissipates; G does no work. The
+    energy is a norm, and thus bounds the motion, while `h < 2 / omega_max`. (Damping with the velocity of the
+    half step behind would lower the limit.)
+    """
+    bodies = [model.rotor, *(stator.body for stator in model.stators)]
+    radius = max(float(np.abs(_natural_squares(body)).max()) for body in bodies)
+    return 2.0 / math.sqrt(radius)
+
+
+def _natural_squares(body: Body, kind: str | None = None) -> NDArray[np.complex128]:
+    """Eigenvalues of `M^-1 K`, (n,), rad^2/s^2, of all degrees or of one kind."""
+    rows = [row for row, (_, name) in enumerate(body.degrees) if kind is None or name in KINDS[kind]]
+    block = np.ix_(rows, rows)
+    squares: NDArray[np.complex128] = eigvals(body.stiffness[block], body.mass[block])
+    return squares.astype(np.complex128)
