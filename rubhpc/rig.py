@@ -1,106 +1,51 @@
-"""The rig: shaft, discs, bearings, unbalance and stators, as frozen dataclasses in SI units.
+"""The rig: a rotor of shaft, discs, bearings and unbalance, and the stators that it may touch.
 
 Nodes count from 1. Angles count from straight up (+y) towards +z, the sense of positive spin about +x.
-The unit of every field stands in its metadata; `rubhpc.reading` reads it from there.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from rubhpc.dotted import replace_keys
+from rubhpc.errors import InputError
+from rubhpc.fields import FieldError, check_fields, nearest, place, text
+from rubhpc.parts import (
+    HELD_BY_DRIVE,
+    UNDAMPED,
+    Bearing,
+    Damping,
+    Disc,
+    ShaftSection,
+    Stator,
+    Torsion,
+    Unbalance,
+)
+from rubhpc.reading import build, plain, read_toml
 
-def quantity(unit: str, **kwargs):
-    """Declare a field that holds a number in `unit` (SI)."""
-    return field(metadata={"unit": unit}, **kwargs)
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
+__all__ = [
+    "Bearing",
+    "Damping",
+    "Disc",
+    "Rig",
+    "Rotor",
+    "ShaftSection",
+    "Stator",
+    "Torsion",
+    "Unbalance",
+    "packaged_rigs",
+    "read_rig",
+    "rig_from_dict",
+    "with_key",
+    "with_keys",
+]
 
-@dataclass(frozen=True, kw_only=True)
-class Damping:
-    """Rayleigh damping `alpha M + beta K`, by coefficients or by ratios at given frequencies."""
-
-    alpha: float = quantity("1/s", default=0.0)
-    beta: float = quantity("s", default=0.0)
-    ratios: tuple[tuple[float, float], ...] = ()  # (frequency, Hz; fraction of critical)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ShaftSection:
-    """A cylindrical length of shaft, divided into equal Timoshenko elements."""
-
-    length: float = quantity("m")
-    outer_diameter: float = quantity("m")
-    inner_diameter: float = quantity("m", default=0.0)
-    elements: int
-    youngs_modulus: float = quantity("Pa")
-    shear_modulus: float = quantity("Pa")
-    density: float = quantity("kg/m^3")
-    shear: bool = True  # False: Rayleigh beam
-
-
-@dataclass(frozen=True, kw_only=True)
-class Disc:
-    """A rigid disc: either diameter, thickness and density, or mass and inertias."""
-
-    node: int
-    diameter: float | None = quantity("m", default=None)
-    thickness: float | None = quantity("m", default=None)
-    density: float | None = quantity("kg/m^3", default=None)
-    mass: float | None = quantity("kg", default=None)
-    diametral_inertia: float | None = quantity("kg m^2", default=None)
-    polar_inertia: float | None = quantity("kg m^2", default=None)
-
-    @property
-    def inertia(self) -> tuple[float, float, float]:
-        """Mass (kg), diametral and polar moments of inertia (kg m^2)."""
-        raise NotImplementedError
-
-
-@dataclass(frozen=True, kw_only=True)
-class Bearing:
-    """A linear support: `stiffness` and `damping` in both directions, or full 2x2 matrices."""
-
-    node: int
-    stiffness: float | None = quantity("N/m", default=None)
-    kyy: float | None = quantity("N/m", default=None)
-    kzz: float | None = quantity("N/m", default=None)
-    kyz: float = quantity("N/m", default=0.0)
-    kzy: float = quantity("N/m", default=0.0)
-    damping: float | None = quantity("N s/m", default=None)
-    cyy: float | None = quantity("N s/m", default=None)
-    czz: float | None = quantity("N s/m", default=None)
-    cyz: float = quantity("N s/m", default=0.0)
-    czy: float = quantity("N s/m", default=0.0)
-
-    @property
-    def stiffness_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """((kyy, kyz), (kzy, kzz)), N/m."""
-        raise NotImplementedError
-
-    @property
-    def damping_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """((cyy, cyz), (czy, czz)), N s/m."""
-        raise NotImplementedError
-
-
-@dataclass(frozen=True, kw_only=True)
-class Unbalance:
-    """A mass at a radius; `phase` is its angle from +y towards +z at time zero."""
-
-    node: int
-    mass: float = quantity("kg")
-    radius: float = quantity("m")
-    phase: float = quantity("rad", default=0.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Torsion:
-    """Torsional boundary: one node held by the drive, or a spring (and damper) to ground."""
-
-    fixed_node: int | None = None
-    node: int = 1
-    stiffness: float | None = quantity("N m/rad", default=None)
-    damping: float = quantity("N m s/rad", default=0.0)
+PACKAGED = Path(__file__).parent / "rigs"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,39 +56,108 @@ class Rotor:
     disc: tuple[Disc, ...] = ()
     bearing: tuple[Bearing, ...] = ()
     unbalance: tuple[Unbalance, ...] = ()
-    torsion: Torsion = Torsion(fixed_node=1)
-    damping: Damping = Damping()
+    torsion: Torsion = HELD_BY_DRIVE
+    damping: Damping = UNDAMPED
 
-
-@dataclass(frozen=True, kw_only=True)
-class Stator:
-    """A cantilever that stands radially over the rotor; its free end faces the rim."""
-
-    node: int
-    angle: float = quantity("rad", default=0.0)
-    length: float = quantity("m")
-    width: float = quantity("m")  # along the shaft
-    height: float = quantity("m")  # along the lateral (tangential) motion
-    elements: int = 6
-    youngs_modulus: float = quantity("Pa")
-    poissons_ratio: float = quantity("", default=0.3)
-    density: float = quantity("kg/m^3")
-    lateral: bool = True
-    radius: float | None = quantity("m", default=None)  # of contact; None: the disc's
-    clearance_offset: float = quantity("m", default=0.0)
-    damping: Damping = Damping()
+    def __post_init__(self) -> None:
+        for key in ("shaft", "bearing"):
+            if not getattr(self, key):
+                raise FieldError(key, f"missing; a rotor has at least one [[rotor.{key}]]")
+        for key in ("disc", "bearing", "unbalance"):
+            for i, item in enumerate(getattr(self, key), 1):
+                self.check_node(f"{key}.{i}.node", item.node)
+        for key in ("fixed_node", "node"):
+            self.check_node(f"torsion.{key}", getattr(self.torsion, key) or 1)
 
     @property
-    def euler_load(self) -> float:
-        """Buckling load of the cantilever, pi^2 E I / (4 L^2), N."""
-        least = self.height * self.width * min(self.height, self.width) ** 2 / 12
-        return math.pi**2 * self.youngs_modulus * least / (4 * self.length**2)
+    def n_node(self) -> int:
+        """Number of nodes along the shaft."""
+        return 1 + sum(s.elements for s in self.shaft)
+
+    def check_node(self, key: str, node: int) -> None:
+        """Refuse a node that the shaft does not have."""
+        if node > self.n_node:
+            raise FieldError(key, f"{node} is not on the shaft; its nodes run from 1 to {self.n_node}")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rig:
     """Everything that stands on the bench."""
 
-    name: str
+    name: str = text()
     rotor: Rotor
     stator: tuple[Stator, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        for i, stator in enumerate(self.stator, 1):
+            self.rotor.check_node(f"stator.{i}.node", stator.node)
+            if self.contact_radius(stator) is None:
+                mend = f"give it, or give a disc at node {stator.node} a diameter"
+                raise FieldError(f"stator.{i}.radius", f"missing, and no disc there has a diameter; {mend}")
+
+    def contact_radius(self, stator: Stator) -> float | None:
+        """Radius at which a stator touches, m: its own, or that of the largest disc at its node."""
+        rims = [d.diameter / 2 for d in self.rotor.disc if d.node == stator.node and d.diameter is not None]
+        return stator.radius if stator.radius is not None else max(rims, default=None)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the rig as plain dicts, lists, numbers and text, for JSON."""
+        result: dict[str, Any] = plain(self)
+        return result
+
+
+def rig_from_dict(table: Mapping[str, Any], where: str = "rig") -> Rig:
+    """Return the rig that `Rig.as_dict` described; `where` is what an error names."""
+    return build(Rig, table, where)
+
+
+def packaged_rigs() -> list[str]:
+    """Return the names of the rigs that come with the package."""
+    return sorted(p.stem for p in PACKAGED.glob("*.toml"))
+
+
+def read_rig(name_or_path: str | Path, relative_to: Path | None = None) -> Rig:
+    """Return a packaged rig by its name, or the rig of a TOML file.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        "mokhtar2017", or the path of a rig file.
+    relative_to : Path, optional
+        Folder from which a relative path counts; the working directory by default.
+
+    Raises
+    ------
+    InputError
+        When there is no such rig, or its file cannot be used as it stands.
+    """
+    name = str(name_or_path)
+    if name in packaged_rigs():
+        path = PACKAGED / f"{name}.toml"
+        return build(Rig, read_toml(path), f"{name}.toml")
+    path = (relative_to or Path()) / name
+    if not name.endswith(".toml") and "/" not in name and not path.exists():
+        mend = nearest(name, packaged_rigs())
+        raise InputError(f"rig: neither a packaged rig nor a file {place(str(path))}; {mend}")
+    return build(Rig, read_toml(path), str(path))
+
+
+def with_key(rig: Rig, dotted: str, value: object) -> Rig:
+    """Return the rig with one key set, in SI units or as text with a unit.
+
+    "stator.youngs_modulus" sets it in all stators, "stator.1.angle" in the first. Where the rig says the
+    same in another way, that way makes room: `kyy` splits a bearing's common `stiffness`, and `stiffness`
+    replaces `kyy` and `kzz`.
+
+    Raises
+    ------
+    InputError
+        When there is no such key, or the rig cannot be with that value.
+    """
+    return with_keys(rig, {dotted: value})
+
+
+def with_keys(rig: Rig, values: Mapping[str, object]) -> Rig:
+    """Return the rig with several dotted keys set at once, so that only the result has to make sense."""
+    return replace_keys(rig, values)

@@ -1,0 +1,155 @@
+"""Numbers that come from outside: SI as they stand, or text with a unit, `"100 um"`, read with pint."""
+
+from __future__ import annotations
+
+import math
+import re
+from decimal import Decimal
+from functools import cache
+from typing import Any
+
+from rubhpc.errors import InputError
+
+# One number, then a product of units. Nothing else reaches pint, whose grammar also takes sums and towers of
+# powers.
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?"
+_UNIT = r"[^\W\d]\w{0,40}(?:(?:\^|\*\*)-?\d)?|%|°"
+_JOIN = r"(?:\s*[*/·]\s*|\s+)"
+_TEXT = re.compile(rf"\s*({_NUMBER})\s*((?:1\s*/\s*)?(?:{_UNIT})(?:{_JOIN}\(?(?:{_UNIT})\)?){{0,7}})?\s*")
+
+# The everyday units: loading pint costs every rank 0.4 s, and most files need nothing but these.
+_EVERYDAY = {
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
+    "kg": {"kg": 1.0, "g": 1e-3},
+    "Pa": {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "rad": {"rad": 1.0, "deg": math.pi / 180},
+    "rad/s": {"rad/s": 1.0, "rpm": math.pi / 30, "Hz": 2 * math.pi},
+    "Hz": {"Hz": 1.0, "rpm": 1 / 60},
+    "N/m": {"N/m": 1.0},
+    "": {"%": 1e-2},
+}
+_EXAMPLES = {
+    "m": '"100 um"',
+    "kg": '"8 g"',
+    "Pa": '"3 GPa"',
+    "s": '"0.5 us"',
+    "rad": '"90 deg"',
+    "rad/s": '"1800 rpm"',
+    "Hz": '"31.56 Hz"',
+    "": "0.3",
+}
+
+
+def parse_quantity(value: object, unit: str, where: str) -> float:
+    """Return a number in `unit`, the SI unit of the field.
+
+    Parameters
+    ----------
+    value : int, float or str
+        A number counts as SI; text carries a number and a unit ("1800 rpm", "100 um", "5 %").
+        Hertz are turns a second where `unit` is rad/s, and the other way round.
+    unit : str
+        Unit of the result, readable by pint; "" for a number without dimension.
+    where : str
+        What an error names: "study.toml: [grid] speed".
+
+    Raises
+    ------
+    InputError
+        When `value` is no finite number, or its unit does not fit.
+    """
+    if isinstance(value, str):
+        return _parse_text(value, unit, where)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{where}: {brief(value)} is not a number; {_mend(unit)}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(f"{where}: {brief(value)} is not finite; write a finite number")
+    return number + 0.0  # no negative zero: it would make two cases of one
+
+
+def brief(value: object) -> str:
+    """Return a value as it may stand in a one-line message."""
+    text = (
+        f'"{value}"'
+        if isinstance(value, str)
+        else str(value).lower()
+        if isinstance(value, bool)
+        else repr(value)
+    )
+    text = "".join(c if c.isprintable() else " " for c in text)
+    return text if len(text) <= 60 else f"{text[:56]} ..."
+
+
+def _parse_text(text: str, unit: str, where: str) -> float:
+    match = _TEXT.fullmatch(text) if len(text) <= 200 else None
+    if match is None:
+        raise InputError(f"{where}: {brief(text)} is not a number with a unit; {_mend(unit)}")
+    number, given = match[1], (match[2] or "").strip()
+    if not given and unit:
+        raise InputError(
+            f"{where}: {brief(text)} carries no unit; write {brief(f'{number} {unit}')} or a number"
+        )
+    if not math.isfinite(float(number)):
+        raise InputError(f"{where}: {brief(text)} is not finite; write a finite number")
+    factor = 1.0 if given == unit else _EVERYDAY.get(unit, {}).get(given) or _factor(given, unit, where, text)
+    # In decimals "30 um" is 3e-05, the very number that a user writes in SI; 30 * 1e-6 is not.
+    result = float(Decimal(number) * Decimal(repr(factor)))
+    if not math.isfinite(result):
+        raise InputError(f"{where}: {brief(text)} is not finite; write a finite number")
+    return result + 0.0
+
+
+def _factor(given: str, unit: str, where: str, text: str) -> float:
+    """Factor from the unit given to the one wanted."""
+    import pint
+
+    registry = _registry()
+    try:
+        units, wanted = registry.parse_units(given), registry.parse_units(unit)
+        factor = float(registry.convert(1.0, units, wanted))
+        has_offset = registry.convert(0.0, units, wanted) != 0.0
+    except pint.DimensionalityError:
+        kind = f"in {unit}" if unit else "a plain number"
+        raise InputError(f"{where}: {brief(text)} is not {kind}; {_mend(unit)}") from None
+    except Exception:
+        raise InputError(f'{where}: unknown unit "{given}"; {_mend(unit)}') from None
+    if has_offset or not math.isfinite(factor) or factor <= 0:
+        raise InputError(f"{where}: {brief(text)} is not a multiple of {unit or 1}; {_mend(unit)}")
+    # To pint a radian is 1, and so is the turn in a hertz: count the turns that it loses.
+    turns = _turns(units) - _turns(wanted)
+    if _angles(units) + turns == _angles(wanted):
+        factor *= (2 * math.pi) ** turns
+    tidy = float(f"{factor:.14g}")  # 999.9999999999999 for g/cm^3
+    return tidy if abs(tidy / factor - 1) < 5e-16 else factor
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    registry: Any = pint.UnitRegistry()
+    registry.define("@alias revolution = rev")
+    return registry
+
+
+def _turns(units: Any) -> float:
+    return sum(float(p) for name, p in units._units.items() if name.endswith("hertz"))
+
+
+def _angles(units: Any) -> float:
+    _, root = _registry().get_root_units(units)
+    return float(root._units.get("radian", 0))
+
+
+def example(unit: str) -> str:
+    """Return how a value of that unit may be written in a file."""
+    return _EXAMPLES.get(unit) or f'"1.5 {unit}"'
+
+
+def _mend(unit: str) -> str:
+    return f"write a number ({unit}) or text such as {example(unit)}" if unit else "write a plain number"
