@@ -126,7 +126,9 @@ def _eigenpairs(
     shapes = basis @ (vectors[:n_mode] / sigma[:, np.newaxis])
     # at critical damping rounding splits a double root by the square root of EPS
     oscillates = values.imag > 1e-7 * np.abs(values)
-    pairs = [(values[i], values[i].conjugate(), shapes[:, i]) for i in np.flatnonzero(oscillates)]
+    pairs: list[Pair] = [
+        (complex(values[i]), complex(values[i].conj()), shapes[:, i]) for i in np.flatnonzero(oscillates)
+    ]
     real = np.abs(values.imag) <= 1e-7 * np.abs(values)
     pairs.extend(_real_pairs(values[real].real, shapes[:, real].real, mass))
     return pairs
