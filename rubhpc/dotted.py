@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+_SETTABLE = ("quantity", "count", "flag")  # kinds of fields that one number can set
+
 
 def find_key(owner: object, dotted: str) -> dataclasses.Field[Any]:
     """Return the field that a dotted key names, or refuse the key, naming the nearest.
@@ -22,14 +24,23 @@ def find_key(owner: object, dotted: str) -> dataclasses.Field[Any]:
     InputError
         When there is no such key: a part is unknown, names a whole table, or counts past the end.
     """
-    keys = dict(_keys(owner))
-    if dotted not in keys:
-        inside = [k for k in keys if k.startswith(f"{dotted}.")]
-        if inside:
-            raise InputError(f"is a table, not a value; did you mean {inside[0]}?")
-        mend = nearest(dotted, keys)
-        raise InputError(f"unknown key; {mend if '?' in mend else 'see the rig file for its keys'}")
-    return keys[dotted]
+    held: Any = owner
+    declared = None
+    for part in dotted.split("."):
+        if isinstance(held, tuple) and held and part.isdigit():
+            held, declared = (held[int(part) - 1] if 0 < int(part) <= len(held) else None), None
+            continue
+        held = held[0] if isinstance(held, tuple) and held else held
+        declared = _fields(type(held)).get(part)
+        held = getattr(held, part) if declared else None
+    if declared is not None and declared.metadata.get("kind") in _SETTABLE:
+        return declared
+    known = list(_keys(owner))
+    inside = [k for k in known if k.startswith(f"{dotted}.")]
+    if inside:
+        raise InputError(f"is a table, not a value; did you mean {inside[0]}?")
+    mend = nearest(dotted, known)
+    raise InputError(f"unknown key; {mend if '?' in mend else 'see the rig file for its keys'}")
 
 
 def replace_keys(owner: T, values: Mapping[str, object]) -> T:
@@ -81,7 +92,7 @@ def _replaced_items(items: Any, values: Mapping[tuple[str, ...], Any], path: tup
     return tuple(result)
 
 
-def _keys(owner: Any, prefix: str = "") -> Iterator[tuple[str, dataclasses.Field[Any]]]:
+def _keys(owner: Any, prefix: str = "") -> Iterator[str]:
     """Every dotted key that names a single value, in reading order."""
     for declared in dataclasses.fields(owner):
         value = getattr(owner, declared.name)
@@ -92,5 +103,9 @@ def _keys(owner: Any, prefix: str = "") -> Iterator[tuple[str, dataclasses.Field
             yield from _keys(value[0], f"{name}.")
             for i, item in enumerate(value, 1):
                 yield from _keys(item, f"{name}.{i}.")
-        elif declared.metadata.get("kind") in ("quantity", "count", "flag"):
-            yield name, declared
+        elif declared.metadata.get("kind") in _SETTABLE:
+            yield name
+
+
+def _fields(cls: Any) -> dict[str, dataclasses.Field[Any]]:
+    return {f.name: f for f in dataclasses.fields(cls)} if dataclasses.is_dataclass(cls) else {}

@@ -99,17 +99,22 @@ def check_fields(owner: Any) -> None:
         Naming the field, what is wrong and the mend.
     """
     for declared in dataclasses.fields(owner):
-        kind, value = declared.metadata.get("kind"), getattr(owner, declared.name)
-        if kind not in _CHECKS or (value is None and declared.default is None):
-            continue
-        problem = _CHECKS[kind](value, declared.metadata)
+        problem = check_value(declared, getattr(owner, declared.name))
         if problem:
             raise FieldError(declared.name, problem)
 
 
+def check_value(declared: dataclasses.Field[Any], value: Any) -> str:
+    """Return what is wrong with the value of a field, and the mend; "" when nothing is."""
+    check = _CHECKS.get(declared.metadata.get("kind", ""))
+    if check is None or (value is None and declared.default is None):
+        return ""
+    return check(value, declared.metadata)
+
+
 def place(file: str, table: str = "", key: str = "") -> str:
     """Return "file: [table] key", the head of every message about an input, on one line."""
-    name = " ".join(p for p in (f"[{table}]" if table else "", key) if p)
+    name = " ".join(p for p in (f"[{table[:80]}]" if table else "", key[:80]) if p)
     head = ": ".join(p for p in (file, name) if p)
     return "".join(c if c.isprintable() else " " for c in head)
 

@@ -11,7 +11,7 @@ import tomllib
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
 
 from rubhpc.errors import InputError
-from rubhpc.fields import FieldError, nearest, parse_field, place
+from rubhpc.fields import FieldError, check_value, nearest, parse_field, place
 from rubhpc.quantity import brief, parse_quantity
 
 if TYPE_CHECKING:
@@ -65,6 +65,11 @@ def build(cls: type[T], table: object, file: str, name: str = "") -> T:
             f"{place(file, name)}: {brief(table)} is no table; write [{name}] and its keys below"
         )
     fields = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    for key, declared in fields.items():  # first of all: a way that is not there has keys that are unknown
+        if declared.metadata.get("kind") == "choice" and (
+            problem := check_value(declared, table.get(key, declared.default))
+        ):
+            raise FieldError(key, problem).within(file, name)
     refuse_unknown(table, fields, file, name)
     values, hints = {}, get_type_hints(cls)
     for key, declared in fields.items():

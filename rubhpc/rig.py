@@ -27,6 +27,7 @@ from rubhpc.reading import build, plain, read_toml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from os import PathLike
 
 __all__ = [
     "Bearing",
@@ -117,7 +118,7 @@ def packaged_rigs() -> list[str]:
     return sorted(p.stem for p in PACKAGED.glob("*.toml"))
 
 
-def read_rig(name_or_path: str | Path, relative_to: Path | None = None) -> Rig:
+def read_rig(name_or_path: str | PathLike[str], relative_to: Path | None = None, where: str = "rig") -> Rig:
     """Return a packaged rig by its name, or the rig of a TOML file.
 
     Parameters
@@ -126,6 +127,8 @@ def read_rig(name_or_path: str | Path, relative_to: Path | None = None) -> Rig:
         "mokhtar2017", or the path of a rig file.
     relative_to : Path, optional
         Folder from which a relative path counts; the working directory by default.
+    where : str
+        What an error about the name itself names.
 
     Raises
     ------
@@ -139,7 +142,7 @@ def read_rig(name_or_path: str | Path, relative_to: Path | None = None) -> Rig:
     path = (relative_to or Path()) / name
     if not name.endswith(".toml") and "/" not in name and not path.exists():
         mend = nearest(name, packaged_rigs())
-        raise InputError(f"rig: neither a packaged rig nor a file {place(str(path))}; {mend}")
+        raise InputError(f"{where}: neither a packaged rig nor a file {place(str(path))}; {mend}")
     return build(Rig, read_toml(path), str(path))
 
 

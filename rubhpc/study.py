@@ -1,0 +1,289 @@
+"""A study: a rig, the axes of a grid, and how each case is computed, recorded and run."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rubhpc.axes import CLEARANCE_AXES, SPEED_AXES, Axis, flatten, make_axis
+from rubhpc.errors import InputError
+from rubhpc.fields import FieldError, check_fields, choice, choices, count, place, quantity
+from rubhpc.quantity import brief
+from rubhpc.reading import build, read_toml, refuse_unknown
+from rubhpc.rig import Rig, read_rig, with_keys
+from rubhpc.schema import KEEPABLE, VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from os import PathLike
+
+__all__ = ["Axis", "Contact", "Integrator", "Recording", "Run", "Study", "make_axis", "read_study"]
+
+_TABLES = ("title", "rig", "output", "grid", "override", "contact", "integrator", "record", "run")
+# Names that a store takes for itself; an axis `clearance` is the very setting of that name.
+_RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution"}) - {"clearance"}
+_MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact:
+    """Law of contact and friction, and which way the normal points."""
+
+    law: str = choice(of=("lagrange",), default="lagrange")
+    friction_law: str = choice(of=("sliding",), default="sliding")
+    normal: str = choice(of=("fixed", "updated"), default="fixed")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Integrator:
+    """Scheme and time step; no step given: 0.5 us, or 0.9 of the stability limit where that is less."""
+
+    method: str = choice(of=("central-difference",), default="central-difference")
+    step: float | None = quantity("s", default=None, above=0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """How long a case runs, in revolutions, and what is kept of it."""
+
+    transient: int = count(default=120, at_least=0, at_most=1_000_000)
+    revolutions: int = count(default=64, at_most=100_000)
+    samples_per_revolution: int = count(default=256, at_least=16, at_most=65_536)
+    keep: tuple[str, ...] = choices(of=KEEPABLE, default=KEEPABLE)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.samples_per_revolution % 2:
+            problem = f"{self.samples_per_revolution} is odd; give an even number such as 256"
+            raise FieldError("samples_per_revolution", problem)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """How the study is run; nothing here changes results."""
+
+    block: int | None = count(default=None, at_most=1_000_000)  # cases per work unit and stored chunk
+    time_limit: float | None = quantity("s", default=None, above=0)
+    case_time_limit: float | None = quantity("s", default=None, above=0)
+    max_failures: int | None = count(default=None, at_least=0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+DEFAULT_CONTACT, DEFAULT_INTEGRATOR, DEFAULT_RECORDING, DEFAULT_RUN = (
+    Contact(),
+    Integrator(),
+    Recording(),
+    Run(),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A rig and a grid of cases.
+
+    Attributes
+    ----------
+    title : str
+        For people.
+    rig : Rig
+        With the study's overrides applied.
+    axes : tuple of Axis
+        The cases are their Cartesian product, the last axis running fastest.
+    output : Path
+        The store.
+    source : Path or None
+        The file that the study was read from.
+
+    Raises
+    ------
+    InputError
+        When the grid lacks an axis, has two for one thing, or holds values with which the rig cannot be.
+    """
+
+    title: str
+    rig: Rig
+    axes: tuple[Axis, ...]
+    contact: Contact = DEFAULT_CONTACT
+    integrator: Integrator = DEFAULT_INTEGRATOR
+    recording: Recording = DEFAULT_RECORDING
+    run: Run = DEFAULT_RUN
+    output: Path
+    source: Path | None = None
+
+    def __post_init__(self) -> None:
+        _check_axes(self.axes)
+        _check_rigs(self.rig, [axis for axis in self.axes if axis.is_rig_key], self.axes)
+
+    def axis(self, *names: str) -> Axis:
+        """Return the first axis that has one of these names."""
+        return next(axis for axis in self.axes if axis.name in names)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what the study computes as plain dicts, lists, numbers and text, for JSON.
+
+        Where and how it is run is left out: two runs of one study give the same.
+        """
+        return {
+            "title": self.title,
+            "rig": self.rig.name,
+            "grid": {axis.name: {"unit": axis.unit, "values": list(axis.values)} for axis in self.axes},
+            "contact": asdict(self.contact),
+            "integrator": asdict(self.integrator),
+            "record": asdict(self.recording) | {"keep": list(self.recording.keep)},
+        }
+
+
+def read_study(path: str | PathLike[str], output: str | PathLike[str] | None = None) -> Study:
+    """Return the study of a TOML file.
+
+    Parameters
+    ----------
+    path : path
+        The study file; a relative path of a rig file in it counts from its folder.
+    output : path, optional
+        The store, in place of the one that the file names.
+
+    Raises
+    ------
+    InputError
+        When the file or its rig cannot be used as it stands; one line with file, table, key and mend.
+    """
+    source = Path(path)
+    file = str(source)
+    table = read_toml(source)
+    refuse_unknown(table, dict.fromkeys(_TABLES), file, "")
+    title = _text(table, "title", source.stem, file)
+    store = output if output is not None else _text(table, "output", f"{source.stem}.zarr", file)
+    if "rig" not in table:
+        raise InputError(
+            f'{place(file, "", "rig")}: missing; add rig = "mokhtar2017", or the path of a rig file'
+        )
+    rig = read_rig(_text(table, "rig", "", file), source.parent, place(file, "", "rig"))
+    rig = _overridden(rig, _table(table, "override", file), file)
+    axes = _read_axes(_table(table, "grid", file), rig, file)
+    for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
+        raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
+    contact = build(Contact, table.get("contact", {}), file, "contact")
+    integrator = build(Integrator, table.get("integrator", {}), file, "integrator")
+    recording = build(Recording, table.get("record", {}), file, "record")
+    run = build(Run, table.get("run", {}), file, "run")
+    try:
+        return Study(
+            title=title,
+            rig=rig,
+            axes=axes,
+            contact=contact,
+            integrator=integrator,
+            recording=recording,
+            run=run,
+            output=Path(store),
+            source=source,
+        )
+    except InputError as error:
+        raise InputError(f"{place(file)}: {error}") from None
+
+
+def _text(table: dict[str, Any], key: str, default: str, file: str) -> str:
+    value = table.get(key, default)
+    if not isinstance(value, str) or not value.strip() or not value.isprintable():
+        raise InputError(f'{place(file, "", key)}: {brief(value)} is not a line of text; write {key} = "..."')
+    return value
+
+
+def _table(table: dict[str, Any], key: str, file: str) -> dict[str, Any]:
+    value = table.get(key, {})
+    if not isinstance(value, dict):
+        raise InputError(f"{place(file, key)}: {brief(value)} is no table; write [{key}] and its keys below")
+    return value
+
+
+def _overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
+    try:
+        return with_keys(rig, dict(flatten(table)))
+    except InputError as error:
+        raise InputError(f"{place(file, 'override')} {error}") from None
+
+
+def _read_axes(table: dict[str, Any], rig: Rig, file: str) -> tuple[Axis, ...]:
+    pairs = flatten(table)
+    names = [name for name, _ in pairs]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{place(file, 'grid', name)}: stands twice; leave one out")
+    return tuple(make_axis(name, values, rig, file) for name, values in pairs)
+
+
+def _check_axes(axes: tuple[Axis, ...]) -> None:
+    names = [axis.name for axis in axes]
+    for ways, example in (
+        (SPEED_AXES, "speed_ratio = [0.75, 1.5]"),
+        (CLEARANCE_AXES, "clearance_ratio = 0.7"),
+        (("friction",), "friction = 0.3"),
+    ):
+        given = [name for name in names if name in ways]
+        if not given:
+            raise InputError(f"[grid] {ways[0]}: missing; add {' or '.join(ways)}, such as {example}")
+        if len(given) > 1:
+            raise InputError(f"[grid] {given[1]}: stands beside {given[0]}; give one of them")
+    taken: dict[str, str] = {}
+    for axis in axes:
+        if axis.dimension in _RESERVED:
+            mend = "name one stator, such as stator.1.lateral" if axis.is_rig_key else "leave it out"
+            raise InputError(f"[grid] {axis.name}: a store has another {axis.dimension}; {mend}")
+        if axis.dimension in taken:
+            raise InputError(
+                f"[grid] {axis.name}: is the same dimension as {taken[axis.dimension]}; leave one out"
+            )
+        taken[axis.dimension] = axis.name
+        for other in axes:
+            without_numbers = ".".join(part for part in axis.name.split(".") if not part.isdigit())
+            if other.name == without_numbers != axis.name:
+                raise InputError(f"[grid] {axis.name}: is set by the axis {other.name} too; leave one out")
+
+
+def _check_rigs(rig: Rig, rig_axes: list[Axis], axes: tuple[Axis, ...]) -> None:
+    """Refuse a grid some of whose rigs cannot be, or cannot be studied."""
+    names = [axis.name for axis in rig_axes]
+    grid: Iterable[tuple[float, ...]]
+    if math.prod(len(axis.values) for axis in rig_axes) <= _MOST_RIGS:
+        grid = itertools.product(*(axis.values for axis in rig_axes))
+    else:
+        first = [axis.values[0] for axis in rig_axes]
+        grid = itertools.chain.from_iterable(
+            ((*first[:i], value, *first[i + 1 :]) for value in axis.values) for i, axis in enumerate(rig_axes)
+        )
+    for values in grid:
+        case = dict(zip(names, values, strict=True))
+        try:
+            _check_rig(with_keys(rig, case), axes)
+        except InputError as error:
+            if not case:
+                raise
+            told = ", ".join(f"{name} = {value:g}" for name, value in case.items())
+            raise InputError(f"[grid] {told}: the rig cannot be so: {error}") from None
+
+
+def _check_rig(rig: Rig, axes: tuple[Axis, ...]) -> None:
+    if not rig.stator:
+        raise InputError(f"rig: {rig.name} has no stator to touch; add a [[stator]] to it")
+    by_name = {axis.name: axis for axis in axes}
+    if "clearance_ratio" in by_name and not any(u.mass * u.radius for u in rig.rotor.unbalance):
+        problem = f"{rig.name} has no unbalance, so no contact-free amplitude"
+        raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead, or an unbalance")
+    if "clearance" in by_name:
+        least = min(by_name["clearance"].values)
+        offset = min(stator.clearance_offset for stator in rig.stator)
+        if least + offset <= 0:
+            problem = f"{least:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
+            raise InputError(f"[grid] clearance: {problem}; give a larger clearance")
