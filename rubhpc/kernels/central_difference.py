@@ -1,0 +1,189 @@
+"""The paper's integrator: central difference with contact by Lagrange multipliers (Eqs. 20-24)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit, jit_inline
+from rubhpc.kernels.contact import N_DEGREE, TORSION, UNSOLVED, Pairs, Workspace, is_any_closed, solve_contact
+from rubhpc.kernels.linear import Linear, circulatory_power, free_velocity
+from rubhpc.kernels.observe import (
+    DAMPING_LOSS,
+    TWIST_ACCELERATION,
+    UNBALANCE_WORK,
+    Samples,
+    Tally,
+    centred,
+    observe_contact,
+    observe_motion,
+    take_sample,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+FINISHED, DIVERGED, CONTACT_UNSOLVED = range(3)
+DECAYED = 1e-150  # m, m/s, rad or rad/s
+
+
+@jit_inline
+def apply_contact(
+    start: Ints,
+    inverse: Floats,
+    row: Ints,
+    block: Ints,
+    pull: Floats,
+    force: Floats,
+    step: float,
+    velocity: Floats,
+) -> None:
+    """Add the contact forces' change of velocity over a step, the correction of Eqs. 23 and 24."""
+    for i in range(force.size):
+        if force[i] > 0.0:
+            for a in range(N_DEGREE):
+                b = block[i, a]
+                if b >= 0 and pull[i, a] != 0.0:
+                    impulse = step * pull[i, a] * force[i]
+                    # Row of the transpose: how the block answers to a force on this degree.
+                    answer = inverse[b, row[i, a] - start[b]]
+                    target = velocity[start[b] : start[b + 1]]
+                    for k in range(target.size):
+                        target[k] += impulse * answer[k]
+
+
+@jit
+def advance(
+    linear: Linear,
+    pairs: Pairs,
+    spin: float,
+    step: float,
+    steps_per_sample: int,
+    samples_per_revolution: int,
+    first_sample: int,
+    last_sample: int,
+    is_recorded: bool,
+    displacement_limit: float,
+    output_row: Ints,
+    state: Floats,
+    work: Workspace,
+    scratch: Floats,
+    samples: Samples,
+    tally: Tally,
+) -> int:
+    """Advance a case over samples `first_sample` to `last_sample` (excluded).
+
+    The shaft's angle is `2 pi i / samples_per_revolution` at sample i and turns on from there, so that no
+    phase error builds up. One step solves Eq. 20 for every block, finds the contact forces, and corrects.
+
+    Parameters
+    ----------
+    spin, step : float, rad/s and s
+        Rotation speed and time step; `steps_per_sample` steps fill the interval between two samples.
+    is_recorded : bool
+        Whether to fill `samples` (at index i - first recorded sample = i) and `tally`.
+    displacement_limit : float, m
+        Displacement of a contact degree or of the output node beyond which the case has diverged.
+    output_row : (3,)
+        Rows of vertical, horizontal and torsional displacement of the output node; -1 where held.
+    state : (2, n_dof), m and m/s (rad and rad/s)
+        Displacement, and velocity half a step earlier; advanced in place.
+    scratch : (3, n_dof)
+        Work space.
+
+    Returns
+    -------
+    int
+        FINISHED, DIVERGED or CONTACT_UNSOLVED.
+    """
+    # Tuples are opened here: a field read inside the loop would count a reference at every step.
+    displacement, velocity = state[0], state[1]
+    velocity_next, damping_force, residual = scratch[0], scratch[1], scratch[2]
+    row, axis_y, axis_z, radius, clearance = (
+        pairs.row,
+        pairs.axis_y,
+        pairs.axis_z,
+        pairs.radius,
+        pairs.clearance,
+    )
+    is_updated, at, gap, contact_force = pairs.is_updated, work.at, work.gap, work.force
+    block, pull, matrix, start, inverse = pairs.block, work.pull, work.matrix, linear.start, linear.inverse
+    highest, lowest, peak_lateral, energy = tally.highest, tally.lowest, tally.peak_lateral, tally.energy
+    force_row, force_cosine, force_sine = linear.force_row, linear.force_cosine, linear.force_sine
+    n_dof, q = displacement.size, gap.size
+    twist = output_row[2]
+    is_linear_pair = q == 1 and not is_updated  # one division solves it
+    turn_cosine, turn_sine = np.cos(spin * step), np.sin(spin * step)
+    sense = 1.0 if spin >= 0.0 else -1.0
+    was_touching = True
+    for i_sample in range(first_sample, last_sample):
+        angle = sense * 2.0 * np.pi * (i_sample % samples_per_revolution) / samples_per_revolution
+        cosine, sine = np.cos(angle), np.sin(angle)
+        if is_recorded:
+            take_sample(displacement, output_row, row, i_sample, samples)
+        for i_step in range(steps_per_sample):
+            free_velocity(
+                linear, step, cosine, sine, displacement, velocity, velocity_next, damping_force, residual
+            )
+            for k in range(n_dof):
+                residual[k] = displacement[k] + step * velocity_next[k]
+            is_touching = is_any_closed(row, axis_y, axis_z, radius, clearance, is_updated, residual, at, gap)
+            if is_touching:
+                if is_linear_pair and matrix[0, 0] > 0.0:
+                    contact_force[0] = -gap[0] / matrix[0, 0]
+                elif solve_contact(pairs, work) == UNSOLVED:
+                    return CONTACT_UNSOLVED
+                apply_contact(start, inverse, row, block, pull, contact_force, step, velocity_next)
+            elif was_touching:
+                contact_force[:] = 0.0
+            if is_recorded:
+                observe_motion(displacement, output_row, row, highest, lowest, peak_lateral)
+                if is_touching or was_touching:
+                    observe_contact(pairs, work, spin, step, velocity, velocity_next, tally)
+                    for i in range(q):
+                        samples.force[i, i_sample] += contact_force[i] / steps_per_sample
+                loss = circulatory_power(linear, displacement, velocity)
+                for k in range(n_dof):
+                    loss += velocity[k] * damping_force[k]
+                energy[DAMPING_LOSS] += step * loss
+                for k in range(force_row.size):
+                    force = force_cosine[k] * cosine + force_sine[k] * sine
+                    energy[UNBALANCE_WORK] += step * force * centred(force_row[k], velocity, velocity_next)
+                if i_step == 0 and twist >= 0:
+                    samples.rotor[TWIST_ACCELERATION, i_sample] = (
+                        velocity_next[twist] - velocity[twist]
+                    ) / step
+            for k in range(n_dof):
+                displacement[k] += step * velocity_next[k]
+                velocity[k] = velocity_next[k]
+            cosine, sine = (
+                cosine * turn_cosine - sine * turn_sine,
+                sine * turn_cosine + cosine * turn_sine,
+            )
+            was_touching = is_touching
+        flush_decayed(state)
+        if has_diverged(displacement, output_row, row, displacement_limit):
+            return DIVERGED
+    return FINISHED
+
+
+@jit_inline
+def flush_decayed(state: Floats) -> None:
+    """Set motion that has died away to zero: subnormal numbers slow a step tenfold."""
+    for i in range(state.shape[0]):
+        for k in range(state.shape[1]):
+            if abs(state[i, k]) < DECAYED:
+                state[i, k] = 0.0
+
+
+@jit_inline
+def has_diverged(displacement: Floats, output_row: Ints, pair_row: Ints, limit: float) -> bool:
+    """Whether a translation of the output node or of a contact pair is not finite or beyond the limit, m."""
+    for k in range(2):
+        if output_row[k] >= 0 and not abs(displacement[output_row[k]]) <= limit:
+            return True
+    for i in range(pair_row.shape[0]):
+        for a in range(N_DEGREE):
+            if a != TORSION and pair_row[i, a] >= 0 and not abs(displacement[pair_row[i, a]]) <= limit:
+                return True
+    return False

@@ -1,0 +1,66 @@
+"""Measures of recorded signals: spectra, sections, period and regime."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.fft
+
+from rubhpc.schema import REGIME
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+LONGEST_PERIOD = 16  # revolutions
+PERIOD_TOLERANCE = 1e-2  # rms distance of whole cycles over the orbit's size
+
+
+def amplitude_spectrum(signal: Floats) -> Floats:
+    """Single-sided amplitude (zero to peak) of signals that span whole revolutions.
+
+    Parameters
+    ----------
+    signal : (..., n_sample)
+        n_sample even; no window is needed where the samples are locked to the shaft.
+
+    Returns
+    -------
+    (..., n_sample // 2 + 1)
+        In the signal's unit; line k is order k over the revolutions recorded, line 0 the size of the mean.
+    """
+    n_sample = signal.shape[-1]
+    spectrum: Floats = np.abs(scipy.fft.rfft(signal, axis=-1)) * (2.0 / n_sample)
+    spectrum[..., 0] *= 0.5
+    if n_sample % 2 == 0:
+        spectrum[..., -1] *= 0.5
+    return spectrum
+
+
+def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) -> int:
+    """Period of the orbit in revolutions; 0 where it has none up to 16 (or the record is too short to tell).
+
+    Whole cycles are compared: the rms distance between revolutions k and k + n over the orbit's size stays
+    under 1e-2. A stroboscopic point alone would take a period-2 orbit for period 1.
+
+    Parameters
+    ----------
+    vertical, horizontal : (n_revolution * samples_per_revolution,), m
+    """
+    orbit = (vertical + 1j * horizontal).reshape(-1, samples_per_revolution)
+    size = np.sqrt(np.mean(np.abs(orbit - orbit.mean()) ** 2))
+    n_revolution = orbit.shape[0]
+    for n in range(1, min(LONGEST_PERIOD, n_revolution - 1) + 1):
+        distance = np.sqrt(np.mean(np.abs(orbit[n:] - orbit[:-n]) ** 2))
+        if distance <= PERIOD_TOLERANCE * size:
+            return n
+    return 0
+
+
+def regime(period: int, is_contact: bool) -> int:
+    """Flag of `schema.REGIME`; a motion without period up to 16 is left undecided."""
+    if not is_contact:
+        return REGIME.index("no_contact")
+    return REGIME.index("periodic" if period > 0 else "undecided")

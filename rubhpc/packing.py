@@ -1,0 +1,180 @@
+"""Packs an assembled model into the arrays of the kernels: uncoupled blocks, contact pairs, unbalance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.sparse import csr_array, dia_array
+from scipy.sparse.csgraph import connected_components
+
+from rubhpc.kernels.contact import AXIAL, LATERAL, N_DEGREE, TORSION, Pairs, V, W
+from rubhpc.kernels.linear import Linear
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Packed:
+    """A model at one speed and step, in kernel order: rows sorted by block, unseen blocks left out.
+
+    Attributes
+    ----------
+    row : (n_all,)
+        Kernel row of each degree of rotor, then stators; -1 where nothing seen depends on it.
+    mass, damping, stiffness : (n_dof, n_dof)
+        M, C = D + spin G and K in kernel order.
+    """
+
+    linear: Linear
+    row: Ints
+    mass: Floats
+    damping: Floats
+    stiffness: Floats
+    force: Floats  # (2, n_dof), cosine and sine part of the unbalance force, N
+    degree_row: Ints  # (q, 5), rows of each pair's degrees
+    degree_block: Ints  # (q, 5)
+    compliance: Floats  # (q, 5, q, 5), m/N
+    output_row: Ints  # (3,), vertical, horizontal, torsion
+
+
+def pack(model: Model, spin: float, step: float) -> Packed:
+    """Everything of a model that depends on speed and step alone.
+
+    Parameters
+    ----------
+    spin, step : float
+        Rotation speed, rad/s, and time step, s.
+    """
+    bodies = [model.rotor, *(stator.body for stator in model.stators)]
+    mass = block_diag(*(body.mass for body in bodies))
+    stiffness = block_diag(*(body.stiffness for body in bodies))
+    damping = block_diag(*(body.damping + spin * body.gyroscopic for body in bodies))
+    first = np.cumsum([0, *(body.n_dof for body in bodies)])
+    force = np.zeros((2, mass.shape[0]))
+    force[0, : model.rotor.n_dof] = spin**2 * model.unbalance_cosine
+    force[1, : model.rotor.n_dof] = spin**2 * model.unbalance_sine
+
+    def rotor_row(node: int, name: str) -> int:
+        return model.rotor.index(node, name)
+
+    degree = np.full((len(model.stators), N_DEGREE), -1)
+    for i, stator in enumerate(model.stators):
+        degree[i, V], degree[i, W] = rotor_row(stator.node, "v"), rotor_row(stator.node, "w")
+        degree[i, TORSION] = rotor_row(stator.node, "thx")
+        degree[i, AXIAL] = first[1 + i] + stator.axial
+        degree[i, LATERAL] = first[1 + i] + stator.lateral if stator.lateral >= 0 else -1
+    output = np.array([rotor_row(model.output_node, name) for name in ("v", "w", "thx")])
+
+    coupled = csr_array((mass != 0) | (stiffness != 0) | (damping != 0))
+    n_component, component = connected_components(coupled, directed=False)
+    seen = np.unique(component[np.concatenate([degree[degree >= 0], output[output >= 0]])])
+    # Within a block, degrees coupled by K and M stand together (the planes of bending): fewer diagonals.
+    _, plane = connected_components(csr_array((mass != 0) | (stiffness != 0)), directed=False)
+    order = np.concatenate([np.flatnonzero(component == c) for c in seen])
+    order = order[np.lexsort((plane[order], component[order]))]
+    start = np.cumsum([0, *(np.count_nonzero(component == c) for c in seen)])
+    row = np.full(mass.shape[0], -1)
+    row[order] = np.arange(order.size)
+    block = np.full(n_component, -1)
+    block[seen] = np.arange(seen.size)
+
+    pick = np.ix_(order, order)
+    mass, stiffness, damping, force = mass[pick], stiffness[pick], damping[pick], force[:, order]
+    inverse = _inverses(mass + 0.5 * step * damping, start)
+    degree_row = np.where(degree >= 0, row[degree], -1)
+    degree_block = np.where(degree >= 0, block[component[degree]], -1)
+    return Packed(
+        linear=_linear(inverse, stiffness, damping, force, start),
+        row=row,
+        mass=mass,
+        damping=damping,
+        stiffness=stiffness,
+        force=force,
+        degree_row=degree_row,
+        degree_block=degree_block,
+        compliance=_compliance(inverse, start, degree_row, degree_block, step),
+        output_row=np.where(output >= 0, row[output], -1),
+    )
+
+
+def pairs_of(
+    model: Model, packed: Packed, *, clearance: float, friction: float, spin: float, is_updated: bool
+) -> Pairs:
+    """Contact pairs of a case; clearance in m, friction positive, spin (rad/s) gives its sense."""
+    angle = np.array([stator.angle for stator in model.stators])
+    return Pairs(
+        row=packed.degree_row,
+        block=packed.degree_block,
+        axis_y=np.cos(angle),
+        axis_z=np.sin(angle),
+        radius=np.array([stator.radius for stator in model.stators]),
+        clearance=np.array([clearance + stator.clearance_offset for stator in model.stators]),
+        friction=np.full(angle.size, np.copysign(friction, spin)),
+        compliance=packed.compliance,
+        is_updated=is_updated,
+    )
+
+
+def _inverses(effective: Floats, start: Ints) -> Floats:
+    """Inverse of each diagonal block, transposed, (n_block, n_max, n_max)."""
+    widest = int(np.diff(start).max())
+    inverse = np.zeros((start.size - 1, widest, widest))
+    for b, (i, j) in enumerate(pairwise(start)):
+        inverse[b, : j - i, : j - i] = np.linalg.inv(effective[i:j, i:j]).T
+    return inverse
+
+
+def _diagonals(matrix: Floats) -> tuple[Floats, Ints]:
+    """Diagonals that are not zero, (n_diagonal, n_dof), and the offset and column span of each."""
+    banded = dia_array(matrix)
+    values = np.zeros((banded.offsets.size, matrix.shape[0]))
+    values[:, : banded.data.shape[1]] = banded.data
+    span = np.empty((banded.offsets.size, 3), dtype=np.int64)
+    for k, offset in enumerate(banded.offsets):
+        used = np.flatnonzero(values[k])
+        span[k] = offset, used[0], used[-1] + 1
+    return values, span
+
+
+def _linear(inverse: Floats, stiffness: Floats, damping: Floats, force: Floats, start: Ints) -> Linear:
+    stiffness_values, stiffness_span = _diagonals(stiffness)
+    damping_values, damping_span = _diagonals(damping)
+    skew = 0.5 * (stiffness - stiffness.T)
+    skew[abs(skew) <= 1e-12 * abs(stiffness).max()] = 0.0  # rounding of the assembly
+    skew_row, skew_column = np.nonzero(skew)
+    force_row = np.flatnonzero(np.any(force != 0, axis=0))
+    return Linear(
+        start=start,
+        inverse=inverse,
+        stiffness=stiffness_values,
+        stiffness_span=stiffness_span,
+        damping=damping_values,
+        damping_span=damping_span,
+        circulation=skew[skew_row, skew_column],
+        circulation_row=skew_row,
+        circulation_column=skew_column,
+        force_row=force_row,
+        force_cosine=force[0, force_row],
+        force_sine=force[1, force_row],
+    )
+
+
+def _compliance(inverse: Floats, start: Ints, row: Ints, block: Ints, step: float) -> Floats:
+    """Displacement of each pair's degrees for a unit force on another's over one step, h^2 Mt^-1."""
+    q = row.shape[0]
+    compliance = np.zeros((q, N_DEGREE, q, N_DEGREE))
+    for i, a, j, b in np.ndindex(q, N_DEGREE, q, N_DEGREE):
+        if block[i, a] >= 0 and block[i, a] == block[j, b]:
+            origin = start[block[i, a]]
+            compliance[i, a, j, b] = step**2 * inverse[block[i, a], row[j, b] - origin, row[i, a] - origin]
+    return compliance

@@ -1,0 +1,129 @@
+"""What one case yields: its state before and after, its signals, spectra and scalars."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.schema import DONE, STATUS, VARIABLES
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+
+    Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State:
+    """Motion of rotor and stators at a whole revolution, in the degrees of their bodies (`Body.degrees`).
+
+    Attributes
+    ----------
+    rotor_displacement, rotor_velocity : (n_rotor_dof,)
+        m or rad, m/s or rad/s, in the frame that spins steadily.
+    stator_displacement, stator_velocity : tuple of (n_stator_dof,)
+        m or rad, m/s or rad/s.
+    contact_force : (n_stator,), N
+        Normal force at that instant; it fixes the acceleration from which a run goes on.
+    """
+
+    rotor_displacement: Floats
+    rotor_velocity: Floats
+    stator_displacement: tuple[Floats, ...]
+    stator_velocity: tuple[Floats, ...]
+    contact_force: Floats
+
+    @classmethod
+    def at_rest(cls, model: Model) -> State:
+        """Nothing moves but the steady spin."""
+        stators = tuple(stator.body for stator in model.stators)
+        return cls(
+            rotor_displacement=np.zeros(model.rotor.n_dof),
+            rotor_velocity=np.zeros(model.rotor.n_dof),
+            stator_displacement=tuple(np.zeros(body.n_dof) for body in stators),
+            stator_velocity=tuple(np.zeros(body.n_dof) for body in stators),
+            contact_force=np.zeros(len(stators)),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Record:
+    """One simulated case; every stored variable is an attribute (`record.vertical`, `record.period`).
+
+    Attributes
+    ----------
+    status : int
+        `schema.DONE` or `schema.DIVERGED`; a diverged case holds NaN and says why in `reason`.
+    signals : dict of (n_sample,) or (n_stator, n_sample)
+        Shaft-locked samples over the recorded revolutions, SI units as in `rubhpc.schema`.
+    spectra : dict of (n_order,) or (n_stator, n_order)
+        Single-sided amplitudes, zero to peak, named `spectrum_*`.
+    sections : dict of (n_revolution,)
+        Poincaré sections (one point a revolution), named `section_*`.
+    scalars : dict of float, int or (n_stator,)
+        Everything else of the schema.
+    settings : dict of float
+        `spin_speed` (rad/s) and `clearance` (m).
+    final : State
+        Where the case ended: `initial=` of a run that goes on.
+    """
+
+    status: int = DONE
+    reason: str = ""
+    samples_per_revolution: int
+    signals: dict[str, Floats] = field(default_factory=dict)
+    spectra: dict[str, Floats] = field(default_factory=dict)
+    sections: dict[str, Floats] = field(default_factory=dict)
+    scalars: dict[str, Any] = field(default_factory=dict)
+    settings: dict[str, float] = field(default_factory=dict)
+    final: State
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a variable by its name in the schema."""
+        if not name.startswith("_"):
+            for group in (self.signals, self.spectra, self.sections, self.scalars, self.settings):
+                if name in group:
+                    return group[name]
+        raise AttributeError(f"this record holds no {name}")
+
+    def __repr__(self) -> str:
+        """One line: status and what it holds."""
+        reason = f" ({self.reason})" if self.reason else ""
+        held = ", ".join((*self.signals, *self.spectra, *self.sections))
+        return f"<Record: {STATUS[self.status]}{reason}; {held or 'scalars only'}>"
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the record as a dataset with units, laid out like a store of one case."""
+        import xarray as xr
+
+        arrays = {**self.signals, **self.spectra, **self.sections, **self.scalars, **self.settings}
+        dataset = xr.Dataset(
+            {
+                name: (
+                    VARIABLES[name].dims,
+                    np.asarray(value),
+                    {"units": VARIABLES[name].unit, "long_name": VARIABLES[name].long_name},
+                )
+                for name, value in arrays.items()
+            }
+        )
+        for dim, per_revolution in (("sample", self.samples_per_revolution), ("section", 1)):
+            if dim in dataset.sizes:
+                name = "revolution" if dim == "sample" else "section"
+                values = np.arange(dataset.sizes[dim]) / per_revolution
+                dataset = dataset.assign_coords(
+                    {name: (dim, values, {"units": "1", "long_name": "revolution"})}
+                )
+        if "order" in dataset.sizes:
+            n_order = dataset.sizes["order"]
+            orders = np.arange(n_order) * (0.5 * self.samples_per_revolution / (n_order - 1))
+            dataset = dataset.assign_coords(
+                order=("order", orders, {"units": "1", "long_name": "order of the spin frequency"})
+            )
+        dataset.attrs |= {"status": STATUS[self.status], "reason": self.reason}
+        return dataset

@@ -1,0 +1,116 @@
+"""The face of one case: arguments with units in, a record out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rubhpc.case import run_case
+from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
+from rubhpc.prepare import prepare
+from rubhpc.reading import parse_quantity
+from rubhpc.rig import Rig, read_rig, with_key
+from rubhpc.study import Contact, Integrator, Recording
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from rubhpc.record import Record, State
+
+
+def simulate(
+    rig: Rig | str | PathLike[str],
+    *,
+    speed: float | str | None = None,
+    speed_ratio: float | None = None,
+    clearance: float | str | None = None,
+    clearance_ratio: float | None = None,
+    friction: float = 0.3,
+    overrides: dict[str, float | str] | None = None,
+    normal: str = "fixed",
+    method: str = "central-difference",
+    step: float | str | None = None,
+    transient: int = 120,
+    revolutions: int = 64,
+    samples_per_revolution: int = 256,
+    keep: tuple[str, ...] = ("waveform", "spectrum", "section"),
+    initial: State | None = None,
+) -> Record:
+    """Simulate one case.
+
+    Parameters
+    ----------
+    rig : Rig, str or path
+        A rig, the name of a packaged one ("mokhtar2017"), or the path of a rig file.
+    speed : float (rad/s) or str with a unit, or speed_ratio : float
+        Rotation speed, or its ratio to the rotor's first lateral frequency at standstill.
+    clearance : float (m) or str with a unit, or clearance_ratio : float
+        Radial clearance, or its ratio to the contact-free amplitude at that speed.
+    friction : float
+        Coefficient of friction.
+    overrides : dict, optional
+        Single keys of the rig: `{"stator.youngs_modulus": "30 GPa"}`.
+    normal : {"fixed", "updated"}
+        Contact normal along the stator's axis, or along the line of centres.
+    method : {"central-difference"}
+        Integrator.
+    step : float (s) or str, optional
+        Time step; default 0.5 us, or 0.9 of the stability limit where that is less.
+    transient, revolutions, samples_per_revolution : int
+        Revolutions thrown away, revolutions kept, samples in each.
+    keep : tuple of {"waveform", "spectrum", "section"}
+        What the record holds besides its scalars.
+    initial : State, optional
+        Where to start; default at rest.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    InputError
+        If an argument cannot be used; its text says which and the mend.
+
+    Examples
+    --------
+    >>> record = simulate("mokhtar2017", speed_ratio=0.75, clearance="100 um", transient=60, revolutions=16)
+    >>> record.period
+    2
+    """
+    if not isinstance(rig, Rig):
+        rig = read_rig(rig)
+    for key, value in (overrides or {}).items():
+        rig = with_key(rig, key, value)
+    if (speed is None) == (speed_ratio is None):
+        raise InputError("simulate: give speed or speed_ratio, one of the two")
+    if (clearance is None) == (clearance_ratio is None):
+        raise InputError("simulate: give clearance or clearance_ratio, one of the two")
+    model = assemble(rig)
+    if speed_ratio is not None:
+        spin = speed_ratio * first_lateral_frequency(model)
+    else:
+        spin = parse_quantity(speed, "rad/s", "simulate: speed")
+    if clearance_ratio is not None:
+        gap = clearance_ratio * contact_free_amplitude(model, spin)
+    else:
+        gap = parse_quantity(clearance, "m", "simulate: clearance")
+    setup = prepare(
+        rig,
+        spin,
+        contact=Contact(normal=normal),
+        integrator=Integrator(
+            method=method, step=None if step is None else parse_quantity(step, "s", "simulate: step")
+        ),
+        samples_per_revolution=samples_per_revolution,
+    )
+    recording = Recording(
+        transient=transient,
+        revolutions=revolutions,
+        samples_per_revolution=samples_per_revolution,
+        keep=tuple(keep),
+    )
+    record = run_case(setup, clearance=gap, friction=friction, recording=recording, initial=initial)
+    record.settings["contact_free_amplitude"] = contact_free_amplitude(model, spin)
+    return record
