@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import nnls
 
 if TYPE_CHECKING:
     from rubhpc.rig import Damping
@@ -22,6 +21,8 @@ def rayleigh_coefficients(damping: Damping) -> tuple[float, float]:
     """
     if not damping.ratios:
         return damping.alpha, damping.beta
+    from scipy.optimize import nnls  # 0.3 s to load, and few rigs ask for it
+
     omega = 2 * math.pi * np.array([frequency for frequency, _ in damping.ratios])
     ratio = np.array([ratio for _, ratio in damping.ratios])
     if len(omega) == 1:

@@ -38,13 +38,14 @@ class Mode:
     Attributes
     ----------
     frequency : float
-        Of the damped oscillation, Hz; 0 for an overdamped mode and for a rigid body's.
-    natural_frequency : float
-        Distance of the eigenvalue from zero over 2 pi, Hz; modes are sorted by it.
+        Natural frequency, `|eigenvalue| / 2 pi`, Hz; modes are sorted by it. Of an overdamped mode, with its
+        two real eigenvalues a and b, `sqrt(|a b|) / 2 pi`; 0 for a rigid body's.
+    damped_frequency : float
+        Of the free oscillation, `Im(eigenvalue) / 2 pi`, Hz; 0 for an overdamped mode.
     damping_ratio : float
-        `-Re(eigenvalue) / |eigenvalue|` of a mode that oscillates, negative where it grows. An overdamped
-        mode has two real eigenvalues a and b, and the ratio `-(a + b) / (2 sqrt(a b))`, at least 1; -1 tells
-        that one of them grows. A rigid body's mode has 0, or 1 where its motion dies out.
+        `-Re(eigenvalue) / |eigenvalue|` of a mode that oscillates, negative where it grows. Of an overdamped
+        one `-(a + b) / (2 sqrt(a b))`, at least 1; -1 tells that a or b grows. A rigid body's mode has 0,
+        or 1 where its motion dies out.
     kind : str
         "lateral", "torsional" or "axial".
     whirl : str
@@ -57,7 +58,7 @@ class Mode:
     """
 
     frequency: float
-    natural_frequency: float
+    damped_frequency: float
     damping_ratio: float
     kind: str
     whirl: str
@@ -99,7 +100,7 @@ def modes(body: Body, spin: float = 0.0) -> list[Mode]:
             full = np.zeros(body.n_dof, dtype=np.complex128)
             full[rows] = _normalised(shape, mass)
             found.append(_mode(first, second, full, kind, whirl))
-    return sorted(found, key=lambda mode: (mode.natural_frequency, mode.frequency))
+    return sorted(found, key=lambda mode: (mode.frequency, mode.damped_frequency))
 
 
 def _eigenpairs(
@@ -182,8 +183,8 @@ def _mode(first: complex, second: complex, shape: Vector, kind: str, whirl: str)
     else:
         ratio = 1.0 if second.real < 0.0 else 0.0
     return Mode(
-        frequency=first.imag / (2 * math.pi),
-        natural_frequency=natural / (2 * math.pi),
+        frequency=natural / (2 * math.pi),
+        damped_frequency=first.imag / (2 * math.pi),
         damping_ratio=ratio,
         kind=kind,
         whirl=whirl,

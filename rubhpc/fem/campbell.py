@@ -1,0 +1,109 @@
+"""Modes followed through a range of speeds, and the speeds at which the unbalance meets them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+from scipy.optimize import linear_sum_assignment
+
+from rubhpc.fem.modes import modes
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Body
+    from rubhpc.fem.modes import Mode
+
+
+def campbell(body: Body, speeds: Sequence[float] | NDArray[np.float64]) -> xr.Dataset:
+    """Follow every mode of a body from speed to speed.
+
+    From one speed to the next, modes of one kind are paired so that, all together, shapes and
+    eigenvalues change least: curves that cross keep to their shapes.
+
+    Parameters
+    ----------
+    body : Body
+    speeds : (n_speed,)
+        Spin, rad/s, in order.
+
+    Returns
+    -------
+    xarray.Dataset
+        `frequency` (Hz), `damping_ratio` and `whirl` (mode, speed), with the coordinates `kind` (mode) and
+        `speed` (rad/s). Modes are numbered by their natural frequency at the first speed.
+    """
+    followed = [modes(body, float(speeds[0]))]
+    for speed in speeds[1:]:
+        found = modes(body, float(speed))
+        order = _order(body, followed[-1], found)
+        followed.append([found[i] for i in order])
+    tracks = list(zip(*followed, strict=True))
+    return xr.Dataset(
+        {
+            "frequency": (
+                ("mode", "speed"),
+                [[mode.frequency for mode in track] for track in tracks],
+                {"units": "Hz", "long_name": "Natural frequency"},
+            ),
+            "damping_ratio": (
+                ("mode", "speed"),
+                [[mode.damping_ratio for mode in track] for track in tracks],
+                {"units": "1", "long_name": "Damping ratio"},
+            ),
+            "whirl": (("mode", "speed"), [[mode.whirl for mode in track] for track in tracks]),
+        },
+        coords={
+            "kind": ("mode", [track[0].kind for track in tracks]),
+            "speed": (
+                "speed",
+                np.asarray(speeds, dtype=float),
+                {"units": "rad s-1", "long_name": "Spin speed"},
+            ),
+        },
+    )
+
+
+def critical_speeds(curves: xr.Dataset, order: float = 1.0) -> list[tuple[int, float]]:
+    """Spins at which a multiple of the spin frequency equals that of a lateral mode.
+
+    Parameters
+    ----------
+    curves : xarray.Dataset
+        From `campbell`.
+    order : float
+        Of the spin frequency; 1 is the unbalance.
+
+    Returns
+    -------
+    list of (mode, speed)
+        Number of the mode and spin (rad/s), interpolated along its curve; by rising speed.
+    """
+    speeds = curves["speed"].values
+    excess = order * speeds / (2 * math.pi) - curves["frequency"].values
+    excess[curves["kind"].values != "lateral"] = np.nan
+    crossings = []
+    for i_mode, i_speed in zip(*np.nonzero((excess[:, :-1] < 0.0) & (excess[:, 1:] >= 0.0)), strict=True):
+        before, after = excess[i_mode, i_speed : i_speed + 2]
+        step = speeds[i_speed + 1] - speeds[i_speed]
+        crossings.append((int(i_mode), float(speeds[i_speed] - before / (after - before) * step)))
+    return sorted(crossings, key=lambda crossing: crossing[1])
+
+
+def _order(body: Body, before: list[Mode], after: list[Mode]) -> NDArray[np.intp]:
+    """Which mode of `after` carries on each mode of `before`, (n_mode,)."""
+    likeness = np.abs(
+        np.stack([mode.shape.conj() for mode in before])
+        @ body.mass
+        @ np.stack([mode.shape for mode in after], axis=1)
+    )
+    here = np.array([mode.eigenvalue for mode in before])[:, np.newaxis]
+    there = np.array([mode.eigenvalue for mode in after])
+    change = np.abs(here - there) / np.maximum(np.abs(here) + np.abs(there), 1e-300)
+    order: NDArray[np.intp] = linear_sum_assignment(change - likeness**2)[1]
+    return order
