@@ -92,14 +92,16 @@ def refuse_unknown(table: Mapping[str, object], known: Mapping[str, object], fil
 
 def plain(value: Any) -> Any:
     """Return a dataclass as dicts, lists, numbers and text, from which `build` makes it again."""
-    if dataclasses.is_dataclass(value):
-        items = ((f, getattr(value, f.name)) for f in dataclasses.fields(value))
-        return {
-            f.name: {repr(k): v for k, v in x} if f.metadata.get("kind") == "pairs" else plain(x)
-            for f, x in items
-            if x is not None
-        }
-    return [plain(v) for v in value] if isinstance(value, tuple) else value
+    if not dataclasses.is_dataclass(value):
+        return [plain(v) for v in value] if isinstance(value, tuple) else value
+    result: dict[str, Any] = {}
+    for declared in dataclasses.fields(value):
+        held, kind = getattr(value, declared.name), declared.metadata.get("kind")
+        if kind == "pairs":
+            result[declared.name] = {repr(float(key)): float(number) for key, number in held}
+        elif held is not None:
+            result[declared.name] = float(held) if kind == "quantity" else plain(held)
+    return result
 
 
 def _parse(declared: dataclasses.Field[Any], hint: Any, value: object, file: str, name: str) -> Any:

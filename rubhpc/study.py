@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 __all__ = ["Axis", "Contact", "Integrator", "Recording", "Run", "Study", "make_axis", "read_study"]
 
 _TABLES = ("title", "rig", "output", "grid", "override", "contact", "integrator", "record", "run")
+PAPER_STEP = 0.5e-6  # s
+SAFE_SHARE = 0.9  # of the stability limit
 # Names that a store takes for itself; an axis `clearance` is the very setting of that name.
 _RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution"}) - {"clearance"}
 _MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
@@ -49,6 +51,10 @@ class Integrator:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    def step_within(self, limit: float) -> float:
+        """Time step, s, for matrices that are stable up to `limit`, s."""
+        return self.step if self.step is not None else min(PAPER_STEP, SAFE_SHARE * limit)
 
 
 @dataclass(frozen=True, kw_only=True)

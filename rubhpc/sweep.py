@@ -1,0 +1,190 @@
+"""A study's grid as cases and blocks: who is who, what belongs together, what each block will cost.
+
+Nothing here holds an object a case: a million of them are planned as arrays.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import math
+import struct
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.settings import Settings
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from rubhpc.rig import Rig
+    from rubhpc.study import Study
+
+PHYSICS = 1  # raised whenever the same study gives other numbers than before
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Case:
+    """One point of the grid, with all that it takes to compute it."""
+
+    index: tuple[int, ...]
+    id: str
+    rig: Rig
+    speed: float  # rad/s
+    clearance: float  # m
+    friction: float
+    contact_free_amplitude: float  # m
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Block:
+    """A box of the grid: the unit of work, and one chunk of every stored array."""
+
+    number: int
+    start: tuple[int, ...]
+    shape: tuple[int, ...]
+    cost: int  # predicted integration steps
+
+
+class Sweep:
+    """The cases of a study.
+
+    Parameters
+    ----------
+    study : Study
+    chunk : tuple of int, optional
+        Cases of a block along each axis, where a store has them already. Default: at most `[run] block`
+        cases, taken first from the axes that leave speed and rig alone: a block then shares its setup.
+
+    Attributes
+    ----------
+    dims, shape : tuple
+        Dimension names of the axes, and cases along each.
+    n_case, n_stator : int
+        Number of cases, and of stators.
+    chunk : tuple of int
+        Cases of a block along each axis.
+    identity, identity_parts : str, dict
+        SHA-256 of all that changes results but the values on the axes, and what went into it.
+
+    Raises
+    ------
+    InputError
+        When the step asked for is above the stability limit of a rig.
+    """
+
+    def __init__(self, study: Study, chunk: tuple[int, ...] | None = None) -> None:
+        self.study = study
+        self.dims = tuple(axis.dimension for axis in study.axes)
+        self.shape = tuple(len(axis.values) for axis in study.axes)
+        self.n_case = math.prod(self.shape)
+        self.n_stator = len(study.rig.stator)
+        self._settings = Settings(study)
+        self.chunk = chunk if chunk is not None else self._default_chunk()
+        self.identity_parts = identity_parts(study)
+        text = json.dumps(self.identity_parts, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        self.identity = hashlib.sha256(text.encode()).hexdigest()
+
+    def blocks(self) -> list[Block]:
+        """Return all blocks, the longest first."""
+        starts = [range(0, n, c) for n, c in zip(self.shape, self.chunk, strict=True)]
+        sizes = [[min(c, n - s) for s in at] for n, c, at in zip(self.shape, self.chunk, starts, strict=True)]
+        cost: NDArray[np.float64] = self._settings.steps
+        for i, at in enumerate(starts):
+            if cost.shape[i] == self.shape[i]:
+                cost = np.add.reduceat(cost, np.array(at), axis=i)
+            else:  # the same for every case along this axis
+                cost = cost * np.array(sizes[i]).reshape([-1 if j == i else 1 for j in range(cost.ndim)])
+        steps = np.rint(cost.ravel()).astype(np.int64)
+        order = np.argsort(-steps, kind="stable")
+        corners, shapes = list(itertools.product(*starts)), list(itertools.product(*sizes))
+        return [
+            Block(number=n, start=corners[n], shape=shapes[n], cost=c)
+            for n, c in zip(order.tolist(), steps[order].tolist(), strict=True)
+        ]
+
+    def cases(self, block: Block) -> list[Case]:
+        """Return the cases of a block, the last axis running fastest."""
+        box = itertools.product(*(range(s, s + n) for s, n in zip(block.start, block.shape, strict=True)))
+        return [self._case(index, name) for index, name in zip(box, self.case_ids(block), strict=True)]
+
+    def case(self, index: Sequence[int]) -> Case:
+        """Return the case at an index of the grid."""
+        point = [axis.values[i] for axis, i in zip(self.study.axes, index, strict=True)]
+        return self._case(tuple(index), self._id(point))
+
+    def case_ids(self, block: Block) -> list[str]:
+        """Return the ids of the cases of a block, in the order of `cases`.
+
+        An id is a hash of the identity and of the values on the axes: it outlives the growth of any axis.
+        """
+        box = zip(self.study.axes, block.start, block.shape, strict=True)
+        return [
+            self._id(point) for point in itertools.product(*(axis.values[s : s + n] for axis, s, n in box))
+        ]
+
+    def settings(self) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
+        """Return what the axes amount to: name -> (dimensions of the axes that set it, values in SI units).
+
+        `spin_speed` in rad/s, `clearance` and `contact_free_amplitude` in m.
+
+        Raises
+        ------
+        InputError
+            When a clearance leaves no gap at a stator.
+        """
+        found = self._settings.arrays()
+        return {name: (tuple(self.dims[i] for i in axes), values) for name, (axes, values) in found.items()}
+
+    def _case(self, index: tuple[int, ...], name: str) -> Case:
+        speed, amplitude = self._settings.response(index)
+        return Case(
+            index=index,
+            id=name,
+            rig=self._settings.rig(index),
+            speed=speed,
+            clearance=self._settings.clearance(index),
+            friction=self._settings.friction(index),
+            contact_free_amplitude=amplitude,
+        )
+
+    def _id(self, point: Iterable[float]) -> str:
+        digest = self._digest.copy()
+        digest.update(struct.pack(f"<{len(self.shape)}d", *point))
+        name: str = digest.hexdigest()[:32]
+        return name
+
+    @cached_property
+    def _digest(self) -> Any:
+        return hashlib.sha256(self.identity.encode())
+
+    def _default_chunk(self) -> tuple[int, ...]:
+        wanted = self.study.run.block or min(max(self.n_case // 64, 1), 16)
+        costly = [self._settings.speed_axis, *self._settings.rig_axes]
+        others = [i for i in range(len(self.shape)) if i not in costly]
+        chunk = [1] * len(self.shape)
+        for i in [*reversed(others), *costly]:
+            n_block = -(-self.shape[i] // min(self.shape[i], wanted))
+            chunk[i] = -(-self.shape[i] // n_block)  # blocks of one size, rather than full ones and a rest
+            wanted = max(wanted // chunk[i], 1)
+        return tuple(chunk)
+
+
+def identity_parts(study: Study) -> dict[str, Any]:
+    """Return all that changes the results of a study but the values on its axes, for JSON."""
+    rig = study.rig.as_dict()
+    del rig["name"]
+    return {
+        "physics": PHYSICS,
+        "axes": [axis.name for axis in study.axes],
+        "rig": rig,
+        "contact": asdict(study.contact),
+        "integrator": asdict(study.integrator),
+        "record": asdict(study.recording) | {"keep": sorted(study.recording.keep)},
+    }
