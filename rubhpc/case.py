@@ -78,6 +78,7 @@ def run_case(
 
     outcome = run.advance(-n_transient, 0, samples, tally, is_recorded=False)
     energy_before = _energy(setup, state)
+    tally.is_touching[:] = work.force > 0.0  # a contact under way did not begin in the record
     if outcome == central_difference.FINISHED:
         outcome = run.advance(0, n_sample, samples, tally, is_recorded=True)
     if outcome != central_difference.FINISHED:
@@ -221,6 +222,7 @@ def _start(setup: Setup, initial: State, work: Workspace) -> Floats:
 
     displacement = gather(initial.rotor_displacement, initial.stator_displacement)
     velocity = gather(initial.rotor_velocity, initial.stator_velocity)
+    work.force[:] = initial.contact_force
     force = packed.force[0] - packed.stiffness @ displacement - packed.damping @ velocity
     for i, rows in enumerate(packed.degree_row):
         for a, row in enumerate(rows):

@@ -94,8 +94,7 @@ def scalars_of(
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution
     has_touched = tally.contact_steps > 0
-    # A contact that the record's first sample finds under way began in the same orbit one record earlier.
-    n_contact = np.maximum(tally.n_contact, 1)
+    n_contact = np.maximum(tally.n_contact, 1)  # one that lasts throughout never begins in the record
     orbit_period = period(signals["vertical"], signals["horizontal"], samples_per_revolution)
     given = tally.energy[UNBALANCE_WORK] + tally.energy[DRIVE_WORK]
     lost = tally.energy[[DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS]]
