@@ -1,0 +1,212 @@
+"""The cascade as a figure: stacked spectra (waterfall) or an intensity picture, with orders and modes."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postproc.cascade import below, hold_peaks, hold_rows
+from postproc.cells import cell_edges
+from postproc.load import need_results
+from postproc.units import displayed, scale_of, short_name
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+ORDERS = tuple(Fraction(*f) for f in ((1, 3), (1, 2), (2, 3), (1, 1), (3, 2), (2, 1), (3, 1)))
+_ROWS = 60  # of a waterfall: more overlap at column width
+_PIXELS = (800, 500)  # of an intensity picture at column width and 300 dpi
+_DECADES = 3.0
+_NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
+
+
+def waterfall(
+    spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "frequency", height: float = 0.22
+) -> Axes:
+    """Draw the spectra of a cascade above one another, each on the value of its axis.
+
+    Parameters
+    ----------
+    spectra : (along, order)
+        From `cascade`; only what is drawn is loaded.
+    limit : float
+        End of the abscissa, Hz or orders.
+    abscissa : {"frequency", "order"}
+    height : float
+        Of the highest line, as a part of the ordinate.
+    """
+    spectra = hold_rows(below(spectra, limit, abscissa), _ROWS).compute()
+    need_results(spectra, spectra.to_dataset(name="spectra"))
+    rows, label = displayed(spectra[spectra.dims[0]])
+    spectra = spectra.where(spectra["order"] > 0)  # the mean is no line
+    peak = float(spectra.max())
+    span = float(np.ptp(rows)) or 1.0
+    gain = height * span / (peak or 1.0)
+    x = np.broadcast_to(spectra[abscissa].values, spectra.shape)
+    for i in np.argsort(-rows):  # from the back to the front: each hides what lies behind it
+        if not np.isfinite(spectra.values[i]).any():
+            continue
+        curve = rows[i] + gain * np.nan_to_num(spectra.values[i])
+        order = 3 + (rows.max() - rows[i]) / span
+        ax.fill_between(x[i], rows[i], curve, color="white", linewidth=0, zorder=order)
+        ax.plot(x[i], curve, color="C0", linewidth=0.5, zorder=order)
+    ax.set(xlim=(0, limit), xlabel=_NAMES[abscissa], ylabel=label)
+    ax.set_ylim(rows.min() - 0.04 * span, rows.max() + (height + 0.02) * span)
+    _scale_bar(spectra, ax, peak, gain)
+    return ax
+
+
+def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "frequency") -> Axes:
+    """Draw a cascade as a picture, its amplitudes as colours over three decades; arguments as of `waterfall`.
+
+    Peaks are held down to the figure's resolution chunk by chunk, for stores larger than memory.
+    """
+    from matplotlib.colors import LogNorm
+
+    lines = spectra.where(spectra["order"] > 0, 0.0).where(spectra.notnull())  # the mean is no line
+    held = hold_rows(hold_peaks(lines, limit, _PIXELS[0], abscissa), _PIXELS[1]).compute()
+    need_results(held, held.to_dataset(name="spectra"))
+    rows, label = displayed(held[held.dims[0]])
+    scale = scale_of(held)
+    values = held.values * scale.factor
+    peak = float(np.nanmax(values)) or 1.0
+    ascending = np.argsort(rows)
+    mesh = ax.pcolormesh(
+        np.linspace(0, limit, values.shape[1] + 1),
+        cell_edges(rows[ascending]),
+        np.ma.masked_invalid(np.maximum(values[ascending], peak * 10 ** (-_DECADES - 1))),
+        norm=LogNorm(peak * 10**-_DECADES, peak),
+        cmap="magma",
+        rasterized=True,
+    )
+    ax.set_facecolor("0.85")  # shows where a case is missing
+    ax.set(xlim=(0, limit), xlabel=_NAMES[abscissa], ylabel=label)
+    bar = ax.figure.colorbar(mesh, ax=ax, pad=0.02, aspect=30, extend="min")
+    bar.set_label(scale.label(f"{short_name(held)} amplitude"))
+    return ax
+
+
+def draw_orders(
+    ax: Axes,
+    spectra: xr.DataArray,
+    orders: Sequence[Fraction] = ORDERS,
+    abscissa: str = "frequency",
+    color: str = "0.35",
+) -> Axes:
+    """Add the lines on which multiples of the spin speed lie, named at their upper ends."""
+    rows, rate = _rows_and_rate(spectra)
+    left, right = ax.get_xlim()
+    style: dict[str, Any] = {"color": color, "linewidth": 0.4, "linestyle": (0, (4, 3)), "zorder": 2.5}
+    tagged: list[float] = []
+    # Whole multiples first, so that they keep their names where there is no room for all.
+    for order in sorted(orders, key=lambda o: (o.denominator, o)):
+        x = float(order) * (rate if abscissa == "frequency" else np.ones_like(rate))
+        inside = np.flatnonzero((x >= left) & (x <= right))
+        if inside.size < max(2, 0.08 * rows.size):
+            continue  # it would cut a corner only
+        ax.plot(x, rows, scalex=False, scaley=False, **style)
+        if inside[-1] == rows.size - 1:
+            if all(abs(x[-1] - t) > 0.07 * (right - left) for t in tagged):
+                _tag(ax, float(x[-1]), float(rows[-1]), f"{order}X", color, "center")
+                tagged.append(float(x[-1]))
+        else:
+            _tag(ax, right, float(np.interp(right, x, rows)), f"{order}X", color, "right")
+    return ax
+
+
+def draw_frequencies(
+    ax: Axes,
+    spectra: xr.DataArray,
+    frequencies: Mapping[str, xr.DataArray | float],
+    abscissa: str = "frequency",
+    color: str = "C1",
+) -> Axes:
+    """Add natural frequencies (Hz) as dashed lines named above the axes; they may vary along it."""
+    rows, rate = _rows_and_rate(spectra)
+    left, right = ax.get_xlim()
+    ends = ax.get_ylim()
+    style: dict[str, Any] = {"color": color, "linewidth": 0.7, "linestyle": "--", "zorder": 5}
+    for name, frequency in frequencies.items():
+        values = np.broadcast_to(np.asarray(frequency, dtype=float), rows.shape)
+        x = values if abscissa == "frequency" else values / rate
+        if not ((x >= left) & (x <= right)).any():
+            continue
+        y = np.concatenate((ends[:1], rows, ends[1:]))
+        ax.plot(np.concatenate((x[:1], x, x[-1:])), y, scalex=False, scaley=False, **style)
+        at = float(np.clip(x[-1], left + 0.1 * (right - left), right - 0.14 * (right - left)))
+        ax.annotate(
+            f"{name} {values[-1]:.4g} Hz",
+            (at, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=6.5,
+            color=color,
+            annotation_clip=False,
+        )
+    return ax
+
+
+def default_limit(spectra: xr.DataArray, frequencies: Mapping[str, xr.DataArray | float]) -> float:
+    """Return where a cascade ends unless told, Hz: past the modes named and the highest spin speed."""
+    modes = [2 * float(np.max(f)) for f in frequencies.values()]
+    fastest = float(np.nanmax(spectra["spin_speed"].values)) / (2 * math.pi)
+    limit = max(*modes, 1.25 * fastest) if modes else 4 * fastest
+    return min(math.ceil(limit / 10) * 10, float(np.nanmax(spectra["frequency"].values)))
+
+
+def _rows_and_rate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the displayed ordinates, ascending, and the spin rate (Hz) at each."""
+    rows, _ = displayed(spectra[spectra.dims[0]])
+    ascending = np.argsort(rows)
+    rate = np.broadcast_to(spectra["spin_speed"].values, rows.shape) / (2 * math.pi)
+    return rows[ascending], rate[ascending]
+
+
+def _tag(ax: Axes, x: float, y: float, text: str, color: str, ha: str) -> None:
+    ax.annotate(
+        text,
+        (x, y),
+        xytext=(-1 if ha == "right" else 0, 1),
+        textcoords="offset points",
+        ha=ha,
+        va="bottom",
+        fontsize=6,
+        color=color,
+        zorder=6,
+        clip_on=True,
+    )
+
+
+def _scale_bar(spectra: xr.DataArray, ax: Axes, peak: float, gain: float) -> None:
+    """Add a bar of a round amplitude in the upper right corner."""
+    if not peak > 0:
+        return
+    scale = scale_of(spectra)
+    shown = peak * scale.factor
+    decade = 10 ** math.floor(math.log10(shown))
+    size = max(m for m in (1, 2, 5) if m * decade <= shown) * decade
+    top = ax.get_ylim()[1] - 0.02 * float(np.ptp(ax.get_ylim()))
+    x = 0.975 * ax.get_xlim()[1]
+    ends = [top - gain * size / scale.factor, top]
+    ax.plot([x, x], ends, color="k", linewidth=1.2, zorder=7, solid_capstyle="butt")
+    ax.annotate(
+        f"{short_name(spectra)} {size:g} {scale.unit}",
+        (x, top),
+        xytext=(-3, 0),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=6.5,
+        zorder=7,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+    )

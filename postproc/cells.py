@@ -1,0 +1,69 @@
+"""Cells of a grid picture: their edges around the grid values, and hatching of some of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+
+def cell_edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the edges of cells around ascending grid values: half way between them, on their own scale."""
+    if values.size == 1:
+        half = 0.5 * abs(values[0]) or 0.5
+        return np.array([values[0] - half, values[0] + half])
+    if is_geometric(values):
+        edges: NDArray[np.float64] = np.exp(cell_edges(np.log(values)))
+        return edges
+    middle = (values[1:] + values[:-1]) / 2
+    return np.concatenate(
+        ([1.5 * values[0] - 0.5 * values[1]], middle, [1.5 * values[-1] - 0.5 * values[-2]])
+    )
+
+
+def hatch_cells(
+    ax: Axes,
+    edges: tuple[NDArray[np.float64], NDArray[np.float64]],
+    mask: NDArray[np.bool_],
+    label: str,
+    hatch: str,
+    facecolor: str = "none",
+    color: str = "0.25",
+) -> list[Artist]:
+    """Hatch the cells of a mask (n_y, n_x) as one patch; return it for a legend, or [] where none is."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    if not mask.any():
+        return []
+    x, y = edges
+    # Runs of marked cells along a row become one rectangle, so that a large region is a short path.
+    ends = np.diff(np.pad(mask.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    row, first = np.nonzero(ends == 1)
+    _, last = np.nonzero(ends == -1)
+    corners = np.stack(
+        [
+            np.column_stack((x[first], y[row])),
+            np.column_stack((x[last], y[row])),
+            np.column_stack((x[last], y[row + 1])),
+            np.column_stack((x[first], y[row + 1])),
+            np.column_stack((x[first], y[row])),
+        ],
+        axis=1,
+    ).reshape(-1, 2)
+    codes = np.tile([Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY], row.size)
+    style = {"hatch": hatch, "facecolor": facecolor, "edgecolor": color, "linewidth": 0.0, "label": label}
+    return [ax.add_patch(PathPatch(Path(corners, codes), **style))]
+
+
+def is_geometric(values: NDArray[np.float64]) -> bool:
+    """Tell whether grid values are spaced evenly on a log scale."""
+    if values.size < 3 or values.min() <= 0:
+        return False
+    ratios = np.diff(np.log(values))
+    return bool(np.ptp(ratios) < 1e-6 * np.abs(ratios).max())

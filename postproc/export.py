@@ -1,0 +1,90 @@
+"""The data behind a figure as a file, in SI units: csv, json, zarr or netCDF by its extension."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rubhpc.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FORMATS = (".csv", ".json", ".zarr", ".nc")
+
+
+def check_data_path(path: str | Path) -> Path:
+    """Return `path` where data can be written to it; InputError with the mend where not."""
+    path = Path(path)
+    if path.suffix.lower() not in FORMATS:
+        raise InputError(f"{path}: data is written as {', '.join(FORMATS)}; name it {path.stem}.csv")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: no directory {path.parent}; make it first")
+    if path.suffix == ".zarr" and path.exists():
+        raise InputError(f"{path}: is there already; choose another --data, or remove it")
+    return path
+
+
+def write_data(data: xr.Dataset, path: str | Path) -> Path:
+    """Write a dataset, one line a point in csv, and return where it lies.
+
+    Raises
+    ------
+    InputError
+        The extension is none of the known ones, or the file cannot be written.
+    """
+    path = check_data_path(path)
+    data = data.load().copy()
+    data.attrs = {k: v for k, v in data.attrs.items() if isinstance(v, str | int | float)}
+    try:
+        if path.suffix == ".csv":
+            _write_csv(data, path)
+        elif path.suffix == ".json":
+            path.write_text(json.dumps(_plain(data.to_dict()), allow_nan=False))
+        elif path.suffix == ".zarr":
+            _bare(data).to_zarr(path, zarr_format=3, consolidated=False)
+        else:
+            _write_netcdf(data, path)
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be written: {error.strerror or error}; choose another --data"
+        ) from error
+    return path
+
+
+def _write_csv(data: xr.Dataset, path: Path) -> None:
+    """One column a variable, its unit in the heading."""
+    table = data.to_dataframe().reset_index()
+    units = {str(n): str(v.attrs.get("units", "1")) for n, v in data.variables.items()}
+    headings = {n: f"{n} ({u})" for n, u in units.items() if u not in ("", "1")}
+    dims = list(data.dims)
+    columns = [*dims, *(c for c in table.columns if c not in dims)]
+    table[[c for c in columns if c in table]].rename(columns=headings).to_csv(path, index=False)
+
+
+def _write_netcdf(data: xr.Dataset, path: Path) -> None:
+    """NetCDF 4 where h5netcdf or netCDF4 is there, else netCDF 3 through scipy."""
+    from importlib.util import find_spec
+
+    if find_spec("h5netcdf") or find_spec("netCDF4"):
+        _bare(data).to_netcdf(path)
+    else:
+        _bare(data).to_netcdf(path, engine="scipy", format="NETCDF3_64BIT")
+
+
+def _bare(data: xr.Dataset) -> xr.Dataset:
+    """Return the data without the compression and chunks of the store it came from."""
+    return data.drop_encoding()
+
+
+def _plain(value: Any) -> Any:
+    """Nested dicts and lists with null for what is not finite."""
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if isinstance(value, str | int | float | bool | None) else str(value)

@@ -1,0 +1,61 @@
+"""The lines of a spectrum: the strongest ones, and their names as fractions of the spin speed."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import xarray as xr
+
+MAX_DENOMINATOR = 8  # sub-harmonics beyond the eighth are not told apart from quasi-periodic lines
+
+
+def order_name(order: float, tolerance: float = 1e-6, max_denominator: int = MAX_DENOMINATOR) -> str:
+    """Name an order by the simplest fraction within `tolerance`, as in "1/2X" or "-1X", else by decimals."""
+    for denominator in range(1, max_denominator + 1):
+        fraction = Fraction(round(order * denominator), denominator)
+        if fraction != 0 and abs(float(fraction) - order) <= tolerance:
+            return f"{fraction}X"
+    return f"{order:.2f}X"
+
+
+def strongest_lines(
+    spectrum: xr.DataArray,
+    n_line: int = 6,
+    threshold: float = 0.02,
+    max_denominator: int = MAX_DENOMINATOR,
+) -> xr.Dataset:
+    """Return the strongest local maxima of a spectrum, strongest first, with their names.
+
+    Parameters
+    ----------
+    spectrum : (order,)
+        One case; the mean (order 0) is no line.
+    threshold : float
+        Lines below this fraction of the strongest are left out.
+
+    Returns
+    -------
+    Dataset over `line`
+        `order`, `amplitude`, `name`, and `frequency` (Hz) where the spectrum has it. A name holds to within
+        half a line's width, since a record that does not hold whole periods puts a line beside its order.
+    """
+    order = spectrum["order"].values
+    amplitude = np.where(np.isfinite(spectrum.values), spectrum.values, 0.0)
+    amplitude = np.where(np.abs(order) < 1e-9, 0.0, amplitude)
+    padded = np.concatenate(([0.0], amplitude, [0.0]))
+    is_peak = (amplitude > padded[:-2]) & (amplitude >= padded[2:])
+    is_peak &= amplitude >= threshold * amplitude.max(initial=0.0)
+    peaks = np.flatnonzero(is_peak)
+    peaks = peaks[np.argsort(-amplitude[peaks], kind="stable")][:n_line]
+    half_width = abs(float(order[1] - order[0])) / 2 * (1 + 1e-9)
+    lines = xr.Dataset(
+        {
+            "order": ("line", order[peaks], {"units": "1"}),
+            "amplitude": ("line", amplitude[peaks], dict(spectrum.attrs)),
+            "name": ("line", [order_name(order[i], half_width, max_denominator) for i in peaks]),
+        }
+    )
+    if "frequency" in spectrum.coords:
+        lines["frequency"] = ("line", spectrum["frequency"].values[peaks], {"units": "Hz"})
+    return lines

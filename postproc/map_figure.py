@@ -1,0 +1,124 @@
+"""The map as a figure: colours for values and regimes, hatching for what is missing or out of range."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from postproc.cells import cell_edges, hatch_cells, is_geometric
+from postproc.maps import VALIDITY
+from postproc.units import displayed, scale_of, short_name
+from rubhpc.errors import InputError
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, REGIME, STATUS, VARIABLES
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    Edges = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+# Cases without a result: name, grey, hatch.
+_NOT_DONE = {
+    MISSING: ("missing", "0.93", "...."),
+    FAILED: ("failed", "0.8", "xxxx"),
+    DIVERGED: ("diverged", "0.6", "////"),
+}
+_REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
+_WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
+_LONG_LABEL = 16  # characters
+_STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
+
+
+def value_map(data: xr.Dataset, value: str, ax: Axes, log: bool = False) -> Axes:
+    """Draw a map from `map_data`: flags and periods as distinct colours, other scalars with a colour bar.
+
+    Cells without a result are grey and hatched by their status; where the model left its range, by lines.
+    """
+    y_name, x_name = data[value].dims
+    data = data.sortby([str(y_name), str(x_name)])
+    x, x_label = displayed(data[x_name])
+    y, y_label = displayed(data[y_name])
+    edges = cell_edges(x), cell_edges(y)
+    status = data["status"].values
+    is_known = value == "status" or VARIABLES[value].role == "setting"  # before any case is done
+    done = np.ones_like(status, dtype=bool) if is_known else status == DONE
+    handles = []
+    if value in ("status", "regime", "period"):
+        handles += _draw_categories(ax, data[value], done, edges)
+    else:
+        _draw_scalar(ax, data[value], done, edges, log)
+    if not is_known:
+        for code, (name, color, hatch) in _NOT_DONE.items():
+            handles += hatch_cells(ax, edges, ~done & (status == code), name, hatch, facecolor=color)
+        validity = np.where(done, data["validity"].values, 0)
+        reasons = [text for bit, text, _ in VALIDITY.values() if (validity & bit).any()]
+        invalid = f"out of range: {', '.join(reasons)}"
+        handles += hatch_cells(ax, edges, validity > 0, invalid, "\\\\\\\\", color=_WARNING)
+    for values, name in ((x, "x"), (y, "y")):
+        if is_geometric(values):
+            getattr(ax, f"set_{name}scale")("log")
+    ax.set(xlabel=x_label, ylabel=y_label, xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+    if handles:
+        n_column = 2 if any(len(str(h.get_label())) > _LONG_LABEL for h in handles) else min(4, len(handles))
+        ax.figure.legend(handles=handles, loc="outside lower center", ncols=n_column, fontsize=6.5)
+    return ax
+
+
+def _draw_scalar(
+    ax: Axes,
+    data: xr.DataArray,
+    done: NDArray[np.bool_],
+    edges: Edges,
+    log: bool,
+) -> None:
+    from matplotlib.colors import LogNorm
+
+    shown = data.where(xr.DataArray(done, dims=data.dims))
+    scale = scale_of(shown)
+    values = np.ma.masked_invalid(np.asarray(shown.values, dtype=float) * scale.factor)
+    if values.count() == 0:
+        raise InputError(
+            f"map: no case of this selection has a {data.name}; run the study first, or select others"
+        )
+    norm = None
+    if log:
+        values = np.ma.masked_less_equal(values, 0.0)
+        if values.count() == 0:
+            raise InputError(f"map: {data.name} is nowhere positive; draw it without --log")
+        norm = LogNorm(float(values.min()), float(values.max()))
+    mesh = ax.pcolormesh(*edges, values, norm=norm, cmap="cividis", rasterized=True)
+    bar = ax.figure.colorbar(mesh, ax=ax, pad=0.02, aspect=25)
+    bar.set_label(scale.label(short_name(data)))
+
+
+def _draw_categories(
+    ax: Axes,
+    data: xr.DataArray,
+    done: NDArray[np.bool_],
+    edges: Edges,
+) -> list[Artist]:
+    """Draw codes in colours of their own and return handles of those that occur."""
+    import matplotlib
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    codes = np.where(done, np.nan_to_num(np.asarray(data.values, dtype=float), nan=-1), -1).astype(int)
+    present = [int(c) for c in np.unique(codes) if c >= 0]
+    if data.name == "period":
+        # Period 0 is no period at all, which is a colour apart; the others darken with their length.
+        ramp = matplotlib.colormaps["viridis_r"](np.linspace(0.08, 0.9, max(len(present), 2)))
+        names = {c: "none" if c == 0 else f"P{c}" for c in present}
+        colors = {c: "#D55E00" if c == 0 else ramp[i] for i, c in enumerate(present)}
+    else:
+        meanings, palette = (STATUS, _STATUS_COLORS) if data.name == "status" else (REGIME, _REGIME_COLORS)
+        names = {c: meanings[c].replace("_", "-" if c == 2 else " ") for c in present}
+        colors = {c: palette[c] for c in present}
+    if present:
+        index = np.searchsorted(present, codes).clip(max=len(present) - 1)
+        cells = np.ma.masked_where(codes < 0, index)
+        cmap = ListedColormap([colors[c] for c in present])
+        ax.pcolormesh(*edges, cells, cmap=cmap, vmin=-0.5, vmax=len(present) - 0.5, rasterized=True)
+    return [Patch(facecolor=colors[c], edgecolor="0.4", linewidth=0.3, label=names[c]) for c in present]

@@ -1,0 +1,71 @@
+"""Maps: a scalar, the regime or the status of every case over two axes of the study."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from postproc.load import axes_of, find_axis, need, source
+from postproc.selection import narrow
+from rubhpc.errors import InputError
+from rubhpc.schema import VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in ("scalar", "flag", "setting"))
+# Where the model leaves its range, by variable: the flag, what is out of range, and the test.
+VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
+    "minimum_slip_speed": (1, "slip", lambda slip: slip < 0),
+    "force_over_euler_load": (2, "Euler load", lambda ratio: ratio > 1),
+    "tip_deflection_ratio": (4, "tip deflection", lambda ratio: ratio > 0.1),
+}
+
+
+def default_axes(store: xr.Dataset, x: str | None = None, y: str | None = None) -> tuple[str, str]:
+    """Return the axes a map spreads over, across and up: those named, and else the longest ones."""
+    named = [find_axis(store, name) for name in (x, y) if name]
+    axes = axes_of(store)
+    free = [a for a in axes if store.sizes[a] > 1 and a not in named]
+    free.sort(key=lambda a: -store.sizes[a])  # stable: of two equal ones the first in the grid
+    if len(set(named)) + len(free) < 2 or len(set(named)) < len(named):
+        sizes = ", ".join(f"{a} ({store.sizes[a]})" for a in axes) or "none"
+        raise InputError(f"{source(store)}: a map needs two axes of several values; there is {sizes}")
+    across = named.pop(0) if x else free.pop(0)
+    return across, named.pop(0) if y else free.pop(0)
+
+
+def map_data(store: xr.Dataset, value: str, x: str, y: str) -> xr.Dataset:
+    """Return what a map shows, loaded: no more than this scalar, the status and the validity monitors.
+
+    Parameters
+    ----------
+    store : Dataset
+        All other axes of more than one value must have been selected.
+    value : str
+        A scalar, setting or flag of the store.
+
+    Returns
+    -------
+    Dataset over (y, x)
+        The value, `status`, and `validity`: 0 within the model's range, else the sum of 1 (slip reverses, so
+        that steady sliding is wrong), 2 (force over the stator's Euler load) and 4 (tip over a tenth of its
+        length).
+    """
+    if value not in MAPPABLE:
+        need(store, [value])
+        raise InputError(f"{source(store)}: {value}: no scalar of a case; choose {', '.join(MAPPABLE)}")
+    validity = xr.zeros_like(store["status"], dtype=np.int8)
+    for name, (bit, _, is_bad) in VALIDITY.items():
+        if name in store:
+            bad = is_bad(store[name])
+            # One stator out of range spoils the case, whichever is drawn.
+            bad = bad.any([d for d in ("stator",) if d in bad.dims])
+            validity = validity + np.int8(bit) * bad.astype(np.int8)
+    legend = "sum of " + ", ".join(f"{bit} ({text} out of range)" for bit, text, _ in VALIDITY.values())
+    store = store.assign(validity=validity.assign_attrs(units="1", long_name=legend))
+    data = narrow(store, dict.fromkeys([value, "status", "validity"]), spread=[x, y])
+    loaded: xr.Dataset = data.broadcast_like(store[[x, y]]).transpose(y, x).load()
+    return loaded

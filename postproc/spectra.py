@@ -1,0 +1,170 @@
+"""Amplitude spectra over orders: single-sided ones of a signal, two-sided ones of the whirl.
+
+Sampling is locked to the shaft, so that a record of whole revolutions holds whole periods of every order
+and its spectrum needs no window: a line's height is the amplitude (zero to peak) of its sine.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from postproc.load import find_axis, need, source
+from postproc.selection import narrow
+from rubhpc.errors import InputError
+from rubhpc.schema import SIGNAL_NAMES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def samples_per_revolution(waveform: xr.DataArray) -> int:
+    """Return how many samples a waveform has in a revolution, from its `revolution` coordinate."""
+    revolution = waveform["revolution"].values
+    return round((revolution.size - 1) / float(revolution[-1] - revolution[0]))
+
+
+def last_revolutions(waveform: xr.DataArray, revolutions: int) -> xr.DataArray:
+    """Return the last `revolutions` of a waveform; all of it where it has no more."""
+    return waveform.isel(sample=slice(-revolutions * samples_per_revolution(waveform), None))
+
+
+def amplitude_spectrum(waveform: xr.DataArray) -> xr.DataArray:
+    """Return the single-sided amplitude spectrum over `order`, in the unit of the signal; lazy as that is.
+
+    Parameters
+    ----------
+    waveform : (..., sample)
+        Whole revolutions with the coordinate `revolution`.
+    """
+    n = waveform.sizes["sample"]
+    orders = np.fft.rfftfreq(n, d=1 / samples_per_revolution(waveform))
+    spectrum = _over_orders(waveform, _single_sided, orders)
+    spectrum.name = f"spectrum_{waveform.name}"
+    long_name = waveform.attrs.get("long_name", waveform.name)
+    spectrum.attrs = {**waveform.attrs, "long_name": f"amplitude (zero to peak) of the {long_name}"}
+    return spectrum
+
+
+def full_spectrum(vertical: xr.DataArray, horizontal: xr.DataArray) -> xr.DataArray:
+    """Return the two-sided amplitude spectrum of the whirl `v + i w` over signed `order`.
+
+    Positive spin turns vertical towards horizontal, so that lines at positive orders whirl forward, with the
+    spin, and those at negative orders backward. A circular orbit of radius `a` is one line of height `a`.
+    """
+    whirl = vertical + 1j * horizontal
+    n = whirl.sizes["sample"]
+    orders = np.fft.fftshift(np.fft.fftfreq(n, d=1 / samples_per_revolution(vertical)))
+    spectrum = _over_orders(whirl, _two_sided, orders)
+    spectrum.name = "whirl"
+    spectrum.attrs = {"units": vertical.attrs.get("units", "m"), "long_name": "whirl amplitude"}
+    return spectrum
+
+
+def spectrum_of(store: xr.Dataset, signal: str) -> xr.DataArray:
+    """Return the spectrum of a signal: the stored one, or else the stored waveform's; lazy.
+
+    Raises
+    ------
+    InputError
+        The signal is unknown, or the store keeps neither its spectrum nor its waveform.
+    """
+    check_signal(signal)
+    stored = f"spectrum_{signal}"
+    if stored in store:
+        return store[stored]
+    if signal in store:
+        return amplitude_spectrum(store[signal])
+    raise InputError(
+        f"{source(store)}: keeps neither {stored} nor the waveform {signal}; "
+        'run the study with "spectrum" in [record] keep'
+    )
+
+
+def spectrum_data(store: xr.Dataset, signal: str, over: str | None = None) -> xr.DataArray:
+    """Return the spectrum of a signal, or of the "whirl", with the coordinate `frequency` (Hz); lazy.
+
+    Of one case it is recomputed where the stored one splits a period: 64 revolutions hold 21 1/3 periods of a
+    motion that repeats every third, whose lines then fall between those stored and are drawn too low; the
+    last 63 put them right.
+
+    Parameters
+    ----------
+    store : Dataset
+        One case (and one stator, for a stator's signals), or cases along the axis `over`.
+    """
+    parts = ("vertical", "horizontal") if signal == "whirl" else (signal,)
+    if signal != "whirl":
+        check_signal(signal)
+    kept = [n for s in parts for n in (s, f"spectrum_{s}") if n in store]
+    if signal == "whirl":
+        need(store, parts)
+    spread = [find_axis(store, over)] if over else []
+    data = narrow(store, [*kept, "spin_speed", *(n for n in ("period",) if n in store)], spread)
+    waves = [_whole_periods(data[s], data.get("period")) for s in parts if s in data]
+    if signal == "whirl":
+        spectrum = full_spectrum(*waves)
+    elif waves and waves[0].sizes["sample"] < data[signal].sizes["sample"]:
+        spectrum = amplitude_spectrum(waves[0])
+    else:
+        spectrum = spectrum_of(data, signal)
+    return with_frequency(spectrum, data["spin_speed"].compute())
+
+
+def _whole_periods(waveform: xr.DataArray, period: xr.DataArray | None) -> xr.DataArray:
+    """Return the last revolutions that make whole periods; all where there is no period or not one case."""
+    n_period = int(period.values) if period is not None and period.ndim == 0 else 0
+    revolutions = round(waveform.sizes["sample"] / samples_per_revolution(waveform))
+    whole = revolutions // n_period * n_period if n_period > 0 else 0
+    return last_revolutions(waveform, whole) if whole else waveform
+
+
+def with_frequency(spectrum: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataArray:
+    """Return the spectrum with the coordinate `frequency` (Hz) of its orders at the spin speed (rad/s)."""
+    rate = spin_speed.astype(float) / (2 * math.pi)
+    frequency = (rate * spectrum["order"]).assign_attrs(units="Hz", long_name="frequency")
+    dims = [d for d in spectrum.dims if d in frequency.dims]
+    return spectrum.assign_coords(frequency=frequency.transpose(*dims))
+
+
+def check_signal(signal: str) -> None:
+    """Refuse a name that is no recorded signal."""
+    if signal not in SIGNAL_NAMES:
+        raise InputError(f"{signal}: no such signal; there are {', '.join(SIGNAL_NAMES)}")
+
+
+def _over_orders(waveform: xr.DataArray, function: Any, orders: NDArray[np.floating[Any]]) -> xr.DataArray:
+    spectrum: xr.DataArray = xr.apply_ufunc(
+        function,
+        waveform,
+        input_core_dims=[["sample"]],
+        output_core_dims=[["order"]],
+        dask="parallelized",
+        output_dtypes=[float],
+        dask_gufunc_kwargs={"output_sizes": {"order": orders.size}, "allow_rechunk": True},
+    )
+    return spectrum.assign_coords(
+        order=("order", orders, {"units": "1", "long_name": "order (multiples of the spin speed)"}),
+    )
+
+
+def _single_sided(waveform: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """(..., n_sample) -> (..., n_sample // 2 + 1), amplitudes."""
+    n = waveform.shape[-1]
+    lines = np.fft.rfft(waveform.astype(np.float64), axis=-1)
+    amplitude: NDArray[np.float64] = np.abs(lines) * (2 / n)
+    # The mean has no twin at a negative order, and neither has the last line of an even count.
+    amplitude[..., 0] /= 2
+    if n % 2 == 0:
+        amplitude[..., -1] /= 2
+    return amplitude
+
+
+def _two_sided(whirl: NDArray[np.complexfloating[Any, Any]]) -> NDArray[np.float64]:
+    """(..., n_sample) -> (..., n_sample), amplitudes from the lowest (backward) order to the highest."""
+    lines = np.fft.fftshift(np.fft.fft(whirl, axis=-1), axes=-1)
+    amplitude: NDArray[np.float64] = np.abs(lines) / whirl.shape[-1]
+    return amplitude

@@ -1,0 +1,151 @@
+"""Display of SI quantities: the prefix that suits the size, and axis labels with their unit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+# Units as a store spells them, as an axis does, and the prefixes that engineers put before them.
+_WRITTEN = {
+    "m": ("m", "mµn"),
+    "rad": ("rad", "mµn"),
+    "N": ("N", "kM"),
+    "N s": ("N s", "mµ"),
+    "J": ("J", "kmµ"),
+    "s": ("s", "mµ"),
+    "Pa": ("Pa", "GMk"),
+    "Hz": ("Hz", "kM"),
+    "kg": ("kg", ""),
+    "kg m-3": ("kg/m³", ""),
+    "kg/m^3": ("kg/m³", ""),
+    "m s-1": ("m/s", ""),
+    "rad s-1": ("rad/s", ""),
+    "rad/s": ("rad/s", ""),
+    "rad s-2": ("rad/s²", ""),
+    "N m-1": ("N/m", "MGk"),
+    "N/m": ("N/m", "MGk"),
+}
+_MICRO_UP_TO = 2e-3  # orbits stay in µm, and twists in µrad, a little beyond a thousand of them
+
+# What a quantity is called where there is no room for its long name, and its symbol in the paper.
+_SHORT = {
+    "vertical": "Vertical displacement",
+    "horizontal": "Horizontal displacement",
+    "torsion": "Torsion",
+    "torsion_acceleration": "Torsional acceleration",
+    "stator_axial": "Stator compression",
+    "stator_lateral": "Stator lateral deflection",
+    "contact_force": "Contact force",
+    "speed_ratio": "Speed ratio $r$",
+    "speed": "Spin speed",
+    "spin_speed": "Spin speed",
+    "clearance_ratio": "Clearance ratio $c_g$",
+    "clearance": "Clearance",
+    "friction": "Friction coefficient",
+    "stator_youngs_modulus": "Stator modulus $E_s$",
+    "frequency": "Frequency",
+    "order": "Order (multiples of spin speed)",
+    "revolution": "Revolution",
+    "time": "Time",
+    "wall_time": "Wall time",
+    "tip_deflection_ratio": "Tip deflection over length",
+    "force_over_euler_load": "Contact force over Euler load",
+    "peak_torsion": "Peak torsion",
+    "peak_to_peak_vertical": "Vertical peak to peak",
+    "peak_to_peak_horizontal": "Horizontal peak to peak",
+    "contact_duration": "Contact duration",
+    "contact_impulse": "Impulse per revolution",
+    "friction_work": "Friction work per revolution",
+    "minimum_slip_speed": "Lowest slip speed",
+    "period": "Period (revolutions)",
+    "regime": "Regime",
+    "status": "Status",
+}
+_SYMBOLS = {
+    "speed_ratio": "r",
+    "speed": r"\omega",
+    "spin_speed": r"\omega",
+    "clearance_ratio": "c_g",
+    "clearance": "g",
+    "friction": r"\mu",
+    "stator_youngs_modulus": "E_s",
+}
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How a unit is displayed: multiply by `factor`, write `unit`."""
+
+    factor: float
+    unit: str
+
+    def label(self, text: str) -> str:
+        """Return `text` with the unit in brackets; without a unit, `text`."""
+        return f"{text} ({self.unit})" if self.unit else text
+
+
+_SPEEDS = ("speed", "spin_speed")
+_RPM = Scale(60 / (2 * math.pi), "rpm")  # as speeds are read on a test bench
+
+
+def scale_for(unit: str, size: float) -> Scale:
+    """Return the scale in which a quantity of magnitude `size` (SI) reads between 1 and 1000."""
+    if unit in ("", "1", "dimensionless"):
+        return Scale(1.0, "")
+    written, prefixes = _WRITTEN.get(unit, (unit, ""))
+    if not math.isfinite(size) or size <= 0:
+        return Scale(1.0, written)
+    if "µ" in prefixes and 1e-6 <= size <= _MICRO_UP_TO and unit in ("m", "rad"):
+        return Scale(1e6, f"µ{written}")
+    # The largest prefix that leaves at least one whole unit; below the smallest prefix, the smallest.
+    offered = [(value, sign) for value, sign in _PREFIXES if sign == "" or sign in prefixes]
+    value, sign = next(
+        ((value, sign) for value, sign in offered if size >= value * (1 - 1e-9)),
+        offered[-1],
+    )
+    return Scale(1 / value, f"{sign}{written}")
+
+
+def scale_of(data: xr.DataArray, unit: str | None = None) -> Scale:
+    """Return the scale that suits the largest finite magnitude in `data`."""
+    values = np.abs(np.asarray(data.values, dtype=float))
+    finite = values[np.isfinite(values)]
+    size = float(finite.max()) if finite.size else 0.0
+    return scale_for(str(data.attrs.get("units", "1")) if unit is None else unit, size)
+
+
+def displayed(data: xr.DataArray) -> tuple[NDArray[np.float64], str]:
+    """Return the values in their display unit and the label of the axis they stand on."""
+    scale = _RPM if data.name in _SPEEDS else scale_of(data)
+    return np.asarray(data.values, dtype=float) * scale.factor, scale.label(short_name(data))
+
+
+def short_name(data: xr.DataArray) -> str:
+    """Return a name of the quantity that fits an axis at column width."""
+    name = str(data.name).removeprefix("spectrum_").removeprefix("section_")
+    text = _SHORT.get(name) or str(data.attrs.get("long_name", name.replace("_", " ")))
+    return text[:1].upper() + text[1:]
+
+
+def written_value(coordinate: xr.DataArray) -> str:
+    """Write one setting as a caption does: `$r$ = 1.7`, `$g$ = 84 µm`."""
+    name, value = str(coordinate.name), float(coordinate.values)
+    scale = _RPM if name in _SPEEDS else scale_for(str(coordinate.attrs.get("units", "1")), abs(value))
+    symbol = f"${_SYMBOLS[name]}$" if name in _SYMBOLS else name.replace("_", " ")
+    return f"{symbol} = {value * scale.factor:.4g} {scale.unit}".rstrip()
+
+
+def caption(data: xr.DataArray | xr.Dataset) -> str:
+    """Return the settings that hold for all of `data`: its scalar coordinates."""
+    scalars = [c for c in data.coords.values() if c.ndim == 0 and c.dtype.kind in "fiu"]
+    known = list(_SYMBOLS)
+    scalars.sort(key=lambda c: (known.index(c.name) if c.name in known else len(known), str(c.name)))
+    return ", ".join(written_value(c) for c in scalars)
