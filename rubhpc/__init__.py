@@ -1,0 +1,80 @@
+"""Parallel parameter studies of rotor-stator rub.
+
+`rubhpc.simulate` computes one case, `rubhpc.run` a study, `rubhpc.open` opens a store as a lazy dataset.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from postproc.load import open_store as open
+    from rubhpc.driver import Summary, run
+    from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
+    from rubhpc.record import Record, State
+    from rubhpc.rig import Rig, read_rig
+    from rubhpc.simulate import simulate
+    from rubhpc.study import Study, read_study
+
+__version__ = "0.1.0"
+__all__ = [
+    "InputError",
+    "Record",
+    "Rig",
+    "RubError",
+    "State",
+    "StoppedEarly",
+    "StoreError",
+    "Study",
+    "Summary",
+    "open",
+    "read_rig",
+    "read_study",
+    "run",
+    "simulate",
+]
+
+# Where each name comes from; it is imported when it is first asked for, so that `import rubhpc` takes no time.
+_HOMES = {
+    "InputError": "rubhpc.errors:InputError",
+    "Record": "rubhpc.record:Record",
+    "Rig": "rubhpc.rig:Rig",
+    "RubError": "rubhpc.errors:RubError",
+    "State": "rubhpc.record:State",
+    "StoppedEarly": "rubhpc.errors:StoppedEarly",
+    "StoreError": "rubhpc.errors:StoreError",
+    "Study": "rubhpc.study:Study",
+    "Summary": "rubhpc.driver:Summary",
+    "open": "postproc.load:open_store",
+    "read_rig": "rubhpc.rig:read_rig",
+    "read_study": "rubhpc.study:read_study",
+    "run": "rubhpc.driver:run",
+    "simulate": "rubhpc.simulate:simulate",
+}
+
+
+class _Package(ModuleType):
+    """The package; its function `simulate` is not hidden by the module of the same name once that is imported."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        is_module = isinstance(value, ModuleType)
+        super().__setattr__(name, value.simulate if is_module and name == "simulate" else value)
+
+
+sys.modules[__name__].__class__ = _Package
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, _, attribute = _HOMES[name].partition(":")
+    value = getattr(import_module(module), attribute)
+    setattr(sys.modules[__name__], name, value)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,135 @@
+"""The commands: each reads arguments, calls one library function, prints, and returns an exit code.
+
+Nothing heavy is imported before a command needs it: `rubhpc --help` names all commands without loading any.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import sys
+from importlib import import_module
+
+import click
+
+from rubhpc import __version__
+from rubhpc.errors import RubError
+from rubhpc.launch import launch
+
+_STOPPED = 75
+# One thread a rank: BLAS and numba would each start as many as the machine has cores. Their reductions would also
+# depend on the number of threads, and so would the last bit of a result.
+_THREADS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+)
+
+# name -> (where it is, what it does); --help shows them in this order.
+COMMANDS = {
+    "run": ("rubhpc.cli_run:run", "Run a study, or what is left of it (run may be left out)."),
+    "plan": ("rubhpc.cli_run:plan", "Cases, bytes, files, core-hours; what is done, failed, missing."),
+    "status": ("rubhpc.cli_run:status", "Progress and failures; works while a run is on."),
+    "verify": ("rubhpc.cli_run:verify", "Check every stored case against its checksum."),
+    "modes": (
+        "rubhpc.cli_modes:modes",
+        "Natural frequencies, damping ratios and whirl of a rig; Campbell diagram.",
+    ),
+    "cascade": ("rubhpc.cli_figures:cascade", "Spectrum cascade along an axis."),
+    "map": ("rubhpc.cli_figures:map", "A scalar over two axes."),
+    "orbit": ("rubhpc.cli_figures:orbit", "Orbit of the disc."),
+    "spectrum": ("rubhpc.cli_figures:spectrum", "Amplitude spectrum of a signal."),
+    "waveform": ("rubhpc.cli_figures:waveform", "Signals over the revolutions."),
+    "section": ("rubhpc.cli_figures:section", "Poincaré section, or bifurcation diagram along an axis."),
+    "hht": ("rubhpc.cli_figures:hht", "Hilbert-Huang spectrum of a signal."),
+    "export": ("rubhpc.cli_figures:export", "HDF5 of chosen cases."),
+}
+
+
+class _Commands(click.Group):
+    """A group whose commands are imported when called; what names no command is a study to be run."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module, _, name = COMMANDS[cmd_name][0].partition(":")
+        found = getattr(import_module(module), name, None)
+        if found is None:
+            found = next(command for command in import_module(module).COMMANDS if command.name == cmd_name)
+        command: click.Command = found
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args and args[0] not in COMMANDS and args[0] not in ("--help", "-h", "--version"):
+            _refuse_slip(args[0])
+            args = ["run", *args]
+        return super().parse_args(ctx, args)
+
+
+def _refuse_slip(word: str) -> None:
+    """Tell a mistyped command from a study that is not there."""
+    near = difflib.get_close_matches(word, COMMANDS, n=1)
+    if near and "." not in word and not os.path.exists(word):
+        raise click.UsageError(f"{word}: no such command or study; did you mean {near[0]}?")
+
+
+@click.group(
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    options_metavar="",
+    subcommand_metavar="STUDY.toml | COMMAND [ARGS]...",
+)
+@click.version_option(__version__, prog_name="rubhpc", message="%(prog)s %(version)s")
+def commands() -> None:
+    """Run parameter studies of rotor-stator rub, and look at what they yield.
+
+    `mpirun -n N rubhpc STUDY.toml` runs a study on N ranks; the same command goes on after a stop.
+
+    Exit codes: 0 complete; 1 finished, some cases failed; 2 bad input; 3 store cannot be used; 75 stopped early.
+    """
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the command line and exit with its code."""
+    for name in _THREADS:
+        os.environ[name] = "1"
+    try:
+        code = commands.main(args, prog_name="rubhpc", standalone_mode=False)
+    except RubError as error:
+        code = _tell(str(error), error.exit_code)
+    except click.ClickException as error:
+        code = _tell(_one_line(error), 2)
+    except (KeyboardInterrupt, click.Abort):
+        code = _tell("interrupted; run the same command again", _STOPPED)
+    except BrokenPipeError:  # the reader, `head` say, has had enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 0
+    except Exception as error:
+        from rubhpc.crash import crash
+
+        crashed = crash(error)
+        code = _tell(str(crashed), crashed.exit_code)
+    sys.exit(code)
+
+
+def _tell(text: str, code: int) -> int:
+    """Print an error in one line, on the first rank only."""
+    if launch().rank == 0:
+        print(f"rubhpc: {' '.join(text.split())}", file=sys.stderr)
+    return code
+
+
+def _one_line(error: click.ClickException) -> str:
+    text = error.format_message()
+    if isinstance(error, click.UsageError) and error.ctx is not None:
+        text = f"{text.rstrip('.')}; see {error.ctx.command_path} --help"
+    return text

@@ -1,0 +1,65 @@
+"""Files that are whole or absent, and operating system errors in one line."""
+
+from __future__ import annotations
+
+import errno
+import os
+import uuid
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rubhpc.errors import StoreError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+_MEND = {
+    errno.ENOSPC: "the disk is full; free some space and run the same command again",
+    errno.EDQUOT: "the disk quota is used up; free some space and run the same command again",
+    errno.EFBIG: "the file size limit is reached; raise it (ulimit -f) and run the same command again",
+    errno.EROFS: "the file system is read-only; choose another place with --output",
+    errno.EACCES: "permission denied; mend the permissions or choose another place with --output",
+    errno.EPERM: "not permitted; mend the permissions or choose another place with --output",
+    errno.ENOTDIR: "its parent is not a directory; choose another place with --output",
+    errno.EIO: "the disk reports an input/output error; verify the store once it is mended",
+}
+
+
+@contextmanager
+def disk_errors(place: Path) -> Iterator[None]:
+    """Turn an OSError met while working on `place` into a StoreError that names the mend.
+
+    Raises
+    ------
+    StoreError
+        The disk is full or read-only, permission is missing, or the like.
+    """
+    try:
+        yield
+    except OSError as error:
+        text = _MEND.get(error.errno or 0) or str(error.strerror or error).lower()
+        raise StoreError(f"{place}: {text}") from error
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Put `data` in `path` such that a reader, or the next run after a crash, finds all of it or the old."""
+    partial = path.with_name(f"{path.name}.{uuid.uuid4().hex}.partial")
+    try:
+        with partial.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+    except OSError:
+        partial.unlink(missing_ok=True)
+        raise
+
+
+def flush_to_disk(path: Path) -> None:
+    """Return once the file's content is on the disk, so that what is journalled later vouches for it."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,291 @@
+"""Runs a study: study x store x pool, from the first look at the store to the last packed array."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.case import run_case
+from rubhpc.crash import crash
+from rubhpc.disk import disk_errors
+from rubhpc.errors import RubError, StoppedEarly
+from rubhpc.journal import Ledger, count, next_run
+from rubhpc.manifest import PRIVATE
+from rubhpc.pool import Pool, Tally, connect
+from rubhpc.prepare import prepare
+from rubhpc.progress import Progress, duration
+from rubhpc.resume import bring_up_to_date, find_gone, missing_share, open_store, sweep_for
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
+from rubhpc.stopping import Stopped, Stopping
+from rubhpc.store import Store
+from rubhpc.study import Study, read_study
+from rubhpc.sweep import Sweep
+from rubhpc.worker import Worker
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.sweep import Block
+
+_REASONS = 100  # failed cases a summary names, at most
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """How a run ended.
+
+    Attributes
+    ----------
+    counts : tuple of int
+        Cases of the whole study that are missing, done, failed and diverged, in this order.
+    computed : int
+        Cases this run computed.
+    reasons : tuple of (str, str)
+        Coordinates and reason of each failed case, the first hundred.
+    """
+
+    store: Path
+    counts: tuple[int, ...]
+    computed: int
+    seconds: float
+    reasons: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def exit_code(self) -> int:
+        """0 where every case has a result (a diverged one is a result), 1 where some failed."""
+        return 1 if self.counts[FAILED] else 0
+
+    def text(self) -> str:
+        """The summary in a line."""
+        told = ", ".join(
+            f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING) if self.counts[i]
+        )
+        return f"{self.store}: {told}; {self.computed} computed in {duration(self.seconds)}"
+
+    def complaint(self) -> str:
+        """What failed, in a line with the mend."""
+        case, reason = self.reasons[0]
+        rest = f"; {self.counts[MISSING]} were not computed (--max-failures)" if self.counts[MISSING] else ""
+        return (
+            f"{self.store}: {self.counts[FAILED]} of {sum(self.counts)} cases failed{rest}; the first, {case}: {reason}; "
+            "rubhpc status lists them, --retry-failed computes them anew"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Job:
+    """What the first rank tells the others; `pending` are positions in Sweep.blocks() that lack a case."""
+
+    study: Study
+    chunk: tuple[int, ...]
+    run: int
+    ledger: Ledger
+    missing: NDArray[np.bool_]
+    pending: NDArray[np.int64]
+
+
+def run(
+    study: Study | str | os.PathLike[str],
+    *,
+    output: str | os.PathLike[str] | None = None,
+    retry_failed: bool = False,
+    max_failures: int | None = None,
+    time_limit: float | None = None,
+    quiet: bool = False,
+    stopping: Stopping | None = None,
+) -> Summary:
+    """Run a study, or what is left of it, on this process or on all MPI ranks it is called on.
+
+    Parameters
+    ----------
+    study : Study or path
+        What to run; a path is read on the first rank.
+    output : path, optional
+        The store, instead of the study's.
+    retry_failed : bool
+        Compute the cases anew that have failed before.
+    max_failures : int, optional
+        Stop when more cases than this have failed in this run; overrides the study's.
+    time_limit : float, optional
+        Stop after so many seconds; overrides the study's.
+    quiet : bool
+        Print no progress.
+    stopping : Stopping, optional
+        Signals that are being answered already.
+
+    Returns
+    -------
+    Summary
+
+    Raises
+    ------
+    InputError
+        The study cannot be run as it stands.
+    StoreError
+        The store belongs to another study, is in use, or cannot be written.
+    StoppedEarly
+        A signal, the file STOP or the time limit came before the end.
+    """
+    limits = {"max_failures": max_failures, "time_limit": time_limit}
+
+    def resolve() -> Study:
+        found = study if isinstance(study, Study) else read_study(Path(study))
+        set_limits = {key: value for key, value in limits.items() if value is not None}
+        return replace(
+            found,
+            run=replace(found.run, **set_limits),
+            output=found.output if output is None else Path(output),
+        )
+
+    pool = connect()
+    resolved: Study | None = None
+    try:
+        with stopping or Stopping() as watch, ExitStack() as held:
+            resolved = pool.from_first(resolve)
+            summary = _run(resolved, pool, watch, held, retry_failed=retry_failed, quiet=quiet)
+    except RubError:  # raised on all ranks alike
+        pool.close()
+        raise
+    except Exception as error:
+        crashed = crash(error, resolved.output / PRIVATE / "logs" if resolved else None)
+        if pool.size > 1:  # the others wait for this rank
+            print(f"rubhpc: {crashed}", file=sys.stderr)
+            pool.abort(crashed.exit_code)
+        raise crashed from error
+    pool.close()
+    return summary
+
+
+def _run(
+    study: Study, pool: Pool, stopping: Stopping, held: ExitStack, *, retry_failed: bool, quiet: bool
+) -> Summary:
+    began = time.monotonic()
+    stopping.watch(study.output / "STOP", study.run.time_limit)
+    job = pool.from_first(lambda: _prepare(study, stopping, held, retry_failed=retry_failed))
+    error = _compute(job, pool, stopping, quiet=quiet)
+    for other in pool.gather(error):
+        if other is not None:
+            raise other
+    reason = next((told for told in pool.gather(stopping.verdict) if told), "")
+    summary = pool.from_first(lambda: _finish(job, pool.sums().n_case, time.monotonic() - began))
+    n_missing = summary.counts[MISSING]
+    if n_missing and reason:
+        raise StoppedEarly(
+            f"{summary.store}: stopped by {reason} with {n_missing} of {sum(summary.counts)} cases missing; "
+            "run the same command again"
+        )
+    return summary
+
+
+def _prepare(study: Study, stopping: Stopping, held: ExitStack, *, retry_failed: bool) -> _Job:
+    """Find or make the store, lock it, see what is missing, and compile the kernels: the first rank's part."""
+    sweep = sweep_for(study)
+    store = open_store(sweep)
+    with disk_errors(study.output):
+        held.enter_context(store.lock(on_loss=lambda: stopping.ask("the loss of its lock")))
+    bring_up_to_date(store, sweep)
+    ledger = store.replay(with_metrics=False)
+    run = next_run(store.journal_directory)
+    gone = find_gone(store, sweep, ledger)
+    store.take_back(ledger, gone, run, "gone")
+    missing = ledger.status == MISSING
+    if retry_failed:
+        missing |= ledger.status == FAILED
+    blocks = sweep.blocks()
+    grid = missing.reshape(sweep.shape)
+    pending = [i for i, block in enumerate(blocks) if missing_share(block, grid)]
+    if pending:
+        _warm_up(sweep, blocks[pending[-1]], stopping)
+    return _Job(
+        study=study,
+        chunk=sweep.chunk,
+        run=run,
+        ledger=ledger,
+        missing=missing,
+        pending=np.array(pending, dtype=np.int64),
+    )
+
+
+def _warm_up(sweep: Sweep, block: Block, stopping: Stopping) -> None:
+    """Compile every kernel once, on two revolutions: ranks that compile into one cache at once have crashed."""
+
+    def check() -> None:
+        if stopping.look():
+            raise Stopped
+
+    study = sweep.study
+    with suppress(Exception):  # what is wrong with this case will be its reason to fail
+        case = sweep.cases(block)[0]
+        setup = prepare(
+            case.rig,
+            case.speed,
+            contact=study.contact,
+            integrator=study.integrator,
+            samples_per_revolution=study.recording.samples_per_revolution,
+        )
+        short = replace(study.recording, transient=1, revolutions=1)
+        run_case(setup, clearance=case.clearance, friction=case.friction, recording=short, check=check)
+
+
+def _compute(job: _Job, pool: Pool, stopping: Stopping, *, quiet: bool) -> RubError | None:
+    """Compute blocks until there are none left; what keeps this rank from its store, to be told to all."""
+    limit = job.study.run.max_failures
+    n_missing = int(job.missing.sum())
+    try:
+        sweep = Sweep(job.study, chunk=job.chunk)
+        store = Store(job.study.output)
+        blocks = sweep.blocks()
+        grid = job.missing.reshape(sweep.shape)
+        cost = sum(blocks[i].cost * missing_share(blocks[i], grid) for i in job.pending)
+        with (
+            store.journal(job.run, f"rank{pool.rank:05d}") as journal,
+            Progress(
+                len(job.missing), cost, n_done=len(job.missing) - n_missing, quiet=quiet or pool.rank > 0
+            ) as progress,
+        ):
+
+            def attend() -> None:
+                if pool.rank == 0:
+                    progress.update(pool.sums())
+
+            worker = Worker(sweep, store, job.ledger, job.missing, journal, stopping, pool.add, attend)
+            while not stopping.look():
+                sums = pool.claim()
+                if (
+                    sums.claimed >= len(job.pending)
+                    or sums.stop
+                    or (limit is not None and sums.failed > limit)
+                ):
+                    break
+                worker.work(blocks[job.pending[sums.claimed]])
+                attend()
+    except RubError as error:
+        pool.add(Tally(stop=1))
+        return error
+    if stopping.reason:
+        pool.add(Tally(stop=1))
+    return None
+
+
+def _finish(job: _Job, computed: int, seconds: float) -> Summary:
+    """Pack what the journals tell, and count it: the first rank's part."""
+    store = Store(job.study.output)
+    ledger = store.replay()
+    store.pack(ledger)
+    with disk_errors(store.path):
+        (store.path / "STOP").unlink(missing_ok=True)
+    failed = np.flatnonzero(ledger.status == FAILED)[:_REASONS].tolist()
+    return Summary(
+        store=store.path,
+        counts=count(ledger.status),
+        computed=computed,
+        seconds=seconds,
+        reasons=tuple((store.manifest.name_case(i), ledger.reasons.get(i, "")) for i in failed),
+    )

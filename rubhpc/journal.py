@@ -1,0 +1,267 @@
+"""What has been computed: append-only journals, one a run and rank, one line a case.
+
+A line is `crc flat id status checksum metrics reason`: the CRC-32 of the rest of the line, the case's flat index in
+the grid of the file's header, its id, its status, the CRC-32 of its stored arrays, its metrics (base64 of one packed
+record, so that floats keep every bit; `-` where there are none) and the reason of a failure (JSON, `-` where none).
+The header is `crc {json}`. A later run's line overrides an earlier one's; a line with status 0 takes a case back.
+"""
+
+from __future__ import annotations
+
+import binascii
+import json
+import os
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Self
+from zlib import crc32
+
+import numpy as np
+
+from rubhpc.schema import STATUS, VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+    from types import TracebackType
+
+    from numpy.typing import NDArray
+
+_FORMAT = 1
+_NAME = re.compile(r"run(\d{6})-(\w+)\.journal")
+METRICS = tuple(v for v in VARIABLES.values() if v.role == "scalar" or v.name == "regime")
+
+
+def metrics_type(n_stator: int) -> np.dtype[np.void]:
+    """Packed record of a case's metrics, in the order of the schema; per stator where the schema says so."""
+    return np.dtype(
+        [
+            (v.name, np.dtype(v.dtype).newbyteorder("<"), (n_stator,) if "stator" in v.dims else ())
+            for v in METRICS
+        ]
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One case as the journal tells it; `checksum` is the CRC-32 of its stored arrays."""
+
+    flat: int
+    id: str
+    status: int
+    checksum: int = 0
+    metrics: bytes = b""
+    reason: str = ""
+
+    def line(self) -> bytes:
+        """The entry as a line of the journal, its own checksum first."""
+        metrics = binascii.b2a_base64(self.metrics, newline=False) if self.metrics else b"-"
+        reason = json.dumps(self.reason).encode() if self.reason else b"-"
+        text = b"%d %s %d %08x %s %s" % (
+            self.flat,
+            self.id.encode(),
+            self.status,
+            self.checksum,
+            metrics,
+            reason,
+        )
+        return b"%08x %s\n" % (crc32(text), text)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Header:
+    """What a journal's lines refer to: the study's identity, the grid and the record of metrics."""
+
+    identity: str
+    shape: tuple[int, ...]
+    n_stator: int
+
+    def line(self) -> bytes:
+        """The header as the first line of a journal."""
+        text = json.dumps(
+            {
+                "format": _FORMAT,
+                "identity": self.identity,
+                "shape": list(self.shape),
+                "metrics": _layout(self.n_stator),
+            }
+        ).encode()
+        return b"%08x %s\n" % (crc32(text), text)
+
+
+def _layout(n_stator: int) -> list[Any]:
+    return [[v.name, v.dtype, n_stator if "stator" in v.dims else 0] for v in METRICS]
+
+
+class Journal:
+    """A run's and rank's own journal, opened for appending; made when its first entries come."""
+
+    def __init__(self, directory: Path, run: int, writer: str, header: Header) -> None:
+        self.path = directory / f"run{run:06d}-{writer}.journal"
+        self._header = header
+        self._handle: int | None = None
+
+    def write(self, entries: Iterable[Entry]) -> None:
+        """Append the entries and return once they are on the disk."""
+        data = b"".join(entry.line() for entry in entries)
+        if self._handle is None:
+            self._handle = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o666)
+            data = self._header.line() + data
+        view = memoryview(data)
+        while view:
+            view = view[os.write(self._handle, view) :]
+        os.fsync(self._handle)
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+@dataclass(kw_only=True)
+class Ledger:
+    """What the journals say of every case of a grid.
+
+    Attributes
+    ----------
+    status : (n_case,) int8
+        As in the schema; MISSING where no valid line stands.
+    checksum : (n_case,) uint32
+        CRC-32 of the stored arrays of each case.
+    ids : (n_case,) bytes
+        Id under which each case was journalled.
+    metrics : (n_case,) record or None
+        Metrics of the cases that have any; None where the replay was asked to leave them out.
+    reasons : dict
+        Flat index -> why a case failed or diverged.
+    torn : int
+        Lines that were passed over because they are damaged or cut short.
+    torn_cases : set
+        Flat indices that can still be read in such lines.
+    n_recent : int
+        Lines of the latest run.
+    """
+
+    status: NDArray[np.int8]
+    checksum: NDArray[np.uint32]
+    ids: NDArray[np.bytes_]
+    metrics: NDArray[np.void] | None
+    reasons: dict[int, str] = field(default_factory=dict)
+    torn: int = 0
+    torn_cases: set[int] = field(default_factory=set)
+    n_recent: int = 0
+
+
+def count(status: NDArray[np.int8]) -> tuple[int, ...]:
+    """Cases of each status, in the order of the schema."""
+    return tuple(np.bincount(status, minlength=len(STATUS)).tolist())
+
+
+def journals(directory: Path) -> list[Path]:
+    """The journals in the order in which they count."""
+    return sorted(path for path in directory.glob("*.journal") if _NAME.fullmatch(path.name))
+
+
+def next_run(directory: Path) -> int:
+    """Number of the run that starts now: one more than the highest that left a journal."""
+    numbers = [int(found[1]) for path in directory.glob("*.journal") if (found := _NAME.fullmatch(path.name))]
+    return max(numbers, default=0) + 1
+
+
+def replay(directory: Path, header: Header, *, with_metrics: bool = True) -> Ledger:
+    """Read every journal in turn; damaged lines and journals of other identities are passed over.
+
+    A journal written for a smaller grid is taken over: axes only ever grow at their ends.
+    """
+    n_case = int(np.prod(header.shape, dtype=np.int64))
+    dtype = metrics_type(header.n_stator)
+    metrics = np.zeros(n_case, dtype) if with_metrics else None
+    ledger = Ledger(
+        status=np.zeros(n_case, np.int8),
+        checksum=np.zeros(n_case, np.uint32),
+        ids=np.zeros(n_case, "S32"),
+        metrics=metrics,
+    )
+    paths = journals(directory)
+    for path in paths:
+        n_line = _replay_file(path, header, ledger)
+        if path.name[:9] == paths[-1].name[:9]:
+            ledger.n_recent += n_line
+    return ledger
+
+
+def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
+    """Take a journal's lines over into the ledger; how many there were."""
+    n_case = len(ledger.status)
+    status, checksum, ids, reasons = ledger.status, ledger.checksum, ledger.ids, ledger.reasons
+    size = ledger.metrics.dtype.itemsize if ledger.metrics is not None else 0
+    store = memoryview(ledger.metrics.view(np.uint8)) if ledger.metrics is not None and n_case else None
+    with path.open("rb") as file:
+        places = _places(file.readline(), header)
+        if places is None:
+            ledger.torn += 1
+        if not isinstance(places, list):
+            return 0
+        n_line = 0
+        for line in file:
+            text = line[9:-1]
+            if line[:8] != b"%08x" % crc32(text) or line[-1:] != b"\n":
+                ledger.torn += 1
+                ledger.torn_cases |= _still_legible(text, places, n_case)
+                continue
+            n_line += 1
+            number, case_id, state, check, packed, reason = text.split(b" ", 5)
+            flat = int(number)
+            if places:
+                flat = places[flat]
+            status[flat] = int(state)
+            checksum[flat] = int(check, 16)
+            ids[flat] = case_id
+            if store is not None and packed != b"-":
+                store[flat * size : (flat + 1) * size] = binascii.a2b_base64(packed)
+            if reason != b"-":
+                reasons[flat] = json.loads(reason)
+            elif reasons:
+                reasons.pop(flat, None)
+    return n_line
+
+
+def _still_legible(text: bytes, places: list[int], n_case: int) -> set[int]:
+    """The flat index of a damaged line, if it can be read."""
+    number, *rest = text.split(b" ", 2)
+    if len(rest) < 2 or not number.isdigit() or int(number) >= (len(places) or n_case):
+        return set()
+    return {places[int(number)] if places else int(number)}
+
+
+def _places(first: bytes, header: Header) -> list[int] | str | None:
+    """Where a journal's flat indices lie in the present grid: [] for as they are, a text why it does not count.
+
+    None for a header that is torn.
+    """
+    text = first[9:-1]
+    if first[:8] != b"%08x" % crc32(text):
+        return None
+    told = json.loads(text)
+    shape = tuple(told["shape"])
+    if told["format"] != _FORMAT or told["identity"] != header.identity:
+        return "of another study"
+    if told["metrics"] != _layout(header.n_stator):
+        return "of another version"
+    if shape == header.shape:
+        return []
+    if len(shape) != len(header.shape) or any(a > b for a, b in zip(shape, header.shape, strict=True)):
+        return "of another grid"
+    corner = tuple(slice(n) for n in shape)
+    grid = np.arange(int(np.prod(header.shape, dtype=np.int64))).reshape(header.shape)
+    flats: list[int] = grid[corner].ravel().tolist()
+    return flats

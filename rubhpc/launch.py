@@ -1,0 +1,44 @@
+"""What a launcher such as mpirun or srun told this process; read from the environment, without MPI."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from typing import NamedTuple
+
+# Rank and number of ranks. Slurm's own count comes last: inside `mpirun` it tells of the launcher's daemons.
+_VARIABLES = (
+    ("PMI_RANK", "PMI_SIZE"),
+    ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"),
+    ("SLURM_PROCID", "SLURM_STEP_NUM_TASKS"),
+)
+_LOOK = 0.5  # s between looks at whether the launcher still lives
+_ORPHANED = 75  # exit code of a rank whose launcher is gone: run the same command again
+
+
+class Launch(NamedTuple):
+    """The place a launcher gave this process."""
+
+    rank: int
+    size: int
+
+
+def launch() -> Launch:
+    """What the environment says; (0, 1) without a launcher."""
+    for rank, size in _VARIABLES:
+        if os.environ.get(rank, "").isdigit() and os.environ.get(size, "").isdigit():
+            return Launch(int(os.environ[rank]), int(os.environ[size]))
+    return Launch(0, 1)
+
+
+def end_with_launcher() -> None:
+    """End this process soon after its launcher has died, however deep in a kernel or in MPI it is."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_LOOK)
+        os._exit(_ORPHANED)
+
+    threading.Thread(target=watch, name="launcher watch", daemon=True).start()

@@ -1,0 +1,181 @@
+"""One run at a time on a store: an exclusive lock that tells who holds it and is reclaimed when its holder is dead.
+
+The lock is a file that comes into being whole (a hard link of a finished one). Its holder touches it every few
+seconds. On the holder's own host a dead process gives it away; elsewhere, a heartbeat that has stopped.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import socket
+import threading
+import time
+import uuid
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+from rubhpc.errors import StoreError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import TracebackType
+
+HEARTBEAT = 10.0  # s between touches of the lock
+STALE_AFTER = (
+    180.0  # s without a heartbeat, for holders on other hosts; network file systems cache for a minute
+)
+ORPHAN_PATIENCE = 15.0  # s to wait for a holder whose launcher is gone: it is about to stop
+
+
+@dataclass(frozen=True)
+class Holder:
+    """The process that holds a lock; `born` and `parent` tell it from a later one with the same number."""
+
+    host: str
+    pid: int
+    born: str
+    parent: int
+    since: float
+    token: str
+
+    @classmethod
+    def myself(cls) -> Self:
+        """This process."""
+        pid = os.getpid()
+        state = process_state(pid)
+        return cls(
+            host=socket.gethostname(),
+            pid=pid,
+            born=state[2] if state else "",
+            parent=os.getppid(),
+            since=time.time(),
+            token=uuid.uuid4().hex,
+        )
+
+
+def process_state(pid: int) -> tuple[str, int, str] | None:
+    """State letter, parent and birth (clock ticks after boot) of a process on this host; None: no such process."""
+    try:
+        text = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        # Without a /proc only existence can be asked for.
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return None
+        except PermissionError:
+            pass
+        return None if Path("/proc/self/stat").exists() else ("R", 0, "")
+    fields = text.rpartition(")")[2].split()  # the name before it may hold blanks
+    return fields[0], int(fields[1]), fields[19]
+
+
+def read_holder(path: Path) -> Holder | None:
+    """Who holds the lock at `path`; None where nobody does."""
+    try:
+        return Holder(**json.loads(path.read_text()))
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def heartbeat_age(path: Path) -> float:
+    """Seconds since the last heartbeat, by the file system's own clock, for hosts' clocks differ."""
+    probe = path.with_name(f"{path.name}.{uuid.uuid4().hex}.probe")
+    try:
+        probe.touch()
+        return probe.stat().st_mtime - path.stat().st_mtime
+    finally:
+        probe.unlink(missing_ok=True)
+
+
+def is_alive(holder: Holder, path: Path) -> bool:
+    """Whether the holder of the lock at `path` still runs, as far as can be seen from here."""
+    if holder.host != socket.gethostname():
+        return heartbeat_age(path) < STALE_AFTER
+    state = process_state(holder.pid)
+    return state is not None and state[0] not in "ZX" and state[2] == holder.born
+
+
+def _is_orphan(holder: Holder) -> bool:
+    """Whether the holder, on this host, has lost the launcher that started it."""
+    state = process_state(holder.pid) if holder.host == socket.gethostname() else None
+    return state is not None and state[1] != holder.parent
+
+
+class Lock:
+    """Exclusive use of a store, as a context; `on_loss` is called if another run has taken it over."""
+
+    def __init__(self, path: Path, on_loss: Callable[[], None] = lambda: None) -> None:
+        self.path = path
+        self._on_loss = on_loss
+        self._me = Holder.myself()
+        self._ended = threading.Event()
+        self._heart = threading.Thread(target=self._beat, name="lock heartbeat", daemon=True)
+
+    def __enter__(self) -> Self:
+        deadline = time.monotonic() + ORPHAN_PATIENCE
+        while not self._try():
+            holder = read_holder(self.path)
+            if holder is None:  # it has just ended
+                continue
+            if not _is_orphan(holder) or time.monotonic() > deadline:
+                raise StoreError(
+                    f"{self.path.parent.parent}: in use by process {holder.pid} on {holder.host} since "
+                    f"{time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(holder.since))}; wait for it or stop it"
+                )
+            time.sleep(0.1)
+        self._heart.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ended.set()
+        self._heart.join()
+        if self._is_mine():
+            with suppress(
+                OSError
+            ):  # on a disk gone read-only the lock stays, and is stale once this process ends
+                self.path.unlink()
+
+    def _is_mine(self) -> bool:
+        holder = read_holder(self.path)
+        return holder is not None and holder.token == self._me.token
+
+    def _try(self) -> bool:
+        """Take the lock if it is free or stale."""
+        ready = self.path.with_name(f"{self.path.name}.{self._me.token}")
+        with _guard(self.path):
+            holder = read_holder(self.path)
+            if holder is not None and is_alive(holder, self.path):
+                return False
+            try:
+                ready.write_text(json.dumps(asdict(self._me)))
+                self.path.unlink(missing_ok=True)
+                os.link(ready, self.path)
+            except FileExistsError:  # taken between the look and the link
+                return False
+            finally:
+                ready.unlink(missing_ok=True)
+        return True
+
+    def _beat(self) -> None:
+        while not self._ended.wait(HEARTBEAT):
+            if not self._is_mine():
+                self._on_loss()
+                return
+            with suppress(OSError):  # a full disk still takes a touch; anything else shows at the next write
+                os.utime(self.path)
+
+
+@contextmanager
+def _guard(path: Path) -> Iterator[None]:
+    """Keep two runs on one host from reclaiming the same stale lock at once, where the file system can."""
+    with path.with_name(f"{path.name}.guard").open("w") as file:
+        with suppress(OSError):  # no flock on this file system
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield

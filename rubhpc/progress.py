@@ -1,0 +1,85 @@
+"""How far a run is: a bar on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from rich.progress import Progress as Bar
+
+    from rubhpc.pool import Tally
+
+_REDRAW = 0.2  # s between redraws of the bar
+_FIRST_LINE, _LONGEST_GAP = 10.0, 300.0  # s between lines: they grow rarer as a run grows long
+
+
+class Progress:
+    """Tells how many cases have ended, how fast, and when the rest will have; silent where `quiet`."""
+
+    def __init__(self, n_case: int, cost: int, *, n_done: int, quiet: bool) -> None:
+        self._n_case, self._cost, self._n_done, self._quiet = n_case, max(cost, 1), n_done, quiet
+        self._began = self._told = time.monotonic()
+        self._gap = _FIRST_LINE
+        self._bar: Bar | None = None
+
+    def __enter__(self) -> Self:
+        if not self._quiet and sys.stdout.isatty():
+            from rich import progress
+
+            self._bar = progress.Progress(
+                progress.TextColumn("{task.completed:.0f}/{task.total:.0f} cases"),
+                progress.BarColumn(bar_width=None),
+                progress.TextColumn("{task.fields[rest]}"),
+            )
+            self._bar.start()
+            self._bar.add_task("", total=self._n_case, completed=self._n_done, rest="")
+        elif not self._quiet and self._n_done < self._n_case:
+            print(f"{self._n_done}/{self._n_case} cases are there; computing the rest", flush=True)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def update(self, sums: Tally) -> None:
+        """Show the sums of all ranks, unless that was done a moment ago."""
+        now = time.monotonic()
+        if self._quiet or now - self._told < (self._gap if self._bar is None else _REDRAW):
+            return
+        self._told = now
+        n_ended = self._n_done + sums.n_case
+        if self._bar is None:
+            print(f"{n_ended}/{self._n_case} cases; {self._rest(sums)}", flush=True)
+            self._gap = min(max(self._gap, 0.1 * (now - self._began)), _LONGEST_GAP)
+        else:
+            self._bar.update(self._bar.task_ids[0], completed=n_ended, rest=self._rest(sums))
+
+    def _rest(self, sums: Tally) -> str:
+        """Rate, time left (by predicted steps, for cases differ) and what went wrong."""
+        seconds = max(time.monotonic() - self._began, 1e-9)
+        texts = [f"{sums.n_case / seconds:.3g} a second"]
+        if sums.cost:
+            left = seconds * (self._cost - sums.cost) / sums.cost
+            texts.append(f"{duration(max(left, 0.0))} left")
+        if sums.failed:
+            texts.append(f"{sums.failed} failed")
+        if sums.diverged:
+            texts.append(f"{sums.diverged} diverged")
+        return ", ".join(texts)
+
+
+def duration(seconds: float) -> str:
+    """A span of time for people: 42 s, 3:05 min, 12:40 h, 3.1 d."""
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes}:{rest:02d} min"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d} h" if hours < 48 else f"{hours / 24:.1f} d"

@@ -1,0 +1,90 @@
+"""When a run is to stop: a signal, a file STOP in the store, or the end of its time."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from typing import TYPE_CHECKING, Self
+
+from rubhpc.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from types import FrameType, TracebackType
+
+_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
+_LOOK = 0.5  # s between looks for the file STOP
+SLURM_MARGIN = 30.0  # s kept free before Slurm ends the job: a block's files, the packing, and slow disks
+
+
+class Stopped(Exception):  # noqa: N818 - it drops the case in hand, and is no fault
+    """Raised inside a case to drop it."""
+
+
+class Stopping:
+    """Whether to stop, and why; as a context it answers the signals that ask for it."""
+
+    def __init__(self) -> None:
+        self.reason = ""
+        self._stop_file: Path | None = None
+        self._deadline = float("inf")
+        self._has_skipped = False
+        self._looked = 0.0
+        self._began = time.monotonic()
+        self._handlers: dict[int, object] = {}
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            self._handlers = {number: signal.signal(number, self._note) for number in _SIGNALS}
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)  # type: ignore[arg-type]
+        self._handlers = {}
+
+    def watch(self, stop_file: Path, time_limit: float | None) -> None:
+        """Heed a file, a time limit (s from when this object was made) and the end of a Slurm job."""
+        self._stop_file = stop_file
+        if time_limit is not None:
+            self._deadline = self._began + time_limit
+        slurm_end = os.environ.get("SLURM_JOB_END_TIME", "")
+        if slurm_end:
+            try:
+                left = float(slurm_end) - time.time()
+            except ValueError:
+                raise InputError(f"SLURM_JOB_END_TIME={slurm_end}: not a time; unset it") from None
+            self._deadline = min(self._deadline, time.monotonic() + left - SLURM_MARGIN)
+
+    def look(self) -> str:
+        """Why to stop now; empty to go on."""
+        now = time.monotonic()
+        if not self.reason and now >= self._deadline:
+            self.reason = "the time limit"
+        if not self.reason and self._stop_file is not None and now - self._looked > _LOOK:
+            self._looked = now
+            if self._stop_file.exists():
+                self.reason = "the file STOP"
+        return self.reason
+
+    def fits(self, seconds: float) -> bool:
+        """Whether what takes so long ends before the time does."""
+        fits = time.monotonic() + seconds < self._deadline
+        self._has_skipped |= not fits
+        return fits
+
+    @property
+    def verdict(self) -> str:
+        """Why the run has not done all: the reason to stop, or that something did not fit into its time."""
+        return self.reason or ("the time limit" if self._has_skipped else "")
+
+    def ask(self, reason: str) -> None:
+        """Have the run stop."""
+        self.reason = self.reason or reason
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self.ask(signal.Signals(number).name)
