@@ -79,7 +79,7 @@ def brief(value: object) -> str:
         if isinstance(value, str)
         else str(value).lower()
         if isinstance(value, bool)
-        else repr(value)
+        else str(value)
     )
     text = "".join(c if c.isprintable() else " " for c in text)
     return text if len(text) <= 60 else f"{text[:56]} ..."
@@ -152,4 +152,8 @@ def example(unit: str) -> str:
 
 
 def _mend(unit: str) -> str:
-    return f"write a number ({unit}) or text such as {example(unit)}" if unit else "write a plain number"
+    return (
+        f"write a number ({unit}) or text such as {example(unit)}"
+        if unit
+        else f"write one such as {example(unit)}"
+    )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
 
 from rubhpc.errors import InputError
 from rubhpc.fields import FieldError, check_value, nearest, parse_field, place
-from rubhpc.quantity import brief, parse_quantity
+from rubhpc.quantity import brief, example, parse_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,23 +23,30 @@ __all__ = ["build", "parse_quantity", "plain", "read_toml", "refuse_unknown"]
 T = TypeVar("T")
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path, where: str = "") -> dict[str, Any]:
     """Return the tables of a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+    where : str
+        What asked for the file, for the error when there is none: "study.toml: rig".
 
     Raises
     ------
     InputError
         When the file is missing, unreadable, not UTF-8 or not TOML; with line and column where there are any.
     """
+    named = place(": ".join(p for p in (where, str(path)) if p))
     try:
         if not path.exists():
-            raise InputError(f"{place(str(path))}: no such file; check the path")
+            raise InputError(f"{named}: no such file; check the path")
         if not path.is_file():
-            raise InputError(f"{place(str(path))}: not a file; give the path of a TOML file")
+            raise InputError(f"{named}: not a file; give the path of a TOML file")
         content = path.read_bytes()
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "not a path"
-        raise InputError(f"{place(str(path))}: cannot be read ({reason}); check the path") from None
+        raise InputError(f"{named}: cannot be read ({reason}); check the path") from None
     return _parse_toml(content, str(path))
 
 
@@ -147,7 +154,7 @@ def _number(text: str) -> object:
 def _mend(declared: dataclasses.Field[Any], hint: Any, name: str) -> str:
     kind = declared.metadata.get("kind")
     if kind == "quantity":
-        return f'{declared.name} = "... {declared.metadata["unit"]}"'.replace(' "', ' "')
+        return f"{declared.name} = {example(declared.metadata['unit'])}"
     if kind == "count":
         return f"{declared.name} = 1"
     if kind:

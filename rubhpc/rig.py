@@ -128,7 +128,7 @@ def read_rig(name_or_path: str | PathLike[str], relative_to: Path | None = None,
     relative_to : Path, optional
         Folder from which a relative path counts; the working directory by default.
     where : str
-        What an error about the name itself names.
+        What asks for the rig, for the error when there is none.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def read_rig(name_or_path: str | PathLike[str], relative_to: Path | None = None,
     if not name.endswith(".toml") and "/" not in name and not path.exists():
         mend = nearest(name, packaged_rigs())
         raise InputError(f"{where}: neither a packaged rig nor a file {place(str(path))}; {mend}")
-    return build(Rig, read_toml(path), str(path))
+    return build(Rig, read_toml(path, where), str(path))
 
 
 def with_key(rig: Rig, dotted: str, value: object) -> Rig:

@@ -30,7 +30,7 @@ Index = tuple[int, ...]
 
 
 class Settings:
-    """Values on the axes, resolved: ratios to SI units, keys to rigs; what is costly is kept for the next case.
+    """Values on the axes, resolved: ratios to SI units, keys to rigs. What is costly is kept for reuse.
 
     Parameters
     ----------
