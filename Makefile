@@ -1,0 +1,59 @@
+# `make demo` and `make test` need python3 (3.11 or later), make and git, nothing else: all goes into .venv.
+
+VENV := .venv
+BIN := $(VENV)/bin
+RANKS ?= 2
+STORE := quickstart.zarr
+FIGURES := figures
+
+.PHONY: help demo test lint bench clean
+.DEFAULT_GOAL := help
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: $(VENV)/.installed ## a first study on two cores, and two figures of it
+	$(BIN)/mpirun -n $(RANKS) $(BIN)/rubhpc jobs/quickstart.toml --output $(STORE)
+	@mkdir -p $(FIGURES)
+	$(BIN)/rubhpc cascade $(STORE) --select clearance_ratio=0.7 --figure $(FIGURES)/torsion_cascade.png
+	$(BIN)/rubhpc map $(STORE) --figure $(FIGURES)/contact_force_map.png
+	@echo "The study is in $(CURDIR)/$(STORE), its figures in $(CURDIR)/$(FIGURES)."
+
+test: $(VENV)/.ready ## all tests
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/.ready ## style, types and the layers of imports
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy -p rubhpc -p postproc
+	$(BIN)/lint-imports
+
+bench: $(VENV)/.ready ## timings
+	$(BIN)/python -m pytest tests/bench --benchmark-only --benchmark-columns=min,median,rounds
+
+clean: ## remove .venv, caches, and what the demo made
+	rm -rf $(VENV) $(STORE) $(FIGURES) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \
+		.benchmarks .hypothesis
+	find rubhpc postproc tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# The files beginning with a dot are stamps: what is done is not done again until pyproject.toml changes.
+$(VENV)/.made:
+	@for python in $(PYTHON) python3 python3.13 python3.12 python3.11; do \
+		if $$python -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+			echo "Making $(VENV) with $$($$python --version)"; \
+			$$python -m venv --clear $(VENV) && touch $@; exit; \
+		fi; \
+	done; \
+	echo "No python3 of version 3.11 or later with venv on PATH: install one (Debian: apt install python3-venv)," \
+		"or name it: make PYTHON=/path/to/python3" >&2; exit 1
+
+$(VENV)/.installed: pyproject.toml $(VENV)/.made
+	@echo "Installing rubhpc and what it needs, MPICH included, into $(VENV)"
+	@$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	@$(BIN)/python -m pip install --quiet --editable '.[mpi]'
+	@touch $@
+
+$(VENV)/.ready: $(VENV)/.installed
+	@echo "Installing what the tests need into $(VENV)"
+	@$(BIN)/python -m pip install --quiet --group test
+	@touch $@
