@@ -1,4 +1,4 @@
-"""Cases and blocks: each case in one block, names that outlive growth, an identity that moves with results."""
+"""Cases and blocks: each case in one block, ids that outlive growth, an identity that moves with results."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def study(grid=SMALL, rig=RIG, **parts):
 @st.composite
 def grids(draw):
     """Grids of every kind of axis, in any order."""
-    ratio = st.lists(st.sampled_from([0.5, 0.75, 1.5, 3.0, 4.5]), min_size=1, unique=True)
+    ratio = st.lists(st.sampled_from([0.5, 0.75, 1.5, 3.0]), min_size=1, max_size=3, unique=True)
     grid = {
         draw(st.sampled_from(["speed", "speed_ratio"])): draw(ratio),
         draw(st.sampled_from(["clearance", "clearance_ratio"])): draw(ratio),
-        "friction": draw(st.lists(st.floats(0, 1), min_size=1, max_size=7, unique=True)),
+        "friction": draw(st.lists(st.floats(0, 1), min_size=1, max_size=5, unique=True)),
     }
     if draw(st.booleans()):
         grid["stator.youngs_modulus"] = draw(st.permutations([3e9, 3e10]))
@@ -45,7 +45,7 @@ def grids(draw):
     return dict(draw(st.permutations(list(grid.items()))))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(grid=grids(), block=st.none() | st.integers(1, 40))
 def test_every_case_lies_in_exactly_one_block(grid, block):
     sweep = Sweep(study(grid, run=Run(block=block)))
