@@ -63,6 +63,7 @@ class Settings:
         self._model_at = lru_cache(maxsize=4)(self._make_model)
         self._unit_speed_at = lru_cache(maxsize=65536)(self._make_unit_speed)
         self._response_at = lru_cache(maxsize=65536)(self._make_response)
+        self._limit_at = lru_cache(maxsize=4096)(self._make_limit)
         if study.integrator.step is not None:
             self._check_step(study.integrator.step)
 
@@ -167,7 +168,8 @@ class Settings:
         """Time step, s, at the places of the rig axes."""
         return self.study.integrator.step_within(self._limit_at(at))
 
-    def _limit_at(self, at: Index) -> float:
+    def _make_limit(self, at: Index) -> float:
+        """Stability limit of the step, s, at the places of the rig axes."""
         return step_limit(assemble(self._rig_at(at)))
 
     def _check_step(self, step: float) -> None:
