@@ -66,7 +66,7 @@ if [ "$code" -eq 75 ] && [ "$is_cancelled" = no ]; then
     restarts=${SLURM_RESTART_COUNT:-0}
     if [ "$restarts" -ge "${RUBHPC_MOST_RESTARTS:-100}" ]; then
         echo "sweep.sh: stopped early for the $((restarts + 1)). time; not queued again (RUBHPC_MOST_RESTARTS)" >&2
-    elif scontrol requeue "$SLURM_JOB_ID"; then
+    elif scontrol requeue "${SLURM_JOB_ID:-}"; then
         echo "sweep.sh: stopped early; job $SLURM_JOB_ID goes on when it is its turn again"
     else
         echo "sweep.sh: stopped early and cannot be queued again; submit the same job once more" >&2

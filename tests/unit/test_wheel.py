@@ -1,0 +1,54 @@
+"""The wheel ships both packages whole: what is left undeclared is left out without a word."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("rubhpc", "postproc")
+
+
+@pytest.fixture(scope="module")
+def shipped(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
+    """Names of the files in a wheel built from the working tree, with the installed hatchling."""
+    folder = tmp_path_factory.mktemp("wheel")
+    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", folder, ROOT]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (wheel,) = folder.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        return set(archive.namelist())
+
+
+def test_wheel_holds_every_file_of_both_packages_and_no_other(shipped: set[str]) -> None:
+    wanted = {
+        path.relative_to(ROOT).as_posix()
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert {name for name in shipped if ".dist-info/" not in name} == wanted
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "rubhpc/rigs/mokhtar2017.toml",
+        "postproc/rub.mplstyle",
+        "rubhpc/py.typed",
+        "postproc/py.typed",
+        "rubhpc/kernels/central_difference.py",
+    ],
+)
+def test_wheel_holds_more_than_top_level_modules(name: str, shipped: set[str]) -> None:
+    assert name in shipped
+
+
+def test_wheel_holds_licence_and_command(shipped: set[str]) -> None:
+    ends = {name.split(".dist-info/")[1] for name in shipped if ".dist-info/" in name}
+    assert {"licenses/LICENSE", "entry_points.txt"} <= ends
