@@ -8,8 +8,9 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import eig, eigh
+from scipy.linalg import eig
 
+from rubhpc.fem.undamped import EPS, undamped_modes
 from rubhpc.fem.whirl import planar_twins, whirl_index, whirl_word
 
 if TYPE_CHECKING:
@@ -28,7 +29,6 @@ KINDS = {
     "torsional": ("thx",),
     "axial": ("u", "axial"),
 }
-EPS = float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,9 +115,7 @@ def _eigenpairs(
     """
     n_mode = len(mass)
     symmetric = (stiffness + stiffness.T) / 2
-    square, basis = eigh(symmetric, mass)
-    rounding = 10 * n_mode * EPS * np.abs(square).max()
-    square[np.abs(square) < rounding] = 0.0  # a rigid body's
+    square, basis = undamped_modes(mass, symmetric)
     sigma = np.where(square == 0.0, 1.0, np.sqrt(np.abs(square)))
     stiff = np.diag(square) + basis.T @ (stiffness - symmetric) @ basis
     state = np.block(

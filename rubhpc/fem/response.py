@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import eigvals
+from scipy.linalg import eigvals, eigvalsh
 
 from rubhpc.errors import InputError
-from rubhpc.fem.modes import EPS, KINDS
+from rubhpc.fem.modes import KINDS, modes
+from rubhpc.fem.undamped import undamped_modes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -80,11 +82,14 @@ def first_lateral_frequency(model: Model) -> float:
 
     A rotor free to move sideways has it at its first bending mode, above those of the rigid body.
     """
-    square = _natural_squares(model.rotor, "lateral")
-    # a frequency under this is zero but for rounding
-    floor = np.sqrt(10 * len(square) * EPS * np.abs(square).max())
-    omega = np.abs(np.sqrt(square).real)
-    return float(omega[omega > floor].min())
+    undamped = replace(model.rotor, damping=np.zeros_like(model.rotor.damping))
+    rows = [row for row, (_, name) in enumerate(undamped.degrees) if name in KINDS["lateral"]]
+    stiffness = undamped.stiffness[np.ix_(rows, rows)]
+    if np.array_equal(stiffness, stiffness.T):
+        square, _ = undamped_modes(undamped.mass[np.ix_(rows, rows)], stiffness)
+        return math.sqrt(square[square > 0.0].min())
+    found = [mode.frequency for mode in modes(undamped) if mode.kind == "lateral"]
+    return 2 * math.pi * min(frequency for frequency in found if frequency > 0.0)
 
 
 def step_limit(model: Model) -> float:
@@ -98,13 +103,11 @@ def step_limit(model: Model) -> float:
     half step behind would lower the limit.)
     """
     bodies = [model.rotor, *(stator.body for stator in model.stators)]
-    radius = max(float(np.abs(_natural_squares(body)).max()) for body in bodies)
-    return 2.0 / math.sqrt(radius)
+    return 2.0 / math.sqrt(max(_spectral_radius(body) for body in bodies))
 
 
-def _natural_squares(body: Body, kind: str | None = None) -> NDArray[np.complex128]:
-    """Eigenvalues of `M^-1 K`, (n,), rad^2/s^2, of all degrees or of one kind."""
-    rows = [row for row, (_, name) in enumerate(body.degrees) if kind is None or name in KINDS[kind]]
-    block = np.ix_(rows, rows)
-    squares: NDArray[np.complex128] = eigvals(body.stiffness[block], body.mass[block])
-    return squares.astype(np.complex128)
+def _spectral_radius(body: Body) -> float:
+    """Largest eigenvalue of `M^-1 K` in size, rad^2/s^2."""
+    is_symmetric = np.array_equal(body.stiffness, body.stiffness.T)
+    squares = (eigvalsh if is_symmetric else eigvals)(body.stiffness, body.mass)
+    return float(np.abs(squares).max())
