@@ -86,6 +86,8 @@ def test_a_number_names_one_of_many(rig):
     twice = rig_from_dict({**rig.as_dict(), "stator": rig.as_dict()["stator"] * 2})
     changed = with_keys(twice, {"stator.2.angle": 1.0, "stator.length": 0.05})
     assert [(s.angle, s.length) for s in changed.stator] == [(0.0, 0.05), (1.0, 0.05)]
+    one_apart = with_keys(twice, {"stator.1.angle": 1.0, "stator.angle": 0.5})  # in any order
+    assert [s.angle for s in one_apart.stator] == [1.0, 0.5]
 
 
 @pytest.mark.parametrize(

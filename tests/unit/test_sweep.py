@@ -164,6 +164,16 @@ def test_settings_lie_along_the_axes_that_set_them():
             assert values[tuple(at[dim] for dim in dims)] == value  # to the last bit
 
 
+def test_the_node_of_the_stator_is_where_the_amplitude_is_taken():
+    rig = with_key(RIG, "stator.radius", 0.06)
+    sweep = Sweep(study(SMALL | {"stator.node": [8, 5]}, rig))
+    dims, amplitude = sweep.settings()["contact_free_amplitude"]
+    assert dims == ("speed_ratio", "stator_node")
+    assert np.all(amplitude[:, 1] < 0.9 * amplitude[:, 0])  # nearer to the bearing the shaft swings less
+    model = assemble(rig)
+    assert amplitude[0, 1] == pytest.approx(contact_free_amplitude(model, sweep.case((0, 0, 0, 1)).speed, 5))
+
+
 def test_absolute_axes_are_their_own_settings():
     sweep = Sweep(study({"speed": [100.0, -100.0], "clearance": ["84 um", "100 um"], "friction": 0.3}))
     found = sweep.settings()
