@@ -11,13 +11,14 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from postproc.load import open_store as open
-    from rubhpc.driver import Summary, run
+    from postproc.load import open_store as open  # noqa: A004 - the public name
+    from rubhpc.driver import run
     from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
     from rubhpc.record import Record, State
     from rubhpc.rig import Rig, read_rig
     from rubhpc.simulate import simulate
     from rubhpc.study import Study, read_study
+    from rubhpc.summary import Summary
 
 __version__ = "0.1.0"
 __all__ = [
@@ -37,7 +38,7 @@ __all__ = [
     "simulate",
 ]
 
-# Where each name comes from; it is imported when it is first asked for, so that `import rubhpc` takes no time.
+# Where each name comes from; imported when it is first asked for, so that `import rubhpc` takes no time.
 _HOMES = {
     "InputError": "rubhpc.errors:InputError",
     "Record": "rubhpc.record:Record",
@@ -47,7 +48,7 @@ _HOMES = {
     "StoppedEarly": "rubhpc.errors:StoppedEarly",
     "StoreError": "rubhpc.errors:StoreError",
     "Study": "rubhpc.study:Study",
-    "Summary": "rubhpc.driver:Summary",
+    "Summary": "rubhpc.summary:Summary",
     "open": "postproc.load:open_store",
     "read_rig": "rubhpc.rig:read_rig",
     "read_study": "rubhpc.study:read_study",
@@ -57,7 +58,7 @@ _HOMES = {
 
 
 class _Package(ModuleType):
-    """The package; its function `simulate` is not hidden by the module of the same name once that is imported."""
+    """The package; the module `simulate`, once imported, does not hide the function of that name."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         is_module = isinstance(value, ModuleType)

@@ -17,7 +17,7 @@ from rubhpc.errors import RubError
 from rubhpc.launch import launch
 
 _STOPPED = 75
-# One thread a rank: BLAS and numba would each start as many as the machine has cores. Their reductions would also
+# One thread a rank: BLAS and numba would each start as many as the machine has cores. Their sums would also
 # depend on the number of threads, and so would the last bit of a result.
 _THREADS = (
     "OMP_NUM_THREADS",
@@ -94,7 +94,8 @@ def commands() -> None:
 
     `mpirun -n N rubhpc STUDY.toml` runs a study on N ranks; the same command goes on after a stop.
 
-    Exit codes: 0 complete; 1 finished, some cases failed; 2 bad input; 3 store cannot be used; 75 stopped early.
+    Exit codes: 0 complete; 1 finished, some cases failed; 2 bad input; 3 store cannot be used; 75 stopped
+    early, run the same command again.
     """
 
 

@@ -19,7 +19,7 @@ class Crashed(RubError):  # noqa: N818 - the error that caused it stands in its 
 
 
 def crash(error: Exception, directory: Path | None = None) -> Crashed:
-    """Log the traceback of `error` in `directory`, or else among the temporary files; what to raise instead."""
+    """Log the traceback of `error`, in `directory` or among the temporary files; what to raise instead."""
     name = f"rubhpc-crash-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.log"
     log = (directory if directory is not None and directory.is_dir() else Path(tempfile.gettempdir())) / name
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from contextlib import ExitStack, suppress
@@ -20,63 +19,24 @@ from rubhpc.journal import Ledger, count, next_run
 from rubhpc.manifest import PRIVATE
 from rubhpc.pool import Pool, Tally, connect
 from rubhpc.prepare import prepare
-from rubhpc.progress import Progress, duration
+from rubhpc.progress import Progress
 from rubhpc.resume import bring_up_to_date, find_gone, missing_share, open_store, sweep_for
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
+from rubhpc.schema import FAILED, MISSING
 from rubhpc.stopping import Stopped, Stopping
 from rubhpc.store import Store
 from rubhpc.study import Study, read_study
+from rubhpc.summary import Summary
 from rubhpc.sweep import Sweep
 from rubhpc.worker import Worker
 
 if TYPE_CHECKING:
+    import os
+
     from numpy.typing import NDArray
 
     from rubhpc.sweep import Block
 
 _REASONS = 100  # failed cases a summary names, at most
-
-
-@dataclass(frozen=True, kw_only=True)
-class Summary:
-    """How a run ended.
-
-    Attributes
-    ----------
-    counts : tuple of int
-        Cases of the whole study that are missing, done, failed and diverged, in this order.
-    computed : int
-        Cases this run computed.
-    reasons : tuple of (str, str)
-        Coordinates and reason of each failed case, the first hundred.
-    """
-
-    store: Path
-    counts: tuple[int, ...]
-    computed: int
-    seconds: float
-    reasons: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def exit_code(self) -> int:
-        """0 where every case has a result (a diverged one is a result), 1 where some failed."""
-        return 1 if self.counts[FAILED] else 0
-
-    def text(self) -> str:
-        """The summary in a line."""
-        told = ", ".join(
-            f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING) if self.counts[i]
-        )
-        return f"{self.store}: {told}; {self.computed} computed in {duration(self.seconds)}"
-
-    def complaint(self) -> str:
-        """What failed, in a line with the mend."""
-        case, reason = self.reasons[0]
-        rest = f"; {self.counts[MISSING]} were not computed (--max-failures)" if self.counts[MISSING] else ""
-        return (
-            f"{self.store}: {self.counts[FAILED]} of {sum(self.counts)} cases failed{rest}; the first, {case}: {reason}; "
-            "rubhpc status lists them, --retry-failed computes them anew"
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,16 +93,15 @@ def run(
     StoppedEarly
         A signal, the file STOP or the time limit came before the end.
     """
-    limits = {"max_failures": max_failures, "time_limit": time_limit}
 
     def resolve() -> Study:
         found = study if isinstance(study, Study) else read_study(Path(study))
-        set_limits = {key: value for key, value in limits.items() if value is not None}
-        return replace(
-            found,
-            run=replace(found.run, **set_limits),
-            output=found.output if output is None else Path(output),
+        limits = replace(
+            found.run,
+            time_limit=found.run.time_limit if time_limit is None else time_limit,
+            max_failures=found.run.max_failures if max_failures is None else max_failures,
         )
+        return replace(found, run=limits, output=found.output if output is None else Path(output))
 
     pool = connect()
     resolved: Study | None = None
@@ -185,7 +144,7 @@ def _run(
 
 
 def _prepare(study: Study, stopping: Stopping, held: ExitStack, *, retry_failed: bool) -> _Job:
-    """Find or make the store, lock it, see what is missing, and compile the kernels: the first rank's part."""
+    """Find or make the store, lock it, see what is missing, compile the kernels: the first rank's part."""
     sweep = sweep_for(study)
     store = open_store(sweep)
     with disk_errors(study.output):
@@ -193,8 +152,7 @@ def _prepare(study: Study, stopping: Stopping, held: ExitStack, *, retry_failed:
     bring_up_to_date(store, sweep)
     ledger = store.replay(with_metrics=False)
     run = next_run(store.journal_directory)
-    gone = find_gone(store, sweep, ledger)
-    store.take_back(ledger, gone, run, "gone")
+    store.take_back(ledger, find_gone(store, ledger), run, "gone")
     missing = ledger.status == MISSING
     if retry_failed:
         missing |= ledger.status == FAILED
@@ -214,7 +172,7 @@ def _prepare(study: Study, stopping: Stopping, held: ExitStack, *, retry_failed:
 
 
 def _warm_up(sweep: Sweep, block: Block, stopping: Stopping) -> None:
-    """Compile every kernel once, on two revolutions: ranks that compile into one cache at once have crashed."""
+    """Compile every kernel once, on two revolutions: concurrent compilations into one cache have crashed."""
 
     def check() -> None:
         if stopping.look():
@@ -236,7 +194,7 @@ def _warm_up(sweep: Sweep, block: Block, stopping: Stopping) -> None:
 
 def _compute(job: _Job, pool: Pool, stopping: Stopping, *, quiet: bool) -> RubError | None:
     """Compute blocks until there are none left; what keeps this rank from its store, to be told to all."""
-    limit = job.study.run.max_failures
+    limit = float("inf") if job.study.run.max_failures is None else job.study.run.max_failures
     n_missing = int(job.missing.sum())
     try:
         sweep = Sweep(job.study, chunk=job.chunk)
@@ -266,6 +224,7 @@ def _compute(job: _Job, pool: Pool, stopping: Stopping, *, quiet: bool) -> RubEr
                     break
                 worker.work(blocks[job.pending[sums.claimed]])
                 attend()
+            worker.sync()
     except RubError as error:
         pool.add(Tally(stop=1))
         return error

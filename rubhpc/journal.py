@@ -1,15 +1,17 @@
 """What has been computed: append-only journals, one a run and rank, one line a case.
 
-A line is `crc flat id status checksum metrics reason`: the CRC-32 of the rest of the line, the case's flat index in
-the grid of the file's header, its id, its status, the CRC-32 of its stored arrays, its metrics (base64 of one packed
-record, so that floats keep every bit; `-` where there are none) and the reason of a failure (JSON, `-` where none).
-The header is `crc {json}`. A later run's line overrides an earlier one's; a line with status 0 takes a case back.
+A line is `crc flat id status checksum metrics reason`: the CRC-32 of the rest of the line, the case's flat
+index in the grid of the file's header, its id, its status, the CRC-32 of its stored arrays, its metrics
+(base64 of one packed record, so that floats keep every bit; `-` where there are none) and the reason of a
+failure (JSON, `-` where none). The header is `crc {json}`. A later run's line overrides an earlier one's; a
+line with status 0 takes a case back.
 """
 
 from __future__ import annotations
 
 import binascii
 import json
+import math
 import os
 import re
 from dataclasses import dataclass, field
@@ -70,27 +72,33 @@ class Entry:
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What a journal's lines refer to: the study's identity, the grid and the record of metrics."""
+    """What a journal's lines refer to: the study's identity, the values on its axes, the type of metrics."""
 
     identity: str
-    shape: tuple[int, ...]
+    axes: tuple[tuple[float, ...], ...]
     n_stator: int
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Cases along each axis."""
+        return tuple(len(values) for values in self.axes)
+
+    def told(self, shape: tuple[int, ...]) -> dict[str, Any]:
+        """The header as it is written, of the first values on each axis."""
+        return {
+            "format": _FORMAT,
+            "identity": self.identity,
+            "shape": list(shape),
+            "axes": [
+                crc32(np.array(values[:n]).tobytes()) for values, n in zip(self.axes, shape, strict=True)
+            ],
+            "metrics": [[v.name, v.dtype, self.n_stator if "stator" in v.dims else 0] for v in METRICS],
+        }
 
     def line(self) -> bytes:
         """The header as the first line of a journal."""
-        text = json.dumps(
-            {
-                "format": _FORMAT,
-                "identity": self.identity,
-                "shape": list(self.shape),
-                "metrics": _layout(self.n_stator),
-            }
-        ).encode()
+        text = json.dumps(self.told(self.shape)).encode()
         return b"%08x %s\n" % (crc32(text), text)
-
-
-def _layout(n_stator: int) -> list[Any]:
-    return [[v.name, v.dtype, n_stator if "stator" in v.dims else 0] for v in METRICS]
 
 
 class Journal:
@@ -102,7 +110,7 @@ class Journal:
         self._handle: int | None = None
 
     def write(self, entries: Iterable[Entry]) -> None:
-        """Append the entries and return once they are on the disk."""
+        """Append the entries: they outlive this process, and a power cut once `sync` has returned."""
         data = b"".join(entry.line() for entry in entries)
         if self._handle is None:
             self._handle = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o666)
@@ -110,11 +118,16 @@ class Journal:
         view = memoryview(data)
         while view:
             view = view[os.write(self._handle, view) :]
-        os.fsync(self._handle)
+
+    def sync(self) -> None:
+        """Return once all entries are on the disk."""
+        if self._handle is not None:
+            os.fsync(self._handle)
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file, its entries on the disk."""
         if self._handle is not None:
+            self.sync()
             os.close(self._handle)
             self._handle = None
 
@@ -137,8 +150,8 @@ class Ledger:
         As in the schema; MISSING where no valid line stands.
     checksum : (n_case,) uint32
         CRC-32 of the stored arrays of each case.
-    ids : (n_case,) bytes
-        Id under which each case was journalled.
+    is_known : (n_case,) bool
+        Whether any valid line tells of the case, be it that it is missing.
     metrics : (n_case,) record or None
         Metrics of the cases that have any; None where the replay was asked to leave them out.
     reasons : dict
@@ -153,7 +166,7 @@ class Ledger:
 
     status: NDArray[np.int8]
     checksum: NDArray[np.uint32]
-    ids: NDArray[np.bytes_]
+    is_known: NDArray[np.bool_]
     metrics: NDArray[np.void] | None
     reasons: dict[int, str] = field(default_factory=dict)
     torn: int = 0
@@ -182,13 +195,13 @@ def replay(directory: Path, header: Header, *, with_metrics: bool = True) -> Led
 
     A journal written for a smaller grid is taken over: axes only ever grow at their ends.
     """
-    n_case = int(np.prod(header.shape, dtype=np.int64))
+    n_case = math.prod(header.shape)
     dtype = metrics_type(header.n_stator)
     metrics = np.zeros(n_case, dtype) if with_metrics else None
     ledger = Ledger(
         status=np.zeros(n_case, np.int8),
         checksum=np.zeros(n_case, np.uint32),
-        ids=np.zeros(n_case, "S32"),
+        is_known=np.zeros(n_case, bool),
         metrics=metrics,
     )
     paths = journals(directory)
@@ -202,14 +215,16 @@ def replay(directory: Path, header: Header, *, with_metrics: bool = True) -> Led
 def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
     """Take a journal's lines over into the ledger; how many there were."""
     n_case = len(ledger.status)
-    status, checksum, ids, reasons = ledger.status, ledger.checksum, ledger.ids, ledger.reasons
+    status, checksum, is_known, reasons = ledger.status, ledger.checksum, ledger.is_known, ledger.reasons
     size = ledger.metrics.dtype.itemsize if ledger.metrics is not None else 0
-    store = memoryview(ledger.metrics.view(np.uint8)) if ledger.metrics is not None and n_case else None
+    store = ledger.metrics.view(np.uint8).data if ledger.metrics is not None and n_case else None
     with path.open("rb") as file:
-        places = _places(file.readline(), header)
-        if places is None:
+        first = file.readline()
+        if first[:8] != b"%08x" % crc32(first[9:-1]):
             ledger.torn += 1
-        if not isinstance(places, list):
+            return 0
+        places = _places(json.loads(first[9:-1]), header)
+        if places is None:
             return 0
         n_line = 0
         for line in file:
@@ -219,13 +234,13 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
                 ledger.torn_cases |= _still_legible(text, places, n_case)
                 continue
             n_line += 1
-            number, case_id, state, check, packed, reason = text.split(b" ", 5)
+            number, _, state, check, packed, reason = text.split(b" ", 5)
             flat = int(number)
             if places:
                 flat = places[flat]
             status[flat] = int(state)
             checksum[flat] = int(check, 16)
-            ids[flat] = case_id
+            is_known[flat] = True
             if store is not None and packed != b"-":
                 store[flat * size : (flat + 1) * size] = binascii.a2b_base64(packed)
             if reason != b"-":
@@ -243,25 +258,13 @@ def _still_legible(text: bytes, places: list[int], n_case: int) -> set[int]:
     return {places[int(number)] if places else int(number)}
 
 
-def _places(first: bytes, header: Header) -> list[int] | str | None:
-    """Where a journal's flat indices lie in the present grid: [] for as they are, a text why it does not count.
-
-    None for a header that is torn.
-    """
-    text = first[9:-1]
-    if first[:8] != b"%08x" % crc32(text):
-        return None
-    told = json.loads(text)
-    shape = tuple(told["shape"])
-    if told["format"] != _FORMAT or told["identity"] != header.identity:
-        return "of another study"
-    if told["metrics"] != _layout(header.n_stator):
-        return "of another version"
+def _places(told: dict[str, Any], header: Header) -> list[int] | None:
+    """Where the flat indices of a journal lie in the present grid: [] for as they are, None for nowhere."""
+    shape = tuple(told.get("shape", ()))
+    if len(shape) != len(header.shape) or told != header.told(shape):
+        return None  # of another study or version, or of other values on the axes
     if shape == header.shape:
         return []
-    if len(shape) != len(header.shape) or any(a > b for a, b in zip(shape, header.shape, strict=True)):
-        return "of another grid"
-    corner = tuple(slice(n) for n in shape)
-    grid = np.arange(int(np.prod(header.shape, dtype=np.int64))).reshape(header.shape)
-    flats: list[int] = grid[corner].ravel().tolist()
+    grid = np.arange(math.prod(header.shape)).reshape(header.shape)
+    flats: list[int] = grid[tuple(slice(n) for n in shape)].ravel().tolist()
     return flats

@@ -34,8 +34,8 @@ _PACKAGES = ("numpy", "numba", "scipy", "zarr")
 # Waveforms of a chaotic rub shrink to 77 %, forces that are mostly zero to a few per cent; 0.3 ms per 100 kB.
 _CODEC = BloscCodec(cname="zstd", clevel=1, shuffle="shuffle")
 
-# One rank, one thread: zarr would start as many as the machine has cores, on every rank. A chunk that holds nothing
-# but the fill value is written all the same, so that a file that is absent has been lost.
+# One rank, one thread: zarr would start as many as the machine has cores, on every rank. A chunk that holds
+# nothing but the fill value is written all the same, so that a file that is absent has been lost.
 zarr.config.set({"threading.max_workers": 1, "array.write_empty_chunks": True})
 
 
@@ -82,7 +82,7 @@ def write_static(group: zarr.Group, sweep: Sweep) -> dict[str, int]:
 def consolidate(path: Path) -> None:
     """Gather the metadata of all arrays in one file, so that a reader opens one instead of fifty."""
     with warnings.catch_warnings():
-        # The format's specification is behind its implementations here; and the private directory is no array.
+        # The format's specification is behind its implementations here, and the private directory no array.
         warnings.simplefilter("ignore")
         zarr.consolidate_metadata(path)
 
@@ -97,7 +97,7 @@ def get_array(group: zarr.Group, name: str) -> zarr.Array[Any]:
 
 def checksum(values: NDArray[Any], start: int = 0) -> int:
     """CRC-32 of the bytes of an array, carried on from `start`."""
-    return crc32(np.ascontiguousarray(values), start)
+    return crc32(np.ascontiguousarray(values).data, start)
 
 
 def _create(group: zarr.Group, variable: Variable, manifest: Manifest, *, chunk: tuple[int, ...]) -> None:

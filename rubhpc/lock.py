@@ -1,7 +1,7 @@
-"""One run at a time on a store: an exclusive lock that tells who holds it and is reclaimed when its holder is dead.
+"""One run at a time on a store: a lock that tells who holds it and is reclaimed when its holder is dead.
 
-The lock is a file that comes into being whole (a hard link of a finished one). Its holder touches it every few
-seconds. On the holder's own host a dead process gives it away; elsewhere, a heartbeat that has stopped.
+The lock is a file that comes into being whole (a hard link of a finished one). Its holder touches it every
+few seconds. On the holder's own host a dead process gives it away; elsewhere, a heartbeat that has stopped.
 """
 
 from __future__ import annotations
@@ -42,9 +42,13 @@ class Holder:
     since: float
     token: str
 
+    def __str__(self) -> str:
+        since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(self.since))
+        return f"process {self.pid} on {self.host} since {since}"
+
     @classmethod
     def myself(cls) -> Self:
-        """This process."""
+        """Return what tells of this process."""
         pid = os.getpid()
         state = process_state(pid)
         return cls(
@@ -58,7 +62,7 @@ class Holder:
 
 
 def process_state(pid: int) -> tuple[str, int, str] | None:
-    """State letter, parent and birth (clock ticks after boot) of a process on this host; None: no such process."""
+    """State letter, parent and birth (ticks after boot) of a process on this host; None: no such process."""
     try:
         text = Path(f"/proc/{pid}/stat").read_text()
     except OSError:
@@ -123,10 +127,7 @@ class Lock:
             if holder is None:  # it has just ended
                 continue
             if not _is_orphan(holder) or time.monotonic() > deadline:
-                raise StoreError(
-                    f"{self.path.parent.parent}: in use by process {holder.pid} on {holder.host} since "
-                    f"{time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(holder.since))}; wait for it or stop it"
-                )
+                raise StoreError(f"{self.path.parent.parent}: in use by {holder}; wait for it or stop it")
             time.sleep(0.1)
         self._heart.start()
         return self

@@ -80,7 +80,11 @@ class Manifest:
     @property
     def header(self) -> Header:
         """Header of the journals of this store."""
-        return Header(identity=self.identity, shape=self.shape, n_stator=self.sizes["stator"])
+        return Header(
+            identity=self.identity,
+            axes=tuple(axis.values for axis in self.axes),
+            n_stator=self.sizes["stator"],
+        )
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -162,7 +166,7 @@ class Manifest:
             ) from None
 
     def differences(self, other: Manifest) -> list[str]:
-        """What keeps the study of `other` out of this store, one text a difference; its axes may have grown."""
+        """What keeps the study of `other` out of this store, a text each; its axes may have grown."""
         found = [
             f"{key} was {_short(mine)}, is {_short(yours)}"
             for key, mine, yours in _leaves(self.parts, other.parts)

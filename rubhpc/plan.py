@@ -36,8 +36,8 @@ class Plan:
     ----------
     counts : tuple of int
         Cases that are missing, done, failed and diverged, in this order.
-    n_block, n_file : int
-        Blocks of the whole grid; files of the finished store, about.
+    n_block, n_per_block, n_file : int
+        Blocks of the whole grid, and cases in one; files of the finished store, about.
     n_byte : int
         Of the finished store before compression, about.
     steps : int
@@ -51,6 +51,7 @@ class Plan:
     shape: dict[str, int]
     counts: tuple[int, ...]
     n_block: int
+    n_per_block: int
     n_file: int
     n_byte: int
     steps: int
@@ -69,7 +70,7 @@ class Plan:
             [
                 f"{self.title} -> {self.store}",
                 f"cases       {n_case} = {grid}",
-                f"blocks      {self.n_block}, of at most {-(-n_case // self.n_block)} cases; ranks beyond them idle",
+                f"blocks      {self.n_block}, at most {self.n_per_block} cases each; more ranks would idle",
                 f"store       {_size(self.n_byte)} before compression, {self.n_file} files",
                 "so far      "
                 + ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING)),
@@ -96,7 +97,7 @@ def make_plan(study: Study) -> Plan:
         store = Store(study.output)
         ledger = replay(store.journal_directory, manifest.header, with_metrics=False)
         if store.manifest.shape == manifest.shape:
-            ledger.status[[entry.flat for entry in find_gone(store, sweep, ledger)]] = MISSING
+            ledger.status[find_gone(store, ledger)] = MISSING
         status = ledger.status
     missing = (status == MISSING).reshape(sweep.shape)
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
@@ -109,6 +110,7 @@ def make_plan(study: Study) -> Plan:
         shape=dict(zip((axis.name for axis in study.axes), sweep.shape, strict=True)),
         counts=count(status),
         n_block=len(blocks),
+        n_per_block=math.prod(sweep.chunk),
         n_file=len(blocks) * len(manifest.variables) + _FIXED_FILES,
         n_byte=sweep.n_case * (per_case + 2 * _LINE),
         steps=round(steps),
@@ -117,7 +119,7 @@ def make_plan(study: Study) -> Plan:
 
 
 def _pace(sweep: Sweep, blocks: list[Block]) -> float:
-    """Seconds a predicted step takes: the mean over short cases of the longest, a middling and the shortest block."""
+    """Seconds a predicted step takes: the mean over a case of the longest, the middle and the last block."""
     paces = []
     for block in [blocks[i] for i in sorted({0, len(blocks) // 2, len(blocks) - 1})] if blocks else []:
         try:

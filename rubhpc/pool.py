@@ -1,15 +1,14 @@
-"""Who computes which block: one process, or MPI ranks that all compute and claim the next from a shared counter.
+"""Who computes which block: one process, or MPI ranks that claim the next from a shared counter.
 
-A dedicated master would waste a rank; a counter in an MPI window, longest block first, keeps 99 % of the ideal.
-mpi4py is imported under a launcher only.
+All ranks compute: a dedicated master would waste one, and a counter in an MPI window, longest block first,
+keeps 99 % of the ideal. mpi4py is imported under a launcher only.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar
 
 import numpy as np
 
@@ -22,9 +21,11 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-@dataclass
-class Tally:
-    """Sums over all ranks: blocks claimed, cases that ended well, failed, diverged, their predicted steps; stop code."""
+class Tally(NamedTuple):
+    """Sums over all ranks.
+
+    Blocks claimed; cases done, failed and diverged, and the predicted steps of them all; ranks that stop.
+    """
 
     claimed: int = 0
     done: int = 0
@@ -77,7 +78,7 @@ class Alone:
     size = 1
 
     def __init__(self) -> None:
-        self._sums = np.zeros(6, np.int64)
+        self._sums = np.zeros(len(Tally()), np.int64)
 
     def from_first(self, make: Callable[[], T]) -> T:
         """See Pool."""
@@ -91,7 +92,7 @@ class Alone:
 
     def add(self, tally: Tally) -> None:
         """See Pool."""
-        self._sums += astuple(tally)
+        self._sums += tally
 
     def sums(self) -> Tally:
         """See Pool."""
@@ -119,7 +120,7 @@ class Ranks:
     def __init__(self, MPI: Any, comm: Any) -> None:
         self._MPI, self._comm = MPI, comm
         self.rank, self.size = comm.rank, comm.size
-        n_byte = np.dtype(np.int64).itemsize * len(astuple(Tally())) if self.rank == 0 else 0
+        n_byte = 8 * len(Tally()) if self.rank == 0 else 0
         self._window = MPI.Win.Allocate(n_byte, 8, comm=comm)
         if self.rank == 0:
             np.frombuffer(self._window.tomemory(), np.int64)[:] = 0
@@ -134,9 +135,9 @@ class Ranks:
                 told = (make(), None)
             except RubError as error:
                 told = (None, error)
-        value, error = self._comm.bcast(told)
-        if error is not None:
-            raise error
+        value, trouble = self._comm.bcast(told)
+        if trouble is not None:
+            raise trouble
         result: T = value
         return result
 
@@ -184,7 +185,7 @@ class Ranks:
 
     def _accumulate(self, tally: Tally) -> Tally:
         """Add to the sums and return what they were, in one atomic message."""
-        more = np.array(astuple(tally), np.int64)
+        more = np.array(tally, np.int64)
         before = np.zeros_like(more)
         self._window.Get_accumulate(more, before, 0, op=self._MPI.SUM)
         self._window.Flush(0)
@@ -210,14 +211,15 @@ def connect() -> Pool:
         from mpi4py import MPI
     except ImportError as error:
         raise InputError(
-            f"started as {given.size} processes, but mpi4py cannot be used ({error}); pip install 'rubhpc[mpi]'"
+            f"started as {given.size} processes, but mpi4py cannot be used ({error}); "
+            "pip install 'rubhpc[mpi]'"
         ) from None
     comm = MPI.COMM_WORLD
     if comm.size != given.size:
         library = MPI.Get_library_version().split("\n")[0].strip("\0 ")
         raise InputError(
             f"the launcher started {given.size} processes, but MPI ({library}) connects {comm.size}; "
-            "use the mpirun of that MPI, or build mpi4py for the launcher's (pip install --no-binary mpi4py mpi4py)"
+            "use the mpirun of that MPI, or mpi4py built for this one (pip install --no-binary mpi4py mpi4py)"
         )
     end_with_launcher()
     return Ranks(MPI, comm)

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from rubhpc.errors import StoreError
-from rubhpc.journal import Entry
 from rubhpc.manifest import PRIVATE, Manifest
-from rubhpc.schema import MISSING
+from rubhpc.schema import DIVERGED, DONE
 from rubhpc.store import Store
 from rubhpc.sweep import Sweep
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from rubhpc.journal import Ledger
@@ -43,9 +40,8 @@ def sweep_for(study: Study) -> Sweep:
     manifest = Manifest.read(study.output)
     differences = manifest.differences(Manifest.of(sweep))
     if differences:
-        raise StoreError(
-            f"{study.output}: is the store of another study: {'; '.join(differences)}; choose another --output"
-        )
+        told = "; ".join(differences)
+        raise StoreError(f"{study.output}: is the store of another study: {told}; choose another --output")
     return sweep if sweep.chunk == manifest.chunk else Sweep(study, chunk=manifest.chunk)
 
 
@@ -63,7 +59,7 @@ def open_store(sweep: Sweep) -> Store:
 
 
 def bring_up_to_date(store: Store, sweep: Sweep) -> None:
-    """Grow the store to the sweep's axes, write anew what has been damaged beside the cases, sweep up partial files."""
+    """Grow the store to the sweep's axes, mend what is damaged beside the cases, remove partial files."""
     differences = store.manifest.differences(Manifest.of(sweep))
     if differences:
         raise StoreError(f"{store.path}: has just become that of another study: {'; '.join(differences)}")
@@ -73,19 +69,16 @@ def bring_up_to_date(store: Store, sweep: Sweep) -> None:
     store.remove_partial_files()
 
 
-def find_gone(store: Store, sweep: Sweep, ledger: Ledger) -> list[Entry]:
-    """Entries that take back the cases journalled under another id, or whose files are gone."""
-    gone: list[Entry] = []
-    for block in sweep.blocks():
-        flat = store.flat(block.start)
-        there = ledger.status[flat] != MISSING
-        if not there.any():
-            continue
-        ids = sweep.case_ids(block)
-        is_gone = np.array(ids, dtype=ledger.ids.dtype) != ledger.ids[flat]
-        if not all(path.exists() for path in store.chunk_files(block.start)):
-            is_gone[:] = True
-        gone += [Entry(int(flat[i]), ids[i], MISSING) for i in np.flatnonzero(there & is_gone)]
+def find_gone(store: Store, ledger: Ledger) -> list[int]:
+    """Flat indices of the cases that have been stored, but whose files are gone or empty."""
+    gone: list[int] = []
+    if not store.manifest.variables:
+        return gone
+    stored = (ledger.status == DONE) | (ledger.status == DIVERGED)
+    for start in store.blocks():
+        flat = store.flat(start)
+        if stored[flat].any() and not store.has_files(start):
+            gone += flat[stored[flat]].tolist()
     return gone
 
 

@@ -62,10 +62,9 @@ class StoreStatus:
             + ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING)),
         ]
         if self.holder is not None:
-            since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(self.holder.since))
             left = self.seconds_left
             lines.append(
-                f"running since {since}: process {self.holder.pid} on {self.holder.host}, {self.n_recent} cases so far"
+                f"running: {self.holder}, {self.n_recent} cases so far"
                 + (f", {duration(left)} left" if left is not None else "")
             )
         elif self.counts[MISSING]:

@@ -1,7 +1,7 @@
-"""The zarr store of a study: made whole, written block by block, packed from the journals, opened by xarray.
+"""The zarr store of a study: made whole, written block by block, packed from the journals.
 
-Every array of every case lies in one chunk a block, and a block has one writer. Metrics are lines of a journal
-first (`rubhpc.journal`) and become arrays when a run ends. What is private lies under `.rubhpc`.
+Every array has one chunk a block, and a block has one writer. Metrics are lines of a journal first
+(`rubhpc.journal`) and become arrays when a run ends. What is private lies under `.rubhpc`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 import zarr
 
 from rubhpc import layout
-from rubhpc.disk import disk_errors, flush_to_disk, write_whole
+from rubhpc.disk import disk_errors, write_whole
 from rubhpc.errors import StoreError
 from rubhpc.journal import METRICS, Entry, Journal, Ledger, journals, replay
 from rubhpc.lock import Lock, process_state
@@ -97,19 +97,20 @@ class Store:
         with disk_errors(self.journal_directory):
             return replay(self.journal_directory, self.manifest.header, with_metrics=with_metrics)
 
-    def take_back(self, ledger: Ledger, entries: Sequence[Entry], run: int, writer: str) -> None:
+    def take_back(self, ledger: Ledger, flat: Sequence[int], run: int, writer: str) -> None:
         """Declare cases missing, in the ledger and by a journal of their own."""
-        if entries:
-            ledger.status[[entry.flat for entry in entries]] = MISSING
+        if flat:
+            ledger.status[flat] = MISSING
             with disk_errors(self.journal_directory), self.journal(run, writer) as journal:
-                journal.write(entries)
+                journal.write(Entry(i, "-", MISSING) for i in flat)
 
     def grow(self, sweep: Sweep) -> None:
-        """Lengthen the axes to those of `sweep`, which begin with the old ones; safe to be killed and done again."""
+        """Lengthen the axes to those of `sweep`, which begin as they do; killed, it can be done again."""
         with disk_errors(self.path):
             group = zarr.open_group(self.path, mode="r+", use_consolidated=False)
             layout.resize(group, Manifest.of(sweep))
             static = layout.write_static(group, sweep)
+            group.update_attributes({"study": sweep.study.as_dict()})
             layout.consolidate(self.path)
             self.forget_packing()
             self.manifest = replace(Manifest.of(sweep, static=static), chunk=self.manifest.chunk)
@@ -128,7 +129,7 @@ class Store:
 
     def _vouched(self, name: str, check: int) -> bool:
         try:
-            return layout.checksum(self.arrays[name][...]) == check
+            return layout.checksum(np.asarray(self.arrays[name][...])) == check
         except (RuntimeError, ValueError, OSError):
             return False
 
@@ -141,8 +142,6 @@ class Store:
             raise StoreError(
                 f"{self.path}: its metadata is damaged ({error}); run into another --output"
             ) from None
-
-    # Blocks ---------------------------------------------------------------------------------------------------
 
     def blocks(self) -> Iterator[tuple[int, ...]]:
         """First case of every block of the grid."""
@@ -157,8 +156,10 @@ class Store:
 
     def flat(self, start: tuple[int, ...]) -> NDArray[np.int64]:
         """Flat indices of the cases of a block, in C order."""
-        ranges = np.ix_(*(np.arange(w.start, w.stop) for w in self.window(start)))
-        return np.ravel_multi_index(ranges, self.manifest.shape).ravel()
+        flat = np.zeros(1, np.int64)
+        for window, n in zip(self.window(start), self.manifest.shape, strict=True):
+            flat = np.add.outer(flat * n, np.arange(window.start, window.stop)).ravel()
+        return flat
 
     def chunk_files(self, start: tuple[int, ...]) -> list[Path]:
         """The files that hold a block, one an array."""
@@ -167,6 +168,13 @@ class Store:
             self.path / v.name / self.arrays[v.name].metadata.encode_chunk_key((*place, *[0] * len(v.dims)))
             for v in self.manifest.variables
         ]
+
+    def has_files(self, start: tuple[int, ...]) -> bool:
+        """Whether all files of a block are there and hold something; a power cut may leave empty ones."""
+        try:
+            return all(path.stat().st_size for path in self.chunk_files(start))
+        except FileNotFoundError:
+            return False
 
     def empty_block(self, start: tuple[int, ...]) -> dict[str, NDArray[Any]]:
         """Arrays of a block in which every case is missing, (n_case of it, ...) each."""
@@ -178,7 +186,7 @@ class Store:
 
     def read_block(self, start: tuple[int, ...]) -> dict[str, NDArray[Any]] | None:
         """The arrays of a block as stored; None where a file is missing or cannot be decoded."""
-        if not all(path.exists() for path in self.chunk_files(start)):
+        if not self.has_files(start):
             return None
         window, extent = self.window(start), self.manifest.extent
         try:
@@ -190,7 +198,7 @@ class Store:
             return None
 
     def write_block(self, start: tuple[int, ...], data: dict[str, NDArray[Any]]) -> None:
-        """Store the arrays of a block and return once they are on the disk."""
+        """Store the arrays of a block; each file appears whole."""
         window = self.window(start)
         shape = [w.stop - w.start for w in window]
         with disk_errors(self.path):
@@ -201,7 +209,6 @@ class Store:
                 self.arrays[variable.name][window] = data[variable.name].reshape(
                     *shape, *self.manifest.extent(variable)
                 )
-                flush_to_disk(path)
 
     def remove_partial_files(self) -> None:
         """Remove what writers that were killed left half written."""
@@ -210,10 +217,8 @@ class Store:
                 if name.endswith(".partial"):
                     Path(directory, name).unlink(missing_ok=True)
 
-    # Packing --------------------------------------------------------------------------------------------------
-
     def pack(self, ledger: Ledger) -> None:
-        """Write status and metrics of every case as arrays, unless nothing was journalled since the last time."""
+        """Write status and metrics of every case as arrays, unless the journals tell nothing new."""
         with disk_errors(self.path):
             if not self.is_packed():
                 state = self._journal_state()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import StoreError
-from rubhpc.journal import Entry, next_run
+from rubhpc.journal import next_run
 from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.store import Store, case_checksum
 
@@ -71,8 +71,7 @@ def verify(path: Path) -> Damage:
             with store.lock():
                 if packed:
                     store.forget_packing()
-                entries = [Entry(i, ledger.ids[i].decode(), MISSING) for i in sorted(spoiled)]
-                store.take_back(ledger, entries, next_run(store.journal_directory), "verify")
+                store.take_back(ledger, sorted(spoiled), next_run(store.journal_directory), "verify")
         except (StoreError, OSError) as error:
             note = str(error)
     return Damage(
@@ -97,13 +96,12 @@ def _spoiled_cases(store: Store, ledger: Ledger) -> dict[int, str]:
         there = np.flatnonzero(np.isin(ledger.status[flat], (DONE, DIVERGED)))
         if not len(there):
             continue
-        gone = [file for file in store.chunk_files(start) if not file.exists()]
         data = store.read_block(start)
-        for i_case in there:
-            if gone:
-                spoiled[int(flat[i_case])] = f"{gone[0].relative_to(store.path)} is gone"
-            elif data is None:
-                spoiled[int(flat[i_case])] = "its chunk cannot be decoded"
+        for i_case in there.tolist():
+            if data is None:
+                spoiled[int(flat[i_case])] = (
+                    "a file is gone" if not store.has_files(start) else "a chunk is garbled"
+                )
             elif case_checksum(data, i_case) != ledger.checksum[flat[i_case]]:
                 spoiled[int(flat[i_case])] = "its arrays have changed"
     return spoiled
@@ -111,7 +109,7 @@ def _spoiled_cases(store: Store, ledger: Ledger) -> dict[int, str]:
 
 def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:
     """Cases whose line in a journal is cut short, damaged, or packed and yet no longer there."""
-    never = ledger.ids == b""
+    never = ~ledger.is_known
     packed = _read(store, "status")
     lost = set(ledger.torn_cases)
     if packed is not None:
@@ -120,7 +118,7 @@ def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:
 
 
 def _damaged_packed(store: Store, ledger: Ledger) -> tuple[str, ...]:
-    """Packed arrays that do not hold what the journals say, though they have been packed since the last line."""
+    """Packed arrays that do not hold what the journals say, though these have not changed since."""
     if not store.is_packed():
         return ()
     damaged = []

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.case import run_case
-from rubhpc.disk import disk_errors
+from rubhpc.disk import disk_errors, flush_to_disk
 from rubhpc.journal import Entry, metrics_type
 from rubhpc.pool import Tally
 from rubhpc.prepare import prepare
@@ -20,18 +20,24 @@ from rubhpc.store import case_checksum
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
     from rubhpc.journal import Journal, Ledger
     from rubhpc.prepare import Setup
     from rubhpc.record import Record
+    from rubhpc.rig import Rig
     from rubhpc.stopping import Stopping
     from rubhpc.store import Store
     from rubhpc.sweep import Block, Case, Sweep
 
     Arrays = dict[str, NDArray[Any]]
 
+_SYNC_GAP, _SYNC_SHARE = (
+    1.0,
+    50.0,
+)  # s between syncs, at least, and times what the last took: slow disks cost 2 %
 _SETUPS = 4  # prepared setups a rank keeps; a block shares one, and neighbours often do
 
 
@@ -64,7 +70,9 @@ class Worker:
 
     def __post_init__(self) -> None:
         self._record_type = metrics_type(self.sweep.n_stator)
-        self._setups: OrderedDict[tuple[Any, float], Setup] = OrderedDict()
+        self._setups: OrderedDict[tuple[int, float], tuple[Rig, Setup]] = OrderedDict()
+        self._unsynced: list[Path] = []
+        self._next_sync = time.monotonic()
         self._seconds, self._cost = 0.0, 0.0
         self._case_limit = self.sweep.study.run.case_time_limit
 
@@ -114,10 +122,27 @@ class Worker:
             )
         if entries:
             lost = set(flat[spoiled].tolist()) - {entry.flat for entry in entries}
-            entries += [Entry(i, self.ledger.ids[i].decode(), MISSING) for i in lost]
+            entries += [Entry(i, "-", MISSING) for i in lost]
             self.store.write_block(block.start, data)
             with disk_errors(self.journal.path):
                 self.journal.write(entries)
+            self._unsynced += self.store.chunk_files(block.start)
+            if time.monotonic() > self._next_sync:
+                self.sync()
+
+    def sync(self) -> None:
+        """Return once what has been stored would outlive a power cut, the arrays before their lines.
+
+        A process that is killed loses nothing without it.
+        """
+        began = time.monotonic()
+        with disk_errors(self.store.path):
+            for path in self._unsynced:
+                flush_to_disk(path)
+            self.journal.sync()
+        self._unsynced.clear()
+        ended = time.monotonic()
+        self._next_sync = ended + max(_SYNC_GAP, _SYNC_SHARE * (ended - began))
 
     @property
     def _pace(self) -> float:
@@ -127,7 +152,7 @@ class Worker:
     def _kept(
         self, block: Block, flat: NDArray[np.int64], wanted: NDArray[np.bool_]
     ) -> tuple[Arrays, NDArray[np.bool_]]:
-        """Arrays of the block with the cases that are there already, and which of those turn out to be damaged."""
+        """Arrays of the block with the cases that are there already, and which of those are damaged."""
         data = self.store.empty_block(block.start)
         spoiled = np.zeros_like(wanted)
         status = self.ledger.status[flat]
@@ -135,7 +160,7 @@ class Worker:
         if not len(kept):
             return data, spoiled
         stored = self.store.read_block(block.start)
-        for i_case in kept:
+        for i_case in kept.tolist():
             if stored is None or case_checksum(stored, i_case) != self.ledger.checksum[flat[i_case]]:
                 spoiled[i_case] = True
                 continue
@@ -144,7 +169,7 @@ class Worker:
         return data, spoiled
 
     def _enter(self, case: Case, flat: int, data: Arrays, i_case: int) -> Entry:
-        """Compute a case and put its arrays in the block's; whatever goes wrong in it is its own reason to fail."""
+        """Compute a case and put its arrays in the block's; what goes wrong in it is its reason to fail."""
         try:
             record = self._compute(case)
             if record.status == DONE:
@@ -160,9 +185,13 @@ class Worker:
 
     def _compute(self, case: Case) -> Record:
         study = self.sweep.study
-        key = (case.rig, case.speed)
-        setup = self._setups.get(key)
-        if setup is None:
+        key = (
+            id(case.rig),
+            case.speed,
+        )  # a rig that is kept here keeps its id; hashing it takes as long as a block
+        if key in self._setups:
+            setup = self._setups[key][1]
+        else:
             setup = prepare(
                 case.rig,
                 case.speed,
@@ -170,7 +199,7 @@ class Worker:
                 integrator=study.integrator,
                 samples_per_revolution=study.recording.samples_per_revolution,
             )
-            self._setups[key] = setup
+            self._setups[key] = (case.rig, setup)
             if len(self._setups) > _SETUPS:
                 self._setups.popitem(last=False)
         end = time.monotonic() + self._case_limit if self._case_limit else float("inf")
