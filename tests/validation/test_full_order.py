@@ -1,0 +1,115 @@
+"""Rigs that are not packaged, against the full-order solution of `tests/reference.py`.
+
+They have what the packaged rig lacks: steps and a bore in the shaft, discs off the centre, bearings that are
+anisotropic, cross-coupled and damped, several stators, at one node or at many, some without lateral freedom.
+A few revolutions from rest are compared sample by sample, before any two trajectories could drift apart.
+"""
+
+import math
+
+import numpy as np
+import pytest
+import reference
+
+from rubhpc import simulate
+from rubhpc.rig import Bearing, Damping, Disc, Rig, Rotor, ShaftSection, Stator, Torsion, Unbalance
+
+STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
+STEPPED = (
+    ShaftSection(length=0.2, outer_diameter=0.020, elements=2, **STEEL),
+    ShaftSection(length=0.2, outer_diameter=0.030, inner_diameter=0.012, elements=2, **STEEL),
+    ShaftSection(length=0.25, outer_diameter=0.018, elements=2, **STEEL),
+)
+ROTOR = Rotor(
+    shaft=STEPPED,
+    disc=(
+        Disc(node=3, diameter=0.14, thickness=0.02, density=7800.0),
+        Disc(node=6, mass=0.8, diametral_inertia=4e-4, polar_inertia=7e-4, diameter=0.08),
+    ),
+    bearing=(
+        Bearing(node=1, kyy=2e6, kzz=6e5, kyz=1.5e5, kzy=-2e5, cyy=120.0, czz=60.0, cyz=10.0, czy=-5.0),
+        Bearing(node=7, kyy=8e5, kzz=1.2e6, damping=80.0),
+    ),
+    unbalance=(
+        Unbalance(node=3, mass=0.01, radius=0.06, phase=0.4),
+        Unbalance(node=6, mass=0.004, radius=0.03, phase=-2.0),
+    ),
+    torsion=Torsion(fixed_node=1),
+    damping=Damping(alpha=15.0, beta=2e-6),
+)
+SPRUNG = Rotor(
+    shaft=(ShaftSection(length=0.5, outer_diameter=0.016, elements=6, shear=False, **STEEL),),
+    disc=(Disc(node=3, diameter=0.1, thickness=0.025, density=7800.0),),
+    bearing=(Bearing(node=1, stiffness=4e5, damping=30.0), Bearing(node=7, stiffness=9e5)),
+    unbalance=(Unbalance(node=3, mass=0.01, radius=0.04, phase=1.0),),
+    torsion=Torsion(node=7, stiffness=900.0, damping=0.05),
+    damping=Damping(alpha=10.0),
+)
+
+
+def stator(node, degrees, **changed):
+    given = {
+        "length": 0.05,
+        "width": 0.006,
+        "height": 0.004,
+        "elements": 3,
+        "youngs_modulus": 5e9,
+        "poissons_ratio": 0.35,
+        "density": 1300.0,
+        "damping": Damping(alpha=20.0, beta=1e-5),
+    }
+    return Stator(node=node, angle=math.radians(degrees), **(given | changed))
+
+
+STIFF = {"youngs_modulus": 2e10, "lateral": False}
+# name: rotor, stators, speed (rad/s), clearance (m), friction
+CASES = {
+    "stepped shaft": (ROTOR, [stator(3, 70)], 300.0, 80e-6, 0.3),
+    "reversed spin": (ROTOR, [stator(3, 70)], -300.0, 80e-6, 0.3),
+    "two side by side": (ROTOR, [stator(3, 200), stator(3, 225, width=0.004)], 330.0, 90e-6, 0.2),
+    "three, one set back": (
+        SPRUNG,
+        [stator(3, -60), stator(3, 0, clearance_offset=1e-5), stator(3, 60, **STIFF)],
+        200.0,
+        50e-6,
+        0.2,
+    ),
+    "at two nodes": (ROTOR, [stator(6, 10, radius=0.05), stator(3, 130)], -280.0, 90e-6, 0.25),
+    "no lateral freedom": (SPRUNG, [stator(3, -30, **STIFF)], 400.0, 120e-6, 0.5),
+}
+# Greatest distance over greatest value; with the updated normal it matters in which step a touch begins.
+TOLERANCE = {"fixed": 5e-4, "updated": 4e-3}
+
+
+def distance(found, expected):
+    scale = np.maximum(abs(expected).max(axis=-1), 1e-12)
+    return np.max(abs(found - expected).max(axis=-1) / scale)
+
+
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+@pytest.mark.parametrize("name", CASES)
+def test_case_follows_the_full_order_solution(name, normal):
+    rotor, stators, speed, clearance, friction = CASES[name]
+    rig = Rig(name="trial", rotor=rotor, stator=tuple(stators))
+    revolutions, per_revolution = 3, 128
+    expected = reference.solve(rig, speed, clearance, friction, normal, revolutions, per_revolution, 2e-6)
+    record = simulate(
+        rig,
+        speed=speed,
+        clearance=clearance,
+        friction=friction,
+        normal=normal,
+        transient=0,
+        revolutions=revolutions,
+        samples_per_revolution=per_revolution,
+    )
+    for signal in ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral"):
+        assert distance(getattr(record, signal), expected[signal]) < TOLERANCE[normal], signal
+    # A step's force is the mean around its beginning here and over its length there: half a step apart.
+    assert distance(record.contact_force, expected["contact_force"]) < 4e-3
+    impulse = expected["contact_force"].mean(axis=-1) * 2 * math.pi / abs(speed)
+    assert record.contact_impulse == pytest.approx(impulse, rel=2e-3)
+    assert np.array_equal(record.contacts_per_revolution * revolutions, expected["contacts"])
+    assert expected["contacts"].all()
+    if len(stators) > 1:
+        assert expected["overlap"] > 0.01  # of the time two touch at once
