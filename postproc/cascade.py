@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.load import axes_of, find_axis, source
-from postproc.selection import narrow
-from postproc.spectra import check_signal, spectrum_of, with_frequency
+from postproc.spectra import check_signal, periodic_spectrum, with_frequency
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,6 +20,8 @@ SPEED_AXES = ("speed_ratio", "speed")
 
 def cascade(store: xr.Dataset, signal: str = "torsion", along: str | None = None) -> xr.DataArray:
     """Return the spectra of a signal along one axis; lazy.
+
+    Where waveforms are stored, spectra are taken over whole periods of as many cases as can be.
 
     Parameters
     ----------
@@ -36,9 +37,7 @@ def cascade(store: xr.Dataset, signal: str = "torsion", along: str | None = None
     """
     check_signal(signal)
     along = find_axis(store, along) if along else default_axis(store)
-    stored = f"spectrum_{signal}" if f"spectrum_{signal}" in store or signal not in store else signal
-    data = narrow(store, [stored, "spin_speed"], spread=[along])
-    spectra = spectrum_of(data, signal)
+    spectra, data = periodic_spectrum(store, signal, [along])
     spin = data["spin_speed"].compute().broadcast_like(store[along])
     return with_frequency(spectra.assign_coords(spin_speed=spin), spin).transpose(along, "order")
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.cascade import below, hold_peaks, hold_rows
 from postproc.cells import cell_edges
+from postproc.lines import SPIKE, spikes
 from postproc.load import need_results
 from postproc.units import displayed, scale_of, short_name
 
@@ -53,12 +54,13 @@ def waterfall(
     for i in np.argsort(-rows):  # from the back to the front: each hides what lies behind it
         if not np.isfinite(spectra.values[i]).any():
             continue
-        curve = rows[i] + gain * np.nan_to_num(spectra.values[i])
+        at, line = spikes(x[i], gain * np.nan_to_num(spectra.values[i]), SPIKE * limit)
         order = 3 + (rows.max() - rows[i]) / span
-        ax.fill_between(x[i], rows[i], curve, color="white", linewidth=0, zorder=order)
-        ax.plot(x[i], curve, color="C0", linewidth=0.5, zorder=order)
+        ax.fill_between(at, rows[i], rows[i] + line, color="white", linewidth=0, zorder=order)
+        ax.plot(at, rows[i] + line, color="C0", linewidth=0.5, zorder=order)
     ax.set(xlim=(0, limit), xlabel=_NAMES[abscissa], ylabel=label)
     ax.set_ylim(rows.min() - 0.04 * span, rows.max() + (height + 0.02) * span)
+    ax.set_yticks([t for t in ax.get_yticks() if abs(t - rows.mean()) <= 0.55 * span])
     _scale_bar(spectra, ax, peak, gain)
     return ax
 
@@ -128,7 +130,7 @@ def draw_frequencies(
     abscissa: str = "frequency",
     color: str = "C1",
 ) -> Axes:
-    """Add natural frequencies (Hz) as dashed lines named above the axes; they may vary along it."""
+    """Add natural frequencies (Hz) as dashed lines named beside; they may vary along it."""
     rows, rate = _rows_and_rate(spectra)
     left, right = ax.get_xlim()
     ends = ax.get_ylim()
@@ -140,19 +142,16 @@ def draw_frequencies(
             continue
         y = np.concatenate((ends[:1], rows, ends[1:]))
         ax.plot(np.concatenate((x[:1], x, x[-1:])), y, scalex=False, scaley=False, **style)
-        at = float(np.clip(x[-1], left + 0.1 * (right - left), right - 0.14 * (right - left)))
-        ax.annotate(
-            f"{name} {values[-1]:.4g} Hz",
-            (at, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 2),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=6.5,
-            color=color,
-            annotation_clip=False,
-        )
+        text: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6.5, "color": color, "zorder": 6}
+        if abscissa == "frequency":
+            at = float(np.clip(x[-1], left + 0.1 * (right - left), right - 0.14 * (right - left)))
+            text |= {"xytext": (0, 2), "ha": "center", "va": "bottom", "annotation_clip": False}
+            ax.annotate(f"{name} {values[-1]:.4g} Hz", (at, 1.0), xycoords=("data", "axes fraction"), **text)
+        else:  # over orders the curves meet at the top and part towards slow rotation
+            side, shift = ("right", -2) if x[0] > left + 0.6 * (right - left) else ("left", 2)
+            text |= {"xytext": (shift, 1), "ha": side, "va": "bottom"}
+            text["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.3, "alpha": 0.8}
+            ax.annotate(f"{name} {values[0]:.4g} Hz", (float(x[0]), ends[0]), **text)
     return ax
 
 
@@ -173,13 +172,15 @@ def _rows_and_rate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], NDArray[
 
 
 def _tag(ax: Axes, x: float, y: float, text: str, color: str, ha: str) -> None:
+    bottom, top = ax.get_ylim()
+    has_room = top - y > 0.05 * (top - bottom)
     ax.annotate(
         text,
         (x, y),
-        xytext=(-1 if ha == "right" else 0, 1),
+        xytext=(0, 1) if has_room and ha == "center" else (-1, 1 if has_room else -1),
         textcoords="offset points",
-        ha=ha,
-        va="bottom",
+        ha=ha if has_room else "right",
+        va="bottom" if has_room else "top",
         fontsize=6,
         color=color,
         zorder=6,

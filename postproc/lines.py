@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+SPIKE = 0.004  # half width of a spike, as a part of the abscissa
 MAX_DENOMINATOR = 8  # sub-harmonics beyond the eighth are not told apart from quasi-periodic lines
 
 
@@ -17,6 +22,22 @@ def order_name(order: float, tolerance: float = 1e-6, max_denominator: int = MAX
         if fraction != 0 and abs(float(fraction) - order) <= tolerance:
             return f"{fraction}X"
     return f"{order:.2f}X"
+
+
+def spikes(
+    x: NDArray[np.float64], amplitude: NDArray[np.float64], width: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the curve that shows each line of a spectrum as a spike, at most `width` to either side.
+
+    Joined by straight lines, the few lines of a short record would look like broad peaks. Lines closer than
+    `width` are joined.
+    """
+    if x[1] - x[0] <= width:
+        return x, amplitude
+    width = min(width, float(x[1] - x[0]) / 2)
+    ends = np.stack((x - width, x, x + width), axis=-1)
+    heights = np.stack((np.zeros_like(amplitude), amplitude, np.zeros_like(amplitude)), axis=-1)
+    return ends.ravel(), heights.ravel()
 
 
 def strongest_lines(

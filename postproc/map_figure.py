@@ -28,14 +28,15 @@ _NOT_DONE = {
 }
 _REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
 _WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
-_LONG_LABEL = 16  # characters
+_LEGEND_WIDTH = 64  # characters that fit a column of a page, 6 of them taken by each handle
+_CATEGORIES = ("status", "regime", "period")
 _STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
 
 
 def value_map(data: xr.Dataset, value: str, ax: Axes, log: bool = False) -> Axes:
     """Draw a map from `map_data`: flags and periods as distinct colours, other scalars with a colour bar.
 
-    Cells without a result are grey and hatched by their status; where the model left its range, by lines.
+    Cells without a result are grey and hatched by their status; out of the model's range, by lines.
     """
     y_name, x_name = data[value].dims
     data = data.sortby([str(y_name), str(x_name)])
@@ -46,7 +47,7 @@ def value_map(data: xr.Dataset, value: str, ax: Axes, log: bool = False) -> Axes
     is_known = value == "status" or VARIABLES[value].role == "setting"  # before any case is done
     done = np.ones_like(status, dtype=bool) if is_known else status == DONE
     handles = []
-    if value in ("status", "regime", "period"):
+    if value in _CATEGORIES:
         handles += _draw_categories(ax, data[value], done, edges)
     else:
         _draw_scalar(ax, data[value], done, edges, log)
@@ -55,16 +56,26 @@ def value_map(data: xr.Dataset, value: str, ax: Axes, log: bool = False) -> Axes
             handles += hatch_cells(ax, edges, ~done & (status == code), name, hatch, facecolor=color)
         validity = np.where(done, data["validity"].values, 0)
         reasons = [text for bit, text, _ in VALIDITY.values() if (validity & bit).any()]
+        color = "k" if value in _CATEGORIES else _WARNING
         invalid = f"out of range: {', '.join(reasons)}"
-        handles += hatch_cells(ax, edges, validity > 0, invalid, "\\\\\\\\", color=_WARNING)
+        handles += hatch_cells(ax, edges, validity > 0, invalid, "\\\\\\\\", color=color)
     for values, name in ((x, "x"), (y, "y")):
         if is_geometric(values):
             getattr(ax, f"set_{name}scale")("log")
     ax.set(xlabel=x_label, ylabel=y_label, xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
     if handles:
-        n_column = 2 if any(len(str(h.get_label())) > _LONG_LABEL for h in handles) else min(4, len(handles))
+        n_column = _columns([len(str(h.get_label())) for h in handles])
         ax.figure.legend(handles=handles, loc="outside lower center", ncols=n_column, fontsize=6.5)
     return ax
+
+
+def _columns(lengths: list[int]) -> int:
+    """Return the most columns in which a legend of labels of these lengths fits; it fills by column."""
+    for n_column in range(len(lengths), 1, -1):
+        columns = np.array_split(lengths, n_column)
+        if sum(6 + int(column.max()) for column in columns) <= _LEGEND_WIDTH:
+            return n_column
+    return 1
 
 
 def _draw_scalar(
@@ -109,7 +120,7 @@ def _draw_categories(
     present = [int(c) for c in np.unique(codes) if c >= 0]
     if data.name == "period":
         # Period 0 is no period at all, which is a colour apart; the others darken with their length.
-        ramp = matplotlib.colormaps["viridis_r"](np.linspace(0.08, 0.9, max(len(present), 2)))
+        ramp = matplotlib.colormaps["viridis_r"](np.linspace(0.0, 0.7, max(len(present), 2)))
         names = {c: "none" if c == 0 else f"P{c}" for c in present}
         colors = {c: "#D55E00" if c == 0 else ramp[i] for i, c in enumerate(present)}
     else:

@@ -20,7 +20,7 @@ MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in ("scalar", "flag",
 VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
     "minimum_slip_speed": (1, "slip", lambda slip: slip < 0),
     "force_over_euler_load": (2, "Euler load", lambda ratio: ratio > 1),
-    "tip_deflection_ratio": (4, "tip deflection", lambda ratio: ratio > 0.1),
+    "tip_deflection_ratio": (4, "bending", lambda ratio: ratio > 0.1),
 }
 
 

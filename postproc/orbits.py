@@ -55,6 +55,7 @@ def orbit(data: xr.Dataset, ax: Axes) -> Axes:
             ax.plot(z.values * scale.factor, y.values * scale.factor, linewidth=0.5, label=name)
         ax.legend(loc="upper right")
     ax.set_aspect("equal", adjustable="datalim")
+    ax.locator_params(nbins=6)
     ax.set(xlabel=scale.label("Horizontal displacement"), ylabel=scale.label("Vertical displacement"))
     return ax
 

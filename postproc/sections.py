@@ -68,8 +68,8 @@ def bifurcation(section: xr.DataArray, ax: Axes) -> Axes:
     x, x_label = displayed(section[over])
     scale = scale_of(section)
     y = section.values * scale.factor
-    ax.plot(np.repeat(x, y.shape[1]), y.ravel(), ".", color="C0", markersize=1.6, markeredgewidth=0)
-    ax.set(xlabel=x_label, ylabel=scale.label(f"{short_name(section)}, once a revolution"))
+    ax.plot(np.repeat(x, y.shape[1]), y.ravel(), ".", color="C0", markersize=2.4, markeredgewidth=0)
+    ax.set(xlabel=x_label, ylabel=scale.label(f"{short_name(section)},\nonce a revolution"))
     return ax
 
 

@@ -83,7 +83,8 @@ def first_of_rest(store: xr.Dataset, keep: Iterable[str], variable: str) -> tupl
         for d in rest
         if store.sizes[d] > 1
     ]
-    return store.isel(dict.fromkeys(rest, 0)), notes
+    first = store.isel(dict.fromkeys(rest, 0))
+    return first.drop_vars([d for d in rest if d == "stator" and store.sizes[d] == 1]), notes
 
 
 def written_values(axis: xr.DataArray, around: float | None = None) -> str:

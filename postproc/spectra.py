@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from postproc.load import find_axis, need, source
+from postproc.load import find_axis, source
 from postproc.selection import narrow
 from rubhpc.errors import InputError
 from rubhpc.schema import SIGNAL_NAMES
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
 
@@ -42,7 +44,7 @@ def amplitude_spectrum(waveform: xr.DataArray) -> xr.DataArray:
     """
     n = waveform.sizes["sample"]
     orders = np.fft.rfftfreq(n, d=1 / samples_per_revolution(waveform))
-    spectrum = _over_orders(waveform, _single_sided, orders)
+    spectrum = _over_orders(_single_sided, orders, waveform)
     spectrum.name = f"spectrum_{waveform.name}"
     long_name = waveform.attrs.get("long_name", waveform.name)
     spectrum.attrs = {**waveform.attrs, "long_name": f"amplitude (zero to peak) of the {long_name}"}
@@ -55,10 +57,9 @@ def full_spectrum(vertical: xr.DataArray, horizontal: xr.DataArray) -> xr.DataAr
     Positive spin turns vertical towards horizontal, so that lines at positive orders whirl forward, with the
     spin, and those at negative orders backward. A circular orbit of radius `a` is one line of height `a`.
     """
-    whirl = vertical + 1j * horizontal
-    n = whirl.sizes["sample"]
+    n = vertical.sizes["sample"]
     orders = np.fft.fftshift(np.fft.fftfreq(n, d=1 / samples_per_revolution(vertical)))
-    spectrum = _over_orders(whirl, _two_sided, orders)
+    spectrum = _over_orders(_two_sided, orders, vertical, horizontal)
     spectrum.name = "whirl"
     spectrum.attrs = {"units": vertical.attrs.get("units", "m"), "long_name": "whirl amplitude"}
     return spectrum
@@ -84,42 +85,56 @@ def spectrum_of(store: xr.Dataset, signal: str) -> xr.DataArray:
     )
 
 
+def periodic_spectrum(
+    store: xr.Dataset, signal: str, spread: Iterable[str] = ()
+) -> tuple[xr.DataArray, xr.Dataset]:
+    """Return the spectra of a signal over whole periods of most cases, and those cases; lazy.
+
+    Stored spectra split a period that does not divide the recorded revolutions: 64 hold 21 1/3 periods of a
+    motion that repeats every third, whose lines then fall between those stored and are drawn too low. Where
+    waveforms are stored, the last 63 (60, if others repeat every other) put them right.
+
+    Parameters
+    ----------
+    store : Dataset
+        All axes of more than one value must have been selected, but those in `spread`.
+    """
+    known = [n for n in (signal, f"spectrum_{signal}", "period") if n in store]
+    data = narrow(store, [*known, "spin_speed"], spread)
+    if signal in data:
+        whole = whole_periods(data[signal], data.get("period"))
+        if whole.sizes["sample"] < data[signal].sizes["sample"]:
+            return amplitude_spectrum(whole), data
+    return spectrum_of(data, signal), data
+
+
+def whole_periods(waveform: xr.DataArray, period: xr.DataArray | None) -> xr.DataArray:
+    """Return the last revolutions, at least half of all, that hold whole periods of the most cases."""
+    recorded = round(waveform.sizes["sample"] / samples_per_revolution(waveform))
+    periods = np.ravel(period.values) if period is not None else np.zeros(0, dtype=int)
+    periods = periods[periods > 0].astype(int)
+    counts = range(recorded, (recorded - 1) // 2, -1)  # the longest first, which wins a tie
+    return last_revolutions(waveform, max(counts, key=lambda n: int(np.sum(n % periods == 0))))
+
+
 def spectrum_data(store: xr.Dataset, signal: str, over: str | None = None) -> xr.DataArray:
     """Return the spectrum of a signal, or of the "whirl", with the coordinate `frequency` (Hz); lazy.
-
-    Of one case it is recomputed where the stored one splits a period: 64 revolutions hold 21 1/3 periods of a
-    motion that repeats every third, whose lines then fall between those stored and are drawn too low; the
-    last 63 put them right.
 
     Parameters
     ----------
     store : Dataset
         One case (and one stator, for a stator's signals), or cases along the axis `over`.
     """
-    parts = ("vertical", "horizontal") if signal == "whirl" else (signal,)
-    if signal != "whirl":
-        check_signal(signal)
-    kept = [n for s in parts for n in (s, f"spectrum_{s}") if n in store]
-    if signal == "whirl":
-        need(store, parts)
     spread = [find_axis(store, over)] if over else []
-    data = narrow(store, [*kept, "spin_speed", *(n for n in ("period",) if n in store)], spread)
-    waves = [_whole_periods(data[s], data.get("period")) for s in parts if s in data]
     if signal == "whirl":
-        spectrum = full_spectrum(*waves)
-    elif waves and waves[0].sizes["sample"] < data[signal].sizes["sample"]:
-        spectrum = amplitude_spectrum(waves[0])
+        names = ["vertical", "horizontal", "spin_speed", *(n for n in ("period",) if n in store)]
+        data = narrow(store, names, spread)
+        vertical, horizontal = (whole_periods(data[n], data.get("period")) for n in names[:2])
+        spectrum = full_spectrum(vertical, horizontal)
     else:
-        spectrum = spectrum_of(data, signal)
+        check_signal(signal)
+        spectrum, data = periodic_spectrum(store, signal, spread)
     return with_frequency(spectrum, data["spin_speed"].compute())
-
-
-def _whole_periods(waveform: xr.DataArray, period: xr.DataArray | None) -> xr.DataArray:
-    """Return the last revolutions that make whole periods; all where there is no period or not one case."""
-    n_period = int(period.values) if period is not None and period.ndim == 0 else 0
-    revolutions = round(waveform.sizes["sample"] / samples_per_revolution(waveform))
-    whole = revolutions // n_period * n_period if n_period > 0 else 0
-    return last_revolutions(waveform, whole) if whole else waveform
 
 
 def with_frequency(spectrum: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataArray:
@@ -136,11 +151,11 @@ def check_signal(signal: str) -> None:
         raise InputError(f"{signal}: no such signal; there are {', '.join(SIGNAL_NAMES)}")
 
 
-def _over_orders(waveform: xr.DataArray, function: Any, orders: NDArray[np.floating[Any]]) -> xr.DataArray:
+def _over_orders(function: Any, orders: NDArray[np.floating[Any]], *waveforms: xr.DataArray) -> xr.DataArray:
     spectrum: xr.DataArray = xr.apply_ufunc(
         function,
-        waveform,
-        input_core_dims=[["sample"]],
+        *waveforms,
+        input_core_dims=[["sample"]] * len(waveforms),
         output_core_dims=[["order"]],
         dask="parallelized",
         output_dtypes=[float],
@@ -163,8 +178,11 @@ def _single_sided(waveform: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     return amplitude
 
 
-def _two_sided(whirl: NDArray[np.complexfloating[Any, Any]]) -> NDArray[np.float64]:
+def _two_sided(
+    vertical: NDArray[np.floating[Any]], horizontal: NDArray[np.floating[Any]]
+) -> NDArray[np.float64]:
     """(..., n_sample) -> (..., n_sample), amplitudes from the lowest (backward) order to the highest."""
+    whirl = vertical.astype(np.float64) + 1j * horizontal
     lines = np.fft.fftshift(np.fft.fft(whirl, axis=-1), axes=-1)
     amplitude: NDArray[np.float64] = np.abs(lines) / whirl.shape[-1]
     return amplitude

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.lines import strongest_lines
+from postproc.lines import SPIKE, spikes, strongest_lines
 from postproc.load import need_results
 from postproc.overlay import overlaid
 from postproc.units import scale_of, short_name
@@ -45,10 +45,14 @@ def spectrum(
     is_line = np.abs(amplitude["order"]) > 1e-9  # the mean is no line
     amplitude = amplitude.where(is_line)
     scale = scale_of(amplitude)
-    for name, curve in overlaid(amplitude, "order"):
-        ax.plot(curve[abscissa].values, curve.fillna(0.0).values * scale.factor, label=name, linewidth=0.6)
-    is_full = bool((amplitude["order"].values < 0).any())
     end = float(np.nanmax(amplitude[abscissa].values)) if limit is None else limit
+    for name, curve in overlaid(amplitude, "order"):
+        ax.plot(
+            *spikes(curve[abscissa].values, curve.fillna(0.0).values * scale.factor, SPIKE * end),
+            label=name,
+            linewidth=0.6,
+        )
+    is_full = bool((amplitude["order"].values < 0).any())
     ax.set_xlim(-end if is_full else 0.0, end)
     top = float(amplitude.max()) * scale.factor or 1.0
     if log:
@@ -74,21 +78,25 @@ def default_limit(amplitude: xr.DataArray, abscissa: str = "frequency") -> float
     for _, curve in overlaid(amplitude, "order"):
         first = float(curve[abscissa].values[-1] / curve["order"].values[-1])  # 1X
         lines = strongest_lines(curve)[abscissa].values
-        ends += [4.2 * first, *(1.2 * np.abs(lines))]
+        least = 2.2 if curve["order"].values[0] < 0 else 4.2
+        ends += [least * first, *(1.2 * np.abs(lines))]
     return min(max(ends), float(np.nanmax(amplitude[abscissa].values)))
 
 
 def _name_lines(ax: Axes, lines: xr.Dataset, factor: float, abscissa: str) -> None:
     """Name the lines, the strongest first; one too near to a named one for its text to fit goes unnamed."""
-    left, right = ax.get_xlim()
-    top = ax.get_ylim()[1]
+    is_full = ax.get_xlim()[0] < 0
+    to_axes = ax.transData + ax.transAxes.inverted()
     taken: list[tuple[float, float]] = []
     for i in range(lines.sizes["line"]):
         x, y = float(lines[abscissa].values[i]), float(lines["amplitude"].values[i]) * factor
-        is_crowded = any(abs(x - a) < 0.09 * (right - left) and abs(y - b) < 0.1 * top for a, b in taken)
-        if is_crowded or not left <= x <= right:
+        across, up = to_axes.transform((x, y))
+        # Names of backward and forward lines stand on their outer sides, clear of one another.
+        across += 0.045 * np.sign(x) if is_full else 0.0
+        if not 0 <= across <= 1 or any(abs(across - a) < 0.09 and abs(up - b) < 0.08 for a, b in taken):
             continue
-        taken.append((x, y))
+        taken.append((across, up))
+        side = ("right" if x < 0 else "left") if is_full else "center"
         text = str(lines["name"].values[i])
-        style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 6.5}
+        style: dict[str, Any] = {"ha": side, "va": "bottom", "fontsize": 6.5}
         ax.annotate(text, (x, y), xytext=(0, 1.5), textcoords="offset points", annotation_clip=True, **style)

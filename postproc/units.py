@@ -51,6 +51,7 @@ _SHORT = {
     "clearance": "Clearance",
     "friction": "Friction coefficient",
     "stator_youngs_modulus": "Stator modulus $E_s$",
+    "whirl": "Whirl",
     "frequency": "Frequency",
     "order": "Order (multiples of spin speed)",
     "revolution": "Revolution",

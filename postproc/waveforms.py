@@ -77,6 +77,8 @@ def panels(data: xr.Dataset, axes: Sequence[Axes]) -> list[Axes]:
         waveform(data[name], ax)
         ax.set_ylabel(fill(ax.get_ylabel(), _LABEL_WIDTH), fontsize=7)
         ax.label_outer()
+        ax.locator_params(axis="y", nbins=4)
+    axes[0].figure.align_ylabels(list(axes))
     if "contact_force" in data and data["contact_force"].ndim == 1:
         for ax in axes:
             _shade_contacts(data["contact_force"], ax)

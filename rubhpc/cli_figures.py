@@ -48,7 +48,7 @@ def _of_store(function: Callable[..., None]) -> Callable[..., None]:
 @click.option("--along", metavar="AXIS", help="The axis of the cascade [default: the speed].")
 @click.option("--form", type=click.Choice(["waterfall", "intensity"]), default="waterfall", show_default=True)
 @click.option("--max-frequency", metavar="HZ", help="End of the abscissa [default: beyond modes and 1X].")
-@click.option("--max-order", type=click.FloatRange(min=0, min_open=True), default=8.0, show_default=True)
+@click.option("--max-order", type=click.FloatRange(min=0, min_open=True), default=5.0, show_default=True)
 @_ORDERS
 @click.option("--order-lines", default="1/3,1/2,2/3,1,3/2,2,3", show_default=True, metavar="LIST")
 @click.option("--mark", "marks", multiple=True, metavar="NAME=HZ", help="Mark one more frequency.")
@@ -104,7 +104,7 @@ def cascade(
 @click.option("--x", metavar="AXIS", help="Axis across [default: the longest].")
 @click.option("--y", metavar="AXIS", help="Axis up [default: the next longest].")
 @click.option("--log", is_flag=True, help="Colours on a logarithmic scale.")
-def map_command(
+def map(  # noqa: A001 - the name of the command
     store: str,
     selection: tuple[str, ...],
     figure: str | None,
@@ -247,7 +247,7 @@ def section(
     _finish("section", store, figure, data, shown, draw)
 
 
-COMMANDS = (cascade, map_command, orbit, spectrum, waveform, section)
+COMMANDS = (cascade, map, orbit, spectrum, waveform, section)
 
 
 def _open(store: str, selection: tuple[str, ...]) -> xr.Dataset:

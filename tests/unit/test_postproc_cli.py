@@ -1,0 +1,149 @@
+"""The figure commands, from the command line to the files they leave."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import synthetic_store
+import xarray as xr
+from click.testing import CliRunner
+
+from rubhpc.cli_figures import COMMANDS
+from rubhpc.errors import InputError
+
+BY_NAME = {command.name: command for command in COMMANDS}
+CLEARANCE, FRICTION, MODULUS = "clearance=84 um", "friction=0.3", "stator.youngs_modulus=3 GPa"
+
+
+def options(*chosen):
+    return [word for choice in chosen for word in ("--select", choice)]
+
+
+ONE = options("speed_ratio=1.5", CLEARANCE, FRICTION, MODULUS)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    path = tmp_path_factory.mktemp("stores") / "study.zarr"
+    synthetic_store.write(path, synthetic_store.make())
+    return str(path)
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def invoke(name, *args):
+        return CliRunner().invoke(BY_NAME[name], list(args), catch_exceptions=False).output
+
+    return invoke
+
+
+@pytest.mark.parametrize(
+    ("name", "args"),
+    [
+        ("cascade", options(CLEARANCE, FRICTION, MODULUS)),
+        (
+            "cascade",
+            [*options(CLEARANCE, FRICTION, MODULUS), "--form", "intensity", "--mark", "stiff=53.5 Hz"],
+        ),
+        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--orders", "--signal", "vertical"]),
+        ("map", []),
+        ("map", ["--value", "regime", "--x", "clearance", "--y", "friction"]),
+        ("orbit", ONE),
+        ("orbit", [*options(CLEARANCE, FRICTION, "speed_ratio=1.5"), "--over", "stator.youngs_modulus"]),
+        ("spectrum", ONE),
+        ("spectrum", [*ONE, "--full", "--orders"]),
+        ("spectrum", [*options(CLEARANCE, MODULUS, "speed_ratio=1.5"), "--over", "friction", "--log"]),
+        ("waveform", ONE),
+        ("section", ONE),
+        ("section", [*options(CLEARANCE, FRICTION, MODULUS), "--over", "speed_ratio", "--y", "torsion"]),
+    ],
+)
+def test_each_command_leaves_its_figure_and_says_where(run, store, name, args):
+    said = run(name, store, *args).splitlines()
+    assert said[-1] == f"study_{name}.png"
+    assert Path(said[-1]).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_map_tells_what_it_took_for_the_other_axes(run, store):
+    said = run("map", store)
+    assert "friction = 0.1: the first of 2" in said
+    assert "stator_youngs_modulus = 3 GPa: the first of 2" in said
+
+
+def test_a_spectrum_tells_its_lines(run, store):
+    said = run("spectrum", store, *ONE, "--signal", "vertical").splitlines()
+    assert said[0].split() == ["1X", "47.339", "Hz", "1.0000e-04", "m"]
+
+
+def test_data_come_as_a_table(run, store):
+    run("spectrum", store, *ONE, "--signal", "vertical", "--data", "lines.csv")
+    table = np.genfromtxt("lines.csv", delimiter=",", names=True, deletechars="")
+    row = table[np.isclose(table["order"], 1.0)]
+    assert row["spectrum_vertical_(m)"] == pytest.approx(1e-4, rel=1e-5)
+    assert row["frequency_(Hz)"] == pytest.approx(1.5 * synthetic_store.FIRST_LATERAL)
+
+
+def test_data_come_as_json_with_null_for_what_is_missing(run, store):
+    run("map", store, "--data", "map.json")
+    table = json.loads(Path("map.json").read_text())
+    assert table["data_vars"]["peak_contact_force"]["attrs"]["units"] == "N"
+    assert table["data_vars"]["peak_contact_force"]["data"][0][0] is None
+    assert table["data_vars"]["peak_contact_force"]["data"][1][0] == pytest.approx(75.0)
+
+
+@pytest.mark.parametrize("name", ["orbit.zarr", "orbit.nc"])
+def test_data_come_as_arrays(run, store, name):
+    run("orbit", store, *ONE, "--data", name)
+    opened = xr.open_zarr(name, consolidated=False) if name.endswith(".zarr") else xr.open_dataset(name)
+    with opened:
+        assert float(opened["horizontal"].max()) == pytest.approx(1e-4, rel=1e-3)
+        assert opened["horizontal"].attrs["units"] == "m"
+
+
+@pytest.mark.parametrize(
+    ("name", "args", "said"),
+    [
+        ("orbit", ["--select", "speed_ratio=1.5"], "select one value of clearance"),
+        ("orbit", ["--select", "speed_ratio"], "is no pair; write NAME=VALUE"),
+        ("orbit", [*ONE, "--figure", "orbit.bmp"], "a figure is one of"),
+        ("orbit", [*ONE, "--data", "orbit.xls"], "data is written as"),
+        ("waveform", [*ONE, "--signal", "twist"], "twist: no such signal"),
+        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--order-lines", "1/0"], "no list of orders"),
+        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--max-frequency", "1 kg"], "--max-frequency"),
+        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--max-frequency", "-5"], "out of range"),
+        ("map", ["--value", "vertical"], "no scalar of a case"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(run, store, name, args, said):
+    with pytest.raises(InputError) as refusal:
+        run(name, store, *args)
+    assert said in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert list(Path().iterdir()) == []
+
+
+def test_a_figure_needs_no_display_and_no_pyplot(store, tmp_path):
+    script = (
+        "import sys; from rubhpc.cli_figures import map as command;"
+        f"command([{store!r}], standalone_mode=False); assert 'matplotlib.pyplot' not in sys.modules;"
+        "assert 'mpi4py' not in sys.modules; assert 'numba' not in sys.modules"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "DISPLAY"}
+    environment["PYTHONPATH"] = str(Path(__file__).parents[2])
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=environment, check=True, timeout=120)
+
+
+def test_the_commands_load_nothing_heavy_until_called():
+    script = (
+        "import sys, rubhpc.cli_figures;"
+        "heavy = {'numpy', 'xarray', 'matplotlib', 'dask', 'numba', 'mpi4py'} & set(sys.modules);"
+        "assert not heavy, heavy"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    subprocess.run([sys.executable, "-c", script], env=environment, check=True, timeout=60)
