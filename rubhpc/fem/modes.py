@@ -129,16 +129,27 @@ def _eigenpairs(
         (complex(values[i]), complex(values[i].conj()), shapes[:, i]) for i in np.flatnonzero(oscillates)
     ]
     real = np.abs(values.imag) <= 1e-7 * np.abs(values)
-    pairs.extend(_real_pairs(values[real].real, shapes[:, real].real, mass))
+    pairs.extend(_real_pairs(values[real].real, shapes[:, real].real, mass, damping))
     return pairs
 
 
 def _real_pairs(
-    values: NDArray[np.float64], shapes: NDArray[np.float64], mass: NDArray[np.float64]
+    values: NDArray[np.float64],
+    shapes: NDArray[np.float64],
+    mass: NDArray[np.float64],
+    damping: NDArray[np.float64],
 ) -> Iterator[Pair]:
-    """Real eigenvalues two by two: those of one mode have the most similar shapes."""
-    shapes = shapes / np.sqrt(np.einsum("im,ij,jm->m", shapes, mass, shapes))
-    likeness = np.abs(shapes.T @ mass @ shapes)
+    """Real eigenvalues two by two: those of one mode have the most similar shapes.
+
+    They are compared where they dissipate: the slow creep of a bearing bends the shaft along, its fast
+    root does not. A trace of mass stands in for the damping of a free body that has none.
+    """
+    resistance = (damping + damping.T) / 2
+    trace = 1e-9 * np.abs(resistance).max() / np.abs(mass).max() or 1.0
+    weight = resistance + trace * mass
+    likeness = shapes.T @ weight @ shapes
+    size = np.sqrt(np.maximum(np.abs(np.diag(likeness)), np.finfo(float).tiny))
+    likeness = np.abs(likeness / np.outer(size, size))
     np.fill_diagonal(likeness, -1.0)
     for _ in range(len(values) // 2):
         pair = np.unravel_index(np.argmax(likeness), likeness.shape)

@@ -214,6 +214,33 @@ def test_every_overdamped_mode_of_a_stator_keeps_its_own_ratio():
     assert [mode.frequency for mode in found] == pytest.approx(expected, rel=1e-6)
 
 
+def test_overdamped_rotor_keeps_its_planes_and_motions_apart():
+    damping, arm = 8e3, 0.2
+    found = lateral(rigid_rotor(kyy=1e6, kzz=2e6, damping=damping))
+    expected = []
+    for stiffness in (1e6, 2e6):
+        for k, c, m in (
+            (2 * stiffness, 2 * damping, MASS),
+            (2 * stiffness * arm**2, 2 * damping * arm**2, DIAMETRAL),
+        ):
+            expected.append((math.sqrt(k / m) / (2 * math.pi), c / (2 * math.sqrt(k * m))))
+    for mode, (frequency, ratio) in zip(found, sorted(expected), strict=True):
+        assert mode.frequency == pytest.approx(frequency, rel=1e-4)
+        assert mode.damping_ratio == pytest.approx(ratio, rel=1e-4)
+        assert mode.whirl == "planar"
+
+
+def test_creeping_bearing_pairs_with_its_own_fast_root():
+    # a flexible shaft on bearings so damped that they hardly move: each has a slow root near -k/c
+    rig = read_rig("mokhtar2017")
+    bearings = (Bearing(node=1, stiffness=1e6, damping=1e5), Bearing(node=15, kyy=1e6, kzz=2e6, damping=1e5))
+    body = assemble(replace(rig, rotor=replace(rig.rotor, bearing=bearings))).rotor
+    creeping = [mode for mode in lateral(body, count=None) if mode.damping_ratio > 1]
+    assert sorted(mode.eigenvalue.real for mode in creeping) == pytest.approx([-20, -10, -10, -10], rel=0.01)
+    # paired with one another they would come out near 1.06
+    assert min(mode.damping_ratio for mode in creeping) > 30
+
+
 def test_whirl_index_of_known_orbits():
     names, mass = ["v", "w", "thy", "thz"], np.diag([2.0, 2.0, 0.1, 0.1])
     circle = np.array([1.0, -1j, 0, 0])  # v = cos, w = sin: from y to z
