@@ -1,4 +1,7 @@
-"""One thread for linear algebra, as the commands have it: two would wait for each other on small matrices."""
+"""Puts this directory on the path: tests of every kind share `running` and `reference`.
+
+Linear algebra has one thread, as under the commands: two would wait for each other on small matrices.
+"""
 
 import os
 
