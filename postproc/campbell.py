@@ -44,8 +44,9 @@ def campbell_diagram(
         End of the ordinate, Hz; by default just above the highest curve.
     """
     rpm = 30 / math.pi * curves["speed"].values
-    # an overdamped mode does not oscillate: its curve is broken there
-    frequency = curves["frequency"].where(abs(curves["damping_ratio"]) < 1.0).values
+    # an overdamped mode and a rigid body's do not oscillate: their curves are broken
+    oscillates = (abs(curves["damping_ratio"]) < 1.0) & (curves["frequency"] > 0.0)
+    frequency = curves["frequency"].where(oscillates).values
     drawn = set()
     for i_mode, kind in enumerate(curves["kind"].values):
         words = [whirl if kind == "lateral" else kind for whirl in curves["whirl"].values[i_mode]]

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from rubhpc.errors import InputError
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -22,6 +24,14 @@ def order_name(order: float, tolerance: float = 1e-6, max_denominator: int = MAX
         if fraction != 0 and abs(float(fraction) - order) <= tolerance:
             return f"{fraction}X"
     return f"{order:.2f}X"
+
+
+def parse_orders(text: str, where: str) -> list[Fraction]:
+    """Return the orders that a list such as "1/2, 1X, 2" names; InputError where it is none."""
+    try:
+        return [Fraction(part.strip().upper().removesuffix("X")) for part in text.split(",") if part.strip()]
+    except (ValueError, ZeroDivisionError):
+        raise InputError(f'{where}: "{text}" is no list of orders; write 1/2,1,2') from None
 
 
 def spikes(

@@ -54,6 +54,10 @@ def value_map(data: xr.Dataset, value: str, ax: Axes, log: bool = False) -> Axes
     if not is_known:
         for code, (name, color, hatch) in _NOT_DONE.items():
             handles += hatch_cells(ax, edges, ~done & (status == code), name, hatch, facecolor=color)
+        empty = done & np.isnan(
+            np.asarray(data[value].values, dtype=float)
+        )  # such as durations without contact
+        handles += hatch_cells(ax, edges, empty, "no value", "", facecolor="white")
         validity = np.where(done, data["validity"].values, 0)
         reasons = [text for bit, text, _ in VALIDITY.values() if (validity & bit).any()]
         color = "k" if value in _CATEGORIES else _WARNING

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,15 +67,16 @@ def cascade(
 ) -> None:
     """Spectra of a signal along the speed, with order lines and the rotor's natural frequencies."""
     from postproc.bench import natural_frequencies
-    from postproc.cascade import below, default_axis
+    from postproc.cascade import below
     from postproc.cascade import cascade as gather
     from postproc.cascade_figure import default_limit, draw_frequencies, draw_orders, intensity, waterfall
+    from postproc.lines import parse_orders
     from rubhpc.reading import parse_quantity
 
     cases = _open(store, selection)
-    orders = _fractions(order_lines)
+    orders = parse_orders(order_lines, "--order-lines")
     spectra = gather(cases, signal, along)
-    frequencies: dict[str, Any] = dict(natural_frequencies(cases, along or default_axis(cases)))
+    frequencies: dict[str, Any] = dict(natural_frequencies(cases, str(spectra.dims[0])))
     for name, value in _pairs(marks, "--mark"):
         frequencies[name] = parse_quantity(_number(value), "Hz", f"--mark {name}")
     abscissa = "order" if is_order else "frequency"
@@ -297,10 +297,3 @@ def _number(text: str) -> float | str:
         return float(text)
     except ValueError:
         return text
-
-
-def _fractions(text: str) -> list[Fraction]:
-    try:
-        return [Fraction(part.strip().upper().removesuffix("X")) for part in text.split(",") if part.strip()]
-    except (ValueError, ZeroDivisionError):
-        raise InputError(f'--order-lines: "{text}" is no list of orders; write 1/2,1,2') from None

@@ -126,6 +126,14 @@ def test_a_map_of_settings_needs_no_result(store, ax):
     assert np.ma.count_masked(ax.collections[0].get_array()) == 0
 
 
+def test_a_finished_case_may_have_no_value(plain_map, ax):
+    data = plain_map("contact_duration")
+    data["contact_duration"][1, 2] = np.nan  # it never touched
+    value_map(data, "contact_duration", ax)
+    labels = [text.get_text() for text in ax.figure.legends[0].get_texts()]
+    assert "no value" in labels
+
+
 def test_a_logarithmic_map_needs_positive_values(plain_map, ax):
     value_map(plain_map("peak_contact_force"), "peak_contact_force", ax, log=True)
     data = plain_map("peak_contact_force")
