@@ -89,7 +89,6 @@ def modes(body: Body, spin: float = 0.0) -> list[Mode]:
         block = np.ix_(rows, rows)
         mass = body.mass[block]
         damping = (body.damping + spin * body.gyroscopic)[block]
-        pairs = _eigenpairs(mass, damping, body.stiffness[block])
         names = [body.degrees[row][1] for row in rows]
         pairs = _eigenpairs(mass, damping, body.stiffness[block])
         if "v" in names:
