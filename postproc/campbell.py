@@ -50,6 +50,8 @@ def campbell_diagram(
     drawn = set()
     for i_mode, kind in enumerate(curves["kind"].values):
         words = [whirl if kind == "lateral" else kind for whirl in curves["whirl"].values[i_mode]]
+        if np.isnan(frequency[i_mode]).all():
+            continue
         for word, part in _stretches(words):
             ax.plot(rpm[part], frequency[i_mode, part], **STYLES[word])
             drawn.add(word)
@@ -61,6 +63,7 @@ def campbell_diagram(
         ax.plot(30 / math.pi * speeds, speeds / (2 * math.pi), **_CRITICAL)
     ax.set(xlabel="Spin speed (rpm)", ylabel="Natural frequency (Hz)")
     ax.ticklabel_format(style="plain")
+    ax.locator_params(axis="x", nbins=6)  # six digits of rpm take their room
     _legend(ax, [word for word in STYLES if word in drawn], bool(critical))
     return ax
 
