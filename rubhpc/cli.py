@@ -43,8 +43,6 @@ COMMANDS = {
     "spectrum": ("rubhpc.cli_figures:spectrum", "Amplitude spectrum of a signal."),
     "waveform": ("rubhpc.cli_figures:waveform", "Signals over the revolutions."),
     "section": ("rubhpc.cli_figures:section", "Poincaré section, or bifurcation diagram along an axis."),
-    "hht": ("rubhpc.cli_figures:hht", "Hilbert-Huang spectrum of a signal."),
-    "export": ("rubhpc.cli_figures:export", "HDF5 of chosen cases."),
 }
 
 
@@ -58,10 +56,7 @@ class _Commands(click.Group):
         if cmd_name not in COMMANDS:
             return None
         module, _, name = COMMANDS[cmd_name][0].partition(":")
-        found = getattr(import_module(module), name, None)
-        if found is None:
-            found = next(command for command in import_module(module).COMMANDS if command.name == cmd_name)
-        command: click.Command = found
+        command: click.Command = getattr(import_module(module), name)
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar
 
 import numpy as np
@@ -208,7 +209,9 @@ def connect() -> Pool:
 
         # Only the main thread calls MPI; others keep the lock alive and watch the launcher.
         mpi4py.rc.thread_level = "funneled"
-        from mpi4py import MPI
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # of a foreign launcher, which is refused below
+            from mpi4py import MPI
     except ImportError as error:
         raise InputError(
             f"started as {given.size} processes, but mpi4py cannot be used ({error}); "

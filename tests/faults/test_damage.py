@@ -1,0 +1,131 @@
+"""What is damaged is named, exactly; the next run computes it again, and nothing else."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from running import journalled_cases, run, stored_bytes, write_study
+
+from rubhpc.store import Store
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("finished")
+    done = run(write_study(folder))
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture
+def store(tmp_path: Path, finished: Path) -> Path:
+    return Path(shutil.copytree(finished / "tiny.zarr", tmp_path / "tiny.zarr"))
+
+
+def named_by_verify(store: Path) -> set[tuple[int, ...]]:
+    """Indices of the cases that verify names."""
+    done = run("verify", store)
+    assert done.returncode == 3
+    assert done.stderr.startswith(f"rubhpc: {store}: damage in ")
+    assert done.stderr.count("\n") == 1
+    return {
+        tuple(int(i) for i in found.split(", "))
+        for found in re.findall(r"damaged: case \(([\d, ]+)\)", done.stdout)
+    }
+
+
+def mended_by_run(store: Path, finished: Path) -> int:
+    """Run the study again; how many cases that took to make all as it was."""
+    n_before = journalled_cases(store)
+    done = run(finished / "tiny.toml", "--output", store)
+    assert done.returncode == 0, done.stderr
+    assert stored_bytes(store) == stored_bytes(finished / "tiny.zarr")
+    assert run("verify", store).returncode == 0
+    return journalled_cases(store) - n_before
+
+
+def change_byte(path: Path, at: int) -> None:
+    data = bytearray(path.read_bytes())
+    data[at] ^= 0x40
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize(("name", "at"), [("vertical", -1), ("contact_force", 16), ("section_torsion", -3)])
+def test_a_byte_of_a_chunk_is_changed(store, finished, name, at):
+    """The chunk holds the cases (0, 1, 0) and (0, 1, 1); a byte may belong to one or to both."""
+    change_byte(store / name / "c" / "/".join("010" + "0" * (Store(store).arrays[name].ndim - 3)), at)
+    named = named_by_verify(store)
+    assert named
+    assert named <= {(0, 1, 0), (0, 1, 1)}
+    assert mended_by_run(store, finished) == len(named)
+
+
+def test_one_case_of_a_chunk_is_changed(store, finished):
+    """Only its own numbers: the other case of the chunk is carried over."""
+    Store(store).arrays["torsion"][1, 0, 0, 7] += 1e-9
+    assert named_by_verify(store) == {(1, 0, 0)}
+    assert mended_by_run(store, finished) == 1
+
+
+def test_a_chunk_is_deleted(store, finished):
+    Store(store).chunk_files((1, 0, 0))[4].unlink()
+    assert named_by_verify(store) == {(1, 0, 0), (1, 0, 1)}
+    assert mended_by_run(store, finished) == 2
+
+
+def test_a_run_sees_a_deleted_chunk_by_itself(store, finished):
+    Store(store).chunk_files((1, 0, 0))[4].unlink()
+    assert mended_by_run(store, finished) == 2
+
+
+def test_the_journal_is_cut_short(store, finished):
+    (path,) = (store / ".rubhpc" / "journal").iterdir()
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:-2]) + lines[-2][:50])
+    lost = {int(line.split()[1]) for line in lines[-2:]}
+    assert named_by_verify(store) == {
+        tuple(int(i) for i in np.unravel_index(flat, (2, 2, 3))) for flat in lost
+    }
+    # The line cut short stays in its file; two new ones come.
+    assert mended_by_run(store, finished) == 2
+
+
+def test_a_line_of_the_journal_is_changed(store, finished):
+    (path,) = (store / ".rubhpc" / "journal").iterdir()
+    lines = path.read_bytes().splitlines(keepends=True)
+    flat = int(lines[4].split()[1])
+    change_byte(path, len(b"".join(lines[:4])) + 60)
+    assert named_by_verify(store) == {tuple(int(i) for i in np.unravel_index(flat, (2, 2, 3)))}
+    assert mended_by_run(store, finished) == 1
+
+
+@pytest.mark.parametrize("name", ["period", "status", "speed_ratio", "clearance", "revolution"])
+def test_what_is_no_case_is_written_anew_without_computing(store, finished, name):
+    (chunk,) = (path for path in (store / name / "c").rglob("*") if path.is_file())
+    change_byte(chunk, -1)
+    done = run("verify", store)
+    assert done.returncode == 3
+    assert f"damaged: array {name}" in done.stdout
+    assert "damaged: case" not in done.stdout
+    assert mended_by_run(store, finished) == 0
+
+
+def test_a_partial_file_is_no_damage(store, finished):
+    stray = store / "vertical" / "c" / "0" / "0" / "0" / "0.5f.partial"
+    stray.write_bytes(b"half a chunk")
+    assert run("verify", store).returncode == 0
+    assert mended_by_run(store, finished) == 0
+    assert not stray.exists()
+
+
+def test_verify_names_the_damage_while_the_store_is_in_use(store):
+    Store(store).chunk_files((1, 0, 0))[4].unlink()
+    with Store(store).lock():
+        done = run("verify", store)
+    assert done.returncode == 3
+    assert "not marked for the next run" in done.stderr
+    assert done.stdout.count("damaged: case") == 2

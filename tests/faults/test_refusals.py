@@ -1,0 +1,139 @@
+"""Poisoned cases, locks, and disks that will not be written to."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from running import command, environment, journalled_cases, run, start, write_study
+
+from rubhpc.verify import verify
+
+POISONED = Path(__file__).with_name("poisoned.py")
+
+
+def test_poisoned_cases_fail_and_the_others_finish(tmp_path):
+    study = write_study(tmp_path, run='case_time_limit = "1.5 s"')
+    done = run("cases", study, ranks=2, script=POISONED)
+    assert done.returncode == 1, done.stderr
+    (line,) = [line for line in done.stderr.splitlines() if line]
+    assert line.startswith(f"rubhpc: {tmp_path / 'tiny.zarr'}: 8 of 12 cases failed; the first, ")
+    told = run("status", tmp_path / "tiny.zarr").stdout
+    assert "12 cases: 4 done, 8 failed, 0 diverged, 0 missing" in told
+    assert told.count("friction=0.3: failed: ZeroDivisionError: a poisoned case") == 4
+    assert told.count("friction=0.5: failed: over its time limit of 1.5 s") == 4
+    healthy = run(study, "--retry-failed", ranks=2)
+    assert healthy.returncode == 0, healthy.stderr
+    assert "12 done; 8 computed" in healthy.stdout
+
+
+def test_a_second_run_on_a_store_is_refused_and_status_tells_of_the_first(tmp_path):
+    study, store = write_study(tmp_path, transient=2000), tmp_path / "tiny.zarr"
+    first = start(study)
+    lock = store / ".rubhpc" / "lock"
+    while not lock.exists():
+        time.sleep(0.02)
+        assert first.poll() is None
+    second = run(study)
+    assert second.returncode == 3
+    assert f"in use by process {first.pid} on " in second.stderr
+    assert second.stderr.count("\n") == 1
+    told = run("status", store)
+    assert told.returncode == 0
+    assert f"running: process {first.pid} on " in told.stdout
+    first.send_signal(signal.SIGTERM)
+    first.communicate(timeout=20)
+    assert first.returncode == 75
+
+
+def test_the_lock_of_a_killed_run_is_no_hindrance(tmp_path):
+    study, store = write_study(tmp_path, transient=8), tmp_path / "tiny.zarr"
+    first = start(study)
+    while journalled_cases(store) == 0:
+        time.sleep(0.02)
+    first.kill()
+    first.communicate()
+    assert (store / ".rubhpc" / "lock").exists()
+    assert run(study).returncode == 0
+    assert not (store / ".rubhpc" / "lock").exists()
+
+
+def as_nobody(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run the program as a user whom permissions bind; root is bound by none."""
+    user = 65534 if os.geteuid() == 0 else None
+    return subprocess.run(
+        [*command(*arguments)],
+        env=environment(HOME="/nonexistent"),
+        user=user,
+        group=user,
+        extra_groups=[] if user else None,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def test_a_store_that_cannot_be_written_is_told_in_a_line(tmp_path):
+    study, store = write_study(tmp_path), tmp_path / "tiny.zarr"
+    part = write_study(tmp_path, "part.toml", speed_ratio=[0.9])
+    assert run(part).returncode == 0
+    before = {path: path.read_bytes() for path in store.rglob("*") if path.is_file()}
+    folders = [tmp_path, *(path for path in tmp_path.rglob("*") if path.is_dir())]
+    for folder in tmp_path.parents[:3]:
+        folder.chmod(0o755)
+    for folder in folders:
+        folder.chmod(0o555)
+    try:
+        for arguments in ((study,), (study, "--output", tmp_path / "new.zarr")):
+            done = as_nobody(*arguments)
+            assert done.returncode == 3, done.stderr
+            assert done.stderr.startswith(f"rubhpc: {tmp_path}")
+            assert "permission" in done.stderr
+            assert done.stderr.count("\n") == 1
+        assert as_nobody("status", store).returncode == 0
+    finally:
+        for folder in folders:
+            folder.chmod(0o755)
+    assert {path: path.read_bytes() for path in store.rglob("*") if path.is_file()} == before
+    assert run(study).returncode == 0
+
+
+def test_a_full_disk_is_told_in_a_line_and_the_run_goes_on_once_there_is_space(tmp_path):
+    """A limit on the size of files stands for the disk: a journal may not grow beyond a few lines."""
+    study, store = write_study(tmp_path, block=1), tmp_path / "tiny.zarr"
+    assert run(write_study(tmp_path, "empty.toml", block=1), "--time-limit", "1 ms").returncode == 75
+    full = subprocess.run(
+        command(study),
+        env=environment(),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2500, 2500)),
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert full.returncode == 3, full.stderr
+    assert full.stderr.startswith(f"rubhpc: {store}: the file size limit is reached")
+    assert full.stderr.count("\n") == 1
+    done = run(study)
+    assert done.returncode == 0, done.stderr
+    assert not verify(store)
+    n_kept = int(done.stdout.split("/12 cases are there")[0])
+    assert 0 < n_kept < 12
+
+
+def test_malformed_studies_write_nothing(tmp_path):
+    study = write_study(tmp_path, transient='"many"')
+    for ranks in (0, 2):
+        done = run(study, ranks=ranks)
+        assert done.returncode == 2
+        assert "tiny.toml" in done.stderr
+        assert "transient" in done.stderr
+        assert "Traceback" not in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["tiny.toml"]
+    assert sys.executable in command(study)[0]

@@ -1,0 +1,171 @@
+"""Any number of ranks computes the same bytes, and ranks that cannot work together say so."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import psutil
+import pytest
+from running import command, environment, journalled_cases, run, start, stored_bytes, write_study
+
+from rubhpc.launch import launch
+
+if TYPE_CHECKING:
+    import subprocess
+
+TRANSIENT = 8  # revolutions: a case takes some 0.1 s, long enough to be stopped among others
+POISONED = Path(__file__).parents[1] / "faults" / "poisoned.py"
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """What one process without MPI stores."""
+    folder = tmp_path_factory.mktemp("alone")
+    done = run(write_study(folder, transient=TRANSIENT))
+    assert done.returncode == 0, done.stderr
+    return stored_bytes(folder / "tiny.zarr")
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_any_number_of_ranks_stores_equal_bytes(tmp_path, alone, ranks):
+    done = run(write_study(tmp_path, transient=TRANSIENT), ranks=ranks)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("12 done; 12 computed") == 1  # one rank speaks
+    assert stored_bytes(tmp_path / "tiny.zarr") == alone
+
+
+def test_a_resumed_run_of_other_size_stores_equal_bytes(tmp_path, alone):
+    study, store = write_study(tmp_path, transient=TRANSIENT), tmp_path / "tiny.zarr"
+    job = start(study, ranks=2)
+    while journalled_cases(store) == 0:
+        time.sleep(0.02)
+        assert job.poll() is None
+    job.send_signal(signal.SIGTERM)
+    job.communicate(timeout=10)
+    assert job.returncode == 75
+    assert 0 < journalled_cases(store) < 12
+    done = run(study, ranks=3)
+    assert done.returncode == 0, done.stderr
+    assert journalled_cases(store) == 12  # none was computed twice
+    assert stored_bytes(store) == alone
+
+
+def test_ranks_share_the_work(tmp_path):
+    """Each computes: two ranks leave two journals, of blocks that differ."""
+    study = write_study(tmp_path, transient=TRANSIENT, block=1)
+    assert run(study, ranks=2).returncode == 0
+    files = sorted((tmp_path / "tiny.zarr" / ".rubhpc" / "journal").iterdir())
+    assert [path.name[-14:-8] for path in files] == ["k00000", "k00001"]
+    cases = [{line.split()[1] for line in path.read_text().splitlines()[1:]} for path in files]
+    assert not cases[0] & cases[1]
+    assert len(cases[0] | cases[1]) == 12
+    assert min(len(part) for part in cases) >= 2
+
+
+@pytest.mark.parametrize(
+    "variables",
+    [
+        {"PMI_RANK": "0", "PMI_SIZE": "4"},
+        {"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "4"},
+        {"SLURM_PROCID": "0", "SLURM_STEP_NUM_TASKS": "4"},
+    ],
+    ids=["another MPICH", "Open MPI", "srun without PMI"],
+)
+def test_the_wrong_launcher_is_refused(tmp_path, variables):
+    """What the ranks of another vendor's mpirun see: four were started, and MPI connects one."""
+    done = run(write_study(tmp_path), **variables)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("rubhpc: the launcher started 4 processes, but MPI (")
+    assert "connects 1; use the mpirun of that MPI" in line
+    assert not (tmp_path / "tiny.zarr").exists()
+
+
+def test_other_ranks_of_the_wrong_launcher_are_silent(tmp_path):
+    done = run(write_study(tmp_path), OMPI_COMM_WORLD_RANK="3", OMPI_COMM_WORLD_SIZE="4")
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", "")
+
+
+def test_a_launcher_without_mpi4py_names_the_mend(tmp_path):
+    (tmp_path / "mpi4py.py").write_text("raise ImportError('none here')")
+    path = f"{tmp_path}{os.pathsep}{environment()['PYTHONPATH']}"
+    done = run(write_study(tmp_path), PMI_RANK="0", PMI_SIZE="2", PYTHONPATH=path)
+    assert done.returncode == 2
+    assert "pip install 'rubhpc[mpi]'" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_mpi_is_loaded_under_a_launcher_only(tmp_path):
+    (tmp_path / "mpi4py.py").write_text("raise ImportError('none here')")
+    path = f"{tmp_path}{os.pathsep}{environment()['PYTHONPATH']}"
+    assert run(write_study(tmp_path), PYTHONPATH=path).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("variables", "expected"),
+    [
+        ({}, (0, 1)),
+        ({"PMI_RANK": "2", "PMI_SIZE": "3", "SLURM_PROCID": "0", "SLURM_STEP_NUM_TASKS": "1"}, (2, 3)),
+        ({"SLURM_NTASKS": "8", "SLURM_PROCID": "0"}, (0, 1)),  # a batch script that starts no step
+        ({"SLURM_STEP_NUM_TASKS": "8", "SLURM_PROCID": "5"}, (5, 8)),
+        ({"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_RANK": "1"}, (1, 2)),
+    ],
+)
+def test_launchers_are_told_apart(monkeypatch, variables, expected):
+    for name in list(os.environ):
+        if name.startswith(("PMI", "OMPI_", "SLURM_")):
+            monkeypatch.delenv(name)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert launch() == expected
+
+
+def test_an_input_error_is_told_once(tmp_path):
+    done = run(tmp_path / "nowhere.toml", ranks=3)
+    assert done.returncode == 2
+    assert done.stderr.count("nowhere.toml: no such file") == 1
+
+
+def test_a_rank_that_slips_ends_the_job(tmp_path):
+    began = time.monotonic()
+    done = run("rank1", write_study(tmp_path, transient=2000), ranks=2, script=POISONED, timeout=60)
+    assert done.returncode == 70
+    assert time.monotonic() - began < 30  # the study itself takes minutes
+    assert "rubhpc: rank 1: LookupError: a slip; the traceback is in " in done.stderr
+    assert "Traceback" not in done.stderr
+    (log,) = (tmp_path / "tiny.zarr" / ".rubhpc" / "logs").iterdir()
+    assert "a slip" in log.read_text()
+
+
+def ranks_of(job: subprocess.Popen[str]) -> dict[int, psutil.Process]:
+    """The ranks that a launcher has started so far, by number."""
+    return {
+        int(child.environ()["PMI_RANK"]): child
+        for child in psutil.Process(job.pid).children(recursive=True)
+        if child.name().startswith("python") and "PMI_RANK" in child.environ()
+    }
+
+
+@pytest.mark.parametrize("rank", [0, 1])
+def test_a_rank_that_is_killed_ends_the_job_and_the_next_run_completes(tmp_path, rank):
+    study, store = write_study(tmp_path, transient=TRANSIENT), tmp_path / "tiny.zarr"
+    job = start(study, ranks=2)
+    while journalled_cases(store) == 0:
+        time.sleep(0.02)
+        assert job.poll() is None
+    os.kill(ranks_of(job)[rank].pid, signal.SIGKILL)
+    job.communicate(timeout=5)
+    assert job.returncode != 0
+    done = run(study, ranks=2)
+    assert done.returncode == 0, done.stderr
+    assert "12 done" in done.stdout
+
+
+def test_the_tests_start_the_launcher_that_comes_with_the_program():
+    assert Path(command(ranks=1)[0]).parent == Path(sys.executable).parent

@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from rubhpc.journal import Entry, Header, Journal, journals, metrics_type, next_run, replay
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, VARIABLES
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+HEADER = Header(identity="abc", axes=((0.1, 0.2), (1.0, 2.0, 3.0)), n_stator=2)
+
+
+def write(
+    folder: Path, *entries: Entry, run: int = 1, writer: str = "rank00000", header: Header = HEADER
+) -> Path:
+    with Journal(folder, run, writer, header) as journal:
+        journal.write(entries)
+    return journal.path
+
+
+def metrics(seed: int, n_stator: int = 2) -> np.ndarray:
+    """Every bit pattern a float may have, near enough: signs, subnormals, infinities, NaN."""
+    rng = np.random.default_rng(seed)
+    row = np.zeros((), metrics_type(n_stator))
+    for name in row.dtype.names:
+        kind = row[name].dtype
+        if kind.kind == "f":
+            values = rng.choice(
+                [math.pi * 1e-300, 5e-324, -0.0, math.inf, math.nan, rng.normal()], row[name].shape
+            )
+            row[name] = values
+        else:
+            row[name] = rng.integers(0, np.iinfo(kind).max, row[name].shape)
+    return row
+
+
+def test_what_is_written_is_read_back_bit_by_bit(tmp_path):
+    rows = {flat: metrics(flat) for flat in range(5)}
+    write(tmp_path, *(Entry(i, f"id{i}", DONE, 0xDEADBEEF - i, row.tobytes()) for i, row in rows.items()))
+    ledger = replay(tmp_path, HEADER)
+    assert ledger.status.tolist() == [DONE] * 5 + [MISSING]
+    assert ledger.checksum[:5].tolist() == [0xDEADBEEF - i for i in range(5)]
+    for i, row in rows.items():
+        assert ledger.metrics[i].tobytes() == row.tobytes()
+
+
+def test_metrics_are_those_of_the_schema():
+    names = {v.name for v in VARIABLES.values() if v.role == "scalar"} | {"regime"}
+    assert set(metrics_type(1).names) == names
+
+
+def test_a_reason_of_any_text_stays_on_its_line(tmp_path):
+    reason = 'line one\nline two - "quoted" \\ ünïcode'
+    write(
+        tmp_path,
+        Entry(0, "a", FAILED, reason=reason),
+        Entry(1, "b", DIVERGED, 1, metrics(1).tobytes(), "grew"),
+    )
+    ledger = replay(tmp_path, HEADER)
+    assert ledger.reasons == {0: reason, 1: "grew"}
+    assert ledger.status[:2].tolist() == [FAILED, DIVERGED]
+
+
+@pytest.mark.parametrize("cut", [1, 2, 10, 60])
+def test_a_line_cut_short_is_passed_over_and_the_rest_kept(tmp_path, cut):
+    path = write(tmp_path, *(Entry(i, f"id{i}", DONE, i, metrics(i).tobytes()) for i in range(3)))
+    path.write_bytes(path.read_bytes()[:-cut])
+    ledger = replay(tmp_path, HEADER)
+    assert ledger.status[:3].tolist() == [DONE, DONE, MISSING]
+    assert ledger.torn == 1
+    assert ledger.torn_cases == {2}
+
+
+def test_no_flipped_bit_goes_unseen(tmp_path):
+    path = write(tmp_path, Entry(4, "id", DONE, 7, metrics(0).tobytes()))
+    whole = path.read_bytes()
+    begin = whole.index(b"\n") + 1
+    for at in range(begin, len(whole), 7):
+        changed = bytearray(whole)
+        changed[at] ^= 0x10
+        path.write_bytes(changed)
+        ledger = replay(tmp_path, HEADER)
+        assert not ledger.status.any(), at
+        assert ledger.torn >= 1
+
+
+def test_a_torn_header_drops_its_file_only(tmp_path):
+    torn = write(tmp_path, Entry(0, "a", DONE, 1, metrics(0).tobytes()))
+    write(tmp_path, Entry(1, "b", DONE, 1, metrics(0).tobytes()), writer="rank00001")
+    torn.write_bytes(torn.read_bytes()[:20])
+    assert replay(tmp_path, HEADER).status[:2].tolist() == [MISSING, DONE]
+
+
+@pytest.mark.parametrize(
+    "foreign",
+    [
+        Header(identity="other", axes=HEADER.axes, n_stator=2),
+        Header(identity="abc", axes=HEADER.axes, n_stator=1),
+        Header(identity="abc", axes=((0.1, 0.25), (1.0, 2.0, 3.0)), n_stator=2),
+        Header(identity="abc", axes=((0.1, 0.2), (1.0, 2.0, 3.0, 4.0)), n_stator=2),
+        Header(identity="abc", axes=((0.1, 0.2),), n_stator=2),
+    ],
+    ids=["identity", "stators", "values", "larger grid", "fewer axes"],
+)
+def test_journals_of_another_study_do_not_count(tmp_path, foreign):
+    write(tmp_path, Entry(0, "a", DONE, 1, metrics(0, foreign.n_stator).tobytes()), header=foreign)
+    ledger = replay(tmp_path, HEADER)
+    assert not ledger.is_known.any()
+    assert ledger.torn == 0
+
+
+def test_a_smaller_grid_keeps_its_cases_in_their_places(tmp_path):
+    small = Header(identity="abc", axes=((0.1,), (1.0, 2.0)), n_stator=2)
+    write(tmp_path, Entry(0, "a", DONE, 10, metrics(0).tobytes()), header=small)
+    write(tmp_path, Entry(1, "b", FAILED, reason="why"), header=small, run=2)
+    wide = Header(identity="abc", axes=((0.1, 0.2), (1.0, 2.0, 3.0)), n_stator=2)
+    tall = Header(identity="abc", axes=((0.1, 0.2, 0.3), (1.0, 2.0)), n_stator=2)
+    assert replay(tmp_path, wide).status.reshape(2, 3).tolist() == [[DONE, FAILED, 0], [0, 0, 0]]
+    assert replay(tmp_path, tall).status.reshape(3, 2).tolist() == [[DONE, FAILED], [0, 0], [0, 0]]
+
+
+def test_the_later_run_has_the_last_word(tmp_path):
+    write(tmp_path, Entry(0, "a", FAILED, reason="old"), Entry(1, "b", DONE, 1, metrics(0).tobytes()))
+    write(tmp_path, Entry(0, "a", DONE, 5, metrics(1).tobytes()), run=2)
+    write(tmp_path, Entry(1, "-", MISSING), run=10, writer="verify")
+    ledger = replay(tmp_path, HEADER)
+    assert ledger.status[:2].tolist() == [DONE, MISSING]
+    assert ledger.reasons == {}
+    assert ledger.is_known[:2].all()
+    assert next_run(tmp_path) == 11
+
+
+def test_what_a_run_takes_back_comes_before_what_it_computes(tmp_path):
+    write(tmp_path, Entry(0, "a", DONE, 5, metrics(1).tobytes()), run=3)
+    write(tmp_path, Entry(0, "-", MISSING), run=3, writer="gone")
+    assert replay(tmp_path, HEADER).status[0] == DONE
+    assert [path.name for path in journals(tmp_path)] == [
+        "run000003-gone.journal",
+        "run000003-rank00000.journal",
+    ]
+
+
+def test_a_run_without_results_leaves_no_file(tmp_path):
+    with Journal(tmp_path, 1, "rank00000", HEADER):
+        pass
+    assert journals(tmp_path) == []
+    assert next_run(tmp_path) == 1
