@@ -174,8 +174,8 @@ def test_pieces_of_a_run_are_the_run():
     assert np.array_equal(whole.state, pieces.state)
     for name in whole.samples._fields:
         assert np.array_equal(getattr(whole.samples, name), getattr(pieces.samples, name)), name
-    assert whole.tally.contact_steps.sum() > 100
-    for name in ("contact_steps", "impulse", "energy", "highest", "lowest", "least_slip", "peak_force"):
+    assert np.count_nonzero(whole.samples.force) > 100
+    for name in whole.tally._fields:
         assert np.array_equal(getattr(whole.tally, name), getattr(pieces.tally, name)), name
 
 
