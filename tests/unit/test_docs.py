@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -47,10 +50,10 @@ def run_as_shown(text: str) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def quickstart(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of a quickstart.zarr with one case of the quick start, and a short one."""
+    """Folder of a quickstart.zarr with four cases of the quick start, and short ones."""
     folder = tmp_path_factory.mktemp("quickstart")
     study = read_study(ROOT / "jobs" / "quickstart.toml", output=folder / "quickstart.zarr")
-    wanted = {"speed_ratio": (1.7,), "clearance_ratio": (0.7,)}
+    wanted = {"speed_ratio": (1.7, 3.5), "clearance_ratio": (0.7, 0.85)}
     axes = tuple(replace(axis, values=wanted.get(axis.name, axis.values)) for axis in study.axes)
     rubhpc.run(replace(study, axes=axes, recording=Recording(transient=1, revolutions=4)), quiet=True)
     return folder
@@ -133,6 +136,25 @@ def test_store_is_opened_as_shown(text: str, quickstart: Path, monkeypatch: pyte
     monkeypatch.chdir(quickstart)
     shown = run_as_shown(text.replace('rubhpc.run("jobs/quickstart.toml")', ""))
     assert np.isfinite(next(shown[name] for name in ("worst", "torsion") if name in shown)).all()
+
+
+def test_slurm_job_draws_the_quick_start(quickstart: Path, tmp_path: Path) -> None:
+    command = tmp_path / "rubhpc"
+    command.write_text(f"""#!/bin/sh\nPYTHONPATH='{ROOT}' exec '{sys.executable}' -m rubhpc "$@"\n""")
+    command.chmod(0o755)
+    job = [
+        "bash",
+        ROOT / "jobs" / "slurm" / "figures.sh",
+        quickstart / "quickstart.zarr",
+        tmp_path / "figures",
+    ]
+    path = {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    done = subprocess.run(
+        [*job, "--select", "clearance_ratio=0.7"], env=path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    drawn = {file.name for file in (tmp_path / "figures").iterdir()}
+    assert drawn == {"contact_force.png", "contact_force.csv", "regime.png", "cascade.png"}
 
 
 def test_study_of_the_readme_is_one(tmp_path: Path) -> None:
