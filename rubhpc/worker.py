@@ -124,7 +124,7 @@ class Worker:
             lost = set(flat[spoiled].tolist()) - {entry.flat for entry in entries}
             entries += [Entry(i, "-", MISSING) for i in lost]
             self.store.write_block(block.start, data)
-            with disk_errors(self.journal.path):
+            with disk_errors(self.store.path):
                 self.journal.write(entries)
             self._unsynced += self.store.chunk_files(block.start)
             if time.monotonic() > self._next_sync:

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from running import journalled_cases, run, stored_bytes, write_study
+from running import run, stored_bytes, write_study
 
+from rubhpc.driver import run as run_study
 from rubhpc.store import Store
+from rubhpc.verify import verify
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("finished")
-    done = run(write_study(folder))
-    assert done.returncode == 0, done.stderr
+    run_study(write_study(folder), quiet=True)
     return folder
 
 
@@ -28,24 +28,19 @@ def store(tmp_path: Path, finished: Path) -> Path:
 
 def named_by_verify(store: Path) -> set[tuple[int, ...]]:
     """Indices of the cases that verify names."""
-    done = run("verify", store)
-    assert done.returncode == 3
-    assert done.stderr.startswith(f"rubhpc: {store}: damage in ")
-    assert done.stderr.count("\n") == 1
-    return {
-        tuple(int(i) for i in found.split(", "))
-        for found in re.findall(r"damaged: case \(([\d, ]+)\)", done.stdout)
-    }
+    damage = verify(store)
+    assert damage
+    assert damage.note == ""
+    return {tuple(int(i) for i in np.unravel_index(flat, (2, 2, 3))) for flat in damage.cases}
 
 
 def mended_by_run(store: Path, finished: Path) -> int:
     """Run the study again; how many cases that took to make all as it was."""
-    n_before = journalled_cases(store)
-    done = run(finished / "tiny.toml", "--output", store)
-    assert done.returncode == 0, done.stderr
+    summary = run_study(finished / "tiny.toml", output=store, quiet=True)
+    assert summary.counts == (0, 12, 0, 0)
     assert stored_bytes(store) == stored_bytes(finished / "tiny.zarr")
-    assert run("verify", store).returncode == 0
-    return journalled_cases(store) - n_before
+    assert not verify(store)
+    return summary.computed
 
 
 def change_byte(path: Path, at: int) -> None:
@@ -107,25 +102,32 @@ def test_a_line_of_the_journal_is_changed(store, finished):
 def test_what_is_no_case_is_written_anew_without_computing(store, finished, name):
     (chunk,) = (path for path in (store / name / "c").rglob("*") if path.is_file())
     change_byte(chunk, -1)
-    done = run("verify", store)
-    assert done.returncode == 3
-    assert f"damaged: array {name}" in done.stdout
-    assert "damaged: case" not in done.stdout
+    damage = verify(store)
+    assert damage.arrays == (name,)
+    assert damage.cases == {}
     assert mended_by_run(store, finished) == 0
 
 
 def test_a_partial_file_is_no_damage(store, finished):
     stray = store / "vertical" / "c" / "0" / "0" / "0" / "0.5f.partial"
     stray.write_bytes(b"half a chunk")
-    assert run("verify", store).returncode == 0
+    assert not verify(store)
     assert mended_by_run(store, finished) == 0
     assert not stray.exists()
 
 
-def test_verify_names_the_damage_while_the_store_is_in_use(store):
+def test_the_command_names_the_damage_though_the_store_is_in_use(store):
     Store(store).chunk_files((1, 0, 0))[4].unlink()
     with Store(store).lock():
         done = run("verify", store)
     assert done.returncode == 3
-    assert "not marked for the next run" in done.stderr
-    assert done.stdout.count("damaged: case") == 2
+    assert done.stdout.splitlines() == [
+        "damaged: case (1, 0, 0) speed_ratio=2, clearance_ratio=0.7, friction=0.1: a file is gone",
+        "damaged: case (1, 0, 1) speed_ratio=2, clearance_ratio=0.7, friction=0.3: a file is gone",
+    ]
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"rubhpc: {store}: damage in 2 cases and 0 arrays; not marked for the next run: ")
+    again = run("verify", store)
+    assert (
+        again.stderr == f"rubhpc: {store}: damage in 2 cases and 0 arrays; run its study again to mend it\n"
+    )

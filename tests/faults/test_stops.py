@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import subprocess
     from pathlib import Path
 
-LONG = 60  # transient revolutions: a case takes a second
+LONG = 20  # transient revolutions: a case takes a third of a second
 
 
 def wait_for_a_case(job: subprocess.Popen[str], store: Path) -> None:
