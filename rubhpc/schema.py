@@ -1,4 +1,4 @@
-"""Every array of a store: its dimensions after the axes, type, unit and name. Store, docs and tests read it here."""
+"""Every array of a store: dimensions after the axes, type, unit and name; store, docs and tests read it here."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STATUS = ("missing", "done", "failed", "diverged")
 MISSING, DONE, FAILED, DIVERGED = range(4)
 REGIME = ("no_contact", "periodic", "quasi_periodic", "chaotic", "undecided")
 
-# The recorded signals: name, extra dimensions, unit, long name. Waveforms and spectra are stored in single precision.
+# The recorded signals: name, extra dimensions, unit, long name; in single precision, as are their spectra.
 _SIGNALS = (
     ("vertical", (), "m", "vertical displacement of the disc"),
     ("horizontal", (), "m", "horizontal displacement of the disc"),

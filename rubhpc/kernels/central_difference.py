@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit, jit_inline
-from rubhpc.kernels.contact import N_DEGREE, TORSION, UNSOLVED, Pairs, Workspace, is_any_closed, solve_contact
+from rubhpc.kernels.complementarity import UNSOLVED
+from rubhpc.kernels.contact import N_DEGREE, TORSION, Pairs, Workspace, is_any_closed, solve_contact
 from rubhpc.kernels.linear import Linear, circulatory_power, free_velocity
 from rubhpc.kernels.observe import (
     DAMPING_LOSS,
