@@ -1,4 +1,4 @@
-"""Every array of a store: dimensions after the axes, type, unit and name; store, docs and tests read it here."""
+"""Every array of a store: dimensions after the axes, type, unit and name. Store, docs and tests read it."""
 
 from __future__ import annotations
 
