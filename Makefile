@@ -29,7 +29,7 @@ lint: $(VENV)/.ready ## style, types and the layers of imports
 	$(BIN)/lint-imports
 
 bench: $(VENV)/.ready ## timings
-	$(BIN)/python -m pytest tests/bench --benchmark-only --benchmark-columns=min,median,rounds
+	$(BIN)/python -m pytest tests/bench -m bench --benchmark-columns=min,median,rounds
 
 clean: ## remove .venv, caches, and what the demo made
 	rm -rf $(VENV) $(STORE) $(FIGURES) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \

@@ -1,0 +1,32 @@
+"""Time of a step. One core is meant; on a busy machine the least of several rounds counts."""
+
+import pytest
+
+from rubhpc.case import run_case
+from rubhpc.prepare import prepare
+from rubhpc.rig import read_rig
+from rubhpc.study import Contact, Integrator, Recording
+
+pytestmark = pytest.mark.bench
+
+
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+def test_step_of_the_packaged_rig_takes_two_microseconds(benchmark, normal):
+    """Central difference at the paper's step, rubbing, all of it recorded."""
+    setup = prepare(
+        read_rig("mokhtar2017"),
+        148.7,
+        contact=Contact(normal=normal),
+        integrator=Integrator(method="central-difference", step=0.5e-6),
+        samples_per_revolution=256,
+    )
+    recording = Recording(transient=0, revolutions=3, keep=())
+
+    def run():
+        return run_case(setup, clearance=100e-6, friction=0.3, recording=recording)
+
+    record = benchmark.pedantic(run, rounds=10, warmup_rounds=1)
+    assert record.contacts_per_revolution[0] > 0
+    per_step = benchmark.stats.stats.min / record.steps
+    benchmark.extra_info["us_per_step"] = per_step * 1e6
+    assert per_step <= 2e-6
