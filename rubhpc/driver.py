@@ -31,11 +31,13 @@ from rubhpc.worker import Worker
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
     from rubhpc.sweep import Block
 
+_PACKING_GAP = 600.0  # s between packings while a run is on; one takes 5 s for a million cases
 _REASONS = 100  # failed cases a summary names, at most
 
 
@@ -150,7 +152,9 @@ def _prepare(study: Study, stopping: Stopping, held: ExitStack, *, retry_failed:
     with disk_errors(study.output):
         held.enter_context(store.lock(on_loss=lambda: stopping.ask("the loss of its lock")))
     bring_up_to_date(store, sweep)
-    ledger = store.replay(with_metrics=False)
+    ledger = store.replay()
+    store.pack(ledger)  # readers see what a killed run has left, from now on
+    ledger.metrics = None  # the other ranks need none
     run = next_run(store.journal_directory)
     store.take_back(ledger, find_gone(store, ledger), run, "gone")
     missing = ledger.status == MISSING
@@ -194,19 +198,14 @@ def _warm_up(sweep: Sweep, block: Block, stopping: Stopping) -> None:
 
 def _compute(job: _Job, pool: Pool, stopping: Stopping, *, quiet: bool) -> RubError | None:
     """Compute blocks until there are none left; what keeps this rank from its store, to be told to all."""
-    limit = float("inf") if job.study.run.max_failures is None else job.study.run.max_failures
-    n_missing = int(job.missing.sum())
     try:
         sweep = Sweep(job.study, chunk=job.chunk)
         store = Store(job.study.output)
-        blocks = sweep.blocks()
-        grid = job.missing.reshape(sweep.shape)
-        cost = sum(blocks[i].cost * missing_share(blocks[i], grid) for i in job.pending)
+        every = sweep.blocks()
+        blocks = [every[i] for i in job.pending]
         with (
             store.journal(job.run, f"rank{pool.rank:05d}") as journal,
-            Progress(
-                len(job.missing), cost, n_done=len(job.missing) - n_missing, quiet=quiet or pool.rank > 0
-            ) as progress,
+            _progress(job, sweep, blocks, quiet=quiet or pool.rank > 0, has_bar=pool.size == 1) as progress,
         ):
 
             def attend() -> None:
@@ -214,16 +213,13 @@ def _compute(job: _Job, pool: Pool, stopping: Stopping, *, quiet: bool) -> RubEr
                     progress.update(pool.sums())
 
             worker = Worker(sweep, store, job.ledger, job.missing, journal, stopping, pool.add, attend)
-            while not stopping.look():
-                sums = pool.claim()
-                if (
-                    sums.claimed >= len(job.pending)
-                    or sums.stop
-                    or (limit is not None and sums.failed > limit)
-                ):
-                    break
-                worker.work(blocks[job.pending[sums.claimed]])
+            next_packing = time.monotonic() + _PACKING_GAP
+            for i_block in _claimed(job, pool, stopping):
+                worker.work(blocks[i_block])
                 attend()
+                if pool.rank == 0 and time.monotonic() > next_packing:
+                    store.pack(store.replay())  # for readers who look on
+                    next_packing = time.monotonic() + _PACKING_GAP
             worker.sync()
     except RubError as error:
         pool.add(Tally(stop=1))
@@ -231,6 +227,28 @@ def _compute(job: _Job, pool: Pool, stopping: Stopping, *, quiet: bool) -> RubEr
     if stopping.reason:
         pool.add(Tally(stop=1))
     return None
+
+
+def _claimed(job: _Job, pool: Pool, stopping: Stopping) -> Iterator[int]:
+    """Positions of the blocks this rank is to compute, until there are none, or reason to stop."""
+    most_failures = job.study.run.max_failures
+    while not stopping.look():
+        sums = pool.claim()
+        has_failed = most_failures is not None and sums.failed > most_failures
+        if sums.claimed >= len(job.pending) or sums.stop or has_failed:
+            return
+        yield sums.claimed
+
+
+def _progress(job: _Job, sweep: Sweep, blocks: list[Block], *, quiet: bool, has_bar: bool) -> Progress:
+    grid = job.missing.reshape(sweep.shape)
+    return Progress(
+        sweep.n_case,
+        sum(block.cost * missing_share(block, grid) for block in blocks),
+        n_done=sweep.n_case - int(job.missing.sum()),
+        quiet=quiet,
+        has_bar=has_bar,
+    )
 
 
 def _finish(job: _Job, computed: int, seconds: float) -> Summary:

@@ -22,13 +22,14 @@ class Launch(NamedTuple):
 
     rank: int
     size: int
+    is_open_mpi: bool = False  # its own launcher, which no other library can be started by
 
 
 def launch() -> Launch:
-    """What the environment says; (0, 1) without a launcher."""
+    """What the environment says; rank 0 of 1 without a launcher."""
     for rank, size in _VARIABLES:
         if os.environ.get(rank, "").isdigit() and os.environ.get(size, "").isdigit():
-            return Launch(int(os.environ[rank]), int(os.environ[size]))
+            return Launch(int(os.environ[rank]), int(os.environ[size]), rank.startswith("OMPI_"))
     return Launch(0, 1)
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar
 import numpy as np
 
 from rubhpc.errors import InputError, RubError
-from rubhpc.launch import end_with_launcher, launch
+from rubhpc.launch import Launch, end_with_launcher, launch
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -118,14 +118,17 @@ class Alone:
 class Ranks:
     """The ranks of an MPI communicator, with the sums in a window of the first."""
 
-    def __init__(self, MPI: Any, comm: Any) -> None:
-        self._MPI, self._comm = MPI, comm
-        self.rank, self.size = comm.rank, comm.size
+    def __init__(self) -> None:
+        from mpi4py import MPI
+
+        self._sum, self._comm = MPI.SUM, MPI.COMM_WORLD
+        self.rank, self.size = self._comm.rank, self._comm.size
         n_byte = 8 * len(Tally()) if self.rank == 0 else 0
-        self._window = MPI.Win.Allocate(n_byte, 8, comm=comm)
+        self._window = MPI.Win.Allocate(n_byte, 8, comm=self._comm)
         if self.rank == 0:
-            np.frombuffer(self._window.tomemory(), np.int64)[:] = 0
-        comm.Barrier()
+            memory: Any = self._window.tomemory()
+            np.frombuffer(memory, np.int64)[:] = 0
+        self._comm.Barrier()
         self._window.Lock_all()
 
     def from_first(self, make: Callable[[], T]) -> T:
@@ -188,13 +191,13 @@ class Ranks:
         """Add to the sums and return what they were, in one atomic message."""
         more = np.array(tally, np.int64)
         before = np.zeros_like(more)
-        self._window.Get_accumulate(more, before, 0, op=self._MPI.SUM)
+        self._window.Get_accumulate(more, before, 0, op=self._sum)
         self._window.Flush(0)
         return Tally(*before.tolist())
 
 
 def connect() -> Pool:
-    """The processes of this run: MPI ranks under a launcher, else this one alone.
+    """Return the processes of this run: MPI ranks under a launcher, else this one alone.
 
     Raises
     ------
@@ -204,25 +207,34 @@ def connect() -> Pool:
     given = launch()
     if given.size == 1:
         return Alone()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of a foreign launcher, which is refused here
+        library, n_connected = _connected(given)
+    if n_connected != given.size:
+        raise InputError(
+            f"the launcher started {given.size} processes, but MPI ({library}) connects {n_connected}; "
+            "use the mpirun of that MPI, or mpi4py built for this one (pip install --no-binary mpi4py mpi4py)"
+        )
+    end_with_launcher()
+    return Ranks()
+
+
+def _connected(given: Launch) -> tuple[str, int]:
+    """Name of the MPI library, and how many processes it connects."""
     try:
         import mpi4py
 
-        # Only the main thread calls MPI; others keep the lock alive and watch the launcher.
-        mpi4py.rc.thread_level = "funneled"
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # of a foreign launcher, which is refused below
-            from mpi4py import MPI
+        # Not before library and launcher are known to fit: MPICH aborts where Open MPI's mpirun started it.
+        mpi4py.rc(initialize=False, finalize=True)
+        from mpi4py import MPI
     except ImportError as error:
         raise InputError(
             f"started as {given.size} processes, but mpi4py cannot be used ({error}); "
             "pip install 'rubhpc[mpi]'"
         ) from None
-    comm = MPI.COMM_WORLD
-    if comm.size != given.size:
-        library = MPI.Get_library_version().split("\n")[0].strip("\0 ")
-        raise InputError(
-            f"the launcher started {given.size} processes, but MPI ({library}) connects {comm.size}; "
-            "use the mpirun of that MPI, or mpi4py built for this one (pip install --no-binary mpi4py mpi4py)"
-        )
-    end_with_launcher()
-    return Ranks(MPI, comm)
+    library = MPI.Get_library_version().split("\n")[0].split(",")[0].strip("\0 ")
+    if given.is_open_mpi and any(name in library for name in ("MPICH", "Intel", "MVAPICH")):
+        return library, 1
+    if not MPI.Is_initialized():
+        MPI.Init_thread(MPI.THREAD_FUNNELED)  # other threads keep the lock alive and watch the launcher
+    return library, MPI.COMM_WORLD.size

@@ -18,16 +18,33 @@ _FIRST_LINE, _LONGEST_GAP = 10.0, 300.0  # s between lines: they grow rarer as a
 
 
 class Progress:
-    """Tells how many cases have ended, how fast, and when the rest will have; silent where `quiet`."""
+    """Tells how many cases have ended, how fast, and when the rest will have.
 
-    def __init__(self, n_case: int, cost: int, *, n_done: int, quiet: bool) -> None:
-        self._n_case, self._cost, self._n_done, self._quiet = n_case, max(cost, 1), n_done, quiet
+    Parameters
+    ----------
+    n_case, n_done : int
+        Cases of the study, and those that were there before.
+    cost : float
+        Predicted steps of what is missing.
+    quiet : bool
+        Tell nothing.
+    has_bar : bool
+        Draw a bar, where the output is a terminal. Under a launcher it is none: Open MPI's pretends to be one
+        even when it writes to a file.
+    """
+
+    def __init__(self, n_case: int, cost: float, *, n_done: int, quiet: bool, has_bar: bool) -> None:
+        self._n_case, self._cost, self._n_done = n_case, max(cost, 1.0), n_done
+        self._quiet = quiet or n_done == n_case
+        self._has_bar = has_bar and sys.stdout.isatty()
         self._began = self._told = time.monotonic()
         self._gap = _FIRST_LINE
         self._bar: Bar | None = None
 
     def __enter__(self) -> Self:
-        if not self._quiet and sys.stdout.isatty():
+        if self._quiet:
+            return self
+        if self._has_bar:
             from rich import progress
 
             self._bar = progress.Progress(
@@ -37,7 +54,7 @@ class Progress:
             )
             self._bar.start()
             self._bar.add_task("", total=self._n_case, completed=self._n_done, rest="")
-        elif not self._quiet and self._n_done < self._n_case:
+        else:
             print(f"{self._n_done}/{self._n_case} cases are there; computing the rest", flush=True)
         return self
 
@@ -50,7 +67,7 @@ class Progress:
     def update(self, sums: Tally) -> None:
         """Show the sums of all ranks, unless that was done a moment ago."""
         now = time.monotonic()
-        if self._quiet or now - self._told < (self._gap if self._bar is None else _REDRAW):
+        if self._quiet or now - self._told < (_REDRAW if self._has_bar else self._gap):
             return
         self._told = now
         n_ended = self._n_done + sums.n_case

@@ -365,3 +365,26 @@ def test_progress_goes_to_the_output_and_quiet_says_nothing(physics, study, caps
     assert capsys.readouterr() == ("", "")
     run(replace(study, output=study.output.with_name("b.zarr")))
     assert "0/12 cases" in capsys.readouterr().out
+
+
+def test_what_a_killed_run_left_is_packed_when_the_next_begins(physics, study, monkeypatch):
+    monkeypatch.setattr(Store, "pack", lambda *_: None)  # killed before it could
+    after(6, lambda: os.kill(os.getpid(), signal.SIGTERM), physics)
+    with pytest.raises(StoppedEarly):
+        run(study, quiet=True)
+    assert (xr.open_zarr(study.output).status == MISSING).all()
+    monkeypatch.undo()
+    seen: list[int] = []
+    physics.on_case = lambda: seen.append(int((xr.open_zarr(study.output).status == DONE).sum()))
+    monkeypatch.setattr(worker, "prepare", physics.prepare)
+    monkeypatch.setattr(worker, "run_case", physics.run_case)
+    run(study, quiet=True)
+    assert set(seen) == {6}
+
+
+def test_results_are_packed_now_and_then_for_those_who_look_on(physics, study, monkeypatch):
+    monkeypatch.setattr(driver, "_PACKING_GAP", 0.0)
+    seen: list[int] = []
+    physics.on_case = lambda: seen.append(int((xr.open_zarr(study.output).status == DONE).sum()))
+    run(study, quiet=True)
+    assert seen == [0, 0, 0, 3, 3, 3, 6, 6, 6, 9, 9, 9]
