@@ -49,7 +49,7 @@ def empty_tally(n_stator: int) -> Tally:
         lowest=np.full(3, np.inf),
         is_touching=np.zeros(n_stator, dtype=np.bool_),
         n_contact=np.zeros(n_stator, dtype=np.int64),
-        contact_steps=np.zeros(n_stator, dtype=np.int64),
+        contact_time=np.zeros(n_stator),
         impulse=np.zeros(n_stator),
         friction_work=np.zeros(n_stator),
         least_slip=np.full(n_stator, np.inf),
@@ -78,8 +78,7 @@ def scalars_of(
     *,
     energy_change: float,
     stators: tuple[StatorModel, ...],
-    step: float,
-    steps_per_sample: int,
+    spin: float,
     samples_per_revolution: int,
 ) -> dict[str, Any]:
     """Scalars of a finished case; those of a contact that never happened are zero, or NaN where undefined.
@@ -88,12 +87,12 @@ def scalars_of(
     ----------
     energy_change : float, J
         Mechanical energy at the end of the record less that at its beginning.
-    step : float, s
-        `steps_per_sample` of them lie between two samples.
+    spin : float, rad/s
     """
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution
-    has_touched = tally.contact_steps > 0
+    duration = 2.0 * np.pi * n_revolution / abs(spin)
+    has_touched = tally.contact_time > 0
     n_contact = np.maximum(tally.n_contact, 1)  # one that lasts throughout never begins in the record
     orbit_period = period(signals["vertical"], signals["horizontal"], samples_per_revolution)
     given = tally.energy[UNBALANCE_WORK] + tally.energy[DRIVE_WORK]
@@ -102,9 +101,9 @@ def scalars_of(
     return {
         "period": orbit_period,
         "regime": regime(orbit_period, bool(has_touched.any())),
-        "contact_fraction": tally.contact_steps / (n_sample * steps_per_sample),
+        "contact_fraction": tally.contact_time / duration,
         "contacts_per_revolution": tally.n_contact / n_revolution,
-        "contact_duration": np.where(has_touched, tally.contact_steps * step / n_contact, 0.0),
+        "contact_duration": np.where(has_touched, tally.contact_time / n_contact, 0.0),
         "peak_contact_force": tally.peak_force,
         "contact_impulse": tally.impulse / n_revolution,
         "friction_work": tally.friction_work / n_revolution,

@@ -59,21 +59,10 @@ def pack(model: Model, spin: float, step: float) -> Packed:
     mass = block_diag(*(body.mass for body in bodies))
     stiffness = block_diag(*(body.stiffness for body in bodies))
     damping = block_diag(*(body.damping + spin * body.gyroscopic for body in bodies))
-    first = np.cumsum([0, *(body.n_dof for body in bodies)])
     force = np.zeros((2, mass.shape[0]))
     force[0, : model.rotor.n_dof] = spin**2 * model.unbalance_cosine
     force[1, : model.rotor.n_dof] = spin**2 * model.unbalance_sine
-
-    def rotor_row(node: int, name: str) -> int:
-        return model.rotor.index(node, name)
-
-    degree = np.full((len(model.stators), N_DEGREE), -1)
-    for i, stator in enumerate(model.stators):
-        degree[i, V], degree[i, W] = rotor_row(stator.node, "v"), rotor_row(stator.node, "w")
-        degree[i, TORSION] = rotor_row(stator.node, "thx")
-        degree[i, AXIAL] = first[1 + i] + stator.axial
-        degree[i, LATERAL] = first[1 + i] + stator.lateral if stator.lateral >= 0 else -1
-    output = np.array([rotor_row(model.output_node, name) for name in ("v", "w", "thx")])
+    degree, output = degrees_of(model), output_degrees(model)
 
     coupled = csr_array((mass != 0) | (stiffness != 0) | (damping != 0))
     n_component, component = connected_components(coupled, directed=False)
@@ -105,6 +94,23 @@ def pack(model: Model, spin: float, step: float) -> Packed:
         compliance=_compliance(inverse, start, degree_row, degree_block, step),
         output_row=np.where(output >= 0, row[output], -1),
     )
+
+
+def degrees_of(model: Model) -> Ints:
+    """Rows of each pair's degrees (q, 5) among all degrees, rotor first, then stators; -1 where held."""
+    first = np.cumsum([model.rotor.n_dof, *(stator.body.n_dof for stator in model.stators)])
+    degree = np.full((len(model.stators), N_DEGREE), -1)
+    for i, stator in enumerate(model.stators):
+        degree[i, V], degree[i, W] = model.rotor.index(stator.node, "v"), model.rotor.index(stator.node, "w")
+        degree[i, TORSION] = model.rotor.index(stator.node, "thx")
+        degree[i, AXIAL] = first[i] + stator.axial
+        degree[i, LATERAL] = first[i] + stator.lateral if stator.lateral >= 0 else -1
+    return degree
+
+
+def output_degrees(model: Model) -> Ints:
+    """Rows (3,) of vertical, horizontal and torsional displacement of the output node; -1 where held."""
+    return np.array([model.rotor.index(model.output_node, name) for name in ("v", "w", "thx")])
 
 
 def pairs_of(

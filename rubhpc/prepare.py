@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeAlias
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import step_limit
 from rubhpc.packing import Packed, pack
+from rubhpc.phases import PhaseBook
+from rubhpc.reduction import ReducedModel, reduce_model
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.rig import Rig
     from rubhpc.study import Contact, Integrator
 
-PAPER_STEP = 0.5e-6  # s
-SAFE_SHARE = 0.9  # of the stability limit, where the paper's step would be above it
 DIVERGED_SHARE = 0.1  # of the shaft's length: lateral motion that no rig survives
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Setup:
+class CentralDifferenceSetup:
     """All that the cases of one rig and speed share."""
 
     model: Model
@@ -33,6 +33,29 @@ class Setup:
     samples_per_revolution: int
     is_updated: bool  # normal
     displacement_limit: float  # m
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModalSetup:
+    """All that the cases of one rig and speed share; phases are made as frictions and contacts come."""
+
+    model: Model
+    reduced: ReducedModel
+    spin: float  # rad/s
+    step: float  # s, up to which steps are taken without a bound; with the updated normal, step in contact
+    samples_per_revolution: int
+    is_updated: bool  # normal
+    displacement_limit: float  # m
+    _books: dict[float, PhaseBook] = field(default_factory=dict)
+
+    def book(self, friction: float) -> PhaseBook:
+        """Phases of a friction, shared by its cases."""
+        if friction not in self._books:
+            self._books[friction] = PhaseBook(self.reduced, self.model, friction)
+        return self._books[friction]
+
+
+Setup: TypeAlias = CentralDifferenceSetup | ModalSetup
 
 
 def prepare(
@@ -53,17 +76,27 @@ def prepare(
     if speed == 0.0 or not math.isfinite(speed):
         raise InputError(f"speed: {speed} rad/s; sampling is locked to the shaft, so it has to turn")
     model = assemble(rig)
+    displacement_limit = DIVERGED_SHARE * sum(section.length for section in rig.rotor.shaft)
+    if integrator.method == "modal":
+        return ModalSetup(
+            model=model,
+            reduced=reduce_model(model, speed, integrator.accuracy),
+            spin=speed,
+            step=integrator.contact_step(contact),
+            samples_per_revolution=samples_per_revolution,
+            is_updated=contact.normal == "updated",
+            displacement_limit=displacement_limit,
+        )
     limit = step_limit(model)
     if integrator.step is not None and integrator.step >= limit:
         raise InputError(
             f"[integrator] step: {integrator.step:.4g} s is above the stability limit of rig {rig.name}; "
             f"take less than {limit:.4g} s"
         )
-    wanted = integrator.step if integrator.step is not None else min(PAPER_STEP, SAFE_SHARE * limit)
     interval = 2.0 * math.pi / (abs(speed) * samples_per_revolution)
-    steps_per_sample = math.ceil(interval / wanted * (1.0 - 1e-12))
+    steps_per_sample = math.ceil(interval / integrator.step_within(limit) * (1.0 - 1e-12))
     step = interval / steps_per_sample
-    return Setup(
+    return CentralDifferenceSetup(
         model=model,
         packed=pack(model, speed, step),
         spin=speed,
@@ -71,5 +104,5 @@ def prepare(
         steps_per_sample=steps_per_sample,
         samples_per_revolution=samples_per_revolution,
         is_updated=contact.normal == "updated",
-        displacement_limit=DIVERGED_SHARE * sum(section.length for section in rig.rotor.shaft),
+        displacement_limit=displacement_limit,
     )

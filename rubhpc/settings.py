@@ -64,7 +64,7 @@ class Settings:
         self._unit_speed_at = lru_cache(maxsize=65536)(self._make_unit_speed)
         self._response_at = lru_cache(maxsize=65536)(self._make_response)
         self._limit_at = lru_cache(maxsize=4096)(self._make_limit)
-        if study.integrator.step is not None:
+        if study.integrator.step is not None and study.integrator.method == "central-difference":
             self._check_step(study.integrator.step)
 
     def rig(self, index: Index) -> Rig:

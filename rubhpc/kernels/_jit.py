@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
 
@@ -11,7 +11,12 @@ F = TypeVar("F", bound=Callable[..., object])
 
 # "contract" allows fused multiply-add, "nsz" ignores the sign of zero; "nnan" and "ninf" would make
 # isfinite(nan) true, and "reassoc" would let sums depend on how a loop was vectorised.
-_FLAGS = {"cache": True, "error_model": "numpy", "nogil": True, "fastmath": {"contract", "nsz"}}
+_FLAGS: dict[str, Any] = {
+    "cache": True,
+    "error_model": "numpy",
+    "nogil": True,
+    "fastmath": {"contract", "nsz"},
+}
 _compile = numba.njit(**_FLAGS)
 _compile_inline = numba.njit(inline="always", **_FLAGS)
 
@@ -25,4 +30,22 @@ def jit(function: F) -> F:
 def jit_inline(function: F) -> F:
     """Compile a kernel into its callers: a call that hands over a tuple of arrays costs 0.1 us and more."""
     compiled: F = _compile_inline(function)
+    return compiled
+
+
+# Sums over modes may be reordered, without which no such loop is vectorised; never what isfinite relies on.
+_SUM_FLAGS: dict[str, Any] = {**_FLAGS, "fastmath": {"contract", "nsz", "reassoc"}}
+_compile_sum = numba.njit(**_SUM_FLAGS)
+_compile_inline_sum = numba.njit(inline="always", **_SUM_FLAGS)
+
+
+def jit_sum(function: F) -> F:
+    """Compile a kernel whose sums may be taken in any (fixed) order."""
+    compiled: F = _compile_sum(function)
+    return compiled
+
+
+def jit_inline_sum(function: F) -> F:
+    """Compile such a kernel into its callers."""
+    compiled: F = _compile_inline_sum(function)
     return compiled

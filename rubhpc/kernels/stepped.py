@@ -1,0 +1,179 @@
+"""The modal integrator where the contact normal turns: closed-form motion between short contact steps.
+
+With the updated normal the gap is no linear function of the motion, so that closed contacts have no modes.
+The contact force of a step acts as a kick at its beginning, as in the central difference, and the motion
+drifts freely (exactly, in the modes of the open system) to its end, where the gap must not be negative. Far
+from contact, bounded long steps are taken: the gap along the stator's axis is never the larger one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_sum
+from rubhpc.kernels.complementarity import UNSOLVED
+from rubhpc.kernels.contact import N_DEGREE, Pairs, Workspace, is_any_closed, solve_contact
+from rubhpc.kernels.observe import TWIST_ACCELERATION, Samples, Tally, observe_contact
+from rubhpc.kernels.phases import (
+    CONTACT_UNSOLVED,
+    DIVERGED,
+    FINISHED,
+    N_STEP,
+    TIME,
+    Clock,
+    Phases,
+    Reduced,
+    dot,
+    floor_log2,
+    propagate,
+    proved_time,
+)
+from rubhpc.kernels.sampling import take_sample
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Kicks(NamedTuple):
+    """How contact forces act on the modes of the open system; q pairs of 5 degrees each, m modes."""
+
+    level: int  # steps in contact last 2^level ticks
+    degree_re: Floats  # (5 q, m), displacement of each degree
+    degree_im: Floats
+    drifted_re: Floats  # (5 q, m), modal coordinates a contact step after a unit impulse on each degree
+    drifted_im: Floats
+    twist_answer: Floats  # (5 q,), torsional acceleration of the output node for a unit force
+
+
+@jit_sum
+def advance_stepped(
+    phases: Phases,
+    reduced: Reduced,
+    clock: Clock,
+    kicks: Kicks,
+    pairs: Pairs,
+    work: Workspace,
+    first_tick: int,
+    last_tick: int,
+    is_recorded: bool,
+    displacement_limit: float,
+    progress: Ints,
+    z: Floats,
+    z_next: Floats,
+    motion: Floats,
+    outputs: Floats,
+    before: Floats,
+    samples: Samples,
+    tally: Tally,
+) -> int:
+    """Advance a case from `first_tick` to `last_tick`, as `modal.advance` does with the fixed normal.
+
+    `phases` holds the open phase alone; `pairs.row` numbers the 5 q degrees of `kicks`.
+    """
+    q = pairs.radius.size
+    z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
+    n_degree = q * N_DEGREE
+    position, rate = np.zeros(n_degree), np.zeros(n_degree)
+    step = clock.tick * (1 << kicks.level)
+    highest_level = phases.power_re.shape[1] - 1
+    t = first_tick
+    was_touching = bool(np.any(work.force > 0.0))
+    while True:
+        is_sample = is_recorded and t % clock.ticks_per_sample == 0
+        if t >= last_tick:
+            progress[TIME] = t
+            is_fine = not is_sample or take_sample(
+                phases,
+                reduced,
+                clock,
+                0,
+                t,
+                last_tick,
+                displacement_limit,
+                z,
+                motion,
+                outputs,
+                before,
+                samples,
+                tally,
+            )
+            return FINISHED if is_fine else DIVERGED
+        limit = last_tick
+        if is_recorded:
+            limit = min(limit, (t // clock.ticks_per_sample + 1) * clock.ticks_per_sample)
+        level = min(highest_level, floor_log2(limit - t))
+        proved = proved_time(phases, 0, z)
+        while level > kicks.level and (1 << level) * clock.tick > proved:
+            level -= 1
+        progress[N_STEP] += 1
+        propagate(phases.power_re[0, level], phases.power_im[0, level], z_re, z_im, next_re, next_im)
+        is_touching = False
+        twist_acceleration = 0.0
+        if level <= kicks.level:
+            for a in range(n_degree):
+                position[a] = dot(kicks.degree_re[a], kicks.degree_im[a], next_re, next_im)
+            is_touching = is_any_closed(
+                pairs.row,
+                pairs.axis_y,
+                pairs.axis_z,
+                pairs.radius,
+                pairs.clearance,
+                pairs.is_updated,
+                position,
+                work.at,
+                work.gap,
+            )
+        if is_touching:
+            if solve_contact(pairs, work) == UNSOLVED:
+                progress[TIME] = t
+                return CONTACT_UNSOLVED
+            for i in range(q):
+                for d in range(N_DEGREE):
+                    impulse = step * work.force[i] * work.pull[i, d]
+                    if impulse != 0.0:
+                        b = i * N_DEGREE + d
+                        if is_sample:
+                            twist_acceleration += kicks.twist_answer[b] * impulse / step
+                        for k in range(z_re.size):
+                            next_re[k] += kicks.drifted_re[b, k] * impulse
+                            next_im[k] += kicks.drifted_im[b, k] * impulse
+        elif was_touching:
+            work.force[:] = 0.0
+        if is_sample:
+            if not take_sample(
+                phases,
+                reduced,
+                clock,
+                0,
+                t,
+                last_tick,
+                displacement_limit,
+                z,
+                motion,
+                outputs,
+                before,
+                samples,
+                tally,
+            ):
+                progress[TIME] = t
+                return DIVERGED
+            samples.rotor[TWIST_ACCELERATION, t // clock.ticks_per_sample] += twist_acceleration
+        if is_recorded and (is_touching or was_touching):
+            # The force works on the mean velocity of the step; a kick's own burst dies out within it.
+            for a in range(n_degree):
+                rate[a] = (
+                    dot(kicks.degree_re[a], kicks.degree_im[a], next_re, next_im)
+                    - dot(kicks.degree_re[a], kicks.degree_im[a], z_re, z_im)
+                ) / step
+            observe_contact(pairs, work, clock.spin, step, rate, rate, tally)
+            for i in range(q):
+                samples.force[i, t // clock.ticks_per_sample] += (
+                    work.force[i] * (1 << kicks.level) / clock.ticks_per_sample
+                )
+        was_touching = is_touching
+        for k in range(z_re.size):
+            z_re[k], z_im[k] = next_re[k], next_im[k]
+        t += 1 << level
