@@ -68,13 +68,17 @@ def natural_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str,
 
 
 def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
-    """Return the angle (rad, from straight up with the spin) and the clearance offset (m) of each stator."""
+    """Return angle (rad, from straight up with the spin) and clearance offset (m) of the stators at the disc.
+
+    The disc is the one whose motion is recorded, at the node of the first stator; others touch another disc.
+    """
     if "rig" not in case.attrs:
         return []
-    return [(stator.angle, stator.clearance_offset) for stator in rig_of(case).stator]
+    stators = rig_of(case).stator
+    return [(s.angle, s.clearance_offset) for s in stators if s.node == stators[0].node]
 
 
 def _rig_axes(case: xr.Dataset) -> dict[str, str]:
     """Return the axes of the study that are keys of the rig: dimension to dotted key."""
     study: dict[str, Any] = case.attrs.get("study", {})
-    return {a["dimension"]: a["name"] for a in study.get("axes", []) if "." in a["name"]}
+    return {name.replace(".", "_"): name for name in study.get("grid", {}) if "." in name}

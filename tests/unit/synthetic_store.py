@@ -90,7 +90,8 @@ def make(keep: tuple[str, ...] = ("waveform", "spectrum", "section"), n_stator: 
         "section": ("section", np.arange(REVOLUTIONS), {"units": "1"}),
         "stator": ("stator", np.arange(1, n_stator + 1), {"units": "1"}),
     }
-    study = {"axes": [{"name": name, "dimension": dim} for name, (dim, _, _) in AXES.items()]}
+    grid = {name: {"unit": unit, "values": list(values)} for name, (_, unit, values) in AXES.items()}
+    study = {"title": "synthetic", "rig": "mokhtar2017", "grid": grid}  # as `Study.as_dict` has it
     attrs = {"title": "synthetic", "rig": read_rig("mokhtar2017").as_dict(), "study": study}
     return xr.Dataset(data, coords=coords, attrs=attrs)
 

@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,10 @@ from postproc.cascade import below, cascade, hold_peaks, hold_rows
 from postproc.cascade_figure import default_limit, draw_frequencies, draw_orders, intensity, waterfall
 from postproc.selection import select
 from postproc.style import house_style, new_figure
+from rubhpc.axes import make_axis
 from rubhpc.errors import InputError
+from rubhpc.rig import read_rig
+from rubhpc.study import Study
 
 CHOICE = {"clearance": 100e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
 
@@ -148,8 +152,8 @@ def test_natural_frequencies_are_those_of_the_rig(cases):
 
 def test_natural_frequencies_follow_an_axis_of_the_rig(cases):
     bearing = cases.expand_dims(rotor_bearing_stiffness=[1e5, 1e6])
-    axis = {"name": "rotor.bearing.stiffness", "dimension": "rotor_bearing_stiffness"}
-    bearing.attrs["study"] = {"axes": [axis]}
+    axis = {"rotor.bearing.stiffness": {"unit": "N m-1", "values": [1e5, 1e6]}}
+    bearing.attrs["study"] = {"grid": axis}
     lateral = natural_frequencies(bearing, "rotor_bearing_stiffness")["lateral"]
     assert lateral.dims == ("rotor_bearing_stiffness",)
     assert float(lateral[1]) == pytest.approx(31.5596, rel=1e-4)
@@ -159,6 +163,26 @@ def test_natural_frequencies_follow_an_axis_of_the_rig(cases):
 
 def test_stators_stand_where_the_rig_says(cases):
     assert stator_places(cases) == [(0.0, 0.0)]
+
+
+def test_stators_follow_the_axes_of_a_real_study(cases):
+    rig = read_rig("mokhtar2017")
+    axes = ("speed", [100.0]), ("clearance", [1e-4]), ("friction", [0.3]), ("stator.1.angle", [0.0, 1.2])
+    study = Study(
+        title="as a store tells it",
+        rig=rig,
+        axes=tuple(make_axis(name, values, rig) for name, values in axes),
+        output=Path("none.zarr"),
+    )
+    case = cases.assign_attrs(rig=rig.as_dict(), study=study.as_dict()).assign_coords(stator_1_angle=1.2)
+    assert stator_places(case) == [(1.2, 0.0)]
+
+
+def test_a_stator_over_another_disc_is_not_at_this_one(cases):
+    rig = read_rig("mokhtar2017").as_dict()
+    rig["stator"] += [rig["stator"][0] | {"node": 4, "radius": 0.05, "angle": 1.0}]
+    rig["stator"] += [rig["stator"][0] | {"angle": 2.0, "clearance_offset": 1e-5}]
+    assert stator_places(cases.assign_attrs(rig=rig)) == [(0.0, 0.0), (2.0, 1e-5)]
 
 
 def test_a_store_without_a_rig_says_so():
