@@ -17,14 +17,15 @@ from rubhpc.errors import RubError
 from rubhpc.launch import launch
 
 _STOPPED = 75
-# One thread a rank: BLAS and numba would each start as many as the machine has cores. Their sums would also
-# depend on the number of threads, and so would the last bit of a result.
+# One thread a rank: BLAS, numba and zarr would each start as many as the machine has cores. BLAS's sums would
+# also depend on the number of threads, and so would the last bit of a result.
 _THREADS = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
     "MKL_NUM_THREADS",
     "BLIS_NUM_THREADS",
     "NUMBA_NUM_THREADS",
+    "ZARR_THREADING__MAX_WORKERS",
 )
 
 # name -> (where it is, what it does); --help shows them in this order.

@@ -152,7 +152,7 @@ def _prepare(study: Study, stopping: Stopping, held: ExitStack, *, retry_failed:
     with disk_errors(study.output):
         held.enter_context(store.lock(on_loss=lambda: stopping.ask("the loss of its lock")))
     bring_up_to_date(store, sweep)
-    ledger = store.replay()
+    ledger = store.replay(with_metrics=not store.is_packed())
     store.pack(ledger)  # readers see what a killed run has left, from now on
     ledger.metrics = None  # the other ranks need none
     run = next_run(store.journal_directory)

@@ -34,9 +34,9 @@ _PACKAGES = ("numpy", "numba", "scipy", "zarr")
 # Waveforms of a chaotic rub shrink to 77 %, forces that are mostly zero to a few per cent; 0.3 ms per 100 kB.
 _CODEC = BloscCodec(cname="zstd", clevel=1, shuffle="shuffle")
 
-# One rank, one thread: zarr would start as many as the machine has cores, on every rank. A chunk that holds
-# nothing but the fill value is written all the same, so that a file that is absent has been lost.
-zarr.config.set({"threading.max_workers": 1, "array.write_empty_chunks": True})
+# For arrays being opened or made: a chunk of nothing but the fill value is written all the same, so that a
+# file that is absent has been lost.
+_WRITE_ALL = {"array.write_empty_chunks": True}
 
 
 def fill_value(variable: Variable) -> float | int:
@@ -48,8 +48,8 @@ def fill_value(variable: Variable) -> float | int:
 
 def build(path: Path, sweep: Sweep) -> None:
     """Make all of a store in the empty directory `path`."""
-    group = zarr.create_group(path, zarr_format=3, attributes=_attributes(sweep))
     manifest = Manifest.of(sweep)
+    group = zarr.create_group(path, zarr_format=3, attributes=_attributes(sweep))
     for variable in manifest.variables:
         _create(group, variable, manifest, chunk=manifest.chunk)
     for variable in PACKED:
@@ -71,11 +71,17 @@ def resize(group: zarr.Group, manifest: Manifest) -> None:
 def write_static(group: zarr.Group, sweep: Sweep) -> dict[str, int]:
     """Write coordinates and settings anew; the CRC-32 of each."""
     checks = {}
-    for name, (dims, values, attributes) in _static(sweep).items():
-        group.create_array(
-            name, data=values, dimension_names=dims, attributes=attributes, compressors=_CODEC, overwrite=True
-        )
-        checks[name] = checksum(values)
+    with zarr.config.set(_WRITE_ALL):
+        for name, (dims, values, attributes) in _static(sweep).items():
+            group.create_array(
+                name,
+                data=values,
+                dimension_names=dims,
+                attributes=attributes,
+                compressors=_CODEC,
+                overwrite=True,
+            )
+            checks[name] = checksum(values)
     return checks
 
 
@@ -88,8 +94,9 @@ def consolidate(path: Path) -> None:
 
 
 def get_array(group: zarr.Group, name: str) -> zarr.Array[Any]:
-    """An array of a group by name."""
-    array = group[name]
+    """An array of a group by name, ready to be written."""
+    with zarr.config.set(_WRITE_ALL):
+        array = group[name]
     if not isinstance(array, zarr.Array):
         raise TypeError(f"{name} is no array")
     return array

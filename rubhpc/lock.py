@@ -157,7 +157,7 @@ class Lock:
             try:
                 ready.write_text(json.dumps(asdict(self._me)))
                 self.path.unlink(missing_ok=True)
-                os.link(ready, self.path)
+                _link(ready, self.path)
             except FileExistsError:  # taken between the look and the link
                 return False
             finally:
@@ -171,6 +171,17 @@ class Lock:
                 return
             with suppress(OSError):  # a full disk still takes a touch; anything else shows at the next write
                 os.utime(self.path)
+
+
+def _link(ready: Path, path: Path) -> None:
+    """Have `path` come into being with the content of `ready`, or raise FileExistsError."""
+    try:
+        os.link(ready, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without hard links
+        with path.open("x") as file:
+            file.write(ready.read_text())
 
 
 @contextmanager

@@ -112,6 +112,15 @@ def test_a_run_whose_lock_was_taken_is_told_and_leaves_the_other_alone(path, mon
     assert read_holder(path).token == "another"
 
 
+def test_a_file_system_without_links_will_do(path, monkeypatch):
+    def refuse(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(lock_module.os, "link", refuse)
+    with Lock(path), pytest.raises(StoreError, match="in use"):
+        Lock(path).__enter__()
+
+
 def test_an_orphan_is_waited_for(path):
     """The holder lives but has lost its launcher: it is about to stop, and the next run need not fail."""
     process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(0.7)"])

@@ -1,0 +1,66 @@
+"""A study of many cases with a stub in place of the physics; prints what it took, as JSON.
+
+Run as `python million.py N_CASE FOLDER`. Times are of this process: other work on the machine does not count.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc import driver, plan, worker
+from rubhpc.axes import Axis
+from rubhpc.journal import METRICS
+from rubhpc.rig import read_rig
+from rubhpc.schema import DONE
+from rubhpc.status import read_status
+from rubhpc.study import Recording, Study
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+scalars = {v.name: np.ones(1) if "stator" in v.dims else 1 for v in METRICS}
+record = SimpleNamespace(status=DONE, reason="", signals={}, spectra={}, sections={}, scalars=scalars)
+for module in (driver, plan, worker):
+    vars(module).update(run_case=lambda *_, **__: record, prepare=lambda *_, **__: None)
+
+
+def axis(name: str, first: float, last: float, n: int) -> Axis:
+    values = tuple(np.linspace(first, last, n).tolist())
+    return Axis(name=name, dimension=name, unit="1", values=values, long_name=name)
+
+
+def seconds(action: Callable[[], Any]) -> float:
+    began = time.process_time()
+    action()
+    return time.process_time() - began
+
+
+n_case, folder = int(sys.argv[1]), Path(sys.argv[2])
+study = Study(
+    title="many",
+    rig=read_rig("mokhtar2017"),
+    axes=(
+        axis("speed_ratio", 0.9, 6, 10),
+        axis("clearance_ratio", 0.5, 0.9, 100),
+        axis("friction", 0.1, 0.5, n_case // 1000),
+    ),
+    recording=Recording(keep=()),
+    output=folder / "many.zarr",
+)
+told = {
+    "plan": seconds(lambda: plan.make_plan(study)),
+    "run": seconds(lambda: driver.run(study, quiet=True)),
+    "plan_again": seconds(lambda: plan.make_plan(study)),
+    "status": seconds(lambda: read_status(study.output)),
+    "done": read_status(study.output).counts[DONE],
+    "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000,
+}
+print(json.dumps(told))

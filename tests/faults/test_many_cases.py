@@ -1,0 +1,45 @@
+"""What a study costs beside its physics: a million cases are to be planned, run and told of with ease."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from running import environment
+
+N_FEW, N_MANY = 2_000, 52_000
+MILLION = 1_000_000
+
+
+def took(n_case: int, folder: Path) -> dict[str, float]:
+    script = Path(__file__).with_name("million.py")
+    command = [sys.executable, str(script), str(n_case), str(folder)]
+    done = subprocess.run(command, env=environment(), capture_output=True, text=True, check=True)
+    told: dict[str, float] = json.loads(done.stdout)
+    assert told["done"] == n_case
+    return told
+
+
+@pytest.fixture(scope="module")
+def times(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, float], dict[str, float]]:
+    """What a small and a large study took: their difference is free of what each run costs once."""
+    few, many = (took(n, tmp_path_factory.mktemp("many")) for n in (N_FEW, N_MANY))
+    return few, many
+
+
+@pytest.mark.parametrize(
+    ("what", "most"), [("plan", 10.0), ("run", 50.0), ("plan_again", 10.0), ("status", 5.0)]
+)
+def test_a_million_cases_take(times, what, most):
+    """Plan under 10 s, status under 5 s, and 50 us of a run's time a case."""
+    few, many = times
+    each = (many[what] - few[what]) / (N_MANY - N_FEW)
+    assert few[what] * (what != "run") + each * MILLION < most
+
+
+def test_a_million_cases_fit_in_a_gigabyte(times):
+    few, many = times
+    assert few["memory"] + (many["memory"] - few["memory"]) / (N_MANY - N_FEW) * MILLION < 1000
