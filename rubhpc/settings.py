@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from rubhpc.rig import Rig
     from rubhpc.study import Study
 
+_EVENT_STEPS = 60  # that the modal scheme takes a revolution, samples apart
+_TOUCHING = 0.15  # share of the time in contact, where it takes short steps there
 _MOST_RIGS = 256  # asked for their step, 1 ms each; of more, the first stands for all
 
 Index = tuple[int, ...]
@@ -117,10 +119,22 @@ class Settings:
         recording = self.study.recording
         turns = recording.transient + recording.revolutions
 
+        is_modal = self.study.integrator.method == "modal"
+        modal_steps = recording.transient * _EVENT_STEPS + recording.revolutions * (
+            _EVENT_STEPS + recording.samples_per_revolution
+        )
+
         def predict(index: Index) -> float:
+            if is_modal and self.study.contact.normal == "fixed":
+                return float(modal_steps)
             unit = self._unit_speed_at(tuple(index[i] for i in self._response_axes))
             speed = abs(self._values[self.speed_axis][index[self.speed_axis]]) * unit
-            return turns * 2 * math.pi / speed / self._step_at(tuple(index[i] for i in self.rig_axes))
+            duration = turns * 2 * math.pi / speed
+            if is_modal:
+                return modal_steps + _TOUCHING * duration / self.study.integrator.contact_step(
+                    self.study.contact
+                )
+            return duration / self._step_at(tuple(index[i] for i in self.rig_axes))
 
         shape = [len(values) if i in axes else 1 for i, values in enumerate(self._values)]
         return self._tabulated(axes, predict).reshape(shape)

@@ -203,10 +203,11 @@ CASES = [
     ),
     _study("unknown normal", 'law = "lagrange"', 'normal = "bent"', "[contact] normal:", "fixed", "updated"),
     _study(
-        "integrator to come",
+        "unknown integrator",
         'step = "0.4 us"',
-        'method = "modal"',
+        'method = "modle"',
         "[integrator] method:",
+        "modal",
         "central-difference",
     ),
     _study("step in metres", "0.4 us", "0.4 um", "[integrator] step:", "not in s"),

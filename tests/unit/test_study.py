@@ -104,13 +104,13 @@ def test_the_grid_keeps_its_order(tmp_path):
     ]
 
 
-def test_defaults_are_those_of_the_paper(tmp_path):
+def test_defaults_are_the_exact_scheme_and_the_rest_of_the_paper(tmp_path):
     study = grid(tmp_path, "")
     assert study.title == "s"
     assert study.output == Path("s.zarr")
     assert study.rig == read_rig("mokhtar2017")
     assert study.contact == Contact(law="lagrange", friction_law="sliding", normal="fixed")
-    assert study.integrator == Integrator(method="central-difference", step=None)
+    assert study.integrator == Integrator(method="modal", step=None, accuracy=1e-3)
     assert study.recording == Recording(transient=120, revolutions=64, samples_per_revolution=256)
     assert study.recording.keep == ("waveform", "spectrum", "section")
     assert study.run == Run(block=None, time_limit=None, case_time_limit=None, max_failures=None)
