@@ -1,9 +1,15 @@
 """Puts this directory on the path: tests of every kind share `running` and `reference`.
 
 Linear algebra has one thread, as under the commands: two would wait for each other on small matrices.
+Examples of hypothesis have no deadline, because the first may compile a kernel, and are the same in every run.
 """
 
 import os
 
+from hypothesis import settings
+
 for library in ("OMP", "OPENBLAS", "MKL", "BLIS"):
     os.environ[f"{library}_NUM_THREADS"] = "1"
+
+settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.load_profile("repeatable")
