@@ -1,7 +1,7 @@
 """Puts this directory on the path: tests of every kind share `running` and `reference`.
 
 Linear algebra has one thread, as under the commands: two would wait for each other on small matrices.
-Examples of hypothesis have no deadline, because the first may compile a kernel, and are the same in every run.
+Examples of hypothesis have no deadline, since the first may compile a kernel, and are the same in every run.
 """
 
 import os
