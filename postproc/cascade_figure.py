@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 ORDERS = tuple(Fraction(*f) for f in ((1, 3), (1, 2), (2, 3), (1, 1), (3, 2), (2, 1), (3, 1)))
 _ROWS = 60  # of a waterfall: more overlap at column width
 _PIXELS = (800, 500)  # of an intensity picture at column width and 300 dpi
+_CHARACTER = 0.018  # of the axes, for a letter of a name
 _DECADES = 3.0
 _NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
 
@@ -135,6 +136,7 @@ def draw_frequencies(
     left, right = ax.get_xlim()
     ends = ax.get_ylim()
     style: dict[str, Any] = {"color": color, "linewidth": 0.7, "linestyle": "--", "zorder": 5}
+    named: list[tuple[float, float]] = []  # ends of the names that stand above the axes
     for name, frequency in frequencies.items():
         values = np.broadcast_to(np.asarray(frequency, dtype=float), rows.shape)
         x = values if abscissa == "frequency" else values / rate
@@ -145,8 +147,12 @@ def draw_frequencies(
         text: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6.5, "color": color, "zorder": 6}
         if abscissa == "frequency":
             at = float(np.clip(x[-1], left + 0.1 * (right - left), right - 0.14 * (right - left)))
-            text |= {"xytext": (0, 2), "ha": "center", "va": "bottom", "annotation_clip": False}
-            ax.annotate(f"{name} {values[-1]:.4g} Hz", (at, 1.0), xycoords=("data", "axes fraction"), **text)
+            label = f"{name} {values[-1]:.4g} Hz"
+            half = 0.5 * _CHARACTER * len(label) * (right - left)
+            level = sum(at - half < end and at + half > start for start, end in named)  # the next line up
+            named.append((at - half, at + half))
+            text |= {"xytext": (0, 2 + 8 * level), "ha": "center", "va": "bottom", "annotation_clip": False}
+            ax.annotate(label, (at, 1.0), xycoords=("data", "axes fraction"), **text)
         else:  # over orders the curves meet at the top and part towards slow rotation
             side, shift = ("right", -2) if x[0] > left + 0.6 * (right - left) else ("left", 2)
             text |= {"xytext": (shift, 1), "ha": side, "va": "bottom"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -94,6 +95,8 @@ class Scale:
 
 
 _SPEEDS = ("speed", "spin_speed")
+_CAPTION_WIDTH = 56  # characters that a column takes
+_MARKUP = re.compile(r"[$\\_]")  # of symbols, which takes no room
 _RPM = Scale(60 / (2 * math.pi), "rpm")  # as speeds are read on a test bench
 
 
@@ -145,8 +148,14 @@ def written_value(coordinate: xr.DataArray) -> str:
 
 
 def caption(data: xr.DataArray | xr.Dataset) -> str:
-    """Return the settings that hold for all of `data`: its scalar coordinates."""
+    """Return the settings that hold for all of `data`: its scalar coordinates, in lines that fit a column."""
     scalars = [c for c in data.coords.values() if c.ndim == 0 and c.dtype.kind in "fiu"]
     known = list(_SYMBOLS)
     scalars.sort(key=lambda c: (known.index(c.name) if c.name in known else len(known), str(c.name)))
-    return ", ".join(written_value(c) for c in scalars)
+    lines: list[str] = []
+    for setting in map(written_value, scalars):
+        if lines and len(_MARKUP.sub("", f"{lines[-1]}, {setting}")) <= _CAPTION_WIDTH:
+            lines[-1] = f"{lines[-1]}, {setting}"
+        else:
+            lines.append(setting)
+    return ",\n".join(lines)

@@ -1,5 +1,6 @@
 """Cascades: gathering, peak holding, and the figures drawn from them."""
 
+import itertools
 import math
 from fractions import Fraction
 from pathlib import Path
@@ -233,3 +234,22 @@ def test_an_unfinished_cascade_says_so(spectra, ax):
     for draw in (waterfall, intensity):
         with pytest.raises(InputError, match="no case of this selection is done"):
             draw(spectra * np.nan, ax, 100.0)
+
+
+def test_names_of_near_frequencies_stand_apart(spectra, ax):
+    waterfall(spectra, ax, 260.0)
+    draw_frequencies(ax, spectra, {"lateral": 60.0, "torsional": 110.0, "mine": 105.0, "far": 220.0})
+    ax.figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in ax.texts if text.get_text().endswith("Hz")]
+    assert len(boxes) == 4
+    for box, other in itertools.combinations(boxes, 2):
+        assert not box.overlaps(other)
+
+
+def test_speeds_in_rpm_are_written_out(spectra, ax):
+    speed = spectra["spin_speed"] * 5  # up to 16096 rpm
+    over_speed = spectra.assign_coords(spin_speed=speed, speed=speed).swap_dims(speed_ratio="speed")
+    waterfall(over_speed, ax, 1300.0)
+    ax.figure.canvas.draw()
+    assert ax.get_ylabel() == "Spin speed (rpm)"
+    assert any("10000" in tick.get_text() for tick in ax.get_yticklabels())

@@ -56,3 +56,13 @@ def test_a_caption_tells_what_was_selected():
         }
     )
     assert caption(data) == r"$r$ = 0.75, $g$ = 84 µm"
+
+
+def test_a_long_caption_takes_as_many_lines_as_it_needs():
+    names = ("speed_ratio", "clearance_ratio", "friction", "rotor_disc_1_mass", "stator_1_angle", "stator")
+    data = xr.Dataset(coords={name: ((), 0.75, {"units": "1"}) for name in names})
+    lines = caption(data).split("\n")
+    assert lines == [
+        r"$r$ = 0.75, $c_g$ = 0.75, $\mu$ = 0.75, rotor disc 1 mass = 0.75,",
+        "stator = 0.75, stator 1 angle = 0.75",
+    ]
