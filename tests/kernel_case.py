@@ -8,37 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.contact_work import workspace
 from rubhpc.fem.assemble import assemble
 from rubhpc.gather import empty_samples, empty_tally
 from rubhpc.kernels.central_difference import advance
-from rubhpc.kernels.contact import N_DEGREE, Workspace, fill_directions, fill_matrix
 from rubhpc.packing import pack, pairs_of
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
-    from rubhpc.kernels.contact import Pairs
+    from rubhpc.kernels.contact import Pairs, Workspace
     from rubhpc.kernels.observe import Samples, Tally
     from rubhpc.packing import Packed
-
-
-def workspace(pairs):
-    """Arrays of a contact solution, with the directions of the stators' axes filled in."""
-    q = pairs.radius.size
-    work = Workspace(
-        at=np.zeros((q, N_DEGREE)),
-        pull=np.zeros((q, N_DEGREE)),
-        push=np.zeros((q, N_DEGREE)),
-        matrix=np.zeros((q, q)),
-        gap=np.zeros(q),
-        force=np.zeros(q),
-        active=np.zeros(q, dtype=np.bool_),
-        elimination=np.zeros((q, q + 1)),
-        moved=np.zeros(N_DEGREE),
-    )
-    for i in range(q):
-        fill_directions(pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.pull[i], work.push[i])
-    fill_matrix(pairs, work)
-    return work
 
 
 @dataclass

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import root
 
+from rubhpc.contact_work import workspace
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact import (
     AXIAL,
@@ -17,9 +18,7 @@ from rubhpc.kernels.contact import (
     Pairs,
     V,
     W,
-    Workspace,
     fill_directions,
-    fill_matrix,
     force_on_disc,
     is_any_closed,
     normal_and_gap,
@@ -46,20 +45,6 @@ def make_pairs(angle, friction=0.3, *, is_updated=False, compliance=None):
         friction=np.full(q, friction),
         compliance=np.zeros((q, N_DEGREE, q, N_DEGREE)) if compliance is None else compliance,
         is_updated=is_updated,
-    )
-
-
-def make_work(q):
-    return Workspace(
-        at=np.zeros((q, N_DEGREE)),
-        pull=np.zeros((q, N_DEGREE)),
-        push=np.zeros((q, N_DEGREE)),
-        matrix=np.zeros((q, q)),
-        gap=np.zeros(q),
-        force=np.zeros(q),
-        active=np.zeros(q, dtype=np.bool_),
-        elimination=np.zeros((q, q + 1)),
-        moved=np.zeros(N_DEGREE),
     )
 
 
@@ -127,7 +112,7 @@ def test_pair_of_forces_is_in_balance(angle, whirl, friction):
 def test_held_degrees_stand_still():
     pairs = make_pairs(0.4)
     pairs.row[0, LATERAL] = pairs.row[0, W] = -1
-    work = make_work(1)
+    work = workspace(pairs)
     displacement = np.full(N_DEGREE, 2e-4)
     is_closed = is_any_closed(
         pairs.row,
@@ -148,7 +133,7 @@ def test_held_degrees_stand_still():
 
 def closed(pairs, displacement):
     """The workspace when the free update leads to `displacement` (5 q,)."""
-    work = make_work(pairs.radius.size)
+    work = workspace(pairs)
     is_closed = is_any_closed(
         pairs.row,
         pairs.axis_y,
@@ -160,9 +145,6 @@ def closed(pairs, displacement):
         work.at,
         work.gap,
     )
-    for i in range(pairs.radius.size):
-        fill_directions(pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.pull[i], work.push[i])
-    fill_matrix(pairs, work)
     return work, is_closed
 
 

@@ -99,6 +99,7 @@ def test_case_follows_the_full_order_solution(name, normal):
         clearance=clearance,
         friction=friction,
         normal=normal,
+        method="central-difference",
         transient=0,
         revolutions=revolutions,
         samples_per_revolution=per_revolution,

@@ -11,7 +11,7 @@ from rubhpc import State, read_rig
 from rubhpc.case import run_case
 from rubhpc.fem.model import Body, Model, StatorModel
 from rubhpc.packing import pack
-from rubhpc.prepare import Setup, prepare
+from rubhpc.prepare import CentralDifferenceSetup, prepare
 from rubhpc.rig import with_keys
 from rubhpc.study import Contact, Integrator, Recording
 
@@ -43,7 +43,7 @@ def test_rotor_in_its_first_mode_meets_the_stator(modulus, release, impulse, pea
         rig,
         2 * math.pi / duration,
         contact=Contact(),
-        integrator=Integrator(step=step * 1.000001),
+        integrator=Integrator(method="central-difference", step=step * 1.000001),
         samples_per_revolution=per_revolution,
     )
     assert setup.steps_per_sample == 1
@@ -97,7 +97,7 @@ def drop(mass, stiffness, velocity, wall_mass, wall_stiffness, clearance, durati
     none = np.zeros(n_dof)
     model = Model(rotor=body, unbalance_cosine=none, unbalance_sine=none, stators=(below,), output_node=1)
     per_revolution = every_step(duration, step)
-    setup = Setup(
+    setup = CentralDifferenceSetup(
         model=model,
         packed=pack(model, 0.0, step),
         spin=2 * math.pi / (per_revolution * step),  # a revolution of samples

@@ -36,6 +36,7 @@ def steady(damped):
         speed_ratio=0.75,
         clearance="84 um",
         friction=0.3,
+        method="central-difference",
         step=FAST,
         transient=24,
         revolutions=2,
@@ -119,6 +120,7 @@ def two_lobes(packaged):
         speed=-148.7,
         clearance="106 um",
         friction=0.4,
+        method="central-difference",
         step=FAST,
         transient=30,
         revolutions=2,
@@ -147,6 +149,7 @@ def test_no_step_penetrates_or_pulls(packaged, normal, angles):
         clearance=clearance,
         friction=0.1,
         normal=normal,
+        method="central-difference",
         step=FAST,
         transient=0,
         revolutions=2,
@@ -173,6 +176,7 @@ def run(packaged):
 
     def runs(rig=packaged, **changed):
         given = {"speed": 148.7, "clearance": 60e-6, "friction": 0.3, "step": FAST, "transient": 0}
+        given["method"] = "central-difference"
         return simulate(rig, revolutions=3, **(given | changed))
 
     return runs
@@ -265,6 +269,7 @@ def test_stator_out_of_reach_is_not_felt(packaged, speed_ratio, ratio, amplitude
             rig,
             speed=speed,
             clearance=share * contact_free_amplitude(model, speed),
+            method="central-difference",
             step=FAST,
             transient=0,
             revolutions=2,
@@ -292,6 +297,7 @@ def test_half_the_step_gives_the_same_orbit(request, orbit, packaged, damped):
             speed=before.spin_speed,
             clearance=before.clearance,
             friction=friction,
+            method="central-difference",
             step=step,
             transient=2,
             revolutions=2,
