@@ -29,14 +29,12 @@ def open_store(path: str | Path) -> xr.Dataset:
 
     Raises
     ------
-    InputError
-        There is nothing at `path`.
     StoreError
-        What lies there is no store of rubhpc.
+        There is nothing at `path`, or no store of rubhpc.
     """
     path = Path(path)
     if not path.exists():
-        raise InputError(f"{path}: no such store; give the directory that a study was run into")
+        raise StoreError(f"{path}: no such store; give the directory that a study was run into")
     long = [n for n, v in VARIABLES.items() if v.role in LONG_ROLES]
     short = [n for n in VARIABLES if n not in long]
     try:

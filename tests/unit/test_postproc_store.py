@@ -149,8 +149,8 @@ def test_the_first_value_of_the_rest_is_announced(store):
     assert notes[0] == "friction = 0.1: the first of 2; change with --select friction=VALUE"
 
 
-def test_nothing_there_is_bad_input_and_another_store_is_a_store_error(tmp_path):
-    with pytest.raises(InputError, match="no such store"):
+def test_what_is_no_store_is_a_store_error_as_it_is_to_status(tmp_path):
+    with pytest.raises(StoreError, match="no such store"):
         open_store(tmp_path / "absent.zarr")
     (tmp_path / "empty.zarr").mkdir()
     with pytest.raises(StoreError, match="cannot be read as a zarr store"):
