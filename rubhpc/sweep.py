@@ -10,16 +10,19 @@ import itertools
 import json
 import math
 import struct
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rubhpc.errors import InputError
+from rubhpc.fields import place
 from rubhpc.settings import Settings
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -85,7 +88,8 @@ class Sweep:
         self.shape = tuple(len(axis.values) for axis in study.axes)
         self.n_case = math.prod(self.shape)
         self.n_stator = len(study.rig.stator)
-        self._settings = Settings(study)
+        with _named(study):
+            self._settings = Settings(study)
         self.chunk = chunk if chunk is not None else self._default_chunk()
         self.identity_parts = identity_parts(study)
         text = json.dumps(self.identity_parts, sort_keys=True, separators=(",", ":"), allow_nan=False)
@@ -139,7 +143,8 @@ class Sweep:
         InputError
             When a clearance leaves no gap at a stator.
         """
-        found = self._settings.arrays()
+        with _named(self.study):
+            found = self._settings.arrays()
         return {name: (tuple(self.dims[i] for i in axes), values) for name, (axes, values) in found.items()}
 
     def _case(self, index: tuple[int, ...], name: str) -> Case:
@@ -174,6 +179,17 @@ class Sweep:
             chunk[i] = -(-self.shape[i] // n_block)  # blocks of one size, rather than full ones and a rest
             wanted = max(wanted // chunk[i], 1)
         return tuple(chunk)
+
+
+@contextmanager
+def _named(study: Study) -> Iterator[None]:
+    """Put the study's file in front of what is wrong with its settings."""
+    try:
+        yield
+    except InputError as error:
+        if study.source is None:
+            raise
+        raise InputError(f"{place(str(study.source))}: {error}") from None
 
 
 def identity_parts(study: Study) -> dict[str, Any]:

@@ -217,6 +217,15 @@ def test_an_offset_that_closes_a_gap_is_refused_with_the_settings():
         Sweep(study(rig=rig)).settings()
 
 
+def test_a_refusal_of_the_settings_names_the_file(tmp_path):
+    file = tmp_path / "study.toml"
+    with pytest.raises(InputError, match=r"study\.toml: \[integrator\] step: 0\.001 s is above"):
+        Sweep(study(integrator=Integrator(method="central-difference", step=1e-3), source=file))
+    rig = with_key(RIG, "stator.clearance_offset", "-90 um")
+    with pytest.raises(InputError, match=r"study\.toml: \[grid\] clearance_ratio: .* leave no gap"):
+        Sweep(study(rig=rig, source=file)).settings()
+
+
 def test_a_million_cases_are_planned_at_once():
     many = {"start": 0.5, "stop": 5.5, "num": 100}
     began = time.perf_counter()
