@@ -65,7 +65,9 @@ class _Commands(click.Group):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        if args and args[0] not in COMMANDS and args[0] not in ("--help", "-h", "--version"):
+        if not args:
+            raise click.UsageError("nothing to do; give a STUDY.toml or a command, see rubhpc --help")
+        if args[0] not in COMMANDS and args[0] not in ("--help", "-h", "--version"):
             _refuse_slip(args[0])
             args = ["run", *args]
         return super().parse_args(ctx, args)

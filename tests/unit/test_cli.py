@@ -92,6 +92,7 @@ def test_status_loads_neither_mpi_nor_numba_nor_zarr(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
+        ([], 2, "nothing to do; give a STUDY.toml or a command, see rubhpc --help"),
         (["nowhere.toml"], 2, "nowhere.toml: no such file"),
         (["plan", "nowhere.toml"], 2, "nowhere.toml: no such file"),
         (["stauts", "x"], 2, "did you mean status?"),
@@ -99,6 +100,7 @@ def test_status_loads_neither_mpi_nor_numba_nor_zarr(tmp_path):
         (["status", "--frobnicate", "x"], 2, "--frobnicate"),
         (["status"], 2, "STORE"),
         (["status", "nowhere.zarr"], 3, "nowhere.zarr: no such store"),
+        (["orbit", "nowhere.zarr"], 3, "nowhere.zarr: no such store"),
         (["verify", "nowhere.zarr"], 3, "nowhere.zarr: no such store"),
         (["x.toml", "--time-limit", "3 parsecs"], 2, "--time-limit"),
         (["x.toml", "--max-failures", "-1"], 2, "--max-failures"),
