@@ -42,14 +42,19 @@ def disk_errors(place: Path) -> Iterator[None]:
         raise StoreError(f"{place}: {text}") from error
 
 
-def write_whole(path: Path, data: bytes) -> None:
-    """Put `data` in `path` such that a reader, or the next run after a crash, finds all of it or the old."""
+def write_whole(path: Path, data: bytes, *, is_synced: bool = True) -> None:
+    """Put `data` in `path` such that a reader, or the next run after a crash, finds all of it or the old.
+
+    Where `is_synced`, the data outlive a power cut too.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{uuid.uuid4().hex}.partial")
     try:
         with partial.open("wb") as file:
             file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
+            if is_synced:
+                file.flush()
+                os.fsync(file.fileno())
         partial.replace(path)
     except OSError:
         partial.unlink(missing_ok=True)

@@ -199,16 +199,15 @@ class Store:
 
     def write_block(self, start: tuple[int, ...], data: dict[str, NDArray[Any]]) -> None:
         """Store the arrays of a block; each file appears whole."""
-        window = self.window(start)
-        shape = [w.stop - w.start for w in window]
+        shape = tuple(w.stop - w.start for w in self.window(start))
+        beyond = [(0, c - n) for n, c in zip(shape, self.manifest.chunk, strict=True)]  # at the grid's edge
         with disk_errors(self.path):
             for variable, path in zip(self.manifest.variables, self.chunk_files(start), strict=True):
-                if tuple(shape) != self.manifest.chunk:
-                    # zarr reads a chunk at the edge before it writes it, and what is replaced may be damaged.
-                    path.unlink(missing_ok=True)
-                self.arrays[variable.name][window] = data[variable.name].reshape(
-                    *shape, *self.manifest.extent(variable)
-                )
+                values = data[variable.name].reshape(*shape, *self.manifest.extent(variable))
+                if shape != self.manifest.chunk:
+                    inside = [(0, 0)] * len(variable.dims)
+                    values = np.pad(values, beyond + inside, constant_values=layout.fill_value(variable))
+                write_whole(path, layout.encode(values), is_synced=False)
 
     def remove_partial_files(self) -> None:
         """Remove what writers that were killed left half written."""

@@ -72,7 +72,7 @@ class Worker:
         self._record_type = metrics_type(self.sweep.n_stator)
         self._setups: OrderedDict[tuple[int, float], tuple[Rig, Setup]] = OrderedDict()
         self._unsynced: list[Path] = []
-        self._next_sync = time.monotonic()
+        self._next_sync = time.monotonic() + _SYNC_GAP
         self._seconds, self._cost = 0.0, 0.0
         self._case_limit = self.sweep.study.run.case_time_limit
 
