@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import subprocess
@@ -24,6 +25,7 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
 STORE = (ROOT / "docs" / "store.md").read_text()
+STUDIES = "Studies that come along"
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "jobs").glob("*.md")])
 
 
@@ -164,12 +166,17 @@ def test_study_of_the_readme_is_one(tmp_path: Path) -> None:
     assert read_study(tmp_path / "study.toml").rig.name == "mokhtar2017"
 
 
-def test_readme_tells_of_every_study_and_of_targets_that_exist() -> None:
+def test_readme_tells_of_targets_that_exist() -> None:
     targets = re.findall(r"^([a-z]+):.*## ", (ROOT / "Makefile").read_text(), re.MULTILINE)
     told = set(re.findall(r"(?:^|`)make ([a-z]+)", README + CONTRIBUTING, re.MULTILINE))
     assert told <= set(targets)
-    studies = {path.name for path in (ROOT / "jobs").glob("*.toml")}
-    assert studies == set(re.findall(r"jobs/([\w-]+\.toml)`?\]", README))
+
+
+def test_readme_tells_of_every_study_and_its_cases() -> None:
+    told = {re.search(r"\((.*)\)", row[0]).group(1): int(row[2]) for row in rows(README, STUDIES)}  # type: ignore[union-attr]
+    axes = {path: read_study(path).axes for path in (ROOT / "jobs").glob("*.toml")}
+    cases = {f"jobs/{path.name}": math.prod(len(axis.values) for axis in axes[path]) for path in axes}
+    assert told == cases
 
 
 def test_figure_of_the_readme_is_small() -> None:
