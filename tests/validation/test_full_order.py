@@ -6,6 +6,7 @@ A few revolutions from rest are compared sample by sample, before any two trajec
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -61,6 +62,7 @@ def stator(node, degrees, **changed):
     return Stator(node=node, angle=math.radians(degrees), **(given | changed))
 
 
+MOTIONS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral")
 STIFF = {"youngs_modulus": 2e10, "lateral": False}
 # name: rotor, stators, speed (rad/s), clearance (m), friction
 CASES = {
@@ -77,40 +79,84 @@ CASES = {
     "at two nodes": (ROTOR, [stator(6, 10, radius=0.05), stator(3, 130)], -280.0, 90e-6, 0.25),
     "no lateral freedom": (SPRUNG, [stator(3, -30, **STIFF)], 400.0, 120e-6, 0.5),
 }
-# Greatest distance over greatest value; with the updated normal it matters in which step a touch begins.
-TOLERANCE = {"fixed": 5e-4, "updated": 4e-3}
+# Accurate enough for the greatest distance at any instant, over the greatest value, to be in tolerance.
+METHODS = {
+    "central-difference": {"method": "central-difference"},
+    "modal": {"method": "modal", "accuracy": 1e-5},
+}
+TOLERANCE = 5e-3
+REVOLUTIONS, PER_REVOLUTION = 3, 128
 
 
-def distance(found, expected):
-    scale = np.maximum(abs(expected).max(axis=-1), 1e-12)
-    return np.max(abs(found - expected).max(axis=-1) / scale)
+def make_rig(name):
+    rotor, stators, *_ = CASES[name]
+    return Rig(name="trial", rotor=rotor, stator=tuple(stators))
 
 
-@pytest.mark.parametrize("normal", ["fixed", "updated"])
-@pytest.mark.parametrize("name", CASES)
-def test_case_follows_the_full_order_solution(name, normal):
-    rotor, stators, speed, clearance, friction = CASES[name]
-    rig = Rig(name="trial", rotor=rotor, stator=tuple(stators))
-    revolutions, per_revolution = 3, 128
-    expected = reference.solve(rig, speed, clearance, friction, normal, revolutions, per_revolution, 2e-6)
-    record = simulate(
-        rig,
+@lru_cache
+def expected(name, normal):
+    return reference.solve(
+        make_rig(name), *CASES[name][2:], normal, REVOLUTIONS, PER_REVOLUTION, longest_step=2e-6
+    )
+
+
+def solve(name, normal, **method):
+    _, _, speed, clearance, friction = CASES[name]
+    return simulate(
+        make_rig(name),
         speed=speed,
         clearance=clearance,
         friction=friction,
         normal=normal,
-        method="central-difference",
         transient=0,
-        revolutions=revolutions,
-        samples_per_revolution=per_revolution,
+        revolutions=REVOLUTIONS,
+        samples_per_revolution=PER_REVOLUTION,
+        **method,
     )
-    for signal in ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral"):
-        assert distance(getattr(record, signal), expected[signal]) < TOLERANCE[normal], signal
-    # A step's force is the mean around its beginning here and over its length there: half a step apart.
-    assert distance(record.contact_force, expected["contact_force"]) < 4e-3
-    impulse = expected["contact_force"].mean(axis=-1) * 2 * math.pi / abs(speed)
+
+
+def distance(found, known):
+    scale = np.maximum(abs(known).max(axis=-1), 1e-12)
+    return np.max(abs(found - known).max(axis=-1) / scale)
+
+
+def check_contacts(record, known):
+    """As many touches, as strong; the record's force is a mean over the interval of a sample."""
+    impulse = known["contact_force"].mean(axis=-1) * 2 * math.pi / abs(record.spin_speed)
     assert record.contact_impulse == pytest.approx(impulse, rel=2e-3)
-    assert np.array_equal(record.contacts_per_revolution * revolutions, expected["contacts"])
-    assert expected["contacts"].all()
-    if len(stators) > 1:
-        assert expected["overlap"] > 0.01  # of the time two touch at once
+    assert np.array_equal(record.contacts_per_revolution * REVOLUTIONS, known["contacts"])
+    assert known["contacts"].all()
+    if len(impulse) > 1:
+        assert known["overlap"] > 0.01  # of the time two touch at once
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+@pytest.mark.parametrize("name", CASES)
+def test_case_follows_the_full_order_solution(name, normal, method):
+    known, record = expected(name, normal), solve(name, normal, **METHODS[method])
+    for signal in (*MOTIONS, "contact_force"):
+        assert distance(getattr(record, signal), known[signal]) < TOLERANCE, signal
+    check_contacts(record, known)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_central_difference_is_closer_still_with_the_fixed_normal(name):
+    """With the updated one it matters in which step of the reference a touch begins."""
+    known, record = expected(name, "fixed"), solve(name, "fixed", method="central-difference")
+    for signal in MOTIONS:
+        assert distance(getattr(record, signal), known[signal]) < 5e-4, signal
+
+
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+@pytest.mark.parametrize("name", CASES)
+def test_usual_accuracy_gives_amplitudes_and_impulses(name, normal):
+    """By default fast axial waves of the stator are left out: 2 % of its motion at some instants."""
+    known, record = expected(name, normal), solve(name, normal)
+    for signal in MOTIONS[:3]:
+        assert distance(getattr(record, signal), known[signal]) < TOLERANCE, signal
+    for signal in MOTIONS:
+        reached = np.ptp(known[signal], axis=-1)
+        share = 0.01 if signal == "stator_axial" else TOLERANCE
+        assert np.ptp(getattr(record, signal), axis=-1) == pytest.approx(reached, rel=share, abs=1e-12)
+    check_contacts(record, known)

@@ -13,7 +13,11 @@ from rubhpc.rig import Damping, with_keys
 
 LATERAL, TWIST, AXIAL = 143343.35, 3125.88, 3e9 * 25e-6 / 0.04  # N/m, N m/rad at the disc; N/m of the stator
 RADIUS = 0.06
-FAST = 2e-6  # s: within 1e-5 of the paper's step, and a quarter of its work
+# 2 us is within 1e-5 of the paper's step, at a quarter of its work.
+METHODS = {
+    "central-difference": {"method": "central-difference", "step": 2e-6},
+    "modal": {"method": "modal"},
+}
 
 
 @pytest.fixture(scope="module")
@@ -28,19 +32,23 @@ def damped(packaged):
     return with_keys(packaged, damping | {"stator.density": 1156.7, "stator.poissons_ratio": 0.35})
 
 
+@pytest.fixture(scope="module", params=METHODS)
+def method(request):
+    return METHODS[request.param]
+
+
 @pytest.fixture(scope="module")
-def steady(damped):
+def steady(damped, method):
     """G1 in its steady state; 4096 samples a revolution, so that extrema fall between samples by little."""
     return simulate(
         damped,
         speed_ratio=0.75,
         clearance="84 um",
         friction=0.3,
-        method="central-difference",
-        step=FAST,
         transient=24,
         revolutions=2,
         samples_per_revolution=4096,
+        **method,
     )
 
 
@@ -85,7 +93,7 @@ def check_means(record, friction, lateral_stiffness):
     """
     force = record.contact_impulse[0] / turn(record)
     sense = np.sign(record.spin_speed)
-    assert record.contact_force.mean() == pytest.approx(force, rel=1e-9)
+    assert record.contact_force.mean() == pytest.approx(force, rel=1e-4)
     found = [
         getattr(record, n).mean()
         for n in ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral")
@@ -113,18 +121,17 @@ def test_means_balance_the_mean_force(steady):
 
 
 @pytest.fixture(scope="module")
-def two_lobes(packaged):
+def two_lobes(packaged, method):
     """A period-2 orbit with reversed spin; at this gap disturbances die away within 30 revolutions."""
     return simulate(
         packaged,
         speed=-148.7,
         clearance="106 um",
         friction=0.4,
-        method="central-difference",
-        step=FAST,
         transient=30,
         revolutions=2,
         samples_per_revolution=1024,
+        **method,
     )
 
 
@@ -149,12 +156,11 @@ def test_no_step_penetrates_or_pulls(packaged, normal, angles):
         clearance=clearance,
         friction=0.1,
         normal=normal,
-        method="central-difference",
-        step=FAST,
         transient=0,
         revolutions=2,
         samples_per_revolution=21_200,
         keep=("waveform",),
+        **METHODS["central-difference"],
     )
     assert record.steps == 2 * 21_200
     axis = np.exp(1j * np.array(angles))[:, np.newaxis]
@@ -171,13 +177,12 @@ def test_no_step_penetrates_or_pulls(packaged, normal, angles):
 
 
 @pytest.fixture(scope="module")
-def run(packaged):
+def run(packaged, method):
     """Three revolutions from rest, in hard contact."""
 
     def runs(rig=packaged, **changed):
-        given = {"speed": 148.7, "clearance": 60e-6, "friction": 0.3, "step": FAST, "transient": 0}
-        given["method"] = "central-difference"
-        return simulate(rig, revolutions=3, **(given | changed))
+        given = {"speed": 148.7, "clearance": 60e-6, "friction": 0.3, "transient": 0, "revolutions": 3}
+        return simulate(rig, **(given | method | changed))
 
     return runs
 
@@ -252,7 +257,7 @@ FREE = [
 
 
 @pytest.mark.parametrize(("speed_ratio", "ratio", "amplitude"), FREE)
-def test_stator_out_of_reach_is_not_felt(packaged, speed_ratio, ratio, amplitude):
+def test_stator_out_of_reach_is_not_felt(packaged, method, speed_ratio, ratio, amplitude):
     """E9: on the steady orbit with the stator just out of reach, nothing happens; just within, it touches."""
     damping = Damping(alpha=2 * ratio * 2 * math.pi * 31.56)
     rig = replace(packaged, rotor=replace(packaged.rotor, damping=damping))
@@ -269,11 +274,10 @@ def test_stator_out_of_reach_is_not_felt(packaged, speed_ratio, ratio, amplitude
             rig,
             speed=speed,
             clearance=share * contact_free_amplitude(model, speed),
-            method="central-difference",
-            step=FAST,
             transient=0,
             revolutions=2,
             initial=start,
+            **method,
         )
         for share in (1.0005, 0.9995)
     )
@@ -282,31 +286,36 @@ def test_stator_out_of_reach_is_not_felt(packaged, speed_ratio, ratio, amplitude
     for quiet in ("peak_contact_force", "contact_impulse", "contact_fraction", "friction_work"):
         assert getattr(free, quiet)[0] == 0.0
     assert np.isnan(free.minimum_slip_speed[0])
-    assert not free.torsion.any()
+    assert abs(free.torsion).max() < 1e-20
     assert touched.contact_impulse[0] > 0.0
 
 
+FINER = {
+    "central-difference": [{"step": 0.5e-6}, {"step": 0.25e-6}],
+    "modal": [{"accuracy": 1e-3}, {"accuracy": 1e-5}],
+}
+
+
 @pytest.mark.parametrize("orbit", ["steady", "two_lobes"])
-def test_half_the_step_gives_the_same_orbit(request, orbit, packaged, damped):
-    """E10, from the paper's step of 0.5 us."""
+def test_finer_integration_gives_the_same_orbit(request, orbit, method, packaged, damped):
+    """E10: half the paper's step of 0.5 us, or a hundredth of the error that the modal scheme is allowed."""
     before = request.getfixturevalue(orbit)
     rig, friction = (damped, 0.3) if orbit == "steady" else (packaged, 0.4)
-    paper, half = (
+    usual, fine = (
         simulate(
             rig,
             speed=before.spin_speed,
             clearance=before.clearance,
             friction=friction,
-            method="central-difference",
-            step=step,
             transient=2,
             revolutions=2,
             initial=before.final,
+            **(method | changed),
         )
-        for step in (0.5e-6, 0.25e-6)
+        for changed in FINER[method["method"]]
     )
     for name in ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral"):
-        check_close(getattr(paper, name), getattr(half, name), 1e-4, name)
+        check_close(getattr(usual, name), getattr(fine, name), 1e-4, name)
     for name in ("peak_contact_force", "contact_impulse", "friction_work", "minimum_slip_speed"):
-        assert getattr(paper, name) == pytest.approx(getattr(half, name), rel=1e-4), name
-    assert paper.period == half.period == before.period
+        assert getattr(usual, name) == pytest.approx(getattr(fine, name), rel=1e-4), name
+    assert usual.period == fine.period == before.period
