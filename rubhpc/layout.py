@@ -14,6 +14,7 @@ import zarr
 from numcodecs.blosc import Blosc
 from zarr.codecs import BloscCodec
 
+from rubhpc import __version__
 from rubhpc.journal import METRICS
 from rubhpc.manifest import PRIVATE, Manifest
 from rubhpc.schema import VARIABLES
@@ -190,7 +191,12 @@ def _attributes(sweep: Sweep) -> dict[str, Any]:
         "identity": sweep.identity,
         "study": study.as_dict(),
         "rig": study.rig.as_dict(),
-        "versions": {"python": platform.python_version(), **{name: _version(name) for name in _PACKAGES}},
+        "versions": {
+            "rubhpc": __version__,
+            "python": platform.python_version(),
+            **{name: _version(name) for name in _PACKAGES},
+        },
+        "coordinates": "revolution",  # also where no array over the samples is kept
     }
 
 

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from running import write_study
 
-from rubhpc import layout
+from rubhpc import __version__, layout
 from rubhpc.disk import disk_errors, write_whole
 from rubhpc.errors import StoreError
 from rubhpc.journal import Entry, metrics_type
@@ -74,6 +74,7 @@ def test_a_new_store_opens_in_xarray_without_a_warning(store, study):
             assert array.attrs["flag_meanings"].split() == list(variable.flags)
             assert list(array.attrs["flag_values"]) == list(range(len(variable.flags)))
     assert (ds.status == MISSING).all()
+    assert ds.attrs["versions"]["rubhpc"] == __version__
     assert np.isnan(ds.vertical).all()
     for axis in study.axes:
         assert tuple(ds[axis.dimension].values) == axis.values
@@ -92,6 +93,7 @@ def test_only_what_is_kept_has_arrays(tmp_path):
     ds = xr.open_zarr(Store.create(study.output, Sweep(study)).path)
     roles = {VARIABLES[str(name)].role for name in ds.data_vars if name in VARIABLES}
     assert roles == {"section", "scalar", "setting", "flag"}
+    assert "revolution" in ds.coords  # though nothing here lies along it
 
 
 def test_a_block_is_one_chunk_of_every_array_and_comes_back(store):
