@@ -9,8 +9,9 @@ import numpy as np
 
 from rubhpc.kernels import phases as kernel
 from rubhpc.kernels.modal import advance
-from rubhpc.kernels.phases import N_ROTOR_ROW, enter, find_phase
+from rubhpc.kernels.phases import enter, find_phase
 from rubhpc.march import March
+from rubhpc.nodes import NodeReader
 from rubhpc.record import State
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 FINEST_TICK = 1.5e-9  # s, the resolution of events
 LEVELS_PAST_SAMPLE = 3  # longest step: eight samples
 FIRST_REVOLUTIONS = 8  # of the first kernel call
-LOOKS_A_REVOLUTION = 128  # at the damping power, for the energy balance
 MOST_PHASES = 256  # sets of closed contacts of one speed and friction
 
 
@@ -61,16 +61,14 @@ class ModalMarch(March):
             samples_per_revolution=setup.samples_per_revolution,
             blind_level=max(0, min(sample_level, math.floor(math.log2(setup.step / tick)))),
             contact_level=sample_level - 2,
-            energy_stride=max(1, setup.samples_per_revolution // LOOKS_A_REVOLUTION),
+            end_tick=0,
         )
         self._bodies = self._book.kernel_reduced()
-        _n, q = self._bodies.stiffness.shape[0], self._clearance.size
         self._motion = self._reduce(initial)
-        self._outputs = np.zeros(N_ROTOR_ROW + 3 * q)
-        self._before = np.zeros_like(self._outputs)
         mask = self._first_closed(initial)
-        self._progress = np.array([0, 0, mask, 0, 0])
+        self._progress = np.array([0, 0, mask, 0, 0, 0])
         self._tabulate()
+        self._reader = NodeReader(self._phases, self._bodies, self._clock)
         if find_phase(self._phases.mask, mask) < 0:
             self._add(mask)
         self._progress[[kernel.PHASE, kernel.WANTED]] = find_phase(self._phases.mask, mask), -1
@@ -117,36 +115,40 @@ class ModalMarch(March):
     def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
         per_sample = self._clock.ticks_per_sample
         first = self.sample * per_sample
+        self._clock = self._clock._replace(end_tick=samples.rotor.shape[1] * per_sample)
         while True:
-            outcome = advance(
-                self._phases,
-                self._bodies,
-                self._clock,
-                first,
-                stop * per_sample,
-                is_recorded,
-                self._setup.displacement_limit,
-                self._progress,
-                self._z,
-                self._z_next,
-                self._motion,
-                self._outputs,
-                self._before,
-                samples,
-                tally,
-            )
+            outcome = self._kernel(first, stop * per_sample, tally, is_recorded=is_recorded)
             self.n_step = int(self._progress[kernel.N_STEP])
+            first = int(self._progress[kernel.TIME])
+            if is_recorded:
+                n_node = int(self._progress[kernel.N_NODE])
+                self._progress[kernel.N_NODE] = self._reader.read(n_node, samples, tally)
             if outcome == kernel.PHASE_WANTED:
                 if len(self._book.phases) >= MOST_PHASES:
                     raise EndlessEvents
                 self._add(int(self._progress[kernel.WANTED]))
-                first = int(self._progress[kernel.TIME])
-                continue
-            if outcome == kernel.CONTACT_UNSOLVED:
+            elif outcome == kernel.CONTACT_UNSOLVED:
                 raise EndlessEvents
-            if outcome == kernel.DIVERGED or self._has_diverged():
+            elif outcome == kernel.DIVERGED or self._has_diverged():
                 return f"a displacement passed {self._setup.displacement_limit:.3g} m"
-            return None
+            elif outcome == kernel.FINISHED:
+                return None
+
+    def _kernel(self, first_tick: int, last_tick: int, tally: Tally, *, is_recorded: bool) -> int:
+        return advance(
+            self._phases,
+            self._bodies,
+            self._clock,
+            first_tick,
+            last_tick,
+            is_recorded,
+            self._progress,
+            self._z,
+            self._z_next,
+            self._motion,
+            self._reader.nodes,
+            tally,
+        )
 
     def _has_diverged(self) -> bool:
         """Whether the output node is beyond the limit at the sample reached."""
@@ -159,6 +161,7 @@ class ModalMarch(March):
         if all(phase.mask != mask for phase in self._book.phases):
             self._book.add(mask)
         self._tabulate()
+        self._reader.widen(self._phases)
 
     def _tabulate(self) -> None:
         """Tables of all phases known; modal coordinates are widened where the new ones have more modes."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from rubhpc.contact_work import workspace
 from rubhpc.kernels.contact import N_DEGREE, Pairs
-from rubhpc.kernels.phases import CONTACT_UNSOLVED, DIVERGED, N_STEP
+from rubhpc.kernels.phases import CONTACT_UNSOLVED, FINISHED, N_NODE, N_STEP, TIME
 from rubhpc.kernels.stepped import Kicks, advance_stepped
 from rubhpc.modal import ModalMarch
 
@@ -99,29 +99,33 @@ class SteppedMarch(ModalMarch):
 
     def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
         per_sample = self._clock.ticks_per_sample
-        outcome = advance_stepped(
-            self._phases,
-            self._bodies,
-            self._clock,
-            self._kicks,
-            self._pairs,
-            self._work,
-            self.sample * per_sample,
-            stop * per_sample,
-            is_recorded,
-            self._setup.displacement_limit,
-            self._progress,
-            self._z,
-            self._z_next,
-            self._motion,
-            self._outputs,
-            self._before,
-            samples,
-            tally,
-        )
-        self.n_step = int(self._progress[N_STEP])
-        if outcome == CONTACT_UNSOLVED:
-            return "the contact forces of a step have no solution"
-        if outcome == DIVERGED or self._has_diverged():
-            return f"a displacement passed {self._setup.displacement_limit:.3g} m"
-        return None
+        first = self.sample * per_sample
+        self._clock = self._clock._replace(end_tick=samples.rotor.shape[1] * per_sample)
+        while True:
+            outcome = advance_stepped(
+                self._phases,
+                self._clock,
+                self._kicks,
+                self._pairs,
+                self._work,
+                first,
+                stop * per_sample,
+                is_recorded,
+                self._progress,
+                self._z,
+                self._z_next,
+                self._reader.nodes,
+                samples,
+                tally,
+            )
+            self.n_step = int(self._progress[N_STEP])
+            first = int(self._progress[TIME])
+            if is_recorded:
+                n_node = int(self._progress[N_NODE])
+                self._progress[N_NODE] = self._reader.read(n_node, samples, tally)
+            if outcome == CONTACT_UNSOLVED:
+                return "the contact forces of a step have no solution"
+            if self._has_diverged():
+                return f"a displacement passed {self._setup.displacement_limit:.3g} m"
+            if outcome == FINISHED:
+                return None

@@ -23,26 +23,29 @@ from rubhpc.kernels.phases import (
     CONTACT_UNSOLVED,
     DIVERGED,
     FINISHED,
+    N_NODE,
     N_STEP,
+    NODES_FULL,
     PHASE,
     PHASE_WANTED,
     SAMPLED,
     TIME,
     WANTED,
     Clock,
+    Nodes,
     Phases,
     Reduced,
     dot,
     enter,
     find_phase,
     floor_log2,
+    keep_node,
     propagate,
     proved_time,
 )
-from rubhpc.kernels.sampling import observe_closed, take_sample
 
 if TYPE_CHECKING:
-    from rubhpc.kernels.observe import Samples, Tally
+    from rubhpc.kernels.observe import Tally
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,14 +63,11 @@ def advance(
     first_tick: int,
     last_tick: int,
     is_recorded: bool,
-    displacement_limit: float,
     progress: Ints,
     z: Floats,
     z_next: Floats,
     motion: Floats,
-    outputs: Floats,
-    before: Floats,
-    samples: Samples,
+    nodes: Nodes,
     tally: Tally,
 ) -> int:
     """Advance a case from `first_tick` to `last_tick`; sample 0 is tick 0.
@@ -79,28 +79,30 @@ def advance(
 
     Parameters
     ----------
-    progress : (5,)
+    is_recorded : bool
+        Whether to keep `nodes` and impacts.
+    progress : (6,)
         Tick reached, phase, set of pairs wanted next (-1: none), steps taken, whether the sample at the tick
-        reached is taken. Where a set is met that is not tabulated, PHASE_WANTED is returned with the motion
-        in `motion` (2 n,); the caller adds the phase and calls again.
+        reached is kept, nodes kept. Where a set is met that is not tabulated, PHASE_WANTED is returned with
+        the motion in `motion` (2 n,); the caller adds the phase and calls again.
     z, z_next : (2, m)
         Modal coordinates, real and imaginary, and work space.
-    outputs, before : (o,)
-        Output rows at the last two samples.
 
     Returns
     -------
     int
-        FINISHED, DIVERGED, CONTACT_UNSOLVED or PHASE_WANTED.
+        FINISHED, DIVERGED (not finite), CONTACT_UNSOLVED, PHASE_WANTED or NODES_FULL.
     """
     q, n = reduced.push.shape
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
     mask, switch_re, switch_im = phases.mask, phases.switch_re, phases.switch_im
+    rate_re, rate_im, bound = phases.rate_re, phases.rate_im, phases.bound
     power_re, power_im = phases.power_re, phases.power_im
     tick, ticks_per_sample = clock.tick, clock.ticks_per_sample
     ticks_per_revolution = ticks_per_sample * clock.samples_per_revolution
     sense = 1.0 if clock.spin >= 0.0 else -1.0
-    interval = tick * ticks_per_sample
+    node_tick, node_phase, node_z = nodes.tick, nodes.phase, nodes.z
+    node_sample, node_entry, n_room = nodes.is_sample, nodes.is_entry, nodes.tick.size - 3
     highest_level = power_re.shape[1] - 1
     force, speed = np.zeros(q), np.zeros(q)
     active, elimination = np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
@@ -126,25 +128,40 @@ def advance(
             progress[PHASE], progress[WANTED] = p, -1
             wanted = -1
             is_forced, is_halving = True, False
-        if is_recorded and t % ticks_per_sample == 0 and not is_sampled:
-            is_sampled = True
-            if not take_sample(
-                phases,
-                reduced,
-                clock,
-                p,
-                t,
-                last_tick,
-                displacement_limit,
-                z,
-                motion,
-                outputs,
-                before,
-                samples,
-                tally,
-            ):
-                progress[TIME] = t
-                return DIVERGED
+            if is_recorded and mask[p] != 0:
+                keep_node(
+                    node_tick,
+                    node_phase,
+                    node_sample,
+                    node_entry,
+                    node_z,
+                    progress,
+                    t,
+                    p,
+                    False,
+                    True,
+                    z,
+                )
+        if is_recorded:
+            if progress[N_NODE] > n_room:
+                progress[TIME], progress[SAMPLED] = t, 1 if is_sampled else 0
+                return NODES_FULL
+            is_due = t % ticks_per_sample == 0 and (t < last_tick or t == clock.end_tick)
+            if is_due and not is_sampled:
+                is_sampled = True
+                keep_node(
+                    node_tick,
+                    node_phase,
+                    node_sample,
+                    node_entry,
+                    node_z,
+                    progress,
+                    t,
+                    p,
+                    True,
+                    False,
+                    z,
+                )
         if t >= last_tick:
             progress[TIME] = t
             return FINISHED
@@ -160,7 +177,7 @@ def advance(
         elif is_halving:
             level = min(level, ceiling)
         else:
-            proved = proved_time(phases, p, z)
+            proved = proved_time(switch_re, switch_im, rate_re, rate_im, bound, p, z_re, z_im)
             while level > clock.blind_level and (1 << level) * tick > proved:
                 level -= 1
             is_proved = (1 << level) * tick <= proved
@@ -176,24 +193,24 @@ def advance(
             is_halving, ceiling = True, level - 1
             continue
         if not is_crossed:
-            if is_recorded and mask[p] != 0:
-                observe_closed(
-                    phases,
-                    reduced,
-                    p,
-                    clock.spin,
-                    (1 << level) * tick,
-                    z,
-                    z_next,
-                    t // ticks_per_sample,
-                    interval,
-                    samples,
-                    tally,
-                )
             for k in range(z_re.size):
                 z_re[k], z_im[k] = next_re[k], next_im[k]
             t += 1 << level
             is_sampled = False
+            if is_recorded and mask[p] != 0 and t % ticks_per_sample != 0:
+                keep_node(
+                    node_tick,
+                    node_phase,
+                    node_sample,
+                    node_entry,
+                    node_z,
+                    progress,
+                    t,
+                    p,
+                    False,
+                    False,
+                    z,
+                )
             if is_halving:
                 ceiling -= 1
                 is_halving = ceiling >= 0

@@ -133,29 +133,3 @@ def observe_contact(
 def centred(row: int, velocity: Floats, velocity_next: Floats) -> float:
     """Velocity of a degree at the time of the step's forces; zero where it is held."""
     return 0.5 * (velocity[row] + velocity_next[row]) if row >= 0 else 0.0
-
-
-@jit
-def widen(
-    before: float,
-    slope_before: float,
-    after: float,
-    slope_after: float,
-    step: float,
-    highest: float,
-    lowest: float,
-) -> tuple[float, float]:
-    """Extrema of a motion known with its rate at both ends of a step (Hermite's cubic), with those so far."""
-    highest, lowest = max(highest, after), min(lowest, after)
-    if slope_before * slope_after < 0.0:
-        a, b = slope_before * step, slope_after * step
-        rise = after - before
-        quadratic, cubic = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
-        root = np.sqrt(max(quadratic * quadratic - 3.0 * cubic * a, 0.0))
-        # The form of the quadratic's solution that does not cancel; one of the two lies inside the step.
-        q = -(quadratic + np.copysign(root, quadratic))
-        for s in (q / (3.0 * cubic) if cubic != 0.0 else -1.0, a / q if q != 0.0 else -1.0):
-            if 0.0 < s < 1.0:
-                value = before + s * (a + s * (quadratic + s * cubic))
-                highest, lowest = max(highest, value), min(lowest, value)
-    return highest, lowest

@@ -19,10 +19,10 @@ TWIST_ACCELERATION_ROW = 6
 LATERAL_ROW, LATERAL_RATE = 1, 2
 
 
-FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED = range(4)  # outcomes
+FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED, NODES_FULL = range(5)  # outcomes
 
-# What a call leaves in `progress` (5,) for the next one.
-TIME, PHASE, WANTED, N_STEP, SAMPLED = range(5)
+# What a call leaves in `progress` (6,) for the next one.
+TIME, PHASE, WANTED, N_STEP, SAMPLED, N_NODE = range(6)
 
 
 class Phases(NamedTuple):
@@ -53,6 +53,16 @@ class Phases(NamedTuple):
     enter_constant: Floats  # (p, 2, m)
 
 
+class Nodes(NamedTuple):
+    """Instants kept for what is measured later: every sample, and both ends of every step in contact."""
+
+    tick: Ints  # (n_node,)
+    phase: Ints  # (n_node,)
+    is_sample: NDArray[np.bool_]  # (n_node,)
+    is_entry: NDArray[np.bool_]  # (n_node,), the phase begins here: no step leads to it
+    z: Floats  # (n_node, 2, m), modal coordinates
+
+
 class Reduced(NamedTuple):
     """The linear bodies in a basis in which the mass matrix is the identity."""
 
@@ -77,7 +87,7 @@ class Clock(NamedTuple):
     samples_per_revolution: int
     blind_level: int  # steps up to 2^level ticks need no bound; they are checked at their end
     contact_level: int  # longest step with a pair closed while recording
-    energy_stride: int  # samples between two looks at the damping power
+    end_tick: int  # the record's end
 
 
 @jit_inline_sum
@@ -138,6 +148,29 @@ def find_phase(mask: Ints, wanted: int) -> int:
 
 
 @jit_inline_sum
+def keep_node(
+    tick: Ints,
+    phase: Ints,
+    is_sample: NDArray[np.bool_],
+    is_entry: NDArray[np.bool_],
+    kept: Floats,
+    progress: Ints,
+    t: int,
+    p: int,
+    sampled: bool,
+    entered: bool,
+    z: Floats,
+) -> None:
+    """Append an instant to the nodes, whose fields come one by one for speed."""
+    k = progress[N_NODE]
+    tick[k], phase[k], is_sample[k], is_entry[k] = t, p, sampled, entered
+    for part in range(2):
+        for i in range(z.shape[1]):
+            kept[k, part, i] = z[part, i]
+    progress[N_NODE] = k + 1
+
+
+@jit_inline_sum
 def floor_log2(count: int) -> int:
     """Largest level with 2^level <= count; count at least 1."""
     level = 0
@@ -146,17 +179,26 @@ def floor_log2(count: int) -> int:
     return level
 
 
-@jit_sum
-def proved_time(phases: Phases, p: int, z: Floats) -> float:
-    """Time, s, in which no switch function of phase p can reach zero."""
+@jit_inline_sum
+def proved_time(
+    switch_re: Floats,
+    switch_im: Floats,
+    rate_re: Floats,
+    rate_im: Floats,
+    bound: Floats,
+    p: int,
+    z_re: Floats,
+    z_im: Floats,
+) -> float:
+    """Time, s, in which no switch function of phase p can reach zero; tables come one by one for speed."""
     proved = np.inf
-    for i in range(phases.switch_re.shape[1]):
-        s = dot(phases.switch_re[p, i], phases.switch_im[p, i], z[0], z[1])
-        rate = dot(phases.rate_re[p, i], phases.rate_im[p, i], z[0], z[1])
-        b = bounded(phases.bound[p, i], z[0], z[1])
+    for i in range(switch_re.shape[1]):
+        s = dot(switch_re[p, i], switch_im[p, i], z_re, z_im)
+        rate = dot(rate_re[p, i], rate_im[p, i], z_re, z_im)
+        b = bounded(bound[p, i], z_re, z_im)
         if not s > 0.0:
-            return 0.0
-        if b > 0.0:
+            proved = 0.0
+        elif b > 0.0:
             proved = min(proved, (rate + np.sqrt(rate * rate + 2.0 * b * s)) / b)
         elif rate < 0.0:
             proved = min(proved, -s / rate)

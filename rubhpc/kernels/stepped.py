@@ -19,19 +19,20 @@ from rubhpc.kernels.contact import N_DEGREE, Pairs, Workspace, is_any_closed, so
 from rubhpc.kernels.observe import TWIST_ACCELERATION, Samples, Tally, observe_contact
 from rubhpc.kernels.phases import (
     CONTACT_UNSOLVED,
-    DIVERGED,
     FINISHED,
+    N_NODE,
     N_STEP,
+    NODES_FULL,
     TIME,
     Clock,
+    Nodes,
     Phases,
-    Reduced,
     dot,
     floor_log2,
+    keep_node,
     propagate,
     proved_time,
 )
-from rubhpc.kernels.sampling import take_sample
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -51,7 +52,6 @@ class Kicks(NamedTuple):
 @jit_sum
 def advance_stepped(
     phases: Phases,
-    reduced: Reduced,
     clock: Clock,
     kicks: Kicks,
     pairs: Pairs,
@@ -59,13 +59,10 @@ def advance_stepped(
     first_tick: int,
     last_tick: int,
     is_recorded: bool,
-    displacement_limit: float,
     progress: Ints,
     z: Floats,
     z_next: Floats,
-    motion: Floats,
-    outputs: Floats,
-    before: Floats,
+    nodes: Nodes,
     samples: Samples,
     tally: Tally,
 ) -> int:
@@ -75,46 +72,54 @@ def advance_stepped(
     """
     q = pairs.radius.size
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
+    switch_re, switch_im = phases.switch_re, phases.switch_im
+    rate_re, rate_im, bound = phases.rate_re, phases.rate_im, phases.bound
+    power_re, power_im = phases.power_re, phases.power_im
+    degree_re, degree_im = kicks.degree_re, kicks.degree_im
     n_degree = q * N_DEGREE
+    node_tick, node_phase, node_z = nodes.tick, nodes.phase, nodes.z
+    node_sample, node_entry = nodes.is_sample, nodes.is_entry
     position, rate = np.zeros(n_degree), np.zeros(n_degree)
     step = clock.tick * (1 << kicks.level)
     highest_level = phases.power_re.shape[1] - 1
     t = first_tick
     was_touching = bool(np.any(work.force > 0.0))
     while True:
-        is_sample = is_recorded and t % clock.ticks_per_sample == 0
+        is_sample = is_recorded and t % clock.ticks_per_sample == 0 and (t < last_tick or t == clock.end_tick)
+        if is_sample:
+            if progress[N_NODE] >= node_tick.size:
+                progress[TIME] = t
+                return NODES_FULL
+            keep_node(
+                node_tick,
+                node_phase,
+                node_sample,
+                node_entry,
+                node_z,
+                progress,
+                t,
+                0,
+                True,
+                False,
+                z,
+            )
         if t >= last_tick:
             progress[TIME] = t
-            is_fine = not is_sample or take_sample(
-                phases,
-                reduced,
-                clock,
-                0,
-                t,
-                last_tick,
-                displacement_limit,
-                z,
-                motion,
-                outputs,
-                before,
-                samples,
-                tally,
-            )
-            return FINISHED if is_fine else DIVERGED
+            return FINISHED
         limit = last_tick
         if is_recorded:
             limit = min(limit, (t // clock.ticks_per_sample + 1) * clock.ticks_per_sample)
         level = min(highest_level, floor_log2(limit - t))
-        proved = proved_time(phases, 0, z)
+        proved = proved_time(switch_re, switch_im, rate_re, rate_im, bound, 0, z_re, z_im)
         while level > kicks.level and (1 << level) * clock.tick > proved:
             level -= 1
         progress[N_STEP] += 1
-        propagate(phases.power_re[0, level], phases.power_im[0, level], z_re, z_im, next_re, next_im)
+        propagate(power_re[0, level], power_im[0, level], z_re, z_im, next_re, next_im)
         is_touching = False
         twist_acceleration = 0.0
         if level <= kicks.level:
             for a in range(n_degree):
-                position[a] = dot(kicks.degree_re[a], kicks.degree_im[a], next_re, next_im)
+                position[a] = dot(degree_re[a], degree_im[a], next_re, next_im)
             is_touching = is_any_closed(
                 pairs.row,
                 pairs.axis_y,
@@ -143,30 +148,13 @@ def advance_stepped(
         elif was_touching:
             work.force[:] = 0.0
         if is_sample:
-            if not take_sample(
-                phases,
-                reduced,
-                clock,
-                0,
-                t,
-                last_tick,
-                displacement_limit,
-                z,
-                motion,
-                outputs,
-                before,
-                samples,
-                tally,
-            ):
-                progress[TIME] = t
-                return DIVERGED
             samples.rotor[TWIST_ACCELERATION, t // clock.ticks_per_sample] += twist_acceleration
         if is_recorded and (is_touching or was_touching):
             # The force works on the mean velocity of the step; a kick's own burst dies out within it.
             for a in range(n_degree):
                 rate[a] = (
-                    dot(kicks.degree_re[a], kicks.degree_im[a], next_re, next_im)
-                    - dot(kicks.degree_re[a], kicks.degree_im[a], z_re, z_im)
+                    dot(degree_re[a], degree_im[a], next_re, next_im)
+                    - dot(degree_re[a], degree_im[a], z_re, z_im)
                 ) / step
             observe_contact(pairs, work, clock.spin, step, rate, rate, tally)
             for i in range(q):
