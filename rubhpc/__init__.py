@@ -10,6 +10,8 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from rubhpc.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from postproc.load import open_store as open  # noqa: A004 - the public name
     from rubhpc.driver import run
@@ -20,7 +22,6 @@ if TYPE_CHECKING:
     from rubhpc.study import Study, read_study
     from rubhpc.summary import Summary
 
-__version__ = "0.1.0"
 __all__ = [
     "InputError",
     "Record",

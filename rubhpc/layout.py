@@ -14,10 +14,10 @@ import zarr
 from numcodecs.blosc import Blosc
 from zarr.codecs import BloscCodec
 
-from rubhpc import __version__
 from rubhpc.journal import METRICS
 from rubhpc.manifest import PRIVATE, Manifest
 from rubhpc.schema import VARIABLES
+from rubhpc.version import __version__
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
 import pytest
+
+import rubhpc
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("rubhpc", "postproc")
@@ -52,3 +55,8 @@ def test_wheel_holds_more_than_top_level_modules(name: str, shipped: set[str]) -
 def test_wheel_holds_licence_and_command(shipped: set[str]) -> None:
     ends = {name.split(".dist-info/")[1] for name in shipped if ".dist-info/" in name}
     assert {"licenses/LICENSE", "entry_points.txt"} <= ends
+
+
+def test_the_program_and_its_wheel_have_one_version() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["version"] == rubhpc.__version__
