@@ -125,6 +125,12 @@ def test_links_lead_somewhere(path: Path) -> None:
             assert anchor in {re.sub(r"[^\w -]", "", h).lower().replace(" ", "-") for h in headings}, target
 
 
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_that_are_named_exist(path: Path) -> None:
+    for name in re.findall(r"`((?:rubhpc|postproc|jobs|docs|tests)/[\w./-]*)`", path.read_text()):
+        assert (ROOT / name).exists(), name
+
+
 def test_simulation_of_the_readme_runs() -> None:
     shown = run_as_shown(code(README, "python")[0])
     assert shown["record"].period == 2
