@@ -14,6 +14,7 @@ from rubhpc.gather import (
     named_signals,
     scalars_of,
 )
+from rubhpc.kernels.observe import IMPACT_STEPS
 from rubhpc.measures import amplitude_spectrum
 from rubhpc.modal import EndlessEvents, ModalMarch
 from rubhpc.prepare import CentralDifferenceSetup, ModalSetup
@@ -78,6 +79,7 @@ def _integrate(march: March, setup: Setup, clearance: float, recording: Recordin
     if reason is None:
         energy_before = march.energy()
         tally.is_touching[:] = march.touching()  # a contact under way did not begin in the record
+        tally.age[tally.is_touching] = IMPACT_STEPS
         reason = march.advance(0, n_sample, samples, tally, is_recorded=True)
     if reason is not None:
         revolution = math.floor(recording.transient + march.sample / per_revolution) + 1

@@ -48,6 +48,7 @@ def empty_tally(n_stator: int) -> Tally:
         highest=np.full(3, -np.inf),
         lowest=np.full(3, np.inf),
         is_touching=np.zeros(n_stator, dtype=np.bool_),
+        age=np.zeros(n_stator, dtype=np.int64),
         n_contact=np.zeros(n_stator, dtype=np.int64),
         contact_time=np.zeros(n_stator),
         impulse=np.zeros(n_stator),
@@ -132,7 +133,7 @@ def diverged_record(
     groups: dict[str, dict[str, Any]] = {"waveform": {}, "spectrum": {}, "section": {}, "scalar": {}}
     for name, variable in VARIABLES.items():
         if variable.role == "scalar" and not variable.dims:
-            groups["scalar"][name] = 0 if variable.dtype.startswith("int") else np.nan
+            groups["scalar"][name] = -1 if variable.dtype.startswith("int") else np.nan
         elif variable.role == "scalar" or variable.role in recording.keep:
             groups[variable.role][name] = np.full([length[dim] for dim in variable.dims], np.nan)
     groups["scalar"]["regime"] = -1

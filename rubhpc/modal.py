@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.kernels import phases as kernel
+from rubhpc.kernels.contact import AXIAL, LATERAL, V, W
 from rubhpc.kernels.modal import advance
 from rubhpc.kernels.phases import enter, find_phase
 from rubhpc.march import March
@@ -151,11 +152,15 @@ class ModalMarch(March):
         )
 
     def _has_diverged(self) -> bool:
-        """Whether the output node is beyond the limit at the sample reached."""
-        n = self._bodies.stiffness.shape[0]
-        motion = self._current_motion()
-        reached = np.abs(self._setup.reduced.output[:2] @ motion[:n])
-        return not bool(np.all(reached <= self._setup.displacement_limit))
+        """Whether the output node or a contact degree is, or at a sample was, beyond the limit."""
+        n, limit = self._bodies.stiffness.shape[0], self._setup.displacement_limit
+        displacement = self._current_motion()[:n]
+        reduced = self._setup.reduced
+        reached = max(
+            np.abs(reduced.output[:2] @ displacement).max(),
+            np.abs(reduced.degree[:, [V, W, AXIAL, LATERAL]] @ displacement).max(),
+        )
+        return not (reached <= limit and self._reader.greatest <= limit)
 
     def _add(self, mask: int) -> None:
         if all(phase.mask != mask for phase in self._book.phases):

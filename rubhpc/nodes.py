@@ -34,6 +34,7 @@ class NodeReader:
         """Take the tables of one case; the first read begins its record."""
         self.phases, self._bodies, self._clock = phases, bodies, clock
         self.nodes = _room(phases.switch_re.shape[2])
+        self.greatest = 0.0  # m, displacement of output node or stator tips at a sample
         self._last_outputs: Floats | None = None
 
     def widen(self, phases: kernel.Phases) -> None:
@@ -80,6 +81,8 @@ class NodeReader:
         samples.axial[:, where] = kept[:, kernel.N_ROTOR_ROW :: 3].T
         samples.lateral[:, where] = kept[:, kernel.N_ROTOR_ROW + kernel.LATERAL_ROW :: 3].T
 
+        tips = output[:, kernel.N_ROTOR_ROW :].reshape(output.shape[0], -1, 3)[:, :, :2]
+        self.greatest = max(self.greatest, float(np.abs(output[:, :2]).max()), float(np.abs(tips).max()))
         if self._last_outputs is not None:
             output = np.vstack([self._last_outputs, output])
         self._last_outputs = output[-1]
@@ -191,6 +194,7 @@ def _cubic_extrema(
     # Rates of opposite sign: the slope a + 2 quadratic s + 3 cubic s^2 has one root inside. This form of it
     # does not cancel; `a` is not zero here.
     root = np.sqrt(quadratic**2 - 3.0 * cubic * a)
-    s = a / (np.sign(a) * root - quadratic)
+    below = np.sign(a) * root - quadratic
+    s = np.divide(a, below, out=np.zeros_like(a), where=below != 0.0)  # zero only by underflow
     value = start + s * (a + s * (quadratic + s * cubic))
     return float(value.min()), float(value.max())

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 T = TypeVar("T")
+
+_NAP = 2e-3  # s between looks at whether the others have come
 
 
 class Tally(NamedTuple):
@@ -139,6 +142,7 @@ class Ranks:
                 told = (make(), None)
             except RubError as error:
                 told = (None, error)
+        self._meet()
         value, trouble = self._comm.bcast(told)
         if trouble is not None:
             raise trouble
@@ -159,6 +163,7 @@ class Ranks:
 
     def gather(self, value: T) -> list[T]:
         """See Pool."""
+        self._meet()
         values: list[T] = self._comm.allgather(value)
         return values
 
@@ -186,6 +191,12 @@ class Ranks:
         sys.stderr.flush()
         self._comm.Abort(code)
         os._exit(code)
+
+    def _meet(self) -> None:
+        """Wait for all ranks, asleep: MPI's own waiting takes the core from ranks that still compute."""
+        request = self._comm.Ibarrier()
+        while not request.Test():
+            time.sleep(_NAP)
 
     def _accumulate(self, tally: Tally) -> Tally:
         """Add to the sums and return what they were, in one atomic message."""

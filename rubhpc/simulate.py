@@ -10,13 +10,14 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.prepare import prepare
 from rubhpc.reading import parse_quantity
-from rubhpc.rig import Rig, read_rig, with_key
+from rubhpc.record import State
+from rubhpc.rig import Rig, read_rig, with_keys
 from rubhpc.study import Contact, Integrator, Recording
 
 if TYPE_CHECKING:
     from os import PathLike
 
-    from rubhpc.record import Record, State
+    from rubhpc.record import Record
 
 
 def simulate(
@@ -35,7 +36,7 @@ def simulate(
     transient: int = 120,
     revolutions: int = 64,
     samples_per_revolution: int = 256,
-    keep: tuple[str, ...] = ("waveform", "spectrum", "section"),
+    keep: str | tuple[str, ...] = ("waveform", "spectrum", "section"),
     initial: State | None = None,
 ) -> Record:
     """Simulate one case.
@@ -85,19 +86,24 @@ def simulate(
     """
     if not isinstance(rig, Rig):
         rig = read_rig(rig)
-    for key, value in (overrides or {}).items():
-        rig = with_key(rig, key, value)
+    rig = with_keys(rig, overrides or {})
+    if isinstance(keep, str):
+        keep = (keep,)
+    if initial is not None and not isinstance(initial, State):
+        raise InputError(f"simulate: initial: {initial!r} is no State; give a record's `final`")
     if (speed is None) == (speed_ratio is None):
         raise InputError("simulate: give speed or speed_ratio, one of the two")
     if (clearance is None) == (clearance_ratio is None):
         raise InputError("simulate: give clearance or clearance_ratio, one of the two")
     model = assemble(rig)
     if speed_ratio is not None:
-        spin = speed_ratio * first_lateral_frequency(model)
+        ratio = parse_quantity(speed_ratio, "", "simulate: speed_ratio")
+        spin = ratio * first_lateral_frequency(model)
     else:
         spin = parse_quantity(speed, "rad/s", "simulate: speed")
     if clearance_ratio is not None:
-        gap = clearance_ratio * contact_free_amplitude(model, spin)
+        ratio = parse_quantity(clearance_ratio, "", "simulate: clearance_ratio")
+        gap = ratio * contact_free_amplitude(model, spin)
     else:
         gap = parse_quantity(clearance, "m", "simulate: clearance")
     for stator in model.stators:

@@ -19,6 +19,7 @@ from rubhpc.kernels.observe import (
     TWIST_ACCELERATION,
     UNBALANCE_WORK,
     VERTICAL,
+    observe_contact,
 )
 from rubhpc.rig import Bearing
 
@@ -116,7 +117,17 @@ def test_extrema_are_those_of_all_steps(watched):
     assert np.array_equal(tally.lowest, motion.min(axis=0))
     lateral = watched.degree(watched.displacement, LATERAL)
     assert np.array_equal(tally.peak_lateral, abs(lateral).max(axis=0))
-    assert np.array_equal(tally.peak_force, watched.force.max(axis=0))
+
+
+def test_a_peak_force_is_none_of_an_impact():
+    """The first two steps of a contact hold the impulse of its impact: in their force, none of the peak."""
+    case = KernelCase.of(RIG, 900.0, 3000, clearance=CLEARANCE, friction=FRICTION, n_sample=1)
+    still = np.zeros(case.state.shape[1])
+    for force, peak in ((500.0, 0.0), (400.0, 0.0), (30.0, 30.0), (20.0, 30.0), (0.0, 30.0), (90.0, 30.0)):
+        case.work.force[1] = force
+        observe_contact(case.pairs, case.work, 900.0, 1e-6, still, still, case.tally)
+        assert case.tally.peak_force.tolist() == [0.0, peak, 0.0]
+    assert case.tally.impulse[1] == pytest.approx(1040e-6)
 
 
 def test_contacts_are_counted_where_they_begin(watched):
