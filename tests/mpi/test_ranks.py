@@ -19,14 +19,23 @@ if TYPE_CHECKING:
     import subprocess
 
 TRANSIENT = 8  # revolutions: a case takes some 0.1 s, long enough to be stopped among others
+BY_MODES = {"integrator": 'method = "modal"', "transient": 100, "revolutions": 64, "block": 1}
 POISONED = Path(__file__).parents[1] / "faults" / "poisoned.py"
 
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     """What one process without MPI stores."""
-    folder = tmp_path_factory.mktemp("alone")
-    done = run(write_study(folder, transient=TRANSIENT))
+    return stored_alone(tmp_path_factory.mktemp("alone"), transient=TRANSIENT)
+
+
+@pytest.fixture(scope="module")
+def alone_by_modes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    return stored_alone(tmp_path_factory.mktemp("alone"), **BY_MODES)
+
+
+def stored_alone(folder: Path, **changes: object) -> dict[str, bytes]:
+    done = run(write_study(folder, **changes))
     assert done.returncode == 0, done.stderr
     return stored_bytes(folder / "tiny.zarr")
 
@@ -37,6 +46,13 @@ def test_any_number_of_ranks_stores_equal_bytes(tmp_path, alone, ranks):
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.count("12 done; 12 computed") == 1  # one rank speaks
     assert stored_bytes(tmp_path / "tiny.zarr") == alone
+
+
+def test_the_modal_integrator_does_not_see_how_many_ranks_share_the_machine(tmp_path, alone_by_modes):
+    """Four ranks on two cores: every kernel call takes longer than alone, and none may end elsewhere."""
+    done = run(write_study(tmp_path, **BY_MODES), ranks=4)
+    assert done.returncode == 0, done.stderr
+    assert stored_bytes(tmp_path / "tiny.zarr") == alone_by_modes
 
 
 def test_a_resumed_run_of_other_size_stores_equal_bytes(tmp_path, alone):

@@ -206,6 +206,7 @@ def test_the_python_face(tmp_path: Path):
         speed=float(case.spin_speed),
         clearance=float(case.clearance),
         friction=0.5,
+        method="central-difference",
         step="2 us",
         transient=1,
         revolutions=2,
