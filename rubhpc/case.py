@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rubhpc.central import CentralDifferenceMarch
@@ -65,6 +66,22 @@ def run_case(
     record.scalars["steps"] = march.n_step
     record.scalars["wall_time"] = time.perf_counter() - began
     return record
+
+
+def compile_kernels(
+    setup: Setup,
+    *,
+    clearance: float,
+    friction: float,
+    recording: Recording,
+    check: Callable[[], None] | None = None,
+) -> None:
+    """Compile all that cases of this set-up may call, on two revolutions; endless events have their own way."""
+    short = replace(recording, transient=1, revolutions=1)
+    run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)
+    if isinstance(setup, ModalSetup):
+        march = SteppedMarch(setup, clearance, friction, State.at_rest(setup.model), check)
+        _integrate(march, setup, clearance, short)
 
 
 def _integrate(march: March, setup: Setup, clearance: float, recording: Recording) -> Record:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.case import run_case
+from rubhpc.case import compile_kernels
 from rubhpc.crash import crash
 from rubhpc.disk import disk_errors
 from rubhpc.errors import RubError, StoppedEarly
@@ -192,8 +192,13 @@ def _warm_up(sweep: Sweep, block: Block, stopping: Stopping) -> None:
             integrator=study.integrator,
             samples_per_revolution=study.recording.samples_per_revolution,
         )
-        short = replace(study.recording, transient=1, revolutions=1)
-        run_case(setup, clearance=case.clearance, friction=case.friction, recording=short, check=check)
+        compile_kernels(
+            setup,
+            clearance=case.clearance,
+            friction=case.friction,
+            recording=study.recording,
+            check=check,
+        )
 
 
 def _compute(job: _Job, pool: Pool, stopping: Stopping, *, quiet: bool) -> RubError | None:
