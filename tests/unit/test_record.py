@@ -91,4 +91,4 @@ def test_diverged_record_is_not_a_number_of_the_usual_shape(record, keep):
             if variable.dtype.startswith("float"):
                 assert np.isnan(array).all()
     assert dataset["regime"] == -1
-    assert dataset["period"] == 0
+    assert dataset["period"] == -1
