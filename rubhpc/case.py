@@ -76,7 +76,7 @@ def compile_kernels(
     recording: Recording,
     check: Callable[[], None] | None = None,
 ) -> None:
-    """Compile all that cases of this set-up may call, on two revolutions; endless events have their own way."""
+    """Compile all that cases of this set-up may call, on two revolutions, those of endless events too."""
     short = replace(recording, transient=1, revolutions=1)
     run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)
     if isinstance(setup, ModalSetup):
