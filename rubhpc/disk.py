@@ -47,7 +47,8 @@ def write_whole(path: Path, data: bytes, *, is_synced: bool = True) -> None:
 
     Where `is_synced`, the data outlive a power cut too.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.parent.is_dir():
+        path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{uuid.uuid4().hex}.partial")
     try:
         with partial.open("wb") as file:
