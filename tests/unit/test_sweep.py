@@ -187,7 +187,14 @@ def test_absolute_axes_are_their_own_settings():
 def test_cost_is_revolutions_over_speed_over_step():
     recording = Recording(transient=10, revolutions=6)
     grid = {"speed": [50.0, -200.0, 100.0], "clearance": 1e-4, "friction": [0.1, 0.2]}
-    sweep = Sweep(study(grid, recording=recording, integrator=Integrator(step=0.5e-6), run=Run(block=2)))
+    sweep = Sweep(
+        study(
+            grid,
+            recording=recording,
+            integrator=Integrator(method="central-difference", step=0.5e-6),
+            run=Run(block=2),
+        )
+    )
     assert [(b.start[0], b.cost) for b in sweep.blocks()] == [
         (i, round(2 * 16 * 2 * math.pi / speed / 0.5e-6)) for i, speed in ((0, 50), (2, 100), (1, 200))
     ]
