@@ -10,6 +10,7 @@ from scipy.linalg import block_diag, eigh
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from rubhpc.errors import InputError
 from rubhpc.kernels.contact import AXIAL, N_DEGREE, V, W
 from rubhpc.packing import degrees_of, output_degrees
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 # by its static shape, whose error goes with the fourth power of the frequency ratio.
 CUTOFF_RATIO = 10.0
 FEWEST_MODES = 2  # kept of every part, whatever their frequency
+FREE = 1e-12  # square of a frequency over the greatest, below which a mode is free motion
 UNSEEN = 1e-9  # relative motion or coupling below which a mode is taken for unseen
 
 
@@ -70,6 +72,12 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     spin : float, rad/s
     accuracy : float
         Relative; 1e-3 keeps waveforms to about 1e-4 on the packaged rig.
+
+    Raises
+    ------
+    InputError
+        Where nothing holds a body: its constant response, on which the modal form of closed contacts rests,
+        does not exist.
     """
     bodies = [model.rotor, *(stator.body for stator in model.stators)]
     mass = block_diag(*(body.mass for body in bodies))
@@ -134,6 +142,11 @@ def _basis(mass: Floats, stiffness: Floats, looked_at: Ints, cutoff: float) -> F
     """Modes of a part below the cutoff, rad/s, and static shapes, orthonormal in the mass."""
     n = mass.shape[0]
     square, mode = eigh(stiffness, mass)
+    if square[0] <= FREE * square[-1]:
+        raise InputError(
+            "[integrator] method: modal needs bodies that are held, and here one is free to move or to turn; "
+            'take method = "central-difference"'
+        )
     frequency = np.sqrt(np.maximum(square, 0.0))
     n_keep = max(int(np.count_nonzero(frequency <= cutoff)), min(FEWEST_MODES, n))
     kept: Floats = mode[:, :n_keep]

@@ -1,15 +1,20 @@
 """The reduced bodies against what the full ones answer, by solving the full equations."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, eigvals
 from trial_rig import trial_rig
 
 from rubhpc import read_rig
+from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.kernels.contact import AXIAL, LATERAL, TORSION, V, W
 from rubhpc.packing import degrees_of, output_degrees
 from rubhpc.reduction import directions, reduce_model
+from rubhpc.rig import Damping, Torsion
 
 SPIN = 210.0
 FULL = 1e-30  # accuracy at which no mode that anything sees is left out
@@ -105,7 +110,7 @@ def test_more_accuracy_takes_more_coordinates_and_errs_less():
     assert size[0] < size[1] < size[-1]
     assert error[-1] < 1e-9
     assert error[1] < 0.1 * error[0]
-    assert all(later <= earlier for earlier, later in zip(error, error[1:], strict=False))
+    assert all(later <= earlier for earlier, later in pairwise(error))
 
 
 def test_spin_enters_by_the_gyroscopic_moments_and_the_unbalance():
@@ -157,3 +162,20 @@ def test_stator_without_lateral_freedom_has_no_lateral_row():
     reduced = reduce_model(model, SPIN, 1e-3)
     assert not reduced.degree[:, LATERAL].any()
     assert reduced.degree[:, AXIAL].any(axis=1).all()
+
+
+@pytest.mark.parametrize("alpha", [0.0, 25.0])
+@pytest.mark.parametrize("accuracy", [1e-3, FULL])
+def test_body_that_nothing_holds_is_refused_with_the_mend(alpha, accuracy):
+    rig = trial_rig(1)
+    rotor = replace(rig.rotor, torsion=Torsion(free=True), damping=Damping(alpha=alpha))
+    with pytest.raises(InputError, match=r'free to move or to turn; take method = "central-difference"'):
+        reduce_model(assemble(replace(rig, rotor=rotor)), SPIN, accuracy)
+
+
+def test_drive_as_soft_as_a_clock_spring_is_not_taken_for_free():
+    """0.01 N m/rad turns the rotor at 0.2 Hz."""
+    rig = trial_rig(1)
+    rotor = replace(rig.rotor, torsion=Torsion(node=1, stiffness=0.01))
+    reduced = reduce_model(assemble(replace(rig, rotor=rotor)), SPIN, 1e-3)
+    assert np.sqrt(np.linalg.eigvalsh(reduced.stiffness)[0]) / (2 * np.pi) == pytest.approx(0.2, rel=0.3)
