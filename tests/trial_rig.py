@@ -1,4 +1,4 @@
-"""A small rig for tests of the modal scheme: five nodes, bearings unlike in y and z, any number of stators."""
+"""A small rig for tests of the modal scheme: bearings unlike in y and z, any number of stators."""
 
 import math
 
