@@ -125,9 +125,8 @@ class Journal:
             os.fsync(self._handle)
 
     def close(self) -> None:
-        """Close the file, its entries on the disk."""
+        """Close the file."""
         if self._handle is not None:
-            self.sync()
             os.close(self._handle)
             self._handle = None
 

@@ -87,4 +87,8 @@ class Stopping:
         self.reason = self.reason or reason
 
     def _note(self, number: int, frame: FrameType | None) -> None:
+        if (
+            number == signal.SIGINT and self.reason == "SIGINT"
+        ):  # asked twice: do not even finish what is in hand
+            raise KeyboardInterrupt
         self.ask(signal.Signals(number).name)

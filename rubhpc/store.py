@@ -103,6 +103,7 @@ class Store:
             ledger.status[flat] = MISSING
             with disk_errors(self.journal_directory), self.journal(run, writer) as journal:
                 journal.write(Entry(i, "-", MISSING) for i in flat)
+                journal.sync()
 
     def grow(self, sweep: Sweep) -> None:
         """Lengthen the axes to those of `sweep`, which begin as they do; killed, it can be done again."""

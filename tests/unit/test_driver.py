@@ -389,3 +389,15 @@ def test_results_are_packed_now_and_then_for_those_who_look_on(physics, study, m
     physics.on_case = lambda: seen.append(int((xr.open_zarr(study.output).status == DONE).sum()))
     run(study, quiet=True)
     assert seen == [0, 0, 0, 3, 3, 3, 6, 6, 6, 9, 9, 9]
+
+
+def test_a_second_interrupt_does_not_wait(physics, study):
+    def twice() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    after(2, twice, physics)
+    with pytest.raises(KeyboardInterrupt):
+        run(study, quiet=True)
+    with Store(study.output).lock():  # released all the same
+        pass

@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import io
+from types import SimpleNamespace
+
+import pytest
+
+from rubhpc import progress
+from rubhpc.pool import Tally
+from rubhpc.progress import Progress, duration
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.2, "0 s"),
+        (59, "59 s"),
+        (185, "3:05 min"),
+        (3599.6, "1:00 h"),
+        (7260, "2:01 h"),
+        (3 * 86400, "3.0 d"),
+    ],
+)
+def test_durations_are_for_people(seconds, text):
+    assert duration(seconds) == text
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    now = SimpleNamespace(time=100.0)
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: now.time))
+    return now
+
+
+def test_lines_come_now_and_then_with_the_time_left_by_predicted_steps(clock, capsys):
+    """Half the cases are done, but three quarters of the steps: a third of the time so far is left."""
+    with Progress(20, 1000, n_done=10, quiet=False, has_bar=True) as shown:
+        clock.time += 5
+        shown.update(Tally(done=1, cost=10))
+        clock.time += 25
+        shown.update(Tally(done=3, failed=1, diverged=1, cost=750))
+        clock.time += 1
+        shown.update(Tally(done=4, failed=1, diverged=1, cost=800))
+    assert capsys.readouterr().out.splitlines() == [
+        "10/20 cases are there; computing the rest",
+        "15/20 cases; 0.167 a second, 10 s left, 1 failed, 1 diverged",
+    ]
+
+
+def test_lines_grow_rarer(clock, capsys):
+    with Progress(10**6, 10**6, n_done=0, quiet=False, has_bar=False) as shown:
+        for _ in range(3600):
+            clock.time += 1
+            shown.update(Tally(done=1, cost=1))
+    assert 10 < capsys.readouterr().out.count("\n") < 60
+
+
+@pytest.mark.parametrize(("n_done", "quiet"), [(0, True), (20, False)])
+def test_nothing_is_said_where_there_is_nothing_to_say(clock, capsys, n_done, quiet):
+    with Progress(20, 1000, n_done=n_done, quiet=quiet, has_bar=True) as shown:
+        clock.time += 100
+        shown.update(Tally(done=1, cost=10))
+    assert capsys.readouterr().out == ""
+
+
+def test_a_terminal_gets_a_bar(clock, monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stdout", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    with Progress(20, 1000, n_done=0, quiet=False, has_bar=True) as shown:
+        clock.time += 10
+        shown.update(Tally(done=5, cost=500))
+    assert "5/20 cases" in terminal.getvalue()
+    assert "10 s left" in terminal.getvalue()
