@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 FINEST_TICK = 1.5e-9  # s, the resolution of events
 LEVELS_PAST_SAMPLE = 3  # longest step: eight samples
+CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
 FIRST_REVOLUTIONS = 8  # of the first kernel call
 MOST_PHASES = 256  # sets of closed contacts of one speed and friction
 
@@ -50,7 +51,8 @@ class ModalMarch(March):
         super().__init__(check, FIRST_REVOLUTIONS * setup.samples_per_revolution)
         self._setup, self._book = setup, setup.book(friction)
         self._clearance = np.array([clearance + stator.clearance_offset for stator in setup.model.stators])
-        interval = 2.0 * math.pi / (abs(setup.spin) * setup.samples_per_revolution)
+        turn = 2.0 * math.pi / abs(setup.spin)
+        interval = turn / setup.samples_per_revolution
         sample_level = max(2, math.ceil(math.log2(interval / FINEST_TICK)))
         tick = interval / 2**sample_level
         self._sample_level = sample_level
@@ -61,13 +63,13 @@ class ModalMarch(March):
             ticks_per_sample=2**sample_level,
             samples_per_revolution=setup.samples_per_revolution,
             blind_level=max(0, min(sample_level, math.floor(math.log2(setup.step / tick)))),
-            contact_level=sample_level - 2,
+            contact_level=math.floor(math.log2(min(interval / 4, turn / CONTACT_STEPS) / tick)),
             end_tick=0,
         )
         self._bodies = self._book.kernel_reduced()
         self._motion = self._reduce(initial)
         mask = self._first_closed(initial)
-        self._progress = np.array([0, 0, mask, 0, 0, 0])
+        self._progress = np.array([0, 0, mask, 0, 0, 0, -(2**62)])
         self._tabulate()
         self._reader = NodeReader(self._phases, self._bodies, self._clock)
         if find_phase(self._phases.mask, mask) < 0:

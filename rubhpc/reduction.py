@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
 
-# Modes up to this multiple of the contact frequency, times (1e-3 / accuracy)^(1/4): what lies above answers
-# by its static shape, whose error goes with the fourth power of the frequency ratio.
+# Modes up to this multiple of the contact frequency (or the spin, where that is higher), times
+# (1e-3 / accuracy)^(1/4): what lies above answers by its static shape, whose error goes with the fourth
+# power of the frequency ratio.
 CUTOFF_RATIO = 10.0
 FEWEST_MODES = 2  # kept of every part, whatever their frequency
 FREE = 1e-12  # square of a frequency over the greatest, below which a mode is free motion
@@ -89,7 +90,8 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     degree, output = degrees_of(model), output_degrees(model)
     seen = np.unique(np.concatenate([degree[degree >= 0], output[output >= 0]]))
 
-    cutoff = CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * _contact_frequency(mass, stiffness, degree, model)
+    fastest = max(_contact_frequency(mass, stiffness, degree, model), abs(spin))
+    cutoff = CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * fastest
     symmetric = 0.5 * (stiffness + stiffness.T)
     coupled = (mass != 0) | (stiffness != 0)
     n_part, part = connected_components(csr_array(coupled), directed=False)

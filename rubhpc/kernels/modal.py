@@ -22,6 +22,7 @@ from rubhpc.kernels.events import change_contacts
 from rubhpc.kernels.phases import (
     CONTACT_UNSOLVED,
     DIVERGED,
+    ENTERED,
     FINISHED,
     N_NODE,
     N_STEP,
@@ -81,10 +82,11 @@ def advance(
     ----------
     is_recorded : bool
         Whether to keep `nodes` and impacts.
-    progress : (6,)
+    progress : (7,)
         Tick reached, phase, set of pairs wanted next (-1: none), steps taken, whether the sample at the tick
-        reached is kept, nodes kept. Where a set is met that is not tabulated, PHASE_WANTED is returned with
-        the motion in `motion` (2 n,); the caller adds the phase and calls again.
+        reached is kept, nodes kept, tick at which the phase began. Where a set is met that is not tabulated,
+        PHASE_WANTED is returned with the motion in `motion` (2 n,); the caller adds the phase and calls
+        again.
     z, z_next : (2, m)
         Modal coordinates, real and imaginary, and work space.
 
@@ -125,7 +127,7 @@ def advance(
                 return PHASE_WANTED
             p = found
             enter(phases, p, np.cos(angle), np.sin(angle), motion, z)
-            progress[PHASE], progress[WANTED] = p, -1
+            progress[PHASE], progress[WANTED], progress[ENTERED] = p, -1, t
             wanted = -1
             is_forced, is_halving = True, False
             if is_recorded and mask[p] != 0:
@@ -170,7 +172,9 @@ def advance(
             limit = min(limit, (t // ticks_per_sample + 1) * ticks_per_sample)
         level = min(highest_level, floor_log2(limit - t))
         if is_recorded and mask[p] != 0:
-            level = min(level, clock.contact_level)
+            # What an impact sets off is fast at first: no step is longer than the contact has lasted.
+            age = floor_log2(max(1, t - progress[ENTERED]))
+            level = min(level, clock.contact_level, max(age, clock.blind_level))
         is_proved = False
         if is_forced:
             level, is_forced, is_proved = min(level, FORCED_LEVEL), False, True

@@ -21,8 +21,8 @@ LATERAL_ROW, LATERAL_RATE = 1, 2
 
 FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED, NODES_FULL = range(5)  # outcomes
 
-# What a call leaves in `progress` (6,) for the next one.
-TIME, PHASE, WANTED, N_STEP, SAMPLED, N_NODE = range(6)
+# What a call leaves in `progress` (7,) for the next one.
+TIME, PHASE, WANTED, N_STEP, SAMPLED, N_NODE, ENTERED = range(7)
 
 
 class Phases(NamedTuple):
