@@ -30,10 +30,7 @@ block = {block}
 
 
 def write_study(folder: Path, name: str = "tiny.toml", **changes: object) -> Path:
-    """Write a study file with some keys changed.
-
-    Unless told: 12 cases in blocks of 2, of some 50 ms each and 15 ms more for every further revolution.
-    """
+    """Write a study file with some keys changed; unless told, 12 cases in blocks of 2, of some 10 ms each."""
     told = {
         "output": folder / "tiny.zarr",
         "speed_ratio": [0.9, 2.0],
@@ -41,12 +38,18 @@ def write_study(folder: Path, name: str = "tiny.toml", **changes: object) -> Pat
         "revolutions": 2,
         "keep": '["waveform", "spectrum", "section"]',
         "block": 2,
-        "integrator": 'method = "central-difference"\nstep = "2 us"',
+        "integrator": 'method = "modal"',
         "run": "",
     }
     path = folder / name
     path.write_text(STUDY.format(**(told | changes)))
     return path
+
+
+def write_slow_study(folder: Path, name: str = "tiny.toml", **changes: object) -> Path:
+    """Write a study that can be stopped on its way: 15 ms a case and revolution."""
+    integrator = 'method = "central-difference"\nstep = "2 us"'
+    return write_study(folder, name, **({"integrator": integrator, "transient": 8} | changes))
 
 
 def command(*arguments: object, ranks: int = 0, script: Path | None = None) -> list[str]:

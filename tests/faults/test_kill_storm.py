@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import psutil
 import pytest
-from running import journalled_cases, run, start, stored_bytes, write_study
+from running import journalled_cases, run, start, stored_bytes, write_slow_study
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-KILLS, RANKS, BLOCK = 5, 2, 2
+KILLS, RANKS, BLOCK = 5, 2, 2  # cases in a block, unless told
 
 
 def descendants_alive(store: Path) -> list[int]:
@@ -28,11 +28,10 @@ def descendants_alive(store: Path) -> list[int]:
 
 
 def test_a_kill_storm_loses_nothing(tmp_path):
-    changes = {"transient": 8, "block": BLOCK}
-    whole = write_study(tmp_path, "whole.toml", output=tmp_path / "whole.zarr", **changes)
+    whole = write_slow_study(tmp_path, "whole.toml", output=tmp_path / "whole.zarr")
     assert run(whole, ranks=RANKS).returncode == 0
     store = tmp_path / "storm.zarr"
-    study = write_study(tmp_path, output=store, **changes)
+    study = write_slow_study(tmp_path, output=store)
     moments = random.Random(20)
     for _ in range(KILLS):
         job = start(study, "--output", store, ranks=RANKS)
@@ -54,7 +53,7 @@ def test_a_kill_storm_loses_nothing(tmp_path):
 @pytest.mark.parametrize("moment", [0.3, 1.0])
 def test_a_rank_ends_with_its_launcher(tmp_path, moment):
     store = tmp_path / "tiny.zarr"
-    job = start(write_study(tmp_path, transient=3000), "--output", store, ranks=RANKS)
+    job = start(write_slow_study(tmp_path, transient=3000), "--output", store, ranks=RANKS)
     time.sleep(moment)
     job.kill()
     job.communicate()

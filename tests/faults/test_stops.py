@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING
 
 import pytest
-from running import journalled_cases, run, start, write_study
+from running import journalled_cases, run, start, write_slow_study
 
 from rubhpc.store import Store
 from rubhpc.verify import verify
@@ -40,7 +40,7 @@ def ended_early(job: subprocess.Popen[str]) -> str:
     ("number", "ranks"), [(signal.SIGTERM, 0), (signal.SIGTERM, 2), (signal.SIGINT, 0), (signal.SIGUSR1, 2)]
 )
 def test_a_signal_stops_a_run(tmp_path, number, ranks):
-    study, store = write_study(tmp_path, transient=LONG, block=1), tmp_path / "tiny.zarr"
+    study, store = write_slow_study(tmp_path, transient=LONG, block=1), tmp_path / "tiny.zarr"
     job = start(study, ranks=ranks)
     wait_for_a_case(job, store)
     job.send_signal(number)
@@ -54,7 +54,7 @@ def test_a_signal_stops_a_run(tmp_path, number, ranks):
 
 
 def test_the_file_stop_stops_all_ranks_and_the_next_run_completes(tmp_path):
-    study, store = write_study(tmp_path, transient=8, block=1), tmp_path / "tiny.zarr"
+    study, store = write_slow_study(tmp_path, block=1), tmp_path / "tiny.zarr"
     job = start(study, ranks=2)
     wait_for_a_case(job, store)
     (store / "STOP").touch()
@@ -68,14 +68,14 @@ def test_the_file_stop_stops_all_ranks_and_the_next_run_completes(tmp_path):
 
 def test_the_time_limit_stops_a_run(tmp_path):
     began = time.monotonic()
-    done = run(write_study(tmp_path, transient=2000), "--time-limit", "1.5 s", ranks=2)
+    done = run(write_slow_study(tmp_path, transient=2000), "--time-limit", "1.5 s", ranks=2)
     assert done.returncode == 75
     assert time.monotonic() - began < 12  # a case takes half a minute
     assert "stopped by the time limit with 12 of 12 cases missing" in done.stderr
 
 
 def test_a_signal_before_the_first_case_stops_a_run_too(tmp_path):
-    job = start(write_study(tmp_path, transient=2000))
+    job = start(write_slow_study(tmp_path, transient=2000))
     time.sleep(0.4)
     job.send_signal(signal.SIGTERM)
     _, err = job.communicate(timeout=20)

@@ -11,52 +11,56 @@ from typing import TYPE_CHECKING
 
 import psutil
 import pytest
-from running import command, environment, journalled_cases, run, start, stored_bytes, write_study
+from running import (
+    command,
+    environment,
+    journalled_cases,
+    run,
+    start,
+    stored_bytes,
+    write_slow_study,
+    write_study,
+)
 
 from rubhpc.launch import launch
 
 if TYPE_CHECKING:
     import subprocess
 
-TRANSIENT = 8  # revolutions: a case takes some 0.1 s, long enough to be stopped among others
-BY_MODES = {"integrator": 'method = "modal"', "transient": 100, "revolutions": 64, "block": 1}
+LONG = {"transient": 100, "revolutions": 64, "block": 1}
 POISONED = Path(__file__).parents[1] / "faults" / "poisoned.py"
 
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     """What one process without MPI stores."""
-    return stored_alone(tmp_path_factory.mktemp("alone"), transient=TRANSIENT)
-
-
-@pytest.fixture(scope="module")
-def alone_by_modes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    return stored_alone(tmp_path_factory.mktemp("alone"), **BY_MODES)
-
-
-def stored_alone(folder: Path, **changes: object) -> dict[str, bytes]:
-    done = run(write_study(folder, **changes))
+    folder = tmp_path_factory.mktemp("alone")
+    done = run(write_slow_study(folder))
     assert done.returncode == 0, done.stderr
     return stored_bytes(folder / "tiny.zarr")
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
 def test_any_number_of_ranks_stores_equal_bytes(tmp_path, alone, ranks):
-    done = run(write_study(tmp_path, transient=TRANSIENT), ranks=ranks)
+    done = run(write_slow_study(tmp_path), ranks=ranks)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.count("12 done; 12 computed") == 1  # one rank speaks
     assert stored_bytes(tmp_path / "tiny.zarr") == alone
 
 
-def test_the_modal_integrator_does_not_see_how_many_ranks_share_the_machine(tmp_path, alone_by_modes):
+def test_the_modal_integrator_does_not_see_how_many_ranks_share_the_machine(tmp_path):
     """Four ranks on two cores: every kernel call takes longer than alone, and none may end elsewhere."""
-    done = run(write_study(tmp_path, **BY_MODES), ranks=4)
-    assert done.returncode == 0, done.stderr
-    assert stored_bytes(tmp_path / "tiny.zarr") == alone_by_modes
+    stored = []
+    for ranks in (0, 4):
+        store = tmp_path / f"{ranks}.zarr"
+        done = run(write_study(tmp_path, **LONG), "--output", store, ranks=ranks)
+        assert done.returncode == 0, done.stderr
+        stored.append(stored_bytes(store))
+    assert stored[0] == stored[1]
 
 
 def test_a_resumed_run_of_other_size_stores_equal_bytes(tmp_path, alone):
-    study, store = write_study(tmp_path, transient=TRANSIENT), tmp_path / "tiny.zarr"
+    study, store = write_slow_study(tmp_path), tmp_path / "tiny.zarr"
     job = start(study, ranks=2)
     while journalled_cases(store) == 0:
         time.sleep(0.02)
@@ -73,7 +77,7 @@ def test_a_resumed_run_of_other_size_stores_equal_bytes(tmp_path, alone):
 
 def test_ranks_share_the_work(tmp_path):
     """Each computes: two ranks leave two journals, of blocks that differ."""
-    study = write_study(tmp_path, transient=20, block=1)
+    study = write_slow_study(tmp_path, transient=20, block=1)
     assert run(study, ranks=2).returncode == 0
     files = sorted((tmp_path / "tiny.zarr" / ".rubhpc" / "journal").iterdir())
     assert [path.name[-14:-8] for path in files] == ["k00000", "k00001"]
@@ -149,7 +153,7 @@ def test_an_input_error_is_told_once(tmp_path):
 
 def test_a_rank_that_slips_ends_the_job(tmp_path):
     began = time.monotonic()
-    done = run("rank1", write_study(tmp_path, transient=2000), ranks=2, script=POISONED, timeout=60)
+    done = run("rank1", write_slow_study(tmp_path, transient=2000), ranks=2, script=POISONED, timeout=60)
     assert done.returncode == 70
     assert time.monotonic() - began < 30  # the study itself takes minutes
     assert "rubhpc: rank 1: LookupError: a slip; the traceback is in " in done.stderr
@@ -169,7 +173,7 @@ def ranks_of(job: subprocess.Popen[str]) -> dict[int, psutil.Process]:
 
 @pytest.mark.parametrize("rank", [0, 1])
 def test_a_rank_that_is_killed_ends_the_job_and_the_next_run_completes(tmp_path, rank):
-    study, store = write_study(tmp_path, transient=TRANSIENT), tmp_path / "tiny.zarr"
+    study, store = write_slow_study(tmp_path), tmp_path / "tiny.zarr"
     job = start(study, ranks=2)
     while journalled_cases(store) == 0:
         time.sleep(0.02)

@@ -206,8 +206,6 @@ def test_the_python_face(tmp_path: Path):
         speed=float(case.spin_speed),
         clearance=float(case.clearance),
         friction=0.5,
-        method="central-difference",
-        step="2 us",
         transient=1,
         revolutions=2,
         samples_per_revolution=32,
