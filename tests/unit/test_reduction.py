@@ -11,6 +11,7 @@ from trial_rig import trial_rig
 from rubhpc import read_rig
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
+from rubhpc.fem.response import steady_response
 from rubhpc.kernels.contact import AXIAL, LATERAL, TORSION, V, W
 from rubhpc.packing import degrees_of, output_degrees
 from rubhpc.reduction import directions, reduce_model
@@ -179,3 +180,14 @@ def test_drive_as_soft_as_a_clock_spring_is_not_taken_for_free():
     rotor = replace(rig.rotor, torsion=Torsion(node=1, stiffness=0.01))
     reduced = reduce_model(assemble(replace(rig, rotor=rotor)), SPIN, 1e-3)
     assert np.sqrt(np.linalg.eigvalsh(reduced.stiffness)[0]) / (2 * np.pi) == pytest.approx(0.2, rel=0.3)
+
+
+@pytest.mark.parametrize("speed", [150.0, 1050.0, 4000.0, -20_000.0])
+def test_unbalance_is_answered_at_any_speed(speed):
+    """By the steady response of the full rotor, also where the spin is far above the contact frequency."""
+    model = assemble(read_rig("mokhtar2017"))
+    reduced = reduce_model(model, speed, 1e-3)
+    system = reduced.stiffness - speed**2 * np.eye(len(reduced.stiffness)) + 1j * speed * reduced.damping
+    found = reduced.output @ np.linalg.solve(system, reduced.force[0] - 1j * reduced.force[1])
+    known = steady_response(model, speed)[output_degrees(model)]
+    assert found == pytest.approx(known, abs=1e-3 * abs(known).max())
