@@ -83,6 +83,7 @@ CASES = {
 METHODS = {
     "central-difference": {"method": "central-difference"},
     "modal": {"method": "modal", "accuracy": 1e-5},
+    "usual": {},
 }
 TOLERANCE = 5e-3
 REVOLUTIONS, PER_REVOLUTION = 3, 128
@@ -100,7 +101,8 @@ def expected(name, normal):
     )
 
 
-def solve(name, normal, **method):
+@lru_cache
+def solve(name, normal, method):
     _, _, speed, clearance, friction = CASES[name]
     return simulate(
         make_rig(name),
@@ -111,7 +113,7 @@ def solve(name, normal, **method):
         transient=0,
         revolutions=REVOLUTIONS,
         samples_per_revolution=PER_REVOLUTION,
-        **method,
+        **METHODS[method],
     )
 
 
@@ -130,11 +132,11 @@ def check_contacts(record, known):
         assert known["overlap"] > 0.01  # of the time two touch at once
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["central-difference", "modal"])
 @pytest.mark.parametrize("normal", ["fixed", "updated"])
 @pytest.mark.parametrize("name", CASES)
 def test_case_follows_the_full_order_solution(name, normal, method):
-    known, record = expected(name, normal), solve(name, normal, **METHODS[method])
+    known, record = expected(name, normal), solve(name, normal, method)
     for signal in (*MOTIONS, "contact_force"):
         assert distance(getattr(record, signal), known[signal]) < TOLERANCE, signal
     check_contacts(record, known)
@@ -143,7 +145,7 @@ def test_case_follows_the_full_order_solution(name, normal, method):
 @pytest.mark.parametrize("name", CASES)
 def test_central_difference_is_closer_still_with_the_fixed_normal(name):
     """With the updated one it matters in which step of the reference a touch begins."""
-    known, record = expected(name, "fixed"), solve(name, "fixed", method="central-difference")
+    known, record = expected(name, "fixed"), solve(name, "fixed", "central-difference")
     for signal in MOTIONS:
         assert distance(getattr(record, signal), known[signal]) < 5e-4, signal
 
@@ -152,7 +154,7 @@ def test_central_difference_is_closer_still_with_the_fixed_normal(name):
 @pytest.mark.parametrize("name", CASES)
 def test_usual_accuracy_gives_amplitudes_and_impulses(name, normal):
     """By default fast axial waves of the stator are left out: 2 % of its motion at some instants."""
-    known, record = expected(name, normal), solve(name, normal)
+    known, record = expected(name, normal), solve(name, normal, "usual")
     for signal in MOTIONS[:3]:
         assert distance(getattr(record, signal), known[signal]) < TOLERANCE, signal
     for signal in MOTIONS:

@@ -12,6 +12,7 @@ from rubhpc.case import run_case
 from rubhpc.fem.model import Body, Model, StatorModel
 from rubhpc.packing import pack
 from rubhpc.prepare import CentralDifferenceSetup, prepare
+from rubhpc.reduction import reduce_model
 from rubhpc.rig import with_keys
 from rubhpc.study import Contact, Integrator, Recording
 
@@ -27,27 +28,32 @@ def every_step(duration, step):
     return 2 * math.ceil(duration / step / 2)
 
 
-@pytest.mark.parametrize(
-    ("modulus", "release", "impulse", "peak"),
-    [(3e9, 4.700e-3, 0.128944, 48.8), (30e9, 1.861e-3, 0.129703, 154.0)],
-)
-def test_rotor_in_its_first_mode_meets_the_stator(modulus, release, impulse, peak):
-    """I6: the disc at 0.02 m/s, 10 um off the stator; no spin, damping or friction.
-
-    The shaft does not turn: the speed only sets how long a revolution of samples lasts, 6 ms.
-    """
-    rig = with_keys(read_rig("mokhtar2017"), STILL | {"stator.youngs_modulus": modulus})
-    duration, step = 6e-3, 0.5e-6
+def set_up_at_rest(rig, method, duration, step):
+    """A shaft that does not turn: the speed only sets how long a revolution of samples lasts."""
     per_revolution = every_step(duration, step)
     setup = prepare(
         rig,
         2 * math.pi / duration,
         contact=Contact(),
-        integrator=Integrator(method="central-difference", step=step * 1.000001),
+        integrator=Integrator(method=method, step=step * 1.000001),
         samples_per_revolution=per_revolution,
     )
+    if method == "modal":
+        return replace(setup, reduced=reduce_model(setup.model, 0.0, 1e-3))
     assert setup.steps_per_sample == 1
-    setup = replace(setup, packed=pack(setup.model, 0.0, setup.step))
+    return replace(setup, packed=pack(setup.model, 0.0, setup.step))
+
+
+@pytest.mark.parametrize("method", ["central-difference", "modal"])
+@pytest.mark.parametrize(
+    ("modulus", "release", "impulse", "peak"),
+    [(3e9, 4.700e-3, 0.128944, 48.8), (30e9, 1.861e-3, 0.129703, 154.0)],
+)
+def test_rotor_in_its_first_mode_meets_the_stator(method, modulus, release, impulse, peak):
+    """I6: the disc at 0.02 m/s, 10 um off the stator; no spin, damping or friction."""
+    rig = with_keys(read_rig("mokhtar2017"), STILL | {"stator.youngs_modulus": modulus})
+    duration, step = 6e-3, 0.5e-6
+    setup = set_up_at_rest(rig, method, duration, step)
     rotor = setup.model.rotor
     upward = [row for row, (_, name) in enumerate(rotor.degrees) if name in ("v", "thz")]
     plane = np.ix_(upward, upward)
@@ -59,18 +65,19 @@ def test_rotor_in_its_first_mode_meets_the_stator(modulus, release, impulse, pea
         setup,
         clearance=10e-6,
         friction=0.0,
-        recording=Recording(transient=0, revolutions=1, samples_per_revolution=per_revolution),
+        recording=Recording(transient=0, revolutions=1, samples_per_revolution=setup.samples_per_revolution),
         initial=replace(State.at_rest(setup.model), rotor_velocity=velocity),
     )
     force = record.contact_force[0]
-    touching = np.flatnonzero(force) * setup.step
+    interval = duration / force.size
+    touching = np.flatnonzero(force) * interval
     assert touching[0] == pytest.approx(0.50082e-3, rel=3e-3)
-    assert touching[-1] + setup.step == pytest.approx(release, rel=3e-3)
+    assert touching[-1] + interval == pytest.approx(release, rel=3e-3)
     assert record.contact_impulse[0] == pytest.approx(impulse, rel=3e-3)
-    assert force.sum() * setup.step == pytest.approx(record.contact_impulse[0])
+    assert force.sum() * interval == pytest.approx(record.contact_impulse[0], rel=1e-4)
     assert record.peak_contact_force[0] == pytest.approx(peak, rel=0.01)
-    assert not record.horizontal.any()
-    assert not record.torsion.any()
+    assert abs(record.horizontal).max() < 1e-15
+    assert abs(record.torsion).max() < 1e-15
 
 
 def drop(mass, stiffness, velocity, wall_mass, wall_stiffness, clearance, duration, step):
