@@ -64,6 +64,7 @@ class SteppedMarch(ModalMarch):
             is_updated=setup.is_updated,
         )
         self._work = workspace(self._pairs)
+        self._work.force[:] = initial.contact_force  # a contact under way does not begin anew
 
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs pressed in the last step, (q,)."""
