@@ -130,12 +130,15 @@ def _pace(sweep: Sweep, blocks: list[Block]) -> float:
 
 
 def _pilot(sweep: Sweep, block: Block) -> float:
-    """Seconds per predicted step of the block's first case, shortened."""
+    """Seconds per predicted step of the block's first case, shortened.
+
+    Revolutions that are recorded cost more than those thrown away: their shares stay.
+    """
     study, case = sweep.study, sweep.cases(block)[0]
     whole = study.recording
-    n_revolution = whole.transient + whole.revolutions
     steps = block.cost / math.prod(block.shape)
-    short = max(2, min(n_revolution, round(_PILOT_STEPS * n_revolution / steps)))
+    share = min(1.0, _PILOT_STEPS / steps)
+    transient, revolutions = round(share * whole.transient), max(1, round(share * whole.revolutions))
     setup = prepare(
         case.rig,
         case.speed,
@@ -150,7 +153,8 @@ def _pilot(sweep: Sweep, block: Block) -> float:
         return float(record.scalars["wall_time"])
 
     seconds(0, 1)  # compiles
-    return seconds(short - 1, 1) / (steps * short / n_revolution)
+    done = (transient + revolutions) / (whole.transient + whole.revolutions)
+    return seconds(transient, revolutions) / (steps * done)
 
 
 def _size(n_byte: float) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 import pytest
+import xarray as xr
 from running import environment, write_study
 
 from rubhpc import cli
@@ -214,3 +215,16 @@ def test_the_python_face(tmp_path: Path):
     assert {name for name in rubhpc.__all__ if getattr(rubhpc, name) is None} == set()
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         rubhpc.nothing  # noqa: B018
+
+
+def test_plan_foresees_the_time_of_the_cases(tmp_path):
+    """Within a factor of 5: other work on the machine may come and go between the two."""
+    from rubhpc.driver import run
+    from rubhpc.plan import make_plan
+    from rubhpc.study import read_study
+
+    study = read_study(write_study(tmp_path, transient=60, revolutions=64))
+    foreseen = make_plan(study).core_hours * 3600
+    run(study, quiet=True)
+    taken = float(xr.open_zarr(study.output).wall_time.sum())
+    assert taken / 5 < foreseen < 5 * taken
