@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
@@ -19,17 +21,31 @@ _FLAGS: dict[str, Any] = {
 }
 _compile = numba.njit(**_FLAGS)
 _compile_inline = numba.njit(inline="always", **_FLAGS)
+_SOURCES = hashlib.sha256(
+    b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
+).hexdigest()
+
+
+def _stamped(compiled: Any) -> Any:
+    """Make a change of any kernel outdate the cache of this one.
+
+    Numba compares the file of a function alone, though what it calls from other files is compiled into it.
+    """
+    cache = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    if cache is not None:  # nothing is compiled under NUMBA_DISABLE_JIT
+        cache._source_stamp = (cache._source_stamp, _SOURCES)
+    return compiled
 
 
 def jit(function: F) -> F:
     """Compile a kernel on first call, without the interpreter's lock, and cache it on disk."""
-    compiled: F = _compile(function)
+    compiled: F = _stamped(_compile(function))
     return compiled
 
 
 def jit_inline(function: F) -> F:
     """Compile a kernel into its callers: a call that hands over a tuple of arrays costs 0.1 us and more."""
-    compiled: F = _compile_inline(function)
+    compiled: F = _stamped(_compile_inline(function))
     return compiled
 
 
@@ -41,11 +57,11 @@ _compile_inline_sum = numba.njit(inline="always", **_SUM_FLAGS)
 
 def jit_sum(function: F) -> F:
     """Compile a kernel whose sums may be taken in any (fixed) order."""
-    compiled: F = _compile_sum(function)
+    compiled: F = _stamped(_compile_sum(function))
     return compiled
 
 
 def jit_inline_sum(function: F) -> F:
     """Compile such a kernel into its callers."""
-    compiled: F = _compile_inline_sum(function)
+    compiled: F = _stamped(_compile_inline_sum(function))
     return compiled
