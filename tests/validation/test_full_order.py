@@ -126,6 +126,7 @@ def check_contacts(record, known):
     """As many touches, as strong; the record's force is a mean over the interval of a sample."""
     impulse = known["contact_force"].mean(axis=-1) * 2 * math.pi / abs(record.spin_speed)
     assert record.contact_impulse == pytest.approx(impulse, rel=2e-3)
+    assert record.peak_contact_force == pytest.approx(known["peak_contact_force"], rel=TOLERANCE)
     assert np.array_equal(record.contacts_per_revolution * REVOLUTIONS, known["contacts"])
     assert known["contacts"].all()
     if len(impulse) > 1:
