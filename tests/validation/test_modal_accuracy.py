@@ -1,0 +1,72 @@
+"""The exact modal integrator and the central difference at a fine step: one answer, from two directions.
+
+Steady rubs of the packaged rig with period 1, 2 and 3. The modal scheme takes its usual accuracy of 1e-3 and
+runs from rest; the central difference, 0.25 us and all modes of the mesh, goes on from where that ended, long
+enough to leave it if it were not its own orbit.
+"""
+
+import numpy as np
+import pytest
+
+from rubhpc import simulate
+
+MOTIONS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral")
+STIFF = {"stator.youngs_modulus": "30 GPa"}
+ORBITS = {
+    "period 1": (1, {"speed_ratio": 0.75, "clearance": "84 um"}),
+    "period 2": (2, {"speed_ratio": 0.75, "clearance": "100 um"}),
+    "period 2, fast": (2, {"speed_ratio": 3.0, "clearance": "76 um"}),
+    "period 3, stiff": (3, {"speed_ratio": 5.3, "clearance_ratio": 0.70, "overrides": STIFF}),
+}
+
+
+def distance(found, known, name):
+    """Rms distance of a signal over its rms about the mean."""
+    one, other = getattr(found, name), getattr(known, name)
+    return np.sqrt(np.mean((one - other) ** 2)) / np.std(other)
+
+
+@pytest.fixture(scope="module", params=ORBITS)
+def orbit(request):
+    period, given = ORBITS[request.param]
+    settled = simulate("mokhtar2017", **given, transient=240, revolutions=8, keep=("waveform",))
+    recorded = {"transient": 0, "revolutions": 2 * period, "initial": settled.final, "keep": ("waveform",)}
+    known = simulate("mokhtar2017", **given, **recorded, method="central-difference", step="0.25 us")
+    return period, given | recorded, settled, known
+
+
+def test_orbit_is_that_of_the_central_difference(orbit):
+    period, given, settled, known = orbit
+    assert settled.period == known.period == period
+    found = simulate("mokhtar2017", **given)
+    for name in MOTIONS:
+        assert distance(found, known, name) < 1e-3, name
+    for name in ("peak_contact_force", "contact_impulse", "contact_duration", "friction_work"):
+        assert getattr(found, name) == pytest.approx(getattr(known, name), rel=0.01), name
+    assert found.contacts_per_revolution == known.contacts_per_revolution
+    assert found.minimum_slip_speed == pytest.approx(known.minimum_slip_speed, rel=0.01)
+    assert found.energy_residual < 1e-3
+
+
+def test_more_accuracy_is_closer_to_all_modes(orbit):
+    """Some accuracies keep the same modes: the error never grows, and falls a hundredfold over all."""
+    _, given, _, _ = orbit
+    runs = [simulate("mokhtar2017", **given, accuracy=accuracy) for accuracy in (0.1, 1e-3, 1e-5, 1e-30)]
+    error = [max(distance(run, runs[-1], name) for name in MOTIONS) for run in runs[:-1]]
+    assert error[0] >= error[1] >= error[2]
+    assert error[1] < 1e-3
+    assert error[2] < 0.02 * error[0]
+
+
+def test_central_difference_tends_to_the_modal_answer():
+    """Of the second order, until what is left is the modal scheme's own 1e-6."""
+    given = {"speed_ratio": 0.75, "clearance": "84 um", "transient": 0, "revolutions": 2}
+    exact = simulate("mokhtar2017", **given, accuracy=1e-30)
+    error = [
+        distance(
+            simulate("mokhtar2017", **given, method="central-difference", step=f"{step} us"), exact, "torsion"
+        )
+        for step in (2.0, 1.0, 0.5)
+    ]
+    assert np.log2(np.divide(error[:-1], error[1:])) == pytest.approx(2.0, abs=0.2)
+    assert error[-1] < 1e-6
