@@ -55,13 +55,7 @@ def pack(model: Model, spin: float, step: float) -> Packed:
     spin, step : float
         Rotation speed, rad/s, and time step, s.
     """
-    bodies = [model.rotor, *(stator.body for stator in model.stators)]
-    mass = block_diag(*(body.mass for body in bodies))
-    stiffness = block_diag(*(body.stiffness for body in bodies))
-    damping = block_diag(*(body.damping + spin * body.gyroscopic for body in bodies))
-    force = np.zeros((2, mass.shape[0]))
-    force[0, : model.rotor.n_dof] = spin**2 * model.unbalance_cosine
-    force[1, : model.rotor.n_dof] = spin**2 * model.unbalance_sine
+    mass, damping, stiffness, force = whole_system(model, spin)
     degree, output = degrees_of(model), output_degrees(model)
 
     coupled = csr_array((mass != 0) | (stiffness != 0) | (damping != 0))
@@ -94,6 +88,21 @@ def pack(model: Model, spin: float, step: float) -> Packed:
         compliance=_compliance(inverse, start, degree_row, degree_block, step),
         output_row=np.where(output >= 0, row[output], -1),
     )
+
+
+def whole_system(model: Model, spin: float) -> tuple[Floats, Floats, Floats, Floats]:
+    """M, C = D + spin G and K of rotor, then stators (n_all, n_all), and the unbalance force (2, n_all), N.
+
+    The force's rows go with the cosine and the sine of the shaft's angle; spin in rad/s.
+    """
+    bodies = [model.rotor, *(stator.body for stator in model.stators)]
+    mass = block_diag(*(body.mass for body in bodies))
+    stiffness = block_diag(*(body.stiffness for body in bodies))
+    damping = block_diag(*(body.damping + spin * body.gyroscopic for body in bodies))
+    force = np.zeros((2, mass.shape[0]))
+    force[0, : model.rotor.n_dof] = spin**2 * model.unbalance_cosine
+    force[1, : model.rotor.n_dof] = spin**2 * model.unbalance_sine
+    return mass, damping, stiffness, force
 
 
 def degrees_of(model: Model) -> Ints:

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import block_diag, eigh
+from scipy.linalg import eigh
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from rubhpc.errors import InputError
 from rubhpc.kernels.contact import AXIAL, N_DEGREE, V, W
-from rubhpc.packing import degrees_of, output_degrees
+from rubhpc.packing import degrees_of, output_degrees, whole_system
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -80,13 +80,7 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
         Where nothing holds a body: its constant response, on which the modal form of closed contacts rests,
         does not exist.
     """
-    bodies = [model.rotor, *(stator.body for stator in model.stators)]
-    mass = block_diag(*(body.mass for body in bodies))
-    stiffness = block_diag(*(body.stiffness for body in bodies))
-    damping = block_diag(*(body.damping + spin * body.gyroscopic for body in bodies))
-    force = np.zeros((2, mass.shape[0]))
-    force[0, : model.rotor.n_dof] = spin**2 * model.unbalance_cosine
-    force[1, : model.rotor.n_dof] = spin**2 * model.unbalance_sine
+    mass, damping, stiffness, force = whole_system(model, spin)
     degree, output = degrees_of(model), output_degrees(model)
     seen = np.unique(np.concatenate([degree[degree >= 0], output[output >= 0]]))
 
