@@ -10,7 +10,7 @@ import numpy as np
 from postproc.load import axes_of, find_axis, need, source
 from postproc.units import scale_for
 from rubhpc.errors import InputError
-from rubhpc.reading import parse_quantity
+from rubhpc.input.reading import parse_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

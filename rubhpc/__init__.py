@@ -14,13 +14,13 @@ from rubhpc.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from postproc.load import open_store as open  # noqa: A004 - the public name
-    from rubhpc.driver import run
     from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
-    from rubhpc.record import Record, State
+    from rubhpc.integrate.record import Record, State
     from rubhpc.rig import Rig, read_rig
+    from rubhpc.running.driver import run
     from rubhpc.simulate import simulate
+    from rubhpc.storage.summary import Summary
     from rubhpc.study import Study, read_study
-    from rubhpc.summary import Summary
 
 __all__ = [
     "InputError",
@@ -42,18 +42,18 @@ __all__ = [
 # Where each name comes from; imported when it is first asked for, so that `import rubhpc` takes no time.
 _HOMES = {
     "InputError": "rubhpc.errors:InputError",
-    "Record": "rubhpc.record:Record",
+    "Record": "rubhpc.integrate.record:Record",
     "Rig": "rubhpc.rig:Rig",
     "RubError": "rubhpc.errors:RubError",
-    "State": "rubhpc.record:State",
+    "State": "rubhpc.integrate.record:State",
     "StoppedEarly": "rubhpc.errors:StoppedEarly",
     "StoreError": "rubhpc.errors:StoreError",
     "Study": "rubhpc.study:Study",
-    "Summary": "rubhpc.summary:Summary",
+    "Summary": "rubhpc.storage.summary:Summary",
     "open": "postproc.load:open_store",
     "read_rig": "rubhpc.rig:read_rig",
     "read_study": "rubhpc.study:read_study",
-    "run": "rubhpc.driver:run",
+    "run": "rubhpc.running.driver:run",
     "simulate": "rubhpc.simulate:simulate",
 }
 

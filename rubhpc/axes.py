@@ -9,10 +9,10 @@ from dataclasses import Field, dataclass, fields
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.dotted import find_key
 from rubhpc.errors import InputError
-from rubhpc.fields import check_value, nearest, parse_field, place, quantity
-from rubhpc.quantity import brief, parse_quantity
+from rubhpc.input.dotted import find_key
+from rubhpc.input.fields import check_value, nearest, parse_field, place, quantity
+from rubhpc.input.quantity import brief, parse_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

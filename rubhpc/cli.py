@@ -14,7 +14,7 @@ import click
 
 from rubhpc import __version__
 from rubhpc.errors import RubError
-from rubhpc.launch import launch
+from rubhpc.running.launch import launch
 
 _STOPPED = 75
 # One thread a rank: BLAS, numba and zarr would each start as many as the machine has cores. BLAS's sums would
@@ -30,20 +30,20 @@ _THREADS = (
 
 # name -> (where it is, what it does); --help shows them in this order.
 COMMANDS = {
-    "run": ("rubhpc.cli_run:run", "Run a study, or what is left of it (run may be left out)."),
-    "plan": ("rubhpc.cli_run:plan", "Cases, bytes, files, core-hours; what is done, failed, missing."),
-    "status": ("rubhpc.cli_run:status", "Progress and failures; works while a run is on."),
-    "verify": ("rubhpc.cli_run:verify", "Check every stored case against its checksum."),
+    "run": ("rubhpc.commands.run:run", "Run a study, or what is left of it (run may be left out)."),
+    "plan": ("rubhpc.commands.run:plan", "Cases, bytes, files, core-hours; what is done, failed, missing."),
+    "status": ("rubhpc.commands.run:status", "Progress and failures; works while a run is on."),
+    "verify": ("rubhpc.commands.run:verify", "Check every stored case against its checksum."),
     "modes": (
-        "rubhpc.cli_modes:modes",
+        "rubhpc.commands.modes:modes",
         "Natural frequencies, damping ratios and whirl of a rig; Campbell diagram.",
     ),
-    "cascade": ("rubhpc.cli_figures:cascade", "Spectrum cascade along an axis."),
-    "map": ("rubhpc.cli_figures:map", "A scalar over two axes."),
-    "orbit": ("rubhpc.cli_figures:orbit", "Orbit of the disc."),
-    "spectrum": ("rubhpc.cli_figures:spectrum", "Amplitude spectrum of a signal."),
-    "waveform": ("rubhpc.cli_figures:waveform", "Signals over the revolutions."),
-    "section": ("rubhpc.cli_figures:section", "Poincaré section, or bifurcation diagram along an axis."),
+    "cascade": ("rubhpc.commands.figures:cascade", "Spectrum cascade along an axis."),
+    "map": ("rubhpc.commands.figures:map", "A scalar over two axes."),
+    "orbit": ("rubhpc.commands.figures:orbit", "Orbit of the disc."),
+    "spectrum": ("rubhpc.commands.figures:spectrum", "Amplitude spectrum of a signal."),
+    "waveform": ("rubhpc.commands.figures:waveform", "Signals over the revolutions."),
+    "section": ("rubhpc.commands.figures:section", "Poincaré section, or bifurcation diagram along an axis."),
 }
 
 
@@ -113,7 +113,7 @@ def main(args: list[str] | None = None) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
     except Exception as error:
-        from rubhpc.crash import crash
+        from rubhpc.running.crash import crash
 
         crashed = crash(error)
         code = _tell(str(crashed), crashed.exit_code)

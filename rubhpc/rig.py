@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.dotted import replace_keys
 from rubhpc.errors import InputError
-from rubhpc.fields import FieldError, check_fields, nearest, place, text
-from rubhpc.parts import (
+from rubhpc.input.dotted import replace_keys
+from rubhpc.input.fields import FieldError, check_fields, nearest, place, text
+from rubhpc.input.parts import (
     HELD_BY_DRIVE,
     UNDAMPED,
     Bearing,
@@ -23,7 +23,7 @@ from rubhpc.parts import (
     Torsion,
     Unbalance,
 )
-from rubhpc.reading import build, plain, read_toml
+from rubhpc.input.reading import build, plain, read_toml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rubhpc.case import run_case
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
-from rubhpc.prepare import prepare
-from rubhpc.reading import parse_quantity
-from rubhpc.record import State
+from rubhpc.input.reading import parse_quantity
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.prepare import prepare
+from rubhpc.integrate.record import State
 from rubhpc.rig import Rig, read_rig, with_keys
 from rubhpc.study import Contact, Integrator, Recording
 
 if TYPE_CHECKING:
     from os import PathLike
 
-    from rubhpc.record import Record
+    from rubhpc.integrate.record import Record
 
 
 def simulate(

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.axes import CLEARANCE_AXES, SPEED_AXES, Axis, flatten, make_axis
 from rubhpc.errors import InputError
-from rubhpc.fields import FieldError, check_fields, choice, choices, count, place, quantity
-from rubhpc.quantity import brief
-from rubhpc.reading import build, read_toml, refuse_unknown
+from rubhpc.input.fields import FieldError, check_fields, choice, choices, count, place, quantity
+from rubhpc.input.quantity import brief
+from rubhpc.input.reading import build, read_toml, refuse_unknown
 from rubhpc.rig import Rig, read_rig, with_keys
 from rubhpc.schema import KEEPABLE, VARIABLES
 

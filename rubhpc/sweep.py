@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fields import place
+from rubhpc.input.fields import place
 from rubhpc.settings import Settings
 
 if TYPE_CHECKING:

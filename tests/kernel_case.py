@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.contact_work import workspace
 from rubhpc.fem.assemble import assemble
-from rubhpc.gather import empty_samples, empty_tally
+from rubhpc.integrate.contact_work import workspace
+from rubhpc.integrate.gather import empty_samples, empty_tally
+from rubhpc.integrate.packing import pack, pairs_of
 from rubhpc.kernels.central_difference import advance
-from rubhpc.packing import pack, pairs_of
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
+    from rubhpc.integrate.packing import Packed
     from rubhpc.kernels.contact import Pairs, Workspace
     from rubhpc.kernels.observe import Samples, Tally
-    from rubhpc.packing import Packed
 
 
 @dataclass

@@ -2,8 +2,8 @@
 
 import pytest
 
-from rubhpc.case import run_case
-from rubhpc.prepare import prepare
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.prepare import prepare
 from rubhpc.rig import read_rig
 from rubhpc.study import Contact, Integrator, Recording
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from rubhpc.case import run_case
 from rubhpc.fem.assemble import assemble
-from rubhpc.packing import degrees_of
-from rubhpc.prepare import prepare
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.packing import degrees_of
+from rubhpc.integrate.prepare import prepare
 from rubhpc.rig import read_rig
 from rubhpc.study import Contact, Integrator, Recording
 

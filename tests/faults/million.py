@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc import driver, plan, worker
 from rubhpc.axes import Axis
-from rubhpc.journal import METRICS
 from rubhpc.rig import read_rig
+from rubhpc.running import driver, plan, worker
 from rubhpc.schema import DONE
-from rubhpc.status import read_status
+from rubhpc.storage.journal import METRICS
+from rubhpc.storage.status import read_status
 from rubhpc.study import Recording, Study
 
 if TYPE_CHECKING:

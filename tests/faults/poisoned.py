@@ -9,9 +9,9 @@ import sys
 import time
 from typing import Any
 
-from rubhpc import worker
 from rubhpc.cli import main
-from rubhpc.launch import launch
+from rubhpc.running import worker
+from rubhpc.running.launch import launch
 
 run_case = worker.run_case
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from running import run, stored_bytes, write_study
 
-from rubhpc.driver import run as run_study
-from rubhpc.store import Store
-from rubhpc.verify import verify
+from rubhpc.running.driver import run as run_study
+from rubhpc.storage.store import Store
+from rubhpc.storage.verify import verify
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from running import command, environment, journalled_cases, run, start, write_slow_study, write_study
 
-from rubhpc.verify import verify
+from rubhpc.storage.verify import verify
 
 POISONED = Path(__file__).with_name("poisoned.py")
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import pytest
 from running import journalled_cases, run, start, write_slow_study
 
-from rubhpc.store import Store
-from rubhpc.verify import verify
+from rubhpc.storage.store import Store
+from rubhpc.storage.verify import verify
 
 if TYPE_CHECKING:
     import subprocess

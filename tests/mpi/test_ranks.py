@@ -22,7 +22,7 @@ from running import (
     write_study,
 )
 
-from rubhpc.launch import launch
+from rubhpc.running.launch import launch
 
 if TYPE_CHECKING:
     import subprocess

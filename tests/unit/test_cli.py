@@ -41,8 +41,10 @@ def test_help_names_every_command(capsys):
 
 
 def test_no_figure_command_is_left_out():
-    figures = {command.name for command in import_module("rubhpc.cli_figures").COMMANDS}
-    assert figures == {name for name, (home, _) in COMMANDS.items() if home.startswith("rubhpc.cli_figures:")}
+    figures = {command.name for command in import_module("rubhpc.commands.figures").COMMANDS}
+    assert figures == {
+        name for name, (home, _) in COMMANDS.items() if home.startswith("rubhpc.commands.figures:")
+    }
 
 
 def test_the_short_help_is_that_of_a_command():
@@ -219,8 +221,8 @@ def test_the_python_face(tmp_path: Path):
 
 def test_plan_foresees_the_time_of_the_cases(tmp_path):
     """Within a factor of 5: other work on the machine may come and go between the two."""
-    from rubhpc.driver import run
-    from rubhpc.plan import make_plan
+    from rubhpc.running.driver import run
+    from rubhpc.running.plan import make_plan
     from rubhpc.study import read_study
 
     study = read_study(write_study(tmp_path, transient=60, revolutions=64))

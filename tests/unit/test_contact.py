@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import root
 
-from rubhpc.contact_work import workspace
+from rubhpc.integrate.contact_work import workspace
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact import (
     AXIAL,

@@ -14,15 +14,15 @@ import pytest
 import xarray as xr
 from running import journalled_cases, write_study
 
-from rubhpc import driver, stopping, worker
-from rubhpc.driver import run
 from rubhpc.errors import InputError, StoppedEarly, StoreError
-from rubhpc.journal import METRICS
-from rubhpc.record import Record
+from rubhpc.integrate.record import Record
+from rubhpc.running import driver, stopping, worker
+from rubhpc.running.driver import run
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
-from rubhpc.store import Store
+from rubhpc.storage.journal import METRICS
+from rubhpc.storage.store import Store
+from rubhpc.storage.verify import verify
 from rubhpc.study import Integrator, read_study
-from rubhpc.verify import verify
 
 if TYPE_CHECKING:
     from collections.abc import Callable

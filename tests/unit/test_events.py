@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rubhpc.gather import empty_tally
+from rubhpc.integrate.gather import empty_tally
 from rubhpc.kernels.events import change_contacts
 from rubhpc.kernels.observe import DRIVE_WORK, FRICTION_LOSS, IMPACT_LOSS
 from rubhpc.kernels.phases import Reduced

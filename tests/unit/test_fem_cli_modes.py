@@ -8,7 +8,7 @@ import sys
 import pytest
 from click.testing import CliRunner
 
-from rubhpc.cli_modes import modes
+from rubhpc.commands.modes import modes
 from rubhpc.errors import InputError
 
 
@@ -83,7 +83,7 @@ def test_mistakes_are_named_in_one_line(arguments, named):
 
 def test_help_loads_nothing_heavy():
     code = (
-        "import sys; from rubhpc.cli_modes import modes; modes(['--help'], standalone_mode=False);"
+        "import sys; from rubhpc.commands.modes import modes; modes(['--help'], standalone_mode=False);"
         "print([name for name in ('numpy', 'scipy', 'matplotlib', 'pint') if name in sys.modules])"
     )
     output = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

@@ -26,12 +26,20 @@ def test_imports_keep_the_contracts() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+def placed_in(layers: list[str]) -> set[str]:
+    return {name.strip(" ()") for layer in layers for name in layer.replace("|", ":").split(":")}
+
+
 def test_every_module_has_its_layer() -> None:
-    layers = next(contract["layers"] for contract in CONTRACTS if contract["type"] == "layers")
-    placed = {name.strip() for layer in layers for name in layer.replace("|", ":").split(":")}
+    whole, within = (contract for contract in CONTRACTS if contract["type"] == "layers")
+    placed = placed_in(whole["layers"])
     modules = {path.stem for path in (ROOT / "rubhpc").glob("*.py")} - {"__init__", "__main__"}
     packages = {path.parent.name for path in (ROOT / "rubhpc").glob("*/__init__.py")}
     assert {f"rubhpc.{name}" for name in modules | packages} == placed - {"postproc"}
+
+    folders = [ROOT / name.replace(".", "/") for name in within["containers"]]
+    modules = {path.stem for folder in folders for path in folder.glob("*.py")} - {"__init__"}
+    assert modules == placed_in(within["layers"])
 
 
 def test_kernels_and_postproc_have_a_contract_of_their_own() -> None:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from rubhpc.journal import Entry, Header, Journal, journals, metrics_type, next_run, replay
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, VARIABLES
+from rubhpc.storage.journal import Entry, Header, Journal, journals, metrics_type, next_run, replay
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rubhpc import lock as lock_module
 from rubhpc.errors import StoreError
-from rubhpc.lock import STALE_AFTER, Holder, Lock, is_alive, read_holder
+from rubhpc.storage import lock as lock_module
+from rubhpc.storage.lock import STALE_AFTER, Holder, Lock, is_alive, read_holder
 
 if TYPE_CHECKING:
     from pathlib import Path

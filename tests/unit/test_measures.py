@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rubhpc.measures import amplitude_spectrum, period, regime
+from rubhpc.integrate.measures import amplitude_spectrum, period, regime
 from rubhpc.schema import REGIME
 
 SAMPLES = 64  # a revolution

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from trial_rig import trial_rig, turn
 
-from rubhpc import State, march, modal, nodes, read_rig, simulate
+from rubhpc import State, read_rig, simulate
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import steady_response
+from rubhpc.integrate import march, modal, nodes
+from rubhpc.integrate.phases import PhaseBook
 from rubhpc.kernels.phases import CONTACT_UNSOLVED
-from rubhpc.phases import PhaseBook
 from rubhpc.rig import Torsion, with_keys
 from rubhpc.schema import DIVERGED, DONE
 

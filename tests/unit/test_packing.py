@@ -10,8 +10,8 @@ from scipy.linalg import block_diag
 
 from rubhpc import read_rig
 from rubhpc.fem.assemble import assemble
+from rubhpc.integrate.packing import pack, pairs_of
 from rubhpc.kernels.contact import N_DEGREE
-from rubhpc.packing import pack, pairs_of
 from rubhpc.rig import Bearing, Unbalance
 
 SPIN, STEP = 350.0, 6e-7

@@ -8,6 +8,8 @@ from scipy.linalg import expm
 from trial_rig import trial_rig
 
 from rubhpc.fem.assemble import assemble
+from rubhpc.integrate.phases import PhaseBook, make_phase
+from rubhpc.integrate.reduction import reduce_model
 from rubhpc.kernels.phases import (
     LATERAL_RATE,
     LATERAL_ROW,
@@ -18,8 +20,6 @@ from rubhpc.kernels.phases import (
     floor_log2,
     proved_time,
 )
-from rubhpc.phases import PhaseBook, make_phase
-from rubhpc.reduction import reduce_model
 
 CLEARANCE = np.array([80e-6, 95e-6])
 FRICTION = 0.3

@@ -12,7 +12,7 @@ import synthetic_store
 import xarray as xr
 from click.testing import CliRunner
 
-from rubhpc.cli_figures import COMMANDS
+from rubhpc.commands.figures import COMMANDS
 from rubhpc.errors import InputError
 
 BY_NAME = {command.name: command for command in COMMANDS}
@@ -130,7 +130,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(run, store, name, args, said):
 
 def test_a_figure_needs_no_display_and_no_pyplot(store, tmp_path):
     script = (
-        "import sys; from rubhpc.cli_figures import map as command;"
+        "import sys; from rubhpc.commands.figures import map as command;"
         f"command([{store!r}], standalone_mode=False); assert 'matplotlib.pyplot' not in sys.modules;"
         "assert 'mpi4py' not in sys.modules; assert 'numba' not in sys.modules"
     )
@@ -141,7 +141,7 @@ def test_a_figure_needs_no_display_and_no_pyplot(store, tmp_path):
 
 def test_the_commands_load_nothing_heavy_until_called():
     script = (
-        "import sys, rubhpc.cli_figures;"
+        "import sys, rubhpc.commands.figures;"
         "heavy = {'numpy', 'xarray', 'matplotlib', 'dask', 'numba', 'mpi4py'} & set(sys.modules);"
         "assert not heavy, heavy"
     )

@@ -5,9 +5,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from rubhpc import progress
-from rubhpc.pool import Tally
-from rubhpc.progress import Progress, duration
+from rubhpc.running import progress
+from rubhpc.running.pool import Tally
+from rubhpc.running.progress import Progress
+from rubhpc.storage.duration import duration
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ import pytest
 
 from rubhpc import read_rig
 from rubhpc.fem.assemble import assemble
-from rubhpc.gather import diverged_record
-from rubhpc.record import Record, State
+from rubhpc.integrate.gather import diverged_record
+from rubhpc.integrate.record import Record, State
 from rubhpc.schema import DIVERGED, VARIABLES
 from rubhpc.study import Recording
 

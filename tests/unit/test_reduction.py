@@ -12,9 +12,9 @@ from rubhpc import read_rig
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import steady_response
+from rubhpc.integrate.packing import degrees_of, output_degrees
+from rubhpc.integrate.reduction import directions, reduce_model
 from rubhpc.kernels.contact import AXIAL, LATERAL, TORSION, V, W
-from rubhpc.packing import degrees_of, output_degrees
-from rubhpc.reduction import directions, reduce_model
 from rubhpc.rig import Damping, Torsion
 
 SPIN = 210.0

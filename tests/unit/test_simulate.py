@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rubhpc import InputError, State, march, read_rig, simulate
-from rubhpc.case import run_case
+from rubhpc import InputError, State, read_rig, simulate
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
-from rubhpc.measures import amplitude_spectrum
-from rubhpc.prepare import prepare
-from rubhpc.record import Record
+from rubhpc.integrate import march
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.measures import amplitude_spectrum
+from rubhpc.integrate.prepare import prepare
+from rubhpc.integrate.record import Record
 from rubhpc.rig import PACKAGED, with_keys
 from rubhpc.schema import DIVERGED, DONE, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
 from rubhpc.study import Contact, Integrator, Recording

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from trial_rig import trial_rig
 
-from rubhpc import case, simulate
+from rubhpc import simulate
+from rubhpc.integrate import case
+from rubhpc.integrate.stepped import SteppedMarch
 from rubhpc.rig import with_keys
-from rubhpc.stepped import SteppedMarch
 
 RUB = {"speed": 170.0, "clearance": "80 um", "friction": 0.2, "transient": 0, "revolutions": 2}
 CLOSE = RUB | {"clearance": "40 um"}

@@ -10,14 +10,15 @@ import pytest
 import xarray as xr
 from running import write_study
 
-from rubhpc import __version__, layout
-from rubhpc.disk import disk_errors, write_whole
+from rubhpc import __version__
 from rubhpc.errors import StoreError
-from rubhpc.journal import Entry, metrics_type
-from rubhpc.manifest import Manifest
-from rubhpc.resume import bring_up_to_date, find_gone, open_store, sweep_for
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, VARIABLES
-from rubhpc.store import Store, case_checksum
+from rubhpc.storage import layout
+from rubhpc.storage.disk import disk_errors, write_whole
+from rubhpc.storage.journal import Entry, metrics_type
+from rubhpc.storage.manifest import Manifest
+from rubhpc.storage.resume import bring_up_to_date, find_gone, open_store, sweep_for
+from rubhpc.storage.store import Store, case_checksum
 from rubhpc.study import read_study
 from rubhpc.sweep import Sweep
 
@@ -326,7 +327,7 @@ def test_a_file_written_whole_replaces_the_old_one_or_leaves_it(tmp_path, monkey
     def fail(handle: int) -> None:
         raise OSError(errno.EIO, "Input/output error")
 
-    monkeypatch.setattr("rubhpc.disk.os.fsync", fail)
+    monkeypatch.setattr("rubhpc.storage.disk.os.fsync", fail)
     with pytest.raises(OSError, match="Input/output"):
         write_whole(path, b"new")
     assert path.read_bytes() == b"old"

@@ -8,11 +8,11 @@ import pytest
 from scipy.linalg import eigh
 
 from rubhpc import State, read_rig
-from rubhpc.case import run_case
 from rubhpc.fem.model import Body, Model, StatorModel
-from rubhpc.packing import pack
-from rubhpc.prepare import CentralDifferenceSetup, prepare
-from rubhpc.reduction import reduce_model
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.packing import pack
+from rubhpc.integrate.prepare import CentralDifferenceSetup, prepare
+from rubhpc.integrate.reduction import reduce_model
 from rubhpc.rig import with_keys
 from rubhpc.study import Contact, Integrator, Recording
 

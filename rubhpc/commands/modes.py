@@ -1,0 +1,118 @@
+"""`rubhpc modes`: natural frequencies, damping ratios, kinds and whirl of a rig's modes."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rubhpc.fem.model import Model
+    from rubhpc.fem.modes import Mode
+
+N_TABLE = 12  # modes of the rotor in a table, unless told
+N_SPEED = 61  # of a Campbell diagram: curves are smooth, and each speed is an eigenproblem
+
+
+@click.command()
+@click.argument("rig")
+@click.option(
+    "--speed", "speeds", multiple=True, metavar="SPEED", help='"1800 rpm", or rad/s; may be repeated.'
+)
+@click.option("--count", type=click.IntRange(min=1), help="Show only the lowest COUNT modes of each body.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+@click.option(
+    "--figure", type=click.Path(dir_okay=False), help="Draw a Campbell diagram up to the highest speed."
+)
+def modes(rig: str, speeds: tuple[str, ...], count: int | None, as_json: bool, figure: str | None) -> None:
+    """Natural frequencies, damping ratios, kind and whirl of the modes of RIG.
+
+    RIG is the name of a packaged rig or the path of a rig file. Without --speed the rotor stands still.
+    """
+    from postproc.style import check_figure_path
+    from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.modes import modes as find_modes
+    from rubhpc.input.quantity import parse_quantity
+    from rubhpc.rig import read_rig
+
+    spins = [parse_quantity(_number(speed), "rad/s", "--speed") for speed in speeds] or [0.0]
+    path = check_figure_path(figure) if figure else None
+    model = assemble(read_rig(rig))
+    # stators do not spin: their modes hold at every speed
+    stators = [find_modes(stator.body)[:count] for stator in model.stators]
+    found = [(spin, find_modes(model.rotor, spin)[:count]) for spin in spins]
+    if as_json:
+        standing = [[_plain(mode) for mode in stator] for stator in stators]
+        points = [
+            {"speed": spin, "rotor": [_plain(m) for m in rotor], "stators": standing} for spin, rotor in found
+        ]
+        click.echo(json.dumps({"speeds": points}))
+    else:
+        _print_tables(found, stators, count or N_TABLE)
+    if path:
+        _draw(model, max(abs(spin) for spin in spins), count, path)
+
+
+def _number(text: str) -> str | float:
+    """A plain number of the command line as a number, rad/s; other text as it stands."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _plain(mode: Mode) -> dict[str, Any]:
+    return {
+        "frequency": mode.frequency,
+        "damping_ratio": mode.damping_ratio,
+        "kind": mode.kind,
+        "whirl": mode.whirl,
+    }
+
+
+def _print_tables(found: list[tuple[float, list[Mode]]], stators: list[list[Mode]], count: int) -> None:
+    import math
+
+    tables = [(f"Rotor at {spin * 30 / math.pi:g} rpm ({spin:.6g} rad/s)", rotor) for spin, rotor in found]
+    tables += [(f"Stator {number}", stator) for number, stator in enumerate(stators, start=1)]
+    click.echo("Natural and damped frequency in Hz, damping as a fraction of critical.")
+    for title, listed in tables:
+        click.echo(f"\n{title}\n{'natural':>12} {'damped':>12} {'damping':>9}  {'kind':<10} whirl")
+        for mode in listed[:count]:
+            numbers = f"{mode.frequency:12.4f} {mode.damped_frequency:12.4f} {mode.damping_ratio:9.5f}"
+            click.echo(f"{numbers}  {mode.kind:<10} {mode.whirl}")
+        if len(listed) > count:
+            click.echo(f"({len(listed) - count} more; --count {len(listed)} shows all)")
+
+
+def _draw(model: Model, top_speed: float, count: int | None, path: Path) -> None:
+    """Save the Campbell diagram from standstill to the highest speed asked for.
+
+    Without a speed it ends at six times the first lateral frequency, where the paper's speeds end, and
+    without a count it shows what lies under 2X there.
+    """
+    import math
+
+    import numpy as np
+
+    from postproc.campbell import campbell_diagram
+    from postproc.style import house_style, new_figure, save
+    from rubhpc.fem.campbell import campbell, critical_speeds
+    from rubhpc.fem.response import first_lateral_frequency
+
+    top_speed = top_speed or 6 * first_lateral_frequency(model)
+    curves = campbell(model.rotor, np.linspace(0.0, top_speed, N_SPEED))
+    lowest = curves["frequency"].min("speed")
+    limit = None
+    if count is None:
+        limit = 1.02 * max(top_speed / math.pi, 1.1 * float(lowest[:4].max()))
+        curves = curves.isel(mode=(lowest < limit).values)
+    else:
+        curves = curves.isel(mode=slice(count))
+    with house_style():
+        figure, (ax,) = new_figure()
+        campbell_diagram(curves, ax, critical_speeds(curves), limit)
+        save(figure, path)

@@ -1,0 +1,103 @@
+"""`rubhpc STUDY.toml`, `plan`, `status` and `verify`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rubhpc.errors import RubError, StoreError
+from rubhpc.running.launch import launch
+
+_OUTPUT = click.option(
+    "--output", type=click.Path(path_type=Path), metavar="STORE", help="The store, instead of the study's."
+)
+
+
+@click.command()
+@click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
+@_OUTPUT
+@click.option("--retry-failed", is_flag=True, help="Compute the cases anew that have failed before.")
+@click.option(
+    "--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more than N cases fail."
+)
+@click.option("--time-limit", metavar="TIME", help='Stop after TIME: "2 h", or seconds.')
+@click.option("--quiet", is_flag=True, help="Print nothing but errors.")
+def run(
+    study: Path,
+    output: Path | None,
+    retry_failed: bool,
+    max_failures: int | None,
+    time_limit: str | None,
+    quiet: bool,
+) -> int:
+    """Run STUDY.toml, or what is left of it; under mpirun, on all its ranks."""
+    from rubhpc.running.stopping import Stopping
+
+    with Stopping() as stopping:  # signals are answered from here on, whatever the imports below take
+        from rubhpc.input.quantity import parse_quantity
+        from rubhpc.running.driver import run as run_study
+
+        summary = run_study(
+            study,
+            output=output,
+            retry_failed=retry_failed,
+            max_failures=max_failures,
+            time_limit=None
+            if time_limit is None
+            else parse_quantity(_number(time_limit), "s", "--time-limit"),
+            quiet=quiet,
+            stopping=stopping,
+        )
+    if launch().rank == 0 and not quiet:
+        click.echo(summary.text())
+    if summary.exit_code:
+        raise RubError(summary.complaint())
+    return 0
+
+
+@click.command()
+@click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
+@_OUTPUT
+def plan(study: Path, output: Path | None) -> int:
+    """Tell what STUDY.toml takes and what of it is done; writes nothing.
+
+    Core-hours come from a few short pilot cases, timed on this machine and scaled by the predicted steps.
+    """
+    from rubhpc.running.plan import make_plan
+    from rubhpc.study import read_study
+
+    click.echo(make_plan(read_study(study, output)).text())
+    return 0
+
+
+@click.command()
+@click.argument("store", type=click.Path(path_type=Path))
+def status(store: Path) -> int:
+    """Tell how far STORE is, and what failed in it; works while a run is on."""
+    from rubhpc.storage.status import read_status
+
+    click.echo(read_status(store).text())
+    return 0
+
+
+@click.command()
+@click.argument("store", type=click.Path(path_type=Path))
+def verify(store: Path) -> int:
+    """Check every case of STORE against its checksum; the next run computes what is damaged."""
+    from rubhpc.storage.verify import verify as verify_store
+
+    damage = verify_store(store)
+    if not damage:
+        click.echo(f"{damage.n_checked} cases checked, all sound")
+        return 0
+    for line in damage.lines():
+        click.echo(line)
+    raise StoreError(damage.complaint())
+
+
+def _number(text: str) -> str | float:
+    try:
+        return float(text)
+    except ValueError:
+        return text

@@ -1,0 +1,1 @@
+"""Study and rig files read, checked and resolved."""

@@ -1,0 +1,111 @@
+"""Dotted keys, single values in nested dataclasses: "stator.length" in all, "stator.1.angle" in the first."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from rubhpc.errors import InputError
+from rubhpc.input.fields import FieldError, nearest, parse_field
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+T = TypeVar("T")
+
+_SETTABLE = ("quantity", "count", "flag")  # kinds of fields that one number can set
+
+
+def find_key(owner: object, dotted: str) -> dataclasses.Field[Any]:
+    """Return the field that a dotted key names, or refuse the key, naming the nearest.
+
+    Raises
+    ------
+    InputError
+        When there is no such key: a part is unknown, names a whole table, or counts past the end.
+    """
+    held: Any = owner
+    declared = None
+    for part in dotted.split("."):
+        if isinstance(held, tuple) and held and part.isdigit():
+            held, declared = (held[int(part) - 1] if 0 < int(part) <= len(held) else None), None
+            continue
+        held = held[0] if isinstance(held, tuple) and held else held
+        declared = _fields(type(held)).get(part)
+        held = getattr(held, part) if declared else None
+    if declared is not None and declared.metadata.get("kind") in _SETTABLE:
+        return declared
+    known = list(_keys(owner))
+    inside = [k for k in known if k.startswith(f"{dotted}.")]
+    if inside:
+        raise InputError(f"is a table, not a value; did you mean {inside[0]}?")
+    mend = nearest(dotted, known)
+    raise InputError(f"unknown key; {mend if '?' in mend else 'see the rig file for its keys'}")
+
+
+def replace_keys(owner: T, values: Mapping[str, object]) -> T:
+    """Return a nested dataclass with some dotted keys set, all at once.
+
+    A dataclass that can say one thing in two ways has a method `displaced(keys)` which returns what becomes
+    of the other fields when those in `keys` are set.
+
+    Raises
+    ------
+    InputError
+        When a key is unknown or a value does not fit.
+    """
+    parsed = {}
+    for dotted, value in values.items():
+        try:
+            declared = find_key(owner, dotted)
+        except InputError as error:
+            raise InputError(f"{dotted}: {error}") from None
+        parsed[tuple(dotted.split("."))] = parse_field(declared, value, dotted)
+    result: T = _replaced(owner, parsed, ())
+    return result
+
+
+def _replaced(owner: Any, values: Mapping[tuple[str, ...], Any], path: tuple[str, ...]) -> Any:
+    leaves = {key[0]: value for key, value in values.items() if len(key) == 1}
+    changes = owner.displaced(set(leaves)) if leaves and hasattr(owner, "displaced") else {}
+    changes |= leaves
+    for name in {key[0] for key in values if len(key) > 1}:
+        inner = {key[1:]: value for key, value in values.items() if key[0] == name}
+        replaced = _replaced_items if isinstance(getattr(owner, name), tuple) else _replaced
+        changes[name] = replaced(getattr(owner, name), inner, (*path, name))
+    try:
+        return dataclasses.replace(owner, **changes)
+    except FieldError as error:
+        if not path:
+            raise
+        raise FieldError(".".join((*path, error.key)), error.problem) from None
+
+
+def _replaced_items(items: Any, values: Mapping[tuple[str, ...], Any], path: tuple[str, ...]) -> Any:
+    """Set keys in all items, then those that name one item by its number, from 1."""
+    result = []
+    for i, item in enumerate(items, 1):
+        for_all = {key: value for key, value in values.items() if not key[0].isdigit()}
+        for_this = {key[1:]: value for key, value in values.items() if key[0] == str(i)}
+        both = for_all | for_this
+        result.append(_replaced(item, both, (*path, str(i))) if both else item)
+    return tuple(result)
+
+
+def _keys(owner: Any, prefix: str = "") -> Iterator[str]:
+    """Every dotted key that names a single value, in reading order."""
+    for declared in dataclasses.fields(owner):
+        value = getattr(owner, declared.name)
+        name = f"{prefix}{declared.name}"
+        if dataclasses.is_dataclass(value):
+            yield from _keys(value, f"{name}.")
+        elif isinstance(value, tuple) and value and dataclasses.is_dataclass(value[0]):
+            yield from _keys(value[0], f"{name}.")
+            for i, item in enumerate(value, 1):
+                yield from _keys(item, f"{name}.{i}.")
+        elif declared.metadata.get("kind") in _SETTABLE:
+            yield name
+
+
+def _fields(cls: Any) -> dict[str, dataclasses.Field[Any]]:
+    return {f.name: f for f in dataclasses.fields(cls)} if dataclasses.is_dataclass(cls) else {}

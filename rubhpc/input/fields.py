@@ -1,0 +1,204 @@
+"""Fields of a study and a rig: what each may hold is declared once, and read and checked from there."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+from dataclasses import MISSING, field
+from typing import TYPE_CHECKING, Any
+
+from rubhpc.errors import InputError
+from rubhpc.input.quantity import brief, parse_quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class FieldError(InputError):
+    """A value that its field cannot hold; whoever knows the file adds it."""
+
+    def __init__(self, key: str, problem: str) -> None:
+        super().__init__(f"{key}: {problem}")
+        self.key = key  # dotted, from the dataclass that refuses
+        self.problem = problem
+
+    def within(self, file: str, table: str = "") -> InputError:
+        """Return the error as it reads for a table of a file."""
+        *inner, key = self.key.rsplit(".", 1)
+        return InputError(f"{place(file, '.'.join(p for p in (table, *inner) if p), key)}: {self.problem}")
+
+
+def quantity(
+    unit: str,
+    *,
+    default: Any = MISSING,
+    above: float | None = None,
+    at_least: float | None = None,
+    below: float | None = None,
+) -> Any:
+    """Declare a field that holds a finite number in `unit` (SI, readable by pint), within its bounds."""
+    bounds = {"above": above, "at_least": at_least, "below": below}
+    return field(default=default, metadata={"kind": "quantity", "unit": unit, **bounds})
+
+
+def count(*, default: Any = MISSING, at_least: int = 1, at_most: int | None = None) -> Any:
+    """Declare a field that holds a whole number within its bounds."""
+    return field(default=default, metadata={"kind": "count", "at_least": at_least, "at_most": at_most})
+
+
+def flag(*, default: bool) -> Any:
+    """Declare a field that is true or false."""
+    return field(default=default, metadata={"kind": "flag"})
+
+
+def text(*, default: Any = MISSING) -> Any:
+    """Declare a field that holds one line of text."""
+    return field(default=default, metadata={"kind": "text"})
+
+
+def choice(*, of: tuple[str, ...], default: str) -> Any:
+    """Declare a field that holds one word of a list."""
+    return field(default=default, metadata={"kind": "choice", "of": of})
+
+
+def choices(*, of: tuple[str, ...], default: tuple[str, ...]) -> Any:
+    """Declare a field that holds some words of a list, each at most once."""
+    return field(default=default, metadata={"kind": "choices", "of": of})
+
+
+def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> Any:
+    """Return the value that a field takes from a file or a caller; bounds are left to `check_fields`."""
+    kind = declared.metadata.get("kind")
+    if kind == "quantity":
+        return parse_quantity(value, declared.metadata["unit"], where)
+    if kind == "count":
+        return _parse_count(value, where)
+    if kind == "flag":
+        if isinstance(value, float) and value in (0.0, 1.0):
+            return bool(value)  # an axis holds floats
+        if not isinstance(value, bool):
+            raise InputError(f"{where}: {brief(value)} is neither true nor false; write one, without quotes")
+        return value
+    if kind == "choices":
+        if not isinstance(value, list | tuple):
+            words = _listed(declared.metadata["of"])
+            raise InputError(f"{where}: {brief(value)} is no list; write [{words}] or part of it")
+        return tuple(value)
+    if not isinstance(value, str):
+        raise InputError(f'{where}: {brief(value)} is no text; write it in quotes, {declared.name} = "..."')
+    return value
+
+
+def check_fields(owner: Any) -> None:
+    """Refuse values that the declarations of a dataclass exclude; called where it is made.
+
+    Raises
+    ------
+    FieldError
+        Naming the field, what is wrong and the mend.
+    """
+    for declared in dataclasses.fields(owner):
+        problem = check_value(declared, getattr(owner, declared.name))
+        if problem:
+            raise FieldError(declared.name, problem)
+
+
+def check_value(declared: dataclasses.Field[Any], value: Any) -> str:
+    """Return what is wrong with the value of a field, and the mend; "" when nothing is."""
+    check = _CHECKS.get(declared.metadata.get("kind", ""))
+    if check is None or (value is None and declared.default is None):
+        return ""
+    return check(value, declared.metadata)
+
+
+def place(file: str, table: str = "", key: str = "") -> str:
+    """Return "file: [table] key", the head of every message about an input, on one line."""
+    name = " ".join(p for p in (f"[{table[:80]}]" if table else "", key[:80]) if p)
+    head = ": ".join(p for p in (file, name) if p)
+    return "".join(c if c.isprintable() else " " for c in head)
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Return the mend for a word that nobody knows: the one most like it, or the whole list."""
+    known = list(known)
+    close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    if not close:  # letters aside, people leave a word out
+        close = [k for k in known if word and (word.lower() in k.lower() or k.lower() in word.lower())][:1]
+    return f"did you mean {close[0]}?" if close else f"there is {', '.join(known)}"
+
+
+def _parse_count(value: object, where: str) -> int:
+    if isinstance(value, float) and value.is_integer():
+        return int(value)  # an axis holds floats
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise InputError(
+            f"{where}: {brief(value)} is not a whole number; write one such as 12, without quotes"
+        )
+    return value
+
+
+def _check_quantity(value: object, bounds: Any) -> str:
+    unit = f" {bounds['unit']}" if bounds["unit"] else ""
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return f"{brief(value)} is not a number; give one in SI units"
+    if not math.isfinite(number):
+        return f"{brief(value)} is not finite; give a finite number"
+    for word, holds in (("above", number.__gt__), ("at_least", number.__ge__), ("below", number.__lt__)):
+        limit = bounds[word]
+        if limit is not None and not holds(limit):
+            return f"{number:g}{unit} is out of range; it must be {word.replace('_', ' ')} {limit:g}"
+    return ""
+
+
+def _check_count(value: object, bounds: Any) -> str:
+    if isinstance(value, bool) or not isinstance(value, int):
+        return f"{brief(value)} is not a whole number; give one such as 12"
+    if value < bounds["at_least"]:
+        return f"{brief(value)} is out of range; it must be at least {bounds['at_least']}"
+    if bounds["at_most"] is not None and value > bounds["at_most"]:
+        return f"{brief(value)} is out of range; it must be at most {bounds['at_most']}"
+    return ""
+
+
+def _check_flag(value: object, _: Any) -> str:
+    return "" if isinstance(value, bool) else f"{brief(value)} is neither true nor false"
+
+
+def _check_text(value: object, _: Any) -> str:
+    if not isinstance(value, str):
+        return f"{brief(value)} is no text; give one in quotes"
+    if not value.strip() or not value.isprintable():
+        return f"{brief(value)} is not a line of text; give one without control characters"
+    return ""
+
+
+def _check_choice(value: object, bounds: Any) -> str:
+    if value in bounds["of"]:
+        return ""
+    return f"{brief(value)} is not available; there is {_listed(bounds['of'])}"
+
+
+def _check_choices(value: Any, bounds: Any) -> str:
+    for word in value:
+        if problem := _check_choice(word, bounds):
+            return problem
+        if value.count(word) > 1:
+            return f"{brief(word)} stands twice; leave one out"
+    return ""
+
+
+def _listed(words: Iterable[str]) -> str:
+    return ", ".join(f'"{w}"' for w in words)
+
+
+_CHECKS = {
+    "quantity": _check_quantity,
+    "count": _check_count,
+    "flag": _check_flag,
+    "text": _check_text,
+    "choice": _check_choice,
+    "choices": _check_choices,
+}

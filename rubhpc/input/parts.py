@@ -1,0 +1,245 @@
+"""The parts of a rig, as frozen dataclasses in SI units: what each is told, and what it will not be.
+
+The unit and the bounds of every field stand with it; `rubhpc.input.reading` reads them from there. A part
+that can say one thing in two ways has a method `displaced`: what becomes of the other fields when some are set.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from rubhpc.input.fields import FieldError, check_fields, count, flag, quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Damping:
+    """Rayleigh damping `alpha M + beta K`, by coefficients or by ratios at given frequencies."""
+
+    alpha: float = quantity("1/s", default=0.0, at_least=0)
+    beta: float = quantity("s", default=0.0, at_least=0)
+    # (frequency, Hz; fraction of critical)
+    ratios: tuple[tuple[float, float], ...] = field(
+        default=(), metadata={"kind": "pairs", "units": ("Hz", "")}
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.ratios and (self.alpha or self.beta):
+            raise FieldError("ratios", "stands beside alpha or beta; give either ratios or alpha and beta")
+        frequencies = [f for f, _ in self.ratios]
+        for frequency, ratio in self.ratios:
+            if not 0 < frequency < math.inf:
+                raise FieldError("ratios", f"frequency {frequency:g} Hz is out of range; it must be above 0")
+            if not 0 <= ratio < 1:
+                problem = f"{ratio:g} at {frequency:g} Hz is out of range; it must be from 0 to below 1"
+                raise FieldError("ratios", problem)
+            if frequencies.count(frequency) > 1:
+                raise FieldError("ratios", f"{frequency:g} Hz stands twice; leave one out")
+
+
+UNDAMPED = Damping()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShaftSection:
+    """A cylindrical length of shaft, divided into equal Timoshenko elements."""
+
+    length: float = quantity("m", above=0)
+    outer_diameter: float = quantity("m", above=0)
+    inner_diameter: float = quantity("m", default=0.0, at_least=0)
+    elements: int = count(at_most=1000)
+    youngs_modulus: float = quantity("Pa", above=0)
+    shear_modulus: float = quantity("Pa", above=0)
+    density: float = quantity("kg/m^3", above=0)
+    shear: bool = flag(default=True)  # False: Rayleigh beam
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.inner_diameter >= self.outer_diameter:
+            limit = f"{self.outer_diameter:g} m"
+            raise FieldError(
+                "inner_diameter", f"{self.inner_diameter:g} m must be below outer_diameter, {limit}"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disc:
+    """A rigid disc: either diameter, thickness and density, or mass and inertias.
+
+    Beside a mass, a diameter counts as that of the rim which a stator may touch.
+    """
+
+    node: int = count()
+    diameter: float | None = quantity("m", default=None, above=0)
+    thickness: float | None = quantity("m", default=None, above=0)
+    density: float | None = quantity("kg/m^3", default=None, above=0)
+    mass: float | None = quantity("kg", default=None, at_least=0)
+    diametral_inertia: float | None = quantity("kg m^2", default=None, at_least=0)
+    polar_inertia: float | None = quantity("kg m^2", default=None, at_least=0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        body = ("thickness", "density")
+        lumped = ("mass", "diametral_inertia", "polar_inertia")
+        if any(getattr(self, k) is not None for k in lumped):
+            for key in body:
+                if getattr(self, key) is not None:
+                    raise FieldError(
+                        key, f"stands beside {', '.join(lumped)}; give either these or the dimensions"
+                    )
+            wanted = lumped
+        else:
+            wanted = ("diameter", *body)
+        for key in wanted:
+            if getattr(self, key) is None:
+                ways = "diameter, thickness and density, or mass, diametral_inertia and polar_inertia"
+                raise FieldError(key, f"missing; a disc has either {ways}")
+
+    @property
+    def inertia(self) -> tuple[float, float, float]:
+        """Mass (kg), diametral and polar moments of inertia (kg m^2); solid, over the shaft."""
+        if self.mass is not None and self.diametral_inertia is not None and self.polar_inertia is not None:
+            return self.mass, self.diametral_inertia, self.polar_inertia
+        assert self.diameter is not None
+        assert self.thickness is not None
+        assert self.density is not None
+        radius = self.diameter / 2
+        mass = self.density * math.pi * radius**2 * self.thickness
+        return mass, mass * (3 * radius**2 + self.thickness**2) / 12, mass * radius**2 / 2
+
+    def displaced(self, keys: set[str]) -> dict[str, Any]:
+        """Return what setting `keys` does to the other way of giving the same."""
+        if self.mass is None and keys & {"mass", "diametral_inertia", "polar_inertia"}:
+            lumped = dict(zip(("mass", "diametral_inertia", "polar_inertia"), self.inertia, strict=True))
+            return {"thickness": None, "density": None} | lumped
+        return {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bearing:
+    """A linear support: `stiffness` and `damping` in both directions, or full 2x2 matrices."""
+
+    node: int = count()
+    stiffness: float | None = quantity("N/m", default=None, at_least=0)
+    kyy: float | None = quantity("N/m", default=None, at_least=0)
+    kzz: float | None = quantity("N/m", default=None, at_least=0)
+    kyz: float = quantity("N/m", default=0.0)
+    kzy: float = quantity("N/m", default=0.0)
+    damping: float | None = quantity("N s/m", default=None, at_least=0)
+    cyy: float | None = quantity("N s/m", default=None, at_least=0)
+    czz: float | None = quantity("N s/m", default=None, at_least=0)
+    cyz: float = quantity("N s/m", default=0.0)
+    czy: float = quantity("N s/m", default=0.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        for one, letter in (("stiffness", "k"), ("damping", "c")):
+            for key in (f"{letter}yy", f"{letter}zz", f"{letter}yz", f"{letter}zy"):
+                if getattr(self, one) is not None and getattr(self, key) not in (None, 0.0):
+                    ways = f"{one} or {letter}yy, {letter}zz, {letter}yz, {letter}zy"
+                    raise FieldError(key, f"stands beside {one}; give either {ways}")
+        if self.stiffness is None and (self.kyy is None or self.kzz is None):
+            key = "kyy" if self.kyy is None else "kzz"
+            raise FieldError(key, "missing; a bearing has either stiffness, or kyy and kzz")
+
+    @property
+    def stiffness_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """((kyy, kyz), (kzy, kzz)), N/m."""
+        kyy, kzz = (v if v is not None else self.stiffness or 0.0 for v in (self.kyy, self.kzz))
+        return (kyy, self.kyz), (self.kzy, kzz)
+
+    @property
+    def damping_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """((cyy, cyz), (czy, czz)), N s/m."""
+        cyy, czz = (v if v is not None else self.damping or 0.0 for v in (self.cyy, self.czz))
+        return (cyy, self.cyz), (self.czy, czz)
+
+    def displaced(self, keys: set[str]) -> dict[str, Any]:
+        """Return what setting `keys` does to the other way of giving the same."""
+        changes: dict[str, Any] = {}
+        for one, letter in (("stiffness", "k"), ("damping", "c")):
+            common = getattr(self, one)
+            straight, crossed = (f"{letter}yy", f"{letter}zz"), (f"{letter}yz", f"{letter}zy")
+            if one in keys and not keys & {*straight, *crossed}:
+                changes |= dict.fromkeys(straight) | dict.fromkeys(crossed, 0.0)
+            elif common is not None and keys & {*straight, *crossed}:
+                changes |= dict.fromkeys(straight, common) | {one: None}
+        return changes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unbalance:
+    """A mass at a radius; `phase` is its angle from +y towards +z at time zero."""
+
+    node: int = count()
+    mass: float = quantity("kg", at_least=0)
+    radius: float = quantity("m", at_least=0)
+    phase: float = quantity("rad", default=0.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Torsion:
+    """Torsional boundary: one node held by the drive, or a spring (and damper) to ground, or neither."""
+
+    fixed_node: int | None = count(default=None)
+    node: int = count(default=1)  # of the spring
+    stiffness: float | None = quantity("N m/rad", default=None, above=0)
+    damping: float = quantity("N m s/rad", default=0.0, at_least=0)
+    free: bool = flag(default=False)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        ways = "give one of fixed_node, stiffness, free = true"
+        given = [key for key in ("fixed_node", "stiffness", "free") if getattr(self, key)]
+        if len(given) > 1:
+            raise FieldError(given[1], f"stands beside {given[0]}; {ways}")
+        if not given:
+            raise FieldError("fixed_node", f"missing; {ways}")
+        if self.damping and self.fixed_node is not None:
+            raise FieldError(
+                "damping", "stands beside fixed_node, which cannot turn; give a stiffness instead"
+            )
+
+    def displaced(self, keys: set[str]) -> dict[str, Any]:
+        """Return what setting `keys` does to the other way of giving the same."""
+        if keys & {"stiffness"}:
+            return {"fixed_node": None, "free": False, "node": self.fixed_node or self.node}
+        if keys & {"fixed_node", "free"}:
+            return {"fixed_node": None, "stiffness": None, "damping": 0.0, "free": False}
+        return {}
+
+
+HELD_BY_DRIVE = Torsion(fixed_node=1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stator:
+    """A cantilever that stands radially over the rotor; its free end faces the rim."""
+
+    node: int = count()
+    angle: float = quantity("rad", default=0.0)
+    length: float = quantity("m", above=0)
+    width: float = quantity("m", above=0)  # along the shaft
+    height: float = quantity("m", above=0)  # along the lateral (tangential) motion
+    elements: int = count(default=6, at_most=1000)
+    youngs_modulus: float = quantity("Pa", above=0)
+    poissons_ratio: float = quantity("", default=0.3, above=-1, below=0.5)
+    density: float = quantity("kg/m^3", above=0)
+    lateral: bool = flag(default=True)
+    radius: float | None = quantity("m", default=None, above=0)  # of contact; None: the disc's
+    clearance_offset: float = quantity("m", default=0.0)
+    damping: Damping = UNDAMPED
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def euler_load(self) -> float:
+        """Buckling load of the cantilever, pi^2 E I / (4 L^2), N."""
+        least = self.height * self.width * min(self.height, self.width) ** 2 / 12
+        return math.pi**2 * self.youngs_modulus * least / (4 * self.length**2)

@@ -1,0 +1,188 @@
+"""TOML files to frozen dataclasses; the unit and the bounds of every key stand with its field.
+
+A file is data: nothing in it is evaluated, imported or run.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import tomllib
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
+
+from rubhpc.errors import InputError
+from rubhpc.input.fields import FieldError, check_value, nearest, parse_field, place
+from rubhpc.input.quantity import brief, example, parse_quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+__all__ = ["build", "parse_quantity", "plain", "read_toml", "refuse_unknown"]
+
+T = TypeVar("T")
+
+
+def read_toml(path: Path, where: str = "") -> dict[str, Any]:
+    """Return the tables of a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+    where : str
+        What asked for the file, for the error when there is none: "study.toml: rig".
+
+    Raises
+    ------
+    InputError
+        When the file is missing, unreadable, not UTF-8 or not TOML; with line and column where there are any.
+    """
+    named = place(": ".join(p for p in (where, str(path)) if p))
+    try:
+        if not path.exists():
+            raise InputError(f"{named}: no such file; check the path")
+        if not path.is_file():
+            raise InputError(f"{named}: not a file; give the path of a TOML file")
+        content = path.read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "not a path"
+        raise InputError(f"{named}: cannot be read ({reason}); check the path") from None
+    return _parse_toml(content, str(path))
+
+
+def build(cls: type[T], table: object, file: str, name: str = "") -> T:
+    """Return a dataclass made from a table of a file.
+
+    Parameters
+    ----------
+    cls : type
+        Dataclass with fields declared by `rubhpc.input.fields`, other dataclasses, or tuples of them.
+    table : dict
+        As TOML gives it.
+    file, name : str
+        What errors name: the file, and the dotted name of the table in it.
+
+    Raises
+    ------
+    InputError
+        When a key is unknown or missing, or a value does not fit.
+    """
+    if not isinstance(table, dict):
+        raise InputError(
+            f"{place(file, name)}: {brief(table)} is no table; write [{name}] and its keys below"
+        )
+    fields = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    for key, declared in fields.items():  # first of all: a way that is not there has keys that are unknown
+        if declared.metadata.get("kind") == "choice" and (
+            problem := check_value(declared, table.get(key, declared.default))
+        ):
+            raise FieldError(key, problem).within(file, name)
+    refuse_unknown(table, fields, file, name)
+    values, hints = {}, get_type_hints(cls)
+    for key, declared in fields.items():
+        if key in table:
+            values[key] = _parse(declared, hints[key], table[key], file, name)
+        elif declared.default is dataclasses.MISSING:
+            raise InputError(f"{place(file, name, key)}: missing; add {_mend(declared, hints[key], name)}")
+    try:
+        return cls(**values)
+    except FieldError as error:
+        raise error.within(file, name) from None
+
+
+def refuse_unknown(table: Mapping[str, object], known: Mapping[str, object], file: str, name: str) -> None:
+    """Refuse keys that are not known, naming the nearest."""
+    for key in table:
+        if key not in known:
+            raise InputError(f"{place(file, name, key)}: unknown key; {nearest(key, known)}")
+
+
+def plain(value: Any) -> Any:
+    """Return a dataclass as dicts, lists, numbers and text, from which `build` makes it again."""
+    if not dataclasses.is_dataclass(value):
+        return [plain(v) for v in value] if isinstance(value, tuple) else value
+    result: dict[str, Any] = {}
+    for declared in dataclasses.fields(value):
+        held, kind = getattr(value, declared.name), declared.metadata.get("kind")
+        if kind == "pairs":
+            result[declared.name] = {repr(float(key)): float(number) for key, number in held}
+        elif held is not None:
+            result[declared.name] = float(held) if kind == "quantity" else plain(held)
+    return result
+
+
+def _parse(declared: dataclasses.Field[Any], hint: Any, value: object, file: str, name: str) -> Any:
+    where = place(file, name, declared.name)
+    kind = declared.metadata.get("kind")
+    inner = f"{name}.{declared.name}" if name else declared.name
+    if kind == "pairs":
+        return _parse_pairs(value, declared.metadata["units"], file, inner)
+    if kind:
+        return parse_field(declared, value, where)
+    if isinstance(hint, type):
+        return build(hint, value, file, inner)
+    if not isinstance(value, list):
+        raise InputError(f"{where}: not a list of tables; write [[{inner}]], in two brackets")
+    item = get_args(hint)[0]
+    return tuple(build(item, v, file, f"{inner}.{i}") for i, v in enumerate(value, 1))
+
+
+def _parse_pairs(table: object, units: tuple[str, str], file: str, name: str) -> Any:
+    """Pairs from a table of numbers; to TOML a bare `31.56` is the table 31 with the key 56."""
+    key_unit, unit = units
+    if not isinstance(table, dict):
+        raise InputError(f"{place(file, name)}: {brief(table)} is no table; write {{ 31.56 = 0.09 }}")
+    flat: dict[str, object] = {}
+    for key, value in table.items():
+        inner = value.items() if isinstance(value, dict) else [(None, value)]
+        flat.update({key if tail is None else f"{key}.{tail}": v for tail, v in inner})
+    return tuple(
+        (parse_quantity(_number(key), key_unit, where), parse_quantity(value, unit, where))
+        for key, value in flat.items()
+        for where in [place(file, name, key)]
+    )
+
+
+def _number(text: str) -> object:
+    """Return the number that a key spells, or the key itself where it carries a unit."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _mend(declared: dataclasses.Field[Any], hint: Any, name: str) -> str:
+    kind = declared.metadata.get("kind")
+    if kind == "quantity":
+        return f"{declared.name} = {example(declared.metadata['unit'])}"
+    if kind == "count":
+        return f"{declared.name} = 1"
+    if kind:
+        return f'{declared.name} = "..."'
+    inner = f"{name}.{declared.name}" if name else declared.name
+    return f"[{inner}]" if dataclasses.is_dataclass(hint) else f"[[{inner}]]"
+
+
+def _parse_toml(content: bytes, file: str) -> dict[str, Any]:
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InputError(f"{file}: line {line}: not UTF-8 text; save the file as UTF-8") from None
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        message = str(error)
+        at = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", message)
+        lines = text.splitlines() or [""]
+        end = (str(len(lines)), str(len(lines[-1]) + 1))
+        where = (at[1], at[2]) if at and at[1] else end
+        said = (message[: at.start()] if at else message)[:120]
+        said = "".join(c if c.isprintable() else " " for c in said)
+        raise InputError(
+            f"{file}: line {where[0]}, column {where[1]}: not TOML: {said}; mend that line"
+        ) from None
+    except RecursionError:
+        raise InputError(f"{file}: tables nested too deeply; write them flat") from None
+    except ValueError:
+        raise InputError(f"{file}: holds a number that is too long; shorten it") from None

@@ -1,0 +1,1 @@
+"""One case: a rig at a speed integrated and measured."""

@@ -1,0 +1,142 @@
+"""Integrates one case: kernel calls, then measures; no files, no MPI."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from rubhpc.integrate.central import CentralDifferenceMarch
+from rubhpc.integrate.gather import (
+    diverged_record,
+    empty_samples,
+    empty_tally,
+    named_signals,
+    scalars_of,
+)
+from rubhpc.integrate.measures import amplitude_spectrum
+from rubhpc.integrate.modal import EndlessEvents, ModalMarch
+from rubhpc.integrate.prepare import CentralDifferenceSetup, ModalSetup
+from rubhpc.integrate.record import Record, State
+from rubhpc.integrate.stepped import SteppedMarch
+from rubhpc.kernels.observe import IMPACT_STEPS
+from rubhpc.schema import DONE, SECTION_NAMES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rubhpc.integrate.march import March
+    from rubhpc.integrate.prepare import Setup
+    from rubhpc.study import Recording
+
+
+def run_case(
+    setup: Setup,
+    *,
+    clearance: float,
+    friction: float,
+    recording: Recording,
+    initial: State | None = None,
+    check: Callable[[], None] | None = None,
+) -> Record:
+    """Integrate one case and measure it.
+
+    Parameters
+    ----------
+    clearance : float, m
+        Radial clearance at rest; a stator's `clearance_offset` is added.
+    friction : float
+        Coefficient of friction.
+    initial : State, optional
+        Where to start, with the unbalance at its phase; default at rest.
+    check : callable, optional
+        Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
+    """
+    began = time.perf_counter()
+    initial = initial or State.at_rest(setup.model)
+    try:
+        march = _march(setup, clearance, friction, initial, check)
+        record = _integrate(march, setup, clearance, recording)
+    except EndlessEvents:
+        # Contacts that chatter, or too many sets of them: short steps need no events.
+        assert isinstance(setup, ModalSetup)
+        march = SteppedMarch(setup, clearance, friction, initial, check)
+        record = _integrate(march, setup, clearance, recording)
+    record.scalars["steps"] = march.n_step
+    record.scalars["wall_time"] = time.perf_counter() - began
+    return record
+
+
+def compile_kernels(
+    setup: Setup,
+    *,
+    clearance: float,
+    friction: float,
+    recording: Recording,
+    check: Callable[[], None] | None = None,
+) -> None:
+    """Compile all that cases of this set-up may call, on two revolutions, those of endless events too."""
+    short = replace(recording, transient=1, revolutions=1)
+    run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)
+    if isinstance(setup, ModalSetup):
+        march = SteppedMarch(setup, clearance, friction, State.at_rest(setup.model), check)
+        _integrate(march, setup, clearance, short)
+
+
+def _integrate(march: March, setup: Setup, clearance: float, recording: Recording) -> Record:
+    """March through transient and record, then measure."""
+    per_revolution = setup.samples_per_revolution
+    n_stator = len(setup.model.stators)
+    n_sample = recording.revolutions * per_revolution
+    samples, tally = empty_samples(n_stator, n_sample), empty_tally(n_stator)
+    settings = {"spin_speed": setup.spin, "clearance": clearance}
+
+    reason = march.advance(-recording.transient * per_revolution, 0, samples, tally, is_recorded=False)
+    if reason is None:
+        energy_before = march.energy()
+        tally.is_touching[:] = march.touching()  # a contact under way did not begin in the record
+        tally.age[tally.is_touching] = IMPACT_STEPS
+        reason = march.advance(0, n_sample, samples, tally, is_recorded=True)
+    if reason is not None:
+        revolution = math.floor(recording.transient + march.sample / per_revolution) + 1
+        record = diverged_record(
+            f"{reason} in revolution {revolution}", n_stator, recording, settings, march.final()
+        )
+    else:
+        signals = named_signals(samples)
+        record = Record(
+            status=DONE,
+            samples_per_revolution=per_revolution,
+            signals=signals,
+            spectra={f"spectrum_{name}": amplitude_spectrum(signal) for name, signal in signals.items()}
+            if "spectrum" in recording.keep
+            else {},
+            sections={f"section_{name}": signals[name][::per_revolution].copy() for name in SECTION_NAMES}
+            if "section" in recording.keep
+            else {},
+            scalars=scalars_of(
+                tally,
+                signals,
+                energy_change=march.energy() - energy_before,
+                stators=setup.model.stators,
+                spin=setup.spin,
+                samples_per_revolution=per_revolution,
+            ),
+            settings=settings,
+            final=march.final(),
+        )
+        if "waveform" not in recording.keep:
+            record.signals.clear()
+    return record
+
+
+def _march(
+    setup: Setup, clearance: float, friction: float, initial: State, check: Callable[[], None] | None
+) -> March:
+    """Start the case with the integrator that its set-up is for."""
+    if isinstance(setup, CentralDifferenceSetup):
+        return CentralDifferenceMarch(setup, clearance, friction, initial, check)
+    if setup.is_updated:
+        return SteppedMarch(setup, clearance, friction, initial, check)
+    return ModalMarch(setup, clearance, friction, initial, check)

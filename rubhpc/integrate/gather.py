@@ -1,0 +1,150 @@
+"""From the kernels' sums and samples to named signals and scalars of the schema."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.integrate.measures import period, regime
+from rubhpc.integrate.record import Record, State
+from rubhpc.kernels.observe import (
+    DAMPING_LOSS,
+    DRIVE_WORK,
+    FRICTION_LOSS,
+    HORIZONTAL,
+    IMPACT_LOSS,
+    TWIST,
+    TWIST_ACCELERATION,
+    UNBALANCE_WORK,
+    VERTICAL,
+    Samples,
+    Tally,
+)
+from rubhpc.schema import DIVERGED, VARIABLES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import StatorModel
+    from rubhpc.study import Recording
+
+    Floats = NDArray[np.float64]
+
+
+def empty_samples(n_stator: int, n_sample: int) -> Samples:
+    """Room for the samples of a record."""
+    return Samples(
+        rotor=np.zeros((4, n_sample)),
+        axial=np.zeros((n_stator, n_sample)),
+        lateral=np.zeros((n_stator, n_sample)),
+        force=np.zeros((n_stator, n_sample)),
+    )
+
+
+def empty_tally(n_stator: int) -> Tally:
+    """Sums at zero, extrema at their neutral ends."""
+    return Tally(
+        highest=np.full(3, -np.inf),
+        lowest=np.full(3, np.inf),
+        is_touching=np.zeros(n_stator, dtype=np.bool_),
+        age=np.zeros(n_stator, dtype=np.int64),
+        n_contact=np.zeros(n_stator, dtype=np.int64),
+        contact_time=np.zeros(n_stator),
+        impulse=np.zeros(n_stator),
+        friction_work=np.zeros(n_stator),
+        least_slip=np.full(n_stator, np.inf),
+        peak_force=np.zeros(n_stator),
+        peak_lateral=np.zeros(n_stator),
+        energy=np.zeros(5),
+    )
+
+
+def named_signals(samples: Samples) -> dict[str, Floats]:
+    """Samples by their names in the schema, (n_sample,) or (n_stator, n_sample)."""
+    return {
+        "vertical": samples.rotor[VERTICAL],
+        "horizontal": samples.rotor[HORIZONTAL],
+        "torsion": samples.rotor[TWIST],
+        "torsion_acceleration": samples.rotor[TWIST_ACCELERATION],
+        "stator_axial": samples.axial,
+        "stator_lateral": samples.lateral,
+        "contact_force": samples.force,
+    }
+
+
+def scalars_of(
+    tally: Tally,
+    signals: dict[str, Floats],
+    *,
+    energy_change: float,
+    stators: tuple[StatorModel, ...],
+    spin: float,
+    samples_per_revolution: int,
+) -> dict[str, Any]:
+    """Scalars of a finished case; those of a contact that never happened are zero, or NaN where undefined.
+
+    Parameters
+    ----------
+    energy_change : float, J
+        Mechanical energy at the end of the record less that at its beginning.
+    spin : float, rad/s
+    """
+    n_sample = signals["vertical"].size
+    n_revolution = n_sample // samples_per_revolution
+    duration = 2.0 * np.pi * n_revolution / abs(spin)
+    has_touched = tally.contact_time > 0
+    n_contact = np.maximum(tally.n_contact, 1)  # one that lasts throughout never begins in the record
+    orbit_period = period(signals["vertical"], signals["horizontal"], samples_per_revolution)
+    given = tally.energy[UNBALANCE_WORK] + tally.energy[DRIVE_WORK]
+    lost = tally.energy[[DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS]]
+    exchanged = max(abs(tally.energy).sum(), np.finfo(float).tiny)
+    return {
+        "period": orbit_period,
+        "regime": regime(orbit_period, bool(has_touched.any())),
+        "contact_fraction": tally.contact_time / duration,
+        "contacts_per_revolution": tally.n_contact / n_revolution,
+        "contact_duration": np.where(has_touched, tally.contact_time / n_contact, 0.0),
+        "peak_contact_force": tally.peak_force,
+        "contact_impulse": tally.impulse / n_revolution,
+        "friction_work": tally.friction_work / n_revolution,
+        "minimum_slip_speed": np.where(has_touched, tally.least_slip, np.nan),
+        "force_over_euler_load": tally.peak_force / [stator.euler_load for stator in stators],
+        "tip_deflection_ratio": tally.peak_lateral / [stator.length for stator in stators],
+        "peak_torsion": float(max(tally.highest[TWIST], -tally.lowest[TWIST])),
+        "peak_to_peak_vertical": float(tally.highest[VERTICAL] - tally.lowest[VERTICAL]),
+        "peak_to_peak_horizontal": float(tally.highest[HORIZONTAL] - tally.lowest[HORIZONTAL]),
+        "energy_residual": float(abs(given - lost.sum() - energy_change) / (0.5 * exchanged)),
+    }
+
+
+def diverged_record(
+    reason: str, n_stator: int, recording: Recording, settings: dict[str, float], final: State
+) -> Record:
+    """Record of a case that ran away: not-a-number wherever a result would stand."""
+    per_revolution = recording.samples_per_revolution
+    n_sample = recording.revolutions * per_revolution
+    length = {
+        "stator": n_stator,
+        "sample": n_sample,
+        "order": n_sample // 2 + 1,
+        "section": recording.revolutions,
+    }
+    groups: dict[str, dict[str, Any]] = {"waveform": {}, "spectrum": {}, "section": {}, "scalar": {}}
+    for name, variable in VARIABLES.items():
+        if variable.role == "scalar" and not variable.dims:
+            groups["scalar"][name] = -1 if variable.dtype.startswith("int") else np.nan
+        elif variable.role == "scalar" or variable.role in recording.keep:
+            groups[variable.role][name] = np.full([length[dim] for dim in variable.dims], np.nan)
+    groups["scalar"]["regime"] = -1
+    return Record(
+        status=DIVERGED,
+        reason=reason,
+        samples_per_revolution=per_revolution,
+        signals=groups["waveform"],
+        spectra=groups["spectrum"],
+        sections=groups["section"],
+        scalars=groups["scalar"],
+        settings=settings,
+        final=final,
+    )

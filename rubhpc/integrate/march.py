@@ -1,0 +1,64 @@
+"""What every integrator offers a case: to advance it sample by sample, and to tell its state and energy."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.record import State
+    from rubhpc.kernels.observe import Samples, Tally
+
+LONGEST_CALL = 0.15  # s; signals are answered between kernel calls
+STEPS_A_SECOND = 5e5  # half of what every integrator does
+
+
+class March(ABC):
+    """A case under way; sample 0 is the first recorded one, the transient lies before it."""
+
+    def __init__(self, check: Callable[[], None] | None, first_stride: int) -> None:
+        """Take what is called between kernel calls, and the samples of the first call."""
+        self.n_step = 0
+        self.sample = 0
+        self._check = check
+        self._stride = max(1, first_stride)
+
+    def advance(
+        self, first: int, last: int, samples: Samples, tally: Tally, *, is_recorded: bool
+    ) -> str | None:
+        """Go on from sample `first` to `last`; returns None, or why the case cannot go on."""
+        self.sample = first
+        while self.sample < last:
+            if self._check is not None:
+                self._check()
+            before = self.n_step
+            stop = min(self.sample + self._stride, last)
+            reason = self._call(stop, samples, tally, is_recorded=is_recorded)
+            if reason is not None:
+                return reason
+            self.sample = stop
+            # By steps, not by the clock: where a call ends decides the last bits of the modal results.
+            elapsed = max(self.n_step - before, 1) / STEPS_A_SECOND
+            self._stride = max(1, int(self._stride * min(2.0, 0.5 * LONGEST_CALL / elapsed)))
+        return None
+
+    @abstractmethod
+    def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
+        """Advance from `self.sample` to sample `stop` in one kernel call."""
+
+    @abstractmethod
+    def touching(self) -> NDArray[np.bool_]:
+        """Which pairs are in contact, (q,)."""
+
+    @abstractmethod
+    def energy(self) -> float:
+        """Mechanical energy, J."""
+
+    @abstractmethod
+    def final(self) -> State:
+        """State at the sample reached."""

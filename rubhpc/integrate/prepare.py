@@ -1,0 +1,108 @@
+"""What the cases of one rig and speed share: assembled, checked and factorised once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeAlias
+
+from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.response import step_limit
+from rubhpc.integrate.packing import Packed, pack
+from rubhpc.integrate.phases import PhaseBook
+from rubhpc.integrate.reduction import ReducedModel, reduce_model
+
+if TYPE_CHECKING:
+    from rubhpc.fem.model import Model
+    from rubhpc.rig import Rig
+    from rubhpc.study import Contact, Integrator
+
+DIVERGED_SHARE = 0.1  # of the shaft's length: lateral motion that no rig survives
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CentralDifferenceSetup:
+    """All that the cases of one rig and speed share."""
+
+    model: Model
+    packed: Packed
+    spin: float  # rad/s
+    step: float  # s
+    steps_per_sample: int
+    samples_per_revolution: int
+    is_updated: bool  # normal
+    displacement_limit: float  # m
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModalSetup:
+    """All that the cases of one rig and speed share; phases are made as frictions and contacts come."""
+
+    model: Model
+    reduced: ReducedModel
+    spin: float  # rad/s
+    step: float  # s, up to which steps are taken without a bound; with the updated normal, step in contact
+    samples_per_revolution: int
+    is_updated: bool  # normal
+    displacement_limit: float  # m
+    _books: dict[float, PhaseBook] = field(default_factory=dict)
+
+    def book(self, friction: float) -> PhaseBook:
+        """Phases of a friction, shared by its cases."""
+        if friction not in self._books:
+            self._books[friction] = PhaseBook(self.reduced, self.model, friction)
+        return self._books[friction]
+
+
+Setup: TypeAlias = CentralDifferenceSetup | ModalSetup
+
+
+def prepare(
+    rig: Rig, speed: float, *, contact: Contact, integrator: Integrator, samples_per_revolution: int
+) -> Setup:
+    """Assemble, check the step and factorise: once per rig and speed.
+
+    The step is shortened so that a whole number of steps fills a sample's interval.
+
+    Raises
+    ------
+    InputError
+        If the step asked for is above the stability limit of the assembled matrices, the rig has no stator,
+        or the speed is zero.
+    """
+    if not rig.stator:
+        raise InputError(f"rig {rig.name}: [[stator]]: none; a rub case needs at least one")
+    if speed == 0.0 or not math.isfinite(speed):
+        raise InputError(f"speed: {speed} rad/s; sampling is locked to the shaft, so it has to turn")
+    model = assemble(rig)
+    displacement_limit = DIVERGED_SHARE * sum(section.length for section in rig.rotor.shaft)
+    if integrator.method == "modal":
+        return ModalSetup(
+            model=model,
+            reduced=reduce_model(model, speed, integrator.accuracy),
+            spin=speed,
+            step=integrator.contact_step(contact),
+            samples_per_revolution=samples_per_revolution,
+            is_updated=contact.normal == "updated",
+            displacement_limit=displacement_limit,
+        )
+    limit = step_limit(model)
+    if integrator.step is not None and integrator.step >= limit:
+        raise InputError(
+            f"[integrator] step: {integrator.step:.4g} s is above the stability limit of rig {rig.name}; "
+            f"take less than {limit:.4g} s"
+        )
+    interval = 2.0 * math.pi / (abs(speed) * samples_per_revolution)
+    steps_per_sample = math.ceil(interval / integrator.step_within(limit) * (1.0 - 1e-12))
+    step = interval / steps_per_sample
+    return CentralDifferenceSetup(
+        model=model,
+        packed=pack(model, speed, step),
+        spin=speed,
+        step=step,
+        steps_per_sample=steps_per_sample,
+        samples_per_revolution=samples_per_revolution,
+        is_updated=contact.normal == "updated",
+        displacement_limit=displacement_limit,
+    )

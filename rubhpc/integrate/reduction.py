@@ -1,0 +1,185 @@
+"""Galerkin reduction: each body in its lowest modes and its static answers to contact, with unit mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from rubhpc.errors import InputError
+from rubhpc.integrate.packing import degrees_of, output_degrees, whole_system
+from rubhpc.kernels.contact import AXIAL, N_DEGREE, V, W
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+# Modes up to this multiple of the contact frequency (or the spin, where that is higher), times
+# (1e-3 / accuracy)^(1/4): what lies above answers by its static shape, whose error goes with the fourth
+# power of the frequency ratio.
+CUTOFF_RATIO = 10.0
+FEWEST_MODES = 2  # kept of every part, whatever their frequency
+FREE = 1e-12  # square of a frequency over the greatest, below which a mode is free motion
+UNSEEN = 1e-9  # relative motion or coupling below which a mode is taken for unseen
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReducedModel:
+    """A model at one speed in n reduced coordinates with the identity for a mass matrix.
+
+    Attributes
+    ----------
+    basis : (n_all, n)
+        Degrees of rotor, then stators, for unit coordinates.
+    mass : (n_all, n_all)
+        Mass matrix of the full model: `basis.T @ mass` takes a motion to its coordinates.
+    stiffness, damping : (n, n)
+        K and D + spin G.
+    force : (2, n)
+        Cosine and sine part of the unbalance force.
+    degree : (q, 5, n)
+        Each pair's degrees (v, w, torsion, axial, lateral); zero where held.
+    output : (3, n)
+        Vertical, horizontal and torsional displacement of the output node.
+    """
+
+    spin: float
+    basis: Floats
+    mass: Floats
+    stiffness: Floats
+    damping: Floats
+    force: Floats
+    degree: Floats
+    output: Floats
+
+
+def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
+    """Reduce a model so that contact and outputs are met to the accuracy asked for.
+
+    The basis of each uncoupled part holds its undamped modes at standstill up to a cutoff and its static
+    answers to a unit force on each degree that contact or outputs see (component modes with residual
+    attachment shapes); gyroscopic and damping terms are then projected. Modes that nothing sees are left out.
+
+    Parameters
+    ----------
+    spin : float, rad/s
+    accuracy : float
+        Relative; 1e-3 keeps waveforms to about 1e-4 on the packaged rig.
+
+    Raises
+    ------
+    InputError
+        Where nothing holds a body: its constant response, on which the modal form of closed contacts rests,
+        does not exist.
+    """
+    mass, damping, stiffness, force = whole_system(model, spin)
+    degree, output = degrees_of(model), output_degrees(model)
+    seen = np.unique(np.concatenate([degree[degree >= 0], output[output >= 0]]))
+
+    fastest = max(_contact_frequency(mass, stiffness, degree, model), abs(spin))
+    cutoff = CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * fastest
+    symmetric = 0.5 * (stiffness + stiffness.T)
+    coupled = (mass != 0) | (stiffness != 0)
+    n_part, part = connected_components(csr_array(coupled), directed=False)
+    _, whole = connected_components(csr_array(coupled | (damping != 0)), directed=False)
+    columns = []
+    for i_part in range(n_part):
+        rows = np.flatnonzero(part == i_part)
+        looked_at = np.flatnonzero(np.isin(rows, seen))
+        if np.isin(whole[rows[0]], whole[seen]):
+            pick = np.ix_(rows, rows)
+            column = np.zeros((mass.shape[0], rows.size))
+            shapes = _basis(mass[pick], symmetric[pick], looked_at, cutoff)
+            column[rows, : shapes.shape[1]] = shapes
+            columns.append(column[:, : shapes.shape[1]])
+    basis = np.hstack(columns)
+    stiffness, damping = basis.T @ stiffness @ basis, basis.T @ damping @ basis
+    keep = np.flatnonzero(_visible(basis[seen], stiffness, damping))
+    basis, pick = basis[:, keep], np.ix_(keep, keep)
+    return ReducedModel(
+        spin=spin,
+        basis=basis,
+        mass=mass,
+        stiffness=stiffness[pick],
+        damping=damping[pick],
+        force=force @ basis,
+        degree=np.where((degree >= 0)[:, :, None], basis[np.maximum(degree, 0)], 0.0),
+        output=np.where((output >= 0)[:, None], basis[np.maximum(output, 0)], 0.0),
+    )
+
+
+def _contact_frequency(mass: Floats, stiffness: Floats, degree: Ints, model: Model) -> float:
+    """Highest frequency, rad/s, of a contact: the rotor's inertia on the stator's static stiffness."""
+    highest = 0.0
+    for i, stator in enumerate(model.stators):
+        along = np.zeros(mass.shape[0])
+        for a, share in ((V, np.cos(stator.angle)), (W, np.sin(stator.angle))):
+            if degree[i, a] >= 0:
+                along[degree[i, a]] = share
+        tip = np.zeros(mass.shape[0])
+        tip[degree[i, AXIAL]] = 1.0
+        # Inertia of the rotor's static shape under a force at the disc, as that of its first mode.
+        shape = np.linalg.lstsq(stiffness, along, rcond=None)[0]
+        inertia = (shape @ mass @ shape) / (along @ shape) ** 2
+        compliance = tip @ np.linalg.lstsq(stiffness, tip, rcond=None)[0]
+        highest = max(highest, 1.0 / np.sqrt(inertia * compliance))
+    return float(highest)
+
+
+def _basis(mass: Floats, stiffness: Floats, looked_at: Ints, cutoff: float) -> Floats:
+    """Modes of a part below the cutoff, rad/s, and static shapes, orthonormal in the mass."""
+    n = mass.shape[0]
+    square, mode = eigh(stiffness, mass)
+    if square[0] <= FREE * square[-1]:
+        raise InputError(
+            "[integrator] method: modal needs bodies that are held, and here one is free to move or to turn; "
+            'take method = "central-difference"'
+        )
+    frequency = np.sqrt(np.maximum(square, 0.0))
+    n_keep = max(int(np.count_nonzero(frequency <= cutoff)), min(FEWEST_MODES, n))
+    kept: Floats = mode[:, :n_keep]
+    if n_keep + looked_at.size >= n:
+        return np.asarray(mode)
+    # Static answer of the modes above the cutoff alone: no rigid-body motion is left in it.
+    rest = mode[:, n_keep:]
+    shape = (rest / square[n_keep:]) @ rest[looked_at].T
+    shape /= np.sqrt(np.einsum("ij,ij->j", shape, mass @ shape))
+    size, mix = np.linalg.eigh(shape.T @ mass @ shape)
+    independent = size > 1e-8 * size[-1]
+    return np.hstack([kept, shape @ mix[:, independent] / np.sqrt(size[independent])])
+
+
+def _visible(seen: Floats, stiffness: Floats, damping: Floats) -> NDArray[np.bool_]:
+    """Coordinates that move a seen degree, or that K or C couple to one that does."""
+    scale = np.sqrt(np.maximum(np.abs(np.diag(stiffness)), 1.0))
+    couples = np.abs(stiffness) > UNSEEN * np.outer(scale, scale)
+    couples |= np.abs(damping) > UNSEEN * np.sqrt(np.outer(scale, scale))
+    _, group = connected_components(csr_array(couples), directed=False)
+    largest = np.abs(seen).max(axis=1, keepdims=True)
+    moves = np.any(np.abs(seen) > UNSEEN * np.maximum(largest, np.finfo(float).tiny), axis=0)
+    return np.isin(group, group[moves])
+
+
+def directions(reduced: ReducedModel, model: Model, friction: float) -> tuple[Floats, Floats, Floats]:
+    """Rate of each gap, force of a unit contact, and slip, each (q, n), for the fixed normal.
+
+    With e the stator's axis and t = x_hat x e: the gap is `clearance + axial - e . (v, w)`; the disc feels
+    `-e - mu t` and `-mu r_d` in torsion, the tip the opposite (paper, Eqs. 4, 8-10, 19), with mu signed as
+    the spin; the slip speed is `sign(spin) (r_d (spin + thx') + t . (vA - vB))`.
+    """
+    angle = np.array([stator.angle for stator in model.stators])
+    radius = np.array([stator.radius for stator in model.stators])
+    ey, ez = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    v, w, torsion, axial, lateral = (reduced.degree[:, a] for a in range(N_DEGREE))
+    push = axial - ey * v - ez * w
+    along = lateral + ez * v - ey * w - radius[:, None] * torsion
+    pull = push + np.copysign(friction, reduced.spin) * along
+    return push, pull, -np.sign(reduced.spin) * along

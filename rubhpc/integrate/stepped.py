@@ -1,0 +1,132 @@
+"""A case by the modal integrator in short contact steps: the updated normal, or endless events."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.contact_work import workspace
+from rubhpc.integrate.modal import ModalMarch
+from rubhpc.kernels.contact import N_DEGREE, Pairs
+from rubhpc.kernels.phases import CONTACT_UNSOLVED, FINISHED, N_NODE, N_STEP, TIME
+from rubhpc.kernels.stepped import Kicks, advance_stepped
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.prepare import ModalSetup
+    from rubhpc.integrate.record import State
+    from rubhpc.kernels.observe import Samples, Tally
+
+    Floats = NDArray[np.float64]
+
+
+class SteppedMarch(ModalMarch):
+    """Modal coordinates of the open system under way, kicked by the contact forces."""
+
+    def __init__(
+        self,
+        setup: ModalSetup,
+        clearance: float,
+        friction: float,
+        initial: State,
+        check: Callable[[], None] | None,
+    ) -> None:
+        """Start from `initial`."""
+        super().__init__(setup, clearance, friction, initial, check)
+        self._kicks = self._make_kicks()
+        angle = np.array([stator.angle for stator in setup.model.stators])
+        q = angle.size
+        step = self._clock.tick * 2**self._kicks.level
+        phases = self._phases
+        place = phases.motion_re.shape[1] // 2
+        degree = setup.reduced.degree.reshape(q * N_DEGREE, place)
+        # Displacement a contact step after a unit force has acted over it: an impulse, then drift.
+        drifted = step * (
+            self._kicks.degree_re @ self._kicks.drifted_re.T
+            - self._kicks.degree_im @ self._kicks.drifted_im.T
+        )
+        held = ~np.any(degree != 0.0, axis=1)
+        row = np.where(held, -1, np.arange(q * N_DEGREE)).reshape(q, N_DEGREE)
+        self._pairs = Pairs(
+            row=row,
+            block=row,
+            axis_y=np.cos(angle),
+            axis_z=np.sin(angle),
+            radius=np.array([stator.radius for stator in setup.model.stators]),
+            clearance=self._clearance,
+            friction=np.full(q, math.copysign(friction, setup.spin)),
+            compliance=np.ascontiguousarray(drifted.reshape(q, N_DEGREE, q, N_DEGREE)),
+            is_updated=setup.is_updated,
+        )
+        self._work = workspace(self._pairs)
+        self._work.force[:] = initial.contact_force  # a contact under way does not begin anew
+
+    def touching(self) -> NDArray[np.bool_]:
+        """Which pairs pressed in the last step, (q,)."""
+        return self._work.force > 0.0
+
+    def _first_closed(self, initial: State) -> int:
+        """None: a contact under way is found by the first step."""
+        return 0
+
+    def _contact_force(self) -> Floats:
+        return self._work.force.copy()
+
+    def _make_kicks(self) -> Kicks:
+        """Displacements and kicks of every pair's degrees in the modes of the open system."""
+        setup, phases = self._setup, self._phases
+        n = phases.motion_re.shape[1] // 2
+        degree = setup.reduced.degree.reshape(-1, n)
+        motion = phases.motion_re[0] + 1j * phases.motion_im[0]
+        enter = phases.enter_re[0] + 1j * phases.enter_im[0]
+        level = max(0, min(self._clock.blind_level, self._sample_level))
+        power = phases.power_re[0, level] + 1j * phases.power_im[0, level]
+        drifted = degree @ enter[n:] * power
+        positions = degree @ motion[:n]
+
+        return Kicks(
+            level=level,
+            degree_re=np.ascontiguousarray(positions.real),
+            degree_im=np.ascontiguousarray(positions.imag),
+            drifted_re=np.ascontiguousarray(drifted.real),
+            drifted_im=np.ascontiguousarray(drifted.imag),
+            twist_answer=degree @ setup.reduced.output[2],
+        )
+
+    def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
+        per_sample = self._clock.ticks_per_sample
+        first = self.sample * per_sample
+        self._clock = self._clock._replace(end_tick=samples.rotor.shape[1] * per_sample)
+        while True:
+            outcome = advance_stepped(
+                self._phases,
+                self._clock,
+                self._kicks,
+                self._pairs,
+                self._work,
+                first,
+                stop * per_sample,
+                is_recorded,
+                self._progress,
+                self._z,
+                self._z_next,
+                self._reader.nodes,
+                samples,
+                tally,
+            )
+            self.n_step = int(self._progress[N_STEP])
+            first = int(self._progress[TIME])
+            if is_recorded:
+                n_node = int(self._progress[N_NODE])
+                self._progress[N_NODE] = self._reader.read(n_node, samples, tally)
+            if outcome == CONTACT_UNSOLVED:
+                return "the contact forces of a step have no solution"
+            if self._has_diverged():
+                return f"a displacement passed {self._setup.displacement_limit:.3g} m"
+            if outcome == FINISHED:
+                return None

@@ -1,0 +1,31 @@
+"""An error that is the program's own: its traceback goes into a log, and one line tells of it."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+import traceback
+from pathlib import Path
+
+from rubhpc.errors import RubError
+from rubhpc.running.launch import launch
+
+
+class Crashed(RubError):  # noqa: N818 - the error that caused it stands in its log
+    """An error that is the program's own."""
+
+    exit_code = 70
+
+
+def crash(error: Exception, directory: Path | None = None) -> Crashed:
+    """Log the traceback of `error`, in `directory` or among the temporary files; what to raise instead."""
+    name = f"rubhpc-crash-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.log"
+    log = (directory if directory is not None and directory.is_dir() else Path(tempfile.gettempdir())) / name
+    try:
+        log.write_text("".join(traceback.format_exception(error)))
+        place = f"the traceback is in {log}"
+    except OSError as trouble:
+        place = f"its traceback could not be written ({trouble})"
+    text = " ".join(str(error).split())
+    return Crashed(f"rank {launch().rank}: {type(error).__name__}: {text}; {place}; please report it")

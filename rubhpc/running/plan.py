@@ -1,0 +1,165 @@
+"""What a study will take, and what of it is done: counted, and timed on a few short pilot cases."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.prepare import prepare
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
+from rubhpc.storage.duration import duration
+from rubhpc.storage.journal import count, replay
+from rubhpc.storage.manifest import Manifest
+from rubhpc.storage.resume import find_gone, is_store, missing_share, sweep_for
+from rubhpc.storage.store import Store
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rubhpc.study import Study
+    from rubhpc.sweep import Block, Sweep
+
+_PILOT_STEPS = 400_000  # of one pilot case, about; enough for the caches to be warm
+_LINE = 400  # bytes of a case in a journal, about, for one stator
+_FIXED_FILES = 60  # metadata, packed arrays and coordinates
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What a study takes.
+
+    Attributes
+    ----------
+    counts : tuple of int
+        Cases that are missing, done, failed and diverged, in this order.
+    n_block, n_per_block, n_file : int
+        Blocks of the whole grid, and cases in one; files of the finished store, about.
+    n_byte : int
+        Of the finished store before compression, about.
+    steps : int
+        Predicted integration steps of what is missing.
+    core_hours : float
+        For what is missing, from the pilot cases; NaN where they failed.
+    """
+
+    title: str
+    store: Path
+    shape: dict[str, int]
+    counts: tuple[int, ...]
+    n_block: int
+    n_per_block: int
+    n_file: int
+    n_byte: int
+    steps: int
+    core_hours: float
+
+    def text(self) -> str:
+        """The plan for people, a few lines."""
+        n_case = sum(self.counts)
+        grid = " x ".join(f"{n} {name}" for name, n in self.shape.items())
+        cost = (
+            f"{self.core_hours:.3g} core-hours ({duration(self.core_hours * 3600)} on one core)"
+            if math.isfinite(self.core_hours)
+            else "core-hours unknown: the pilot cases failed"
+        )
+        return "\n".join(
+            [
+                f"{self.title} -> {self.store}",
+                f"cases       {n_case} = {grid}",
+                f"blocks      {self.n_block}, at most {self.n_per_block} cases each; more ranks would idle",
+                f"store       {_size(self.n_byte)} before compression, {self.n_file} files",
+                "so far      "
+                + ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING)),
+                f"to compute  {self.steps:.3g} steps, {cost}",
+            ]
+        )
+
+
+def make_plan(study: Study) -> Plan:
+    """Count, look into the store if there is one, and time pilot cases; writes nothing.
+
+    Raises
+    ------
+    InputError
+        The study cannot be run as it stands.
+    StoreError
+        The store at its output is of another study.
+    """
+    sweep = sweep_for(study)
+    manifest = Manifest.of(sweep)
+    blocks = sweep.blocks()
+    status = np.zeros(sweep.n_case, np.int8)
+    if is_store(study.output):
+        store = Store(study.output)
+        ledger = replay(store.journal_directory, manifest.header, with_metrics=False)
+        if store.manifest.shape == manifest.shape:
+            ledger.status[find_gone(store, ledger)] = MISSING
+        status = ledger.status
+    missing = (status == MISSING).reshape(sweep.shape)
+    left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
+    steps = sum(block.cost * share for block, share in left)
+    pace = _pace(sweep, [block for block, _ in left])
+    per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
+    return Plan(
+        title=study.title,
+        store=study.output,
+        shape=dict(zip((axis.name for axis in study.axes), sweep.shape, strict=True)),
+        counts=count(status),
+        n_block=len(blocks),
+        n_per_block=math.prod(sweep.chunk),
+        n_file=len(blocks) * len(manifest.variables) + _FIXED_FILES,
+        n_byte=sweep.n_case * (per_case + 2 * _LINE),
+        steps=round(steps),
+        core_hours=steps * pace / 3600 if left else 0.0,
+    )
+
+
+def _pace(sweep: Sweep, blocks: list[Block]) -> float:
+    """Seconds a predicted step takes: the mean over a case of the longest, the middle and the last block."""
+    paces = []
+    for block in [blocks[i] for i in sorted({0, len(blocks) // 2, len(blocks) - 1})] if blocks else []:
+        try:
+            paces.append(_pilot(sweep, block))
+        except Exception:  # noqa: S112 - the run will tell what is wrong with the case
+            continue
+    return float(np.mean(paces)) if paces else math.nan
+
+
+def _pilot(sweep: Sweep, block: Block) -> float:
+    """Seconds per predicted step of the block's first case, shortened.
+
+    Revolutions that are recorded cost more than those thrown away: their shares stay.
+    """
+    study, case = sweep.study, sweep.cases(block)[0]
+    whole = study.recording
+    steps = block.cost / math.prod(block.shape)
+    share = min(1.0, _PILOT_STEPS / steps)
+    transient, revolutions = round(share * whole.transient), max(1, round(share * whole.revolutions))
+    setup = prepare(
+        case.rig,
+        case.speed,
+        contact=study.contact,
+        integrator=study.integrator,
+        samples_per_revolution=whole.samples_per_revolution,
+    )
+
+    def seconds(transient: int, revolutions: int) -> float:
+        recording = replace(whole, transient=transient, revolutions=revolutions)
+        record = run_case(setup, clearance=case.clearance, friction=case.friction, recording=recording)
+        return float(record.scalars["wall_time"])
+
+    seconds(0, 1)  # compiles
+    done = (transient + revolutions) / (whole.transient + whole.revolutions)
+    return seconds(transient, revolutions) / (steps * done)
+
+
+def _size(n_byte: float) -> str:
+    for unit in ("B", "kB", "MB", "GB"):
+        if n_byte < 1000:
+            return f"{n_byte:.3g} {unit}"
+        n_byte /= 1000
+    return f"{n_byte:.3g} TB"

@@ -1,0 +1,251 @@
+"""Who computes which block: one process, or MPI ranks that claim the next from a shared counter.
+
+All ranks compute: a dedicated master would waste one, and a counter in an MPI window, longest block first,
+keeps 99 % of the ideal. mpi4py is imported under a launcher only.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import warnings
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar
+
+import numpy as np
+
+from rubhpc.errors import InputError, RubError
+from rubhpc.running.launch import Launch, end_with_launcher, launch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+T = TypeVar("T")
+
+_NAP = 2e-3  # s between looks at whether the others have come
+
+
+class Tally(NamedTuple):
+    """Sums over all ranks.
+
+    Blocks claimed; cases done, failed and diverged, and the predicted steps of them all; ranks that stop.
+    """
+
+    claimed: int = 0
+    done: int = 0
+    failed: int = 0
+    diverged: int = 0
+    cost: int = 0
+    stop: int = 0
+
+    @property
+    def n_case(self) -> int:
+        """Cases that have ended."""
+        return self.done + self.failed + self.diverged
+
+
+class Pool(Protocol):
+    """The processes that share a run."""
+
+    rank: int
+    size: int
+
+    def from_first(self, make: Callable[[], T]) -> T:
+        """What `make` returns, or raises of RubErrors, on the first rank, on all of them."""
+
+    def claim(self) -> Tally:
+        """Claim the next block, whose position is `claimed` in the sums as they were before."""
+
+    def add(self, tally: Tally) -> None:
+        """Add to the sums."""
+
+    def sums(self) -> Tally:
+        """The sums as they are; for the first rank, which has them at hand."""
+
+    def gather(self, value: T) -> list[T]:
+        """The values of all ranks, on all of them."""
+
+    def agree(self, make: Callable[[], T]) -> T:
+        """What `make` returns on this rank; what it raises of RubErrors on any rank, on all of them."""
+
+    def close(self) -> None:
+        """End the run together with all ranks."""
+
+    def abort(self, code: int) -> NoReturn:
+        """End every process of the run now."""
+
+
+class Alone:
+    """One process."""
+
+    rank = 0
+    size = 1
+
+    def __init__(self) -> None:
+        self._sums = np.zeros(len(Tally()), np.int64)
+
+    def from_first(self, make: Callable[[], T]) -> T:
+        """See Pool."""
+        return make()
+
+    def claim(self) -> Tally:
+        """See Pool."""
+        before = self.sums()
+        self._sums[0] += 1
+        return before
+
+    def add(self, tally: Tally) -> None:
+        """See Pool."""
+        self._sums += tally
+
+    def sums(self) -> Tally:
+        """See Pool."""
+        return Tally(*self._sums.tolist())
+
+    def gather(self, value: T) -> list[T]:
+        """See Pool."""
+        return [value]
+
+    def agree(self, make: Callable[[], T]) -> T:
+        """See Pool."""
+        return make()
+
+    def close(self) -> None:
+        """See Pool."""
+
+    def abort(self, code: int) -> NoReturn:
+        """See Pool."""
+        sys.exit(code)
+
+
+class Ranks:
+    """The ranks of an MPI communicator, with the sums in a window of the first."""
+
+    def __init__(self) -> None:
+        from mpi4py import MPI
+
+        self._sum, self._comm = MPI.SUM, MPI.COMM_WORLD
+        self.rank, self.size = self._comm.rank, self._comm.size
+        n_byte = 8 * len(Tally()) if self.rank == 0 else 0
+        self._window = MPI.Win.Allocate(n_byte, 8, comm=self._comm)
+        if self.rank == 0:
+            memory: Any = self._window.tomemory()
+            np.frombuffer(memory, np.int64)[:] = 0
+        self._comm.Barrier()
+        self._window.Lock_all()
+
+    def from_first(self, make: Callable[[], T]) -> T:
+        """See Pool."""
+        told: tuple[T | None, RubError | None] = (None, None)
+        if self.rank == 0:
+            try:
+                told = (make(), None)
+            except RubError as error:
+                told = (None, error)
+        self._meet()
+        value, trouble = self._comm.bcast(told)
+        if trouble is not None:
+            raise trouble
+        result: T = value
+        return result
+
+    def claim(self) -> Tally:
+        """See Pool."""
+        return self._accumulate(Tally(claimed=1))
+
+    def add(self, tally: Tally) -> None:
+        """See Pool."""
+        self._accumulate(tally)
+
+    def sums(self) -> Tally:
+        """See Pool."""
+        return self._accumulate(Tally())
+
+    def gather(self, value: T) -> list[T]:
+        """See Pool."""
+        self._meet()
+        values: list[T] = self._comm.allgather(value)
+        return values
+
+    def agree(self, make: Callable[[], T]) -> T:
+        """See Pool."""
+        value, mine = None, None
+        try:
+            value = make()
+        except RubError as error:
+            mine = error
+        for told in self.gather(mine):
+            if told is not None:
+                raise told
+        result: T = value  # type: ignore[assignment]
+        return result
+
+    def close(self) -> None:
+        """See Pool."""
+        self._window.Unlock_all()
+        self._window.Free()
+
+    def abort(self, code: int) -> NoReturn:
+        """See Pool."""
+        sys.stdout.flush()
+        sys.stderr.flush()
+        self._comm.Abort(code)
+        os._exit(code)
+
+    def _meet(self) -> None:
+        """Wait for all ranks, asleep: MPI's own waiting takes the core from ranks that still compute."""
+        request = self._comm.Ibarrier()
+        while not request.Test():
+            time.sleep(_NAP)
+
+    def _accumulate(self, tally: Tally) -> Tally:
+        """Add to the sums and return what they were, in one atomic message."""
+        more = np.array(tally, np.int64)
+        before = np.zeros_like(more)
+        self._window.Get_accumulate(more, before, 0, op=self._sum)
+        self._window.Flush(0)
+        return Tally(*before.tolist())
+
+
+def connect() -> Pool:
+    """Return the processes of this run: MPI ranks under a launcher, else this one alone.
+
+    Raises
+    ------
+    InputError
+        The launcher started several processes, but they do not find each other; the text names the mend.
+    """
+    given = launch()
+    if given.size == 1:
+        return Alone()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of a foreign launcher, which is refused here
+        library, n_connected = _connected(given)
+    if n_connected != given.size:
+        raise InputError(
+            f"the launcher started {given.size} processes, but MPI ({library}) connects {n_connected}; "
+            "use the mpirun of that MPI, or mpi4py built for this one (pip install --no-binary mpi4py mpi4py)"
+        )
+    end_with_launcher()
+    return Ranks()
+
+
+def _connected(given: Launch) -> tuple[str, int]:
+    """Name of the MPI library, and how many processes it connects."""
+    try:
+        import mpi4py
+
+        # Not before library and launcher are known to fit: MPICH aborts where Open MPI's mpirun started it.
+        mpi4py.rc(initialize=False, finalize=True)
+        from mpi4py import MPI
+    except ImportError as error:
+        raise InputError(
+            f"started as {given.size} processes, but mpi4py cannot be used ({error}); "
+            "pip install 'rubhpc[mpi]'"
+        ) from None
+    library = MPI.Get_library_version().split("\n")[0].split(",")[0].strip("\0 ")
+    if given.is_open_mpi and any(name in library for name in ("MPICH", "Intel", "MVAPICH")):
+        return library, 1
+    if not MPI.Is_initialized():
+        MPI.Init_thread(MPI.THREAD_FUNNELED)  # other threads keep the lock alive and watch the launcher
+    return library, MPI.COMM_WORLD.size

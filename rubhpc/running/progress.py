@@ -1,0 +1,93 @@
+"""How far a run is: a bar on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TYPE_CHECKING, Self
+
+from rubhpc.storage.duration import duration
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from rich.progress import Progress as Bar
+
+    from rubhpc.running.pool import Tally
+
+_REDRAW = 0.2  # s between redraws of the bar
+_FIRST_LINE, _LONGEST_GAP = 10.0, 300.0  # s between lines: they grow rarer as a run grows long
+
+
+class Progress:
+    """Tells how many cases have ended, how fast, and when the rest will have.
+
+    Parameters
+    ----------
+    n_case, n_done : int
+        Cases of the study, and those that were there before.
+    cost : float
+        Predicted steps of what is missing.
+    quiet : bool
+        Tell nothing.
+    has_bar : bool
+        Draw a bar, where the output is a terminal. Under a launcher it is none: Open MPI's pretends to be one
+        even when it writes to a file.
+    """
+
+    def __init__(self, n_case: int, cost: float, *, n_done: int, quiet: bool, has_bar: bool) -> None:
+        self._n_case, self._cost, self._n_done = n_case, max(cost, 1.0), n_done
+        self._quiet = quiet or n_done == n_case
+        self._has_bar = has_bar and sys.stdout.isatty()
+        self._began = self._told = time.monotonic()
+        self._gap = _FIRST_LINE
+        self._bar: Bar | None = None
+
+    def __enter__(self) -> Self:
+        if self._quiet:
+            return self
+        if self._has_bar:
+            from rich import progress
+
+            self._bar = progress.Progress(
+                progress.TextColumn("{task.completed:.0f}/{task.total:.0f} cases"),
+                progress.BarColumn(bar_width=None),
+                progress.TextColumn("{task.fields[rest]}"),
+            )
+            self._bar.start()
+            self._bar.add_task("", total=self._n_case, completed=self._n_done, rest="")
+        else:
+            print(f"{self._n_done}/{self._n_case} cases are there; computing the rest", flush=True)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def update(self, sums: Tally) -> None:
+        """Show the sums of all ranks, unless that was done a moment ago."""
+        now = time.monotonic()
+        if self._quiet or now - self._told < (_REDRAW if self._has_bar else self._gap):
+            return
+        self._told = now
+        n_ended = self._n_done + sums.n_case
+        if self._bar is None:
+            print(f"{n_ended}/{self._n_case} cases; {self._rest(sums)}", flush=True)
+            self._gap = min(max(self._gap, 0.1 * (now - self._began)), _LONGEST_GAP)
+        else:
+            self._bar.update(self._bar.task_ids[0], completed=n_ended, rest=self._rest(sums))
+
+    def _rest(self, sums: Tally) -> str:
+        """Rate, time left (by predicted steps, for cases differ) and what went wrong."""
+        seconds = max(time.monotonic() - self._began, 1e-9)
+        texts = [f"{sums.n_case / seconds:.3g} a second"]
+        if sums.cost:
+            left = seconds * (self._cost - sums.cost) / sums.cost
+            texts.append(f"{duration(max(left, 0.0))} left")
+        if sums.failed:
+            texts.append(f"{sums.failed} failed")
+        if sums.diverged:
+            texts.append(f"{sums.diverged} diverged")
+        return ", ".join(texts)

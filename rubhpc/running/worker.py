@@ -1,0 +1,235 @@
+"""One rank's work on a block: compute its missing cases, store them, journal them."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.prepare import prepare
+from rubhpc.running.pool import Tally
+from rubhpc.running.stopping import Stopped
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
+from rubhpc.storage.disk import disk_errors, flush_to_disk
+from rubhpc.storage.journal import Entry, metrics_type
+from rubhpc.storage.store import case_checksum
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.prepare import Setup
+    from rubhpc.integrate.record import Record
+    from rubhpc.rig import Rig
+    from rubhpc.running.stopping import Stopping
+    from rubhpc.storage.journal import Journal, Ledger
+    from rubhpc.storage.store import Store
+    from rubhpc.sweep import Block, Case, Sweep
+
+    Arrays = dict[str, NDArray[Any]]
+
+_SYNC_GAP, _SYNC_SHARE = (
+    1.0,
+    50.0,
+)  # s between syncs, at least, and times what the last took: slow disks cost 2 %
+_SETUPS = 4  # prepared setups a rank keeps; a block shares one, and neighbours often do
+
+
+class _OverTime(Exception):  # noqa: N818 - becomes the reason of a failed case
+    """A case has passed its time limit."""
+
+
+@dataclass
+class Worker:
+    """What a rank needs to compute blocks.
+
+    Attributes
+    ----------
+    missing : (n_case,) bool
+        Which cases are to be computed.
+    report : callable
+        Told of every case that has ended.
+    attend : callable
+        Called several times a second while a case is computed.
+    """
+
+    sweep: Sweep
+    store: Store
+    ledger: Ledger
+    missing: NDArray[np.bool_]
+    journal: Journal
+    stopping: Stopping
+    report: Callable[[Tally], None]
+    attend: Callable[[], None]
+
+    def __post_init__(self) -> None:
+        self._record_type = metrics_type(self.sweep.n_stator)
+        self._setups: OrderedDict[tuple[int, float], tuple[Rig, Setup]] = OrderedDict()
+        self._unsynced: list[Path] = []
+        self._next_sync = time.monotonic() + _SYNC_GAP
+        self._seconds, self._cost = 0.0, 0.0
+        self._case_limit = self.sweep.study.run.case_time_limit
+
+    def work(self, block: Block) -> None:
+        """Compute, store and journal what is missing of a block; what is finished when a stop comes is kept.
+
+        Raises
+        ------
+        StoreError
+            The block cannot be stored.
+        """
+        flat = self.store.flat(block.start)
+        cost = block.cost / len(flat)
+        if not self.stopping.fits(cost * self._pace):
+            return
+        wanted = self.missing[flat]
+        data, spoiled = self._kept(block, flat, wanted)
+        wanted |= spoiled
+        entries: list[Entry] = []
+        try:
+            cases = self.sweep.cases(block)
+        except Exception as error:
+            cases, reason = [], _told(error)
+            ids = self.sweep.case_ids(block)
+            entries = [Entry(int(flat[i]), ids[i], FAILED, reason=reason) for i in np.flatnonzero(wanted)]
+            self.report(Tally(failed=len(entries), cost=round(cost * len(entries))))
+        for i_case, case in enumerate(cases):
+            if not wanted[i_case]:
+                continue
+            if self.stopping.look() or not self.stopping.fits(cost * self._pace):
+                break
+            began = time.perf_counter()
+            try:
+                entry = self._enter(case, int(flat[i_case]), data, i_case)
+            except Stopped:
+                break
+            self._seconds += time.perf_counter() - began
+            self._cost += cost
+            entries.append(entry)
+            self.report(
+                Tally(
+                    done=entry.status == DONE,
+                    failed=entry.status == FAILED,
+                    diverged=entry.status == DIVERGED,
+                    cost=round(cost),
+                )
+            )
+        if entries:
+            lost = set(flat[spoiled].tolist()) - {entry.flat for entry in entries}
+            entries += [Entry(i, "-", MISSING) for i in lost]
+            self.store.write_block(block.start, data)
+            with disk_errors(self.store.path):
+                self.journal.write(entries)
+            self._unsynced += self.store.chunk_files(block.start)
+            if time.monotonic() > self._next_sync:
+                self.sync()
+
+    def sync(self) -> None:
+        """Return once what has been stored would outlive a power cut, the arrays before their lines.
+
+        A process that is killed loses nothing without it.
+        """
+        began = time.monotonic()
+        with disk_errors(self.store.path):
+            for path in self._unsynced:
+                flush_to_disk(path)
+            self.journal.sync()
+        self._unsynced.clear()
+        ended = time.monotonic()
+        self._next_sync = ended + max(_SYNC_GAP, _SYNC_SHARE * (ended - began))
+
+    @property
+    def _pace(self) -> float:
+        """Seconds a predicted step has taken on this rank so far; nothing is known before the first case."""
+        return self._seconds / self._cost if self._cost else 0.0
+
+    def _kept(
+        self, block: Block, flat: NDArray[np.int64], wanted: NDArray[np.bool_]
+    ) -> tuple[Arrays, NDArray[np.bool_]]:
+        """Arrays of the block with the cases that are there already, and which of those are damaged."""
+        data = self.store.empty_block(block.start)
+        spoiled = np.zeros_like(wanted)
+        status = self.ledger.status[flat]
+        kept = np.flatnonzero(~wanted & ((status == DONE) | (status == DIVERGED)))
+        if not len(kept):
+            return data, spoiled
+        stored = self.store.read_block(block.start)
+        for i_case in kept.tolist():
+            if stored is None or case_checksum(stored, i_case) != self.ledger.checksum[flat[i_case]]:
+                spoiled[i_case] = True
+                continue
+            for name, values in stored.items():
+                data[name][i_case] = values[i_case]
+        return data, spoiled
+
+    def _enter(self, case: Case, flat: int, data: Arrays, i_case: int) -> Entry:
+        """Compute a case and put its arrays in the block's; what goes wrong in it is its reason to fail."""
+        try:
+            record = self._compute(case)
+            if record.status == DONE:
+                self._place(record, data, i_case)
+            metrics = self._metrics(record)
+        except Stopped:
+            raise
+        except Exception as error:
+            for values in data.values():
+                values[i_case] = np.nan
+            return Entry(flat, case.id, FAILED, reason=_told(error))
+        return Entry(flat, case.id, record.status, case_checksum(data, i_case), metrics, record.reason)
+
+    def _compute(self, case: Case) -> Record:
+        study = self.sweep.study
+        key = (
+            id(case.rig),
+            case.speed,
+        )  # a rig that is kept here keeps its id; hashing it takes as long as a block
+        if key in self._setups:
+            setup = self._setups[key][1]
+        else:
+            setup = prepare(
+                case.rig,
+                case.speed,
+                contact=study.contact,
+                integrator=study.integrator,
+                samples_per_revolution=study.recording.samples_per_revolution,
+            )
+            self._setups[key] = (case.rig, setup)
+            if len(self._setups) > _SETUPS:
+                self._setups.popitem(last=False)
+        end = time.monotonic() + self._case_limit if self._case_limit else float("inf")
+
+        def check() -> None:
+            self.attend()
+            if self.stopping.look():
+                raise Stopped
+            if time.monotonic() > end:
+                raise _OverTime(f"over its time limit of {self._case_limit:g} s")
+
+        return run_case(
+            setup, clearance=case.clearance, friction=case.friction, recording=study.recording, check=check
+        )
+
+    def _place(self, record: Record, data: Arrays, i_case: int) -> None:
+        told = {**record.signals, **record.spectra, **record.sections}
+        for name, values in data.items():
+            if not np.isfinite(told[name]).all():
+                raise FloatingPointError(f"{name} is not finite")
+            values[i_case] = told[name]
+
+    def _metrics(self, record: Record) -> bytes:
+        row = np.zeros((), self._record_type)
+        for name in self._record_type.names or ():
+            row[name] = record.scalars[name]
+        return row.tobytes()
+
+
+def _told(error: Exception) -> str:
+    """An error as the reason of a failed case, in one line."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, _OverTime) else f"{type(error).__name__}: {text}"

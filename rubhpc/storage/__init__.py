@@ -1,0 +1,1 @@
+"""The store on disk: arrays, journals, lock, verification."""

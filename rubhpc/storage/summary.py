@@ -1,0 +1,57 @@
+"""How a run ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
+from rubhpc.storage.duration import duration
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """How a run ended.
+
+    Attributes
+    ----------
+    counts : tuple of int
+        Cases of the whole study that are missing, done, failed and diverged, in this order.
+    computed : int
+        Cases this run computed.
+    seconds : float
+        What the run took.
+    reasons : tuple of (str, str)
+        Coordinates and reason of each failed case, the first hundred.
+    """
+
+    store: Path
+    counts: tuple[int, ...]
+    computed: int
+    seconds: float
+    reasons: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def exit_code(self) -> int:
+        """0 where every case has a result (a diverged one is a result), 1 where some failed."""
+        return 1 if self.counts[FAILED] else 0
+
+    def text(self) -> str:
+        """The summary in a line."""
+        states = [i for i in (DONE, FAILED, DIVERGED, MISSING) if self.counts[i]]
+        told = ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in states)
+        return f"{self.store}: {told}; {self.computed} computed in {duration(self.seconds)}"
+
+    def complaint(self) -> str:
+        """What failed, in a line with the mend."""
+        case, reason = self.reasons[0]
+        rest = (
+            f" and {self.counts[MISSING]} were not computed (--max-failures)" if self.counts[MISSING] else ""
+        )
+        return (
+            f"{self.store}: {self.counts[FAILED]} of {sum(self.counts)} cases failed{rest}; "
+            f"the first, {case}: {reason}; rubhpc status lists them, --retry-failed computes them anew"
+        )

@@ -1,0 +1,136 @@
+"""Checks every stored case against its checksum, and has the next run compute again what is damaged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.errors import StoreError
+from rubhpc.schema import DIVERGED, DONE, MISSING
+from rubhpc.storage.journal import next_run
+from rubhpc.storage.store import Store, case_checksum
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from rubhpc.storage.journal import Ledger
+
+
+@dataclass(frozen=True, kw_only=True)
+class Damage:
+    """What is not as it was written.
+
+    Attributes
+    ----------
+    cases : dict
+        Flat index -> the case's index and coordinates, and what is wrong with it.
+    arrays : tuple of str
+        Coordinates, settings and packed arrays; the next run writes them anew without computing.
+    n_checked : int
+        Cases that have been compared with their checksum.
+    note : str
+        Why the damage could not be marked for the next run; empty where it was, or where there is none.
+    """
+
+    store: Path
+    cases: dict[int, str]
+    arrays: tuple[str, ...]
+    n_checked: int
+    note: str = ""
+
+    def __bool__(self) -> bool:
+        return bool(self.cases or self.arrays)
+
+    def lines(self) -> list[str]:
+        """What is damaged, a line each."""
+        return [f"damaged: case {text}" for text in self.cases.values()] + [
+            f"damaged: array {name}; the next run writes it anew" for name in self.arrays
+        ]
+
+    def complaint(self) -> str:
+        """All of it in one line, with the mend."""
+        mend = f"not marked for the next run: {self.note}" if self.note else "run its study again to mend it"
+        return f"{self.store}: damage in {len(self.cases)} cases and {len(self.arrays)} arrays; {mend}"
+
+
+def verify(path: Path) -> Damage:
+    """Compare all that a store holds with its checksums; cases found damaged are missing from then on."""
+    store = Store(path)
+    ledger = store.replay()
+    spoiled = _spoiled_cases(store, ledger)
+    lost = _lost_lines(store, ledger)
+    packed = _damaged_packed(store, ledger)
+    n_checked = int(np.isin(ledger.status, (DONE, DIVERGED)).sum())
+    note = ""
+    if spoiled or packed:
+        try:
+            with store.lock():
+                if packed:
+                    store.forget_packing()
+                store.take_back(ledger, sorted(spoiled), next_run(store.journal_directory), "verify")
+        except (StoreError, OSError) as error:
+            note = str(error)
+    return Damage(
+        store=path,
+        cases={i: f"{_name(store, i)}: {text}" for i, text in sorted((spoiled | lost).items())},
+        arrays=(*store.damaged_static(), *packed),
+        n_checked=n_checked,
+        note=note,
+    )
+
+
+def _name(store: Store, flat: int) -> str:
+    index = ", ".join(str(i) for i in np.unravel_index(flat, store.manifest.shape))
+    return f"({index}) {store.manifest.name_case(flat)}"
+
+
+def _spoiled_cases(store: Store, ledger: Ledger) -> dict[int, str]:
+    """Cases whose arrays are gone, cannot be decoded, or have changed."""
+    spoiled = {}
+    for start in store.blocks():
+        flat = store.flat(start)
+        there = np.flatnonzero(np.isin(ledger.status[flat], (DONE, DIVERGED)))
+        if not len(there):
+            continue
+        data = store.read_block(start)
+        for i_case in there.tolist():
+            if data is None:
+                spoiled[int(flat[i_case])] = (
+                    "a file is gone" if not store.has_files(start) else "a chunk is garbled"
+                )
+            elif case_checksum(data, i_case) != ledger.checksum[flat[i_case]]:
+                spoiled[int(flat[i_case])] = "its arrays have changed"
+    return spoiled
+
+
+def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:
+    """Cases whose line in a journal is cut short, damaged, or packed and yet no longer there."""
+    never = ~ledger.is_known
+    packed = _read(store, "status")
+    lost = set(ledger.torn_cases)
+    if packed is not None:
+        lost |= set(np.flatnonzero((packed.ravel() != MISSING) & never).tolist())
+    return {flat: "its line in the journal is damaged or gone" for flat in lost if never[flat]}
+
+
+def _damaged_packed(store: Store, ledger: Ledger) -> tuple[str, ...]:
+    """Packed arrays that do not hold what the journals say, though these have not changed since."""
+    if not store.is_packed():
+        return ()
+    damaged = []
+    for name, values in store.packed_values(ledger).items():
+        stored = _read(store, name)
+        if stored is None or stored.tobytes() != values.tobytes():
+            damaged.append(name)
+    return tuple(damaged)
+
+
+def _read(store: Store, name: str) -> NDArray[np.generic] | None:
+    try:
+        return np.ascontiguousarray(store.arrays[name][...])
+    except (RuntimeError, ValueError, OSError):
+        return None
