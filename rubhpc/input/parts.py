@@ -1,7 +1,7 @@
 """The parts of a rig, as frozen dataclasses in SI units: what each is told, and what it will not be.
 
 The unit and the bounds of every field stand with it; `rubhpc.input.reading` reads them from there. A part
-that can say one thing in two ways has a method `displaced`: what becomes of the other fields when some are set.
+that can say one thing in two ways has a method `displaced`: what becomes of other fields when some are set.
 """
 
 from __future__ import annotations
