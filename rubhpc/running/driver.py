@@ -24,6 +24,7 @@ from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.journal import Ledger, count, next_run
 from rubhpc.storage.manifest import PRIVATE
 from rubhpc.storage.resume import bring_up_to_date, find_gone, missing_share, open_store, sweep_for
+from rubhpc.storage.runs import record_run
 from rubhpc.storage.store import Store
 from rubhpc.storage.summary import Summary
 from rubhpc.study import Study, read_study
@@ -130,6 +131,8 @@ def _run(
     began = time.monotonic()
     stopping.watch(study.output / "STOP", study.run.time_limit)
     job = pool.from_first(lambda: _prepare(study, stopping, held, retry_failed=retry_failed))
+    if job.pending.size:
+        pool.from_first(lambda: _record(study.output, job.run, pool.size))
     error = _compute(job, pool, stopping, quiet=quiet)
     for other in pool.gather(error):
         if other is not None:
@@ -173,6 +176,11 @@ def _prepare(study: Study, stopping: Stopping, held: ExitStack, *, retry_failed:
         missing=missing,
         pending=np.array(pending, dtype=np.int64),
     )
+
+
+def _record(store: Path, run: int, n_rank: int) -> None:
+    with disk_errors(store):
+        record_run(store, run, n_rank)
 
 
 def _warm_up(sweep: Sweep, block: Block, stopping: Stopping) -> None:

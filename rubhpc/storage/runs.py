@@ -1,0 +1,82 @@
+"""What machine each run of a study was on: a small file a run, beside its journals."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from rubhpc.storage.disk import write_whole
+from rubhpc.storage.journal import journals
+from rubhpc.storage.manifest import PRIVATE
+from rubhpc.version import __version__
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A run: where it was, and when its first and its latest case were under way.
+
+    Attributes
+    ----------
+    n_core : int
+        Cores of the first rank's machine.
+    began, wrote : float
+        Seconds since 1970: when it began, and when it last put a case down.
+    """
+
+    number: int
+    host: str
+    system: str
+    processor: str
+    n_core: int
+    n_rank: int
+    version: str
+    began: float
+    wrote: float = 0.0
+
+
+def record_run(store: Path, number: int, n_rank: int) -> None:
+    """Put down where a run takes place, as it begins."""
+    run = Run(
+        number=number,
+        host=platform.node(),
+        system=f"{platform.system()} {platform.release()}",
+        processor=_processor(),
+        n_core=os.cpu_count() or 1,
+        n_rank=n_rank,
+        version=__version__,
+        began=time.time(),
+    )
+    folder = store / PRIVATE / "runs"
+    folder.mkdir(exist_ok=True)
+    write_whole(folder / f"run{number:06d}.json", json.dumps(asdict(run)).encode())
+
+
+def read_runs(store: Path) -> list[Run]:
+    """Return the runs that put a case down, in their order; what is damaged is passed over."""
+    wrote: dict[int, float] = {}
+    for path in journals(store / PRIVATE / "journal"):
+        number = int(path.name[3:9])
+        wrote[number] = max(wrote.get(number, 0.0), path.stat().st_mtime)
+    runs = []
+    for path in sorted((store / PRIVATE / "runs").glob("run*.json")):
+        try:
+            told = Run(**json.loads(path.read_bytes()))
+        except (ValueError, TypeError):
+            continue
+        if told.number in wrote:
+            runs.append(Run(**asdict(told) | {"wrote": wrote[told.number]}))
+    return runs
+
+
+def _processor() -> str:
+    """Name of the processor; of an unknown one, its kind."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
