@@ -26,11 +26,11 @@ _NOT_DONE = {
     FAILED: ("failed", "0.8", "xxxx"),
     DIVERGED: ("diverged", "0.6", "////"),
 }
-_REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
+REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
 _WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
 _LEGEND_WIDTH = 64  # characters that fit a column of a page, 6 of them taken by each handle
 _CATEGORIES = ("status", "regime", "period")
-_STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
+STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
 
 
 def value_map(data: xr.Dataset, value: str, ax: Axes, log: bool = False) -> Axes:
@@ -128,7 +128,7 @@ def _draw_categories(
         names = {c: "none" if c == 0 else f"P{c}" for c in present}
         colors = {c: "#D55E00" if c == 0 else ramp[i] for i, c in enumerate(present)}
     else:
-        meanings, palette = (STATUS, _STATUS_COLORS) if data.name == "status" else (REGIME, _REGIME_COLORS)
+        meanings, palette = (STATUS, STATUS_COLORS) if data.name == "status" else (REGIME, REGIME_COLORS)
         names = {c: meanings[c].replace("_", "-" if c == 2 else " ") for c in present}
         colors = {c: palette[c] for c in present}
     if present:

@@ -57,15 +57,20 @@ def map_data(store: xr.Dataset, value: str, x: str, y: str) -> xr.Dataset:
     if value not in MAPPABLE:
         need(store, [value])
         raise InputError(f"{source(store)}: {value}: no scalar of a case; choose {', '.join(MAPPABLE)}")
-    validity = xr.zeros_like(store["status"], dtype=np.int8)
+    store = store.assign(validity=validity(store))
+    data = narrow(store, dict.fromkeys([value, "status", "validity"]), spread=[x, y])
+    loaded: xr.Dataset = data.broadcast_like(store[[x, y]]).transpose(y, x).load()
+    return loaded
+
+
+def validity(store: xr.Dataset) -> xr.DataArray:
+    """Return how each case leaves the model's range, over the axes: 0, or a sum of bits of `VALIDITY`."""
+    found = xr.zeros_like(store["status"], dtype=np.int8)
     for name, (bit, _, is_bad) in VALIDITY.items():
         if name in store:
             bad = is_bad(store[name])
             # One stator out of range spoils the case, whichever is drawn.
             bad = bad.any([d for d in ("stator",) if d in bad.dims])
-            validity = validity + np.int8(bit) * bad.astype(np.int8)
+            found = found + np.int8(bit) * bad.astype(np.int8)
     legend = "sum of " + ", ".join(f"{bit} ({text} out of range)" for bit, text, _ in VALIDITY.values())
-    store = store.assign(validity=validity.assign_attrs(units="1", long_name=legend))
-    data = narrow(store, dict.fromkeys([value, "status", "validity"]), spread=[x, y])
-    loaded: xr.Dataset = data.broadcast_like(store[[x, y]]).transpose(y, x).load()
-    return loaded
+    return found.rename("validity").assign_attrs(units="1", long_name=legend)
