@@ -2,47 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from rubhpc.commands.drawing import REVOLUTIONS, finish, number, of_store, open_cases, pairs
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import xarray as xr
     from matplotlib.axes import Axes
-
-    Draw = Callable[[list[Axes]], Any]
 
 _SIGNAL = click.option("--signal", default="torsion", show_default=True, help="Which recorded signal.")
 _ORDERS = click.option("--orders", "is_order", is_flag=True, help="Draw over orders instead of Hz.")
 _OVER = click.option("--over", metavar="AXIS", help="Draw the cases along AXIS over one another.")
-_REVOLUTIONS = click.IntRange(min=1)
-
-
-def _of_store(function: Callable[..., None]) -> Callable[..., None]:
-    """Add what every figure command takes: the store, a selection, and where figure and data go."""
-    for decorate in (
-        click.option("--data", metavar="FILE", help="Write the data too: .csv, .json, .zarr or .nc."),
-        click.option("--figure", metavar="FILE", help=".png, .pdf or .svg [default: STORE_COMMAND.png here]"),
-        click.option(
-            "--select",
-            "selection",
-            multiple=True,
-            metavar="AXIS=VALUE",
-            help='Such as speed_ratio=1.7, clearance="84 um", friction=0.1,0.3 or speed_ratio=1..2.',
-        ),
-        click.argument("store"),
-    ):
-        function = decorate(function)
-    return function
 
 
 @click.command()
-@_of_store
+@of_store
 @_SIGNAL
 @click.option("--along", metavar="AXIS", help="The axis of the cascade [default: the speed].")
 @click.option("--form", type=click.Choice(["waterfall", "intensity"]), default="waterfall", show_default=True)
@@ -73,16 +49,16 @@ def cascade(
     from postproc.lines import parse_orders
     from rubhpc.input.reading import parse_quantity
 
-    cases = _open(store, selection)
+    cases = open_cases(store, selection)
     orders = parse_orders(order_lines, "--order-lines")
     spectra = gather(cases, signal, along)
     frequencies: dict[str, Any] = dict(natural_frequencies(cases, str(spectra.dims[0])))
-    for name, value in _pairs(marks, "--mark"):
-        frequencies[name] = parse_quantity(_number(value), "Hz", f"--mark {name}")
+    for name, value in pairs(marks, "--mark"):
+        frequencies[name] = parse_quantity(number(value), "Hz", f"--mark {name}")
     abscissa = "order" if is_order else "frequency"
     limit = max_order if is_order else default_limit(spectra, frequencies)
     if max_frequency is not None and not is_order:
-        limit = parse_quantity(_number(max_frequency), "Hz", "--max-frequency")
+        limit = parse_quantity(number(max_frequency), "Hz", "--max-frequency")
         if limit <= 0:
             raise InputError(f"--max-frequency: {limit:g} Hz is out of range; give one above 0")
 
@@ -93,11 +69,11 @@ def cascade(
         draw_frequencies(axes[0], spectra, frequencies, abscissa, "C1" if is_waterfall else "#56B4E9")
 
     shown = below(spectra, limit, abscissa).to_dataset(name=str(spectra.name))
-    _finish("cascade", store, figure, data, shown, draw, height=80)
+    finish("cascade", store, figure, data, shown, draw, height=80)
 
 
 @click.command("map")
-@_of_store
+@of_store
 @click.option(
     "--value", default="peak_contact_force", show_default=True, help="A scalar, or regime or status."
 )
@@ -119,18 +95,18 @@ def map(  # noqa: A001 - the name of the command
     from postproc.maps import default_axes, map_data
     from postproc.selection import first_of_rest
 
-    cases = _open(store, selection)
+    cases = open_cases(store, selection)
     across, up = default_axes(cases, x, y)
     cases, notes = first_of_rest(cases, [across, up], value)
     shown = map_data(cases, value, across, up)
     for note in notes:
         click.echo(note)
-    _finish("map", store, figure, data, shown, lambda axes: value_map(shown, value, axes[0], log), height=75)
+    finish("map", store, figure, data, shown, lambda axes: value_map(shown, value, axes[0], log), height=75)
 
 
 @click.command()
-@_of_store
-@click.option("--revolutions", type=_REVOLUTIONS, help="Only the last ones [default: all].")
+@of_store
+@click.option("--revolutions", type=REVOLUTIONS, help="Only the last ones [default: all].")
 @_OVER
 def orbit(
     store: str,
@@ -144,12 +120,12 @@ def orbit(
     from postproc.orbits import orbit as draw_orbit
     from postproc.orbits import orbit_data
 
-    shown = orbit_data(_open(store, selection), revolutions, over)
-    _finish("orbit", store, figure, data, shown, lambda axes: draw_orbit(shown, axes[0]), height=80)
+    shown = orbit_data(open_cases(store, selection), revolutions, over)
+    finish("orbit", store, figure, data, shown, lambda axes: draw_orbit(shown, axes[0]), height=80)
 
 
 @click.command()
-@_of_store
+@of_store
 @_SIGNAL
 @click.option("--full", is_flag=True, help="Forward and backward whirl of the orbit instead of a signal.")
 @_ORDERS
@@ -178,7 +154,7 @@ def spectrum(
     from postproc.spectrum_figure import default_limit
     from postproc.spectrum_figure import spectrum as draw_spectrum
 
-    shown = spectrum_data(_open(store, selection), "whirl" if full else signal, over).compute()
+    shown = spectrum_data(open_cases(store, selection), "whirl" if full else signal, over).compute()
     abscissa = "order" if is_order else "frequency"
     limit = end or default_limit(shown, abscissa)
     lines = strongest_lines(shown, n_line) if over is None and n_line else None
@@ -192,15 +168,15 @@ def spectrum(
     def draw(axes: list[Axes]) -> None:
         draw_spectrum(shown, axes[0], lines, abscissa, limit, log)
 
-    _finish("spectrum", store, figure, data, shown.to_dataset(name=str(shown.name)), draw)
+    finish("spectrum", store, figure, data, shown.to_dataset(name=str(shown.name)), draw)
 
 
 @click.command()
-@_of_store
+@of_store
 @click.option(
     "--signal", "signals", multiple=True, help="May be repeated [default: motion and contact force]."
 )
-@click.option("--revolutions", type=_REVOLUTIONS, default=4, show_default=True, help="The last ones.")
+@click.option("--revolutions", type=REVOLUTIONS, default=4, show_default=True, help="The last ones.")
 @_OVER
 def waveform(
     store: str,
@@ -215,12 +191,12 @@ def waveform(
     from postproc.waveforms import DEFAULT_SIGNALS, panels, waveform_data
 
     signals = tuple(dict.fromkeys(signals)) or DEFAULT_SIGNALS
-    shown = waveform_data(_open(store, selection), signals, revolutions, over)
-    _finish("waveform", store, figure, data, shown, lambda axes: panels(shown, axes), n_panel=len(signals))
+    shown = waveform_data(open_cases(store, selection), signals, revolutions, over)
+    finish("waveform", store, figure, data, shown, lambda axes: panels(shown, axes), n_panel=len(signals))
 
 
 @click.command()
-@_of_store
+@of_store
 @click.option("--x", default="horizontal", show_default=True, help="Signal across.")
 @click.option("--y", default="vertical", show_default=True, help="Signal up.")
 @click.option("--over", metavar="AXIS", help="Draw signal Y of the cases along AXIS: a bifurcation diagram.")
@@ -236,7 +212,7 @@ def section(
     """Poincaré section: a point a revolution, in the plane of two signals or along an axis."""
     from postproc.sections import bifurcation, plane, section_data
 
-    shown = section_data(_open(store, selection), [y] if over else [x, y], over)
+    shown = section_data(open_cases(store, selection), [y] if over else [x, y], over)
 
     def draw(axes: list[Axes]) -> None:
         if over:
@@ -244,56 +220,7 @@ def section(
         else:
             plane(shown, x, y, axes[0])
 
-    _finish("section", store, figure, data, shown, draw)
+    finish("section", store, figure, data, shown, draw)
 
 
 COMMANDS = (cascade, map, orbit, spectrum, waveform, section)
-
-
-def _open(store: str, selection: tuple[str, ...]) -> xr.Dataset:
-    from postproc.load import open_store
-    from postproc.selection import select
-
-    return select(open_store(store), dict(_pairs(selection, "--select")))
-
-
-def _finish(
-    command: str,
-    store: str,
-    figure: str | None,
-    data: str | None,
-    shown: xr.Dataset,
-    draw: Draw,
-    n_panel: int = 1,
-    height: float | None = None,
-) -> None:
-    """Draw and save the figure, write the data where asked, and tell where they are."""
-    from postproc.export import check_data_path, write_data
-    from postproc.style import check_figure_path, house_style, new_figure, save
-    from postproc.units import caption
-
-    path = check_figure_path(figure or f"{Path(store).resolve().stem}_{command}.png")
-    data_path = check_data_path(data) if data else None
-    with house_style():
-        page, axes = new_figure(n_panel, height)
-        draw(axes)
-        page.suptitle(caption(shown), fontsize=7, x=0.02, ha="left")
-        save(page, path)
-    click.echo(str(path))
-    if data_path:
-        click.echo(str(write_data(shown, data_path)))
-
-
-def _pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, str]]:
-    for text in texts:
-        if not all(part.strip() for part in text.partition("=")):
-            raise InputError(f'{option}: "{text}" is no pair; write NAME=VALUE')
-    return [(name.strip(), value.strip()) for name, _, value in (text.partition("=") for text in texts)]
-
-
-def _number(text: str) -> float | str:
-    """Return a plain number of the command line as one; other text as it stands, for its unit to be read."""
-    try:
-        return float(text)
-    except ValueError:
-        return text

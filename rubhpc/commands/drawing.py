@@ -1,0 +1,89 @@
+"""What the figure commands share: their store and selection, and where figure and data go."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from rubhpc.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+    Draw = Callable[[list[Axes]], Any]
+
+REVOLUTIONS = click.IntRange(min=1)
+
+
+def of_store(function: Callable[..., None]) -> Callable[..., None]:
+    """Add what every figure command takes: the store, a selection, and where figure and data go."""
+    for decorate in (
+        click.option("--data", metavar="FILE", help="Write the data too: .csv, .json, .zarr or .nc."),
+        click.option("--figure", metavar="FILE", help=".png, .pdf or .svg [default: STORE_COMMAND.png here]"),
+        click.option(
+            "--select",
+            "selection",
+            multiple=True,
+            metavar="AXIS=VALUE",
+            help='Such as speed_ratio=1.7, clearance="84 um", friction=0.1,0.3 or speed_ratio=1..2.',
+        ),
+        click.argument("store"),
+    ):
+        function = decorate(function)
+    return function
+
+
+def open_cases(store: str, selection: tuple[str, ...]) -> xr.Dataset:
+    """Return the cases of a store that the command line selects."""
+    from postproc.load import open_store
+    from postproc.selection import select
+
+    return select(open_store(store), dict(pairs(selection, "--select")))
+
+
+def finish(
+    command: str,
+    store: str,
+    figure: str | None,
+    data: str | None,
+    shown: xr.Dataset,
+    draw: Draw,
+    n_panel: int = 1,
+    height: float | None = None,
+) -> None:
+    """Draw and save the figure, write the data where asked, and tell where they are."""
+    from postproc.export import check_data_path, write_data
+    from postproc.style import check_figure_path, house_style, new_figure, save
+    from postproc.units import caption
+
+    path = check_figure_path(figure or f"{Path(store).resolve().stem}_{command}.png")
+    data_path = check_data_path(data) if data else None
+    with house_style():
+        page, axes = new_figure(n_panel, height)
+        draw(axes)
+        page.suptitle(caption(shown), fontsize=7, x=0.02, ha="left")
+        save(page, path)
+    click.echo(str(path))
+    if data_path:
+        click.echo(str(write_data(shown, data_path)))
+
+
+def pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, str]]:
+    """Return the NAME=VALUE texts of an option as pairs."""
+    for text in texts:
+        if not all(part.strip() for part in text.partition("=")):
+            raise InputError(f'{option}: "{text}" is no pair; write NAME=VALUE')
+    return [(name.strip(), value.strip()) for name, _, value in (text.partition("=") for text in texts)]
+
+
+def number(text: str) -> float | str:
+    """Return a plain number of the command line as one; other text as it stands, for its unit to be read."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
