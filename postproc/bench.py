@@ -11,9 +11,11 @@ from rubhpc.errors import InputError
 from rubhpc.rig import Rig, rig_from_dict, with_keys
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
-_MODES = {"lateral": "lateral", "torsional": "torsional"}  # kind of a mode: its name in figures
+    from rubhpc.fem.modes import Mode
+
+ROTOR_MODES = ("lateral", "torsional")
 
 
 def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
@@ -34,7 +36,7 @@ def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
         raise InputError(f"{source(case)}: tells no rig; only a store that rubhpc has written does")
     rig = rig_from_dict(table, f"{source(case)}: rig")
     chosen = {
-        str(n): float(c.values) for n, c in case.coords.items() if c.ndim == 0 and c.dtype.kind in "fiu"
+        str(n): float(c.item()) for n, c in case.coords.items() if c.size == 1 and c.dtype.kind in "fiu"
     }
     chosen |= values or {}
     return with_keys(rig, {key: chosen[dim] for dim, key in _rig_axes(case).items() if dim in chosen})
@@ -48,17 +50,40 @@ def natural_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str,
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.modes import modes
 
+    return _over_rig(case, along, lambda rig: _first_of_kinds(modes(assemble(rig).rotor), ROTOR_MODES))
+
+
+def stator_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str, xr.DataArray]:
+    """Return the first lateral natural frequency of the stator selected, or of the first, Hz; see above."""
+    from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.modes import modes
+
+    chosen = case.coords.get("stator")
+    i_stator = int(chosen) - 1 if chosen is not None and chosen.ndim == 0 else 0
+    return _over_rig(
+        case,
+        along,
+        lambda rig: _first_of_kinds(modes(assemble(rig).stators[i_stator].body), ("lateral",)),
+    )
+
+
+def _first_of_kinds(found: Sequence[Mode], kinds: Sequence[str]) -> dict[str, float]:
+    lowest = {k: [m.frequency for m in found if m.kind == k and m.frequency > 0] for k in kinds}
+    return {kind: min(frequencies) for kind, frequencies in lowest.items() if frequencies}
+
+
+def _over_rig(
+    case: xr.Dataset, along: str | None, frequencies_of: Callable[[Rig], dict[str, float]]
+) -> dict[str, xr.DataArray]:
+    """Return the frequencies of a case's rig, Hz, as arrays over `along` where that is one of its keys."""
     is_rig_axis = along in _rig_axes(case) and along in case.dims
     points: list[dict[str, float]] = (
         [{along: float(v)} for v in case[along].values] if is_rig_axis and along else [{}]
     )
     found: dict[str, list[float]] = {}
     for point in points:
-        rotor = modes(assemble(rig_of(case, point)).rotor)
-        for kind, name in _MODES.items():
-            frequencies = [m.frequency for m in rotor if m.kind == kind and m.frequency > 0]
-            if frequencies:
-                found.setdefault(name, []).append(min(frequencies))
+        for name, frequency in frequencies_of(rig_of(case, point)).items():
+            found.setdefault(name, []).append(frequency)
     dims = (along,) if is_rig_axis and along else ()
     return {
         name: xr.DataArray(values if dims else values[0], dims=dims, attrs={"units": "Hz"})

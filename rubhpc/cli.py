@@ -44,6 +44,7 @@ COMMANDS = {
     "spectrum": ("rubhpc.commands.figures:spectrum", "Amplitude spectrum of a signal."),
     "waveform": ("rubhpc.commands.figures:waveform", "Signals over the revolutions."),
     "section": ("rubhpc.commands.figures:section", "Poincaré section, or bifurcation diagram along an axis."),
+    "hht": ("rubhpc.commands.signals:hht", "Hilbert-Huang analysis of a signal."),
 }
 
 
