@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import math
 import re
+import struct
 from dataclasses import Field, dataclass, fields
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
@@ -15,7 +17,7 @@ from rubhpc.input.fields import check_value, nearest, parse_field, place, quanti
 from rubhpc.input.quantity import brief, parse_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from rubhpc.rig import Rig
 
@@ -112,6 +114,16 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
         values=numbers,
         long_name=_LONG_NAMES.get(name, name.replace("_", " ").replace(".", " ")),
     )
+
+
+def case_id(identity: str, point: Sequence[float]) -> str:
+    """Return the id of a case: a hash of its study's identity and of its values on the axes.
+
+    It outlives the growth of any axis, and the order of the values on it.
+    """
+    digest = hashlib.sha256(identity.encode())
+    digest.update(struct.pack(f"<{len(point)}d", *point))
+    return digest.hexdigest()[:32]
 
 
 def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:

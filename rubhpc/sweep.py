@@ -9,20 +9,20 @@ import hashlib
 import itertools
 import json
 import math
-import struct
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rubhpc.axes import case_id
 from rubhpc.errors import InputError
 from rubhpc.input.fields import place
+from rubhpc.rig import with_keys
 from rubhpc.settings import Settings
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -121,17 +121,13 @@ class Sweep:
     def case(self, index: Sequence[int]) -> Case:
         """Return the case at an index of the grid."""
         point = [axis.values[i] for axis, i in zip(self.study.axes, index, strict=True)]
-        return self._case(tuple(index), self._id(point))
+        return self._case(tuple(index), case_id(self.identity, point))
 
     def case_ids(self, block: Block) -> list[str]:
-        """Return the ids of the cases of a block, in the order of `cases`.
-
-        An id is a hash of the identity and of the values on the axes: it outlives the growth of any axis.
-        """
+        """Return the ids of the cases of a block, in the order of `cases`."""
         box = zip(self.study.axes, block.start, block.shape, strict=True)
-        return [
-            self._id(point) for point in itertools.product(*(axis.values[s : s + n] for axis, s, n in box))
-        ]
+        points = itertools.product(*(axis.values[s : s + n] for axis, s, n in box))
+        return [case_id(self.identity, point) for point in points]
 
     def settings(self) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
         """Return what the axes amount to: name -> (dimensions of the axes that set it, values in SI units).
@@ -159,16 +155,6 @@ class Sweep:
             contact_free_amplitude=amplitude,
         )
 
-    def _id(self, point: Iterable[float]) -> str:
-        digest = self._digest.copy()
-        digest.update(struct.pack(f"<{len(self.shape)}d", *point))
-        name: str = digest.hexdigest()[:32]
-        return name
-
-    @cached_property
-    def _digest(self) -> Any:
-        return hashlib.sha256(self.identity.encode())
-
     def _default_chunk(self) -> tuple[int, ...]:
         wanted = self.study.run.block or min(max(self.n_case // 64, 1), 16)
         costly = [self._settings.speed_axis, *self._settings.rig_axes]
@@ -193,8 +179,16 @@ def _named(study: Study) -> Iterator[None]:
 
 
 def identity_parts(study: Study) -> dict[str, Any]:
-    """Return all that changes the results of a study but the values on its axes, for JSON."""
-    rig = study.rig.as_dict()
+    """Return all that changes the results of a study but the values on its axes, for JSON.
+
+    What the rig says of a key that is an axis is no part of it: every case sets that key.
+    """
+    keys = [axis.name for axis in study.axes if axis.is_rig_key]
+    rig = with_keys(
+        study.rig, {axis.name: axis.values[0] for axis in study.axes if axis.is_rig_key}
+    ).as_dict()
+    for key in keys:
+        _blank(rig, key.split("."))
     del rig["name"]
     return {
         "physics": PHYSICS,
@@ -204,3 +198,15 @@ def identity_parts(study: Study) -> dict[str, Any]:
         "integrator": asdict(study.integrator),
         "record": asdict(study.recording) | {"keep": sorted(study.recording.keep)},
     }
+
+
+def _blank(table: Any, key: list[str]) -> None:
+    """Put "axis" in place of the value that a dotted key names, in all items of a list or in one."""
+    if isinstance(table, list):
+        items, rest = ([table[int(key[0]) - 1]], key[1:]) if key[0].isdigit() else (table, key)
+        for item in items:
+            _blank(item, rest)
+    elif len(key) == 1:
+        table[key[0]] = "axis"
+    else:
+        _blank(table[key[0]], key[1:])

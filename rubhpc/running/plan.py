@@ -12,7 +12,8 @@ from rubhpc.integrate.case import run_case
 from rubhpc.integrate.prepare import prepare
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 from rubhpc.storage.duration import duration
-from rubhpc.storage.journal import count, replay
+from rubhpc.storage.growth import origins
+from rubhpc.storage.journal import count
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import find_gone, is_store, missing_share, sweep_for
 from rubhpc.storage.store import Store
@@ -95,10 +96,10 @@ def make_plan(study: Study) -> Plan:
     status = np.zeros(sweep.n_case, np.int8)
     if is_store(study.output):
         store = Store(study.output)
-        ledger = replay(store.journal_directory, manifest.header, with_metrics=False)
-        if store.manifest.shape == manifest.shape:
-            ledger.status[find_gone(store, ledger)] = MISSING
-        status = ledger.status
+        ledger = store.replay(with_metrics=False)
+        ledger.status[find_gone(store, ledger)] = MISSING
+        origin = origins(store.manifest, manifest)
+        status = np.where(origin < 0, MISSING, ledger.status[origin])
     missing = (status == MISSING).reshape(sweep.shape)
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
     steps = sum(block.cost * share for block, share in left)

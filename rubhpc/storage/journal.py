@@ -20,6 +20,7 @@ from zlib import crc32
 
 import numpy as np
 
+from rubhpc.axes import case_id
 from rubhpc.schema import STATUS, VARIABLES
 
 if TYPE_CHECKING:
@@ -83,21 +84,27 @@ class Header:
         """Cases along each axis."""
         return tuple(len(values) for values in self.axes)
 
-    def told(self, shape: tuple[int, ...]) -> dict[str, Any]:
-        """The header as it is written, of the first values on each axis."""
+    @property
+    def told(self) -> dict[str, Any]:
+        """The header as it is written."""
         return {
             "format": _FORMAT,
             "identity": self.identity,
-            "shape": list(shape),
-            "axes": [
-                crc32(np.array(values[:n]).tobytes()) for values, n in zip(self.axes, shape, strict=True)
-            ],
+            "shape": list(self.shape),
+            "axes": [crc32(np.array(values).tobytes()) for values in self.axes],
             "metrics": [[v.name, v.dtype, self.n_stator if "stator" in v.dims else 0] for v in METRICS],
         }
 
+    def id_at(self, flat: int) -> str:
+        """Id of the case at a flat index of the grid; "" beyond it."""
+        if flat >= math.prod(self.shape):
+            return ""
+        index = np.unravel_index(flat, self.shape)
+        return case_id(self.identity, [values[i] for values, i in zip(self.axes, index, strict=True)])
+
     def line(self) -> bytes:
         """The header as the first line of a journal."""
-        text = json.dumps(self.told(self.shape)).encode()
+        text = json.dumps(self.told).encode()
         return b"%08x %s\n" % (crc32(text), text)
 
 
@@ -190,10 +197,7 @@ def next_run(directory: Path) -> int:
 
 
 def replay(directory: Path, header: Header, *, with_metrics: bool = True) -> Ledger:
-    """Read every journal in turn; damaged lines and journals of other identities are passed over.
-
-    A journal written for a smaller grid is taken over: axes only ever grow at their ends.
-    """
+    """Read every journal in turn; damaged lines and journals of other identities or grids are passed over."""
     n_case = math.prod(header.shape)
     dtype = metrics_type(header.n_stator)
     metrics = np.zeros(n_case, dtype) if with_metrics else None
@@ -217,31 +221,32 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
     status, checksum, is_known, reasons = ledger.status, ledger.checksum, ledger.is_known, ledger.reasons
     size = ledger.metrics.dtype.itemsize if ledger.metrics is not None else 0
     store = ledger.metrics.view(np.uint8).data if ledger.metrics is not None and n_case else None
+    packed_size = metrics_type(header.n_stator).itemsize
     with path.open("rb") as file:
         first = file.readline()
-        if first[:8] != b"%08x" % crc32(first[9:-1]):
-            ledger.torn += 1
-            return 0
-        places = _places(json.loads(first[9:-1]), header)
-        if places is None:
-            return 0
+        is_sound = first[:8] == b"%08x" % crc32(first[9:-1])
+        if is_sound and json.loads(first[9:-1]) != header.told:
+            return 0  # of another study or version, or of other values on the axes
+        ledger.torn += not is_sound
         n_line = 0
         for line in file:
             text = line[9:-1]
             if line[:8] != b"%08x" % crc32(text) or line[-1:] != b"\n":
                 ledger.torn += 1
-                ledger.torn_cases |= _still_legible(text, places, n_case)
+                ledger.torn_cases |= _still_legible(text, n_case)
                 continue
-            n_line += 1
-            number, _, state, check, packed, reason = text.split(b" ", 5)
+            number, name, state, check, packed, reason = text.split(b" ", 5)
             flat = int(number)
-            if places:
-                flat = places[flat]
+            is_wanted = packed != b"-" and (store is not None or not is_sound)
+            metrics = binascii.a2b_base64(packed) if is_wanted else b""
+            if not is_sound and (name.decode() != header.id_at(flat) or len(metrics) not in (0, packed_size)):
+                continue  # without its header a line counts only if its case is where it says
+            n_line += 1
             status[flat] = int(state)
             checksum[flat] = int(check, 16)
             is_known[flat] = True
-            if store is not None and packed != b"-":
-                store[flat * size : (flat + 1) * size] = binascii.a2b_base64(packed)
+            if store is not None and metrics:
+                store[flat * size : (flat + 1) * size] = metrics
             if reason != b"-":
                 reasons[flat] = json.loads(reason)
             elif reasons:
@@ -249,21 +254,9 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
     return n_line
 
 
-def _still_legible(text: bytes, places: list[int], n_case: int) -> set[int]:
+def _still_legible(text: bytes, n_case: int) -> set[int]:
     """The flat index of a damaged line, if it can be read."""
     number, *rest = text.split(b" ", 2)
-    if len(rest) < 2 or not number.isdigit() or int(number) >= (len(places) or n_case):
+    if len(rest) < 2 or not number.isdigit() or int(number) >= n_case:
         return set()
-    return {places[int(number)] if places else int(number)}
-
-
-def _places(told: dict[str, Any], header: Header) -> list[int] | None:
-    """Where the flat indices of a journal lie in the present grid: [] for as they are, None for nowhere."""
-    shape = tuple(told.get("shape", ()))
-    if len(shape) != len(header.shape) or told != header.told(shape):
-        return None  # of another study or version, or of other values on the axes
-    if shape == header.shape:
-        return []
-    grid = np.arange(math.prod(header.shape)).reshape(header.shape)
-    flats: list[int] = grid[tuple(slice(n) for n in shape)].ravel().tolist()
-    return flats
+    return {int(number)}

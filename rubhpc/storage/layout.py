@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import platform
+import struct
 import warnings
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
@@ -13,8 +14,10 @@ import numpy as np
 import zarr
 from numcodecs.blosc import Blosc
 from zarr.codecs import BloscCodec
+from zarr.storage import MemoryStore
 
 from rubhpc.schema import VARIABLES
+from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import METRICS
 from rubhpc.storage.manifest import PRIVATE, Manifest
 from rubhpc.version import __version__
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+    from zarr.core.buffer import Buffer
 
     from rubhpc.schema import Variable
     from rubhpc.sweep import Sweep
@@ -50,43 +54,37 @@ def fill_value(variable: Variable) -> float | int:
     return math.nan if variable.dtype.startswith("float") else -1
 
 
-def build(path: Path, sweep: Sweep) -> None:
-    """Make all of a store in the empty directory `path`."""
+def skeleton(sweep: Sweep, *, accepted: tuple[int, ...] = ()) -> dict[str, bytes]:
+    """All files of a store that are of no case, by their path in it: metadata, coordinates and settings."""
+    files: dict[str, Buffer] = {}
     manifest = Manifest.of(sweep)
-    group = zarr.create_group(path, zarr_format=3, attributes=_attributes(sweep))
+    group = zarr.create_group(
+        MemoryStore(files), zarr_format=3, attributes=_attributes(sweep, accepted=accepted)
+    )
     for variable in manifest.variables:
         _create(group, variable, manifest, chunk=manifest.chunk)
     for variable in PACKED:
         _create(group, variable, manifest, chunk=_packed_chunk(manifest.shape))
-    static = write_static(group, sweep)
-    consolidate(path)
-    (path / PRIVATE / "journal").mkdir(parents=True)
-    (path / PRIVATE / "logs").mkdir()
-    Manifest.of(sweep, static=static).write(path)
-
-
-def resize(group: zarr.Group, manifest: Manifest) -> None:
-    """Give every array over the grid the manifest's lengths; chunks in place stay."""
-    for variable in (*manifest.variables, *PACKED):
-        array = get_array(group, variable.name)
-        array.resize((*manifest.shape, *manifest.extent(variable)))
-
-
-def write_static(group: zarr.Group, sweep: Sweep) -> dict[str, int]:
-    """Write coordinates and settings anew; the CRC-32 of each."""
-    checks = {}
     with zarr.config.set(_WRITE_ALL):
         for name, (dims, values, attributes) in _static(sweep).items():
             group.create_array(
-                name,
-                data=values,
-                dimension_names=dims,
-                attributes=attributes,
-                compressors=_CODEC,
-                overwrite=True,
+                name, data=values, dimension_names=dims, attributes=attributes, compressors=_CODEC
             )
-            checks[name] = checksum(values)
-    return checks
+    with warnings.catch_warnings():
+        # The format's specification is behind its implementations here.
+        warnings.simplefilter("ignore")
+        zarr.consolidate_metadata(group.store)  # a reader opens one file instead of fifty
+    return {name: held.to_bytes() for name, held in files.items()}
+
+
+def build(path: Path, sweep: Sweep) -> None:
+    """Make all of a store in the empty directory `path`."""
+    files = skeleton(sweep)
+    for name, data in files.items():
+        write_whole(path / name, data, is_synced=False)
+    (path / PRIVATE / "journal").mkdir(parents=True)
+    (path / PRIVATE / "logs").mkdir()
+    Manifest.of(sweep, files={name: crc32(data) for name, data in files.items()}).write(path)
 
 
 def encode(chunk: NDArray[Any]) -> bytes:
@@ -96,16 +94,22 @@ def encode(chunk: NDArray[Any]) -> bytes:
     return encoded
 
 
-def consolidate(path: Path) -> None:
-    """Gather the metadata of all arrays in one file, so that a reader opens one instead of fifty."""
-    with warnings.catch_warnings():
-        # The format's specification is behind its implementations here, and the private directory no array.
-        warnings.simplefilter("ignore")
-        zarr.consolidate_metadata(path)
+def decode(data: bytes, dtype: str, shape: tuple[int, ...]) -> NDArray[Any] | None:
+    """A chunk from its bytes; None where these are damaged and their header tells of another size."""
+    wanted = np.dtype(dtype).newbyteorder("<")
+    if len(data) < 16:
+        return None
+    n_byte, _, n_stored = struct.unpack_from("<III", data, 4)  # the decoder believes its header
+    if n_byte != math.prod(shape) * wanted.itemsize or n_stored != len(data):
+        return None
+    try:
+        return np.frombuffer(_BLOSC.decode(data), wanted).reshape(shape)
+    except (RuntimeError, ValueError):
+        return None
 
 
 def get_array(group: zarr.Group, name: str) -> zarr.Array[Any]:
-    """An array of a group by name, ready to be written."""
+    """An array of a group by name, ready to be written whole."""
     with zarr.config.set(_WRITE_ALL):
         array = group[name]
     if not isinstance(array, zarr.Array):
@@ -183,7 +187,7 @@ def _static(sweep: Sweep) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict
     return static
 
 
-def _attributes(sweep: Sweep) -> dict[str, Any]:
+def _attributes(sweep: Sweep, *, accepted: tuple[int, ...]) -> dict[str, Any]:
     study = sweep.study
     return {
         "title": study.title,
@@ -197,6 +201,7 @@ def _attributes(sweep: Sweep) -> dict[str, Any]:
             **{name: _version(name) for name in _PACKAGES},
         },
         "coordinates": "revolution",  # also where no array over the samples is kept
+        **({"accepted_physics": list(accepted)} if accepted else {}),
     }
 
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass, fields
+import re
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Self
+from zlib import crc32
 
+from rubhpc.axes import case_id
 from rubhpc.errors import StoreError
 from rubhpc.schema import KEEPABLE, VARIABLES
 from rubhpc.storage.disk import write_whole
@@ -18,8 +21,10 @@ if TYPE_CHECKING:
     from rubhpc.schema import Variable
     from rubhpc.sweep import Sweep
 
-_FORMAT = 1
+_FORMAT = 2
 PRIVATE = ".rubhpc"  # the directory of a store that zarr does not look into
+GROWTH = "growth"  # in it: what a growth that was decided on has yet to move to its place
+_NAMES = ("manifest.json", "manifest.copy.json")  # one damaged byte must not cost a study
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,8 +54,10 @@ class Manifest:
         Lengths of the dimensions after the axes: stator, sample, order, section.
     keep : tuple of str
         Roles of the arrays stored for every case.
-    static : dict
-        Name of each coordinate and setting -> CRC-32 of its values.
+    files : dict
+        Path of each file that is of no case (metadata, coordinates, settings) -> CRC-32 of its bytes.
+    accepted : tuple of int
+        Earlier versions of the physics whose cases were kept.
     """
 
     title: str
@@ -60,7 +67,8 @@ class Manifest:
     chunk: tuple[int, ...]
     sizes: dict[str, int]
     keep: tuple[str, ...]
-    static: dict[str, int]
+    files: dict[str, int]
+    accepted: tuple[int, ...] = ()
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -95,18 +103,27 @@ class Manifest:
         """Shape of a variable after the axes."""
         return tuple(self.sizes[dim] for dim in variable.dims)
 
-    def name_case(self, flat: int) -> str:
-        """Coordinates of a case, as in `friction=0.3, clearance_ratio=0.7`."""
-        places = []
+    def point(self, flat: int) -> list[float]:
+        """Values of a case on the axes."""
+        values = []
         for axis in reversed(self.axes):
             flat, i = divmod(flat, len(axis.values))
-            places.append(
-                f"{axis.name}={axis.values[i]:.6g}" + (f" {axis.unit}" if axis.unit not in ("", "1") else "")
-            )
-        return ", ".join(reversed(places))
+            values.append(axis.values[i])
+        return values[::-1]
+
+    def case_id(self, flat: int) -> str:
+        """Id of a case."""
+        return case_id(self.identity, self.point(flat))
+
+    def name_case(self, flat: int) -> str:
+        """Coordinates of a case, as in `friction=0.3, clearance_ratio=0.7`."""
+        return ", ".join(
+            f"{axis.name}={value:.6g}" + (f" {axis.unit}" if axis.unit not in ("", "1") else "")
+            for axis, value in zip(self.axes, self.point(flat), strict=True)
+        )
 
     @classmethod
-    def of(cls, sweep: Sweep, *, static: dict[str, int] | None = None) -> Self:
+    def of(cls, sweep: Sweep, *, files: dict[str, int] | None = None, accepted: tuple[int, ...] = ()) -> Self:
         """The manifest of a store for `sweep`."""
         study = sweep.study
         recording = study.recording
@@ -127,46 +144,68 @@ class Manifest:
                 "section": recording.revolutions,
             },
             keep=tuple(sorted(recording.keep)),
-            static=static or {},
+            files=files or {},
+            accepted=accepted,
         )
 
     def write(self, store: Path) -> None:
-        """Put the manifest into a store."""
-        text = json.dumps({"format": _FORMAT, **asdict(self)}, indent=1)
-        write_whole(store / PRIVATE / "manifest.json", text.encode())
+        """Put the manifest into a store, twice."""
+        text = json.dumps(asdict(self), indent=1).encode()
+        for name in _NAMES:
+            write_whole(store / PRIVATE / name, b"rubhpc %d %08x\n%s" % (_FORMAT, crc32(text), text))
 
     @classmethod
     def read(cls, store: Path) -> Self:
-        """The manifest of a store.
+        """The manifest of a store, as it is once a growth that was decided on has been finished.
 
         Raises
         ------
         StoreError
             There is no store, it is not one of this program, or its manifest is damaged.
         """
-        path = store / PRIVATE / "manifest.json"
-        try:
-            told = json.loads(path.read_bytes())
-            if told.pop("format") != _FORMAT:
-                raise StoreError(
-                    f"{store}: made by another version of rubhpc; use that one or another --output"
-                )
-            told["axes"] = tuple(
-                AxisRecord(**{**axis, "values": tuple(axis["values"])}) for axis in told["axes"]
-            )
-            return cls(**{**told, "chunk": tuple(told["chunk"]), "keep": tuple(told["keep"])})
-        except FileNotFoundError:
-            what = "is not a rubhpc store" if store.exists() else "no such store"
-            raise StoreError(f"{store}: {what}; give the directory that a study was run into") from None
-        except NotADirectoryError:
-            raise StoreError(f"{store}: is not a rubhpc store but a file") from None
-        except (ValueError, KeyError, TypeError) as error:
+        damaged, is_other = None, False
+        for place in manifests(store):
+            try:
+                text = _vouched(place)
+                told = json.loads(text)
+            except (FileNotFoundError, NotADirectoryError):
+                continue
+            except _OtherFormat:
+                is_other = True
+                continue
+            except (ValueError, OSError) as error:
+                damaged = error
+                continue
+            axes = (AxisRecord(**{**axis, "values": tuple(axis["values"])}) for axis in told["axes"])
+            tuples = {name: tuple(told[name]) for name in ("chunk", "keep", "accepted")}
+            return cls(**{**told, **tuples, "axes": tuple(axes)})
+        if is_other:
+            raise StoreError(f"{store}: made by another version of rubhpc; use that one or another --output")
+        if damaged is not None:
             raise StoreError(
-                f"{store}: its manifest is damaged ({error}); run into another --output"
-            ) from None
+                f"{store}: both copies of its manifest are damaged ({damaged}); "
+                "put one back from a backup or run into another --output"
+            )
+        if store.is_file():
+            raise StoreError(f"{store}: is not a rubhpc store but a file")
+        what = "is not a rubhpc store" if store.exists() else "no such store"
+        raise StoreError(f"{store}: {what}; give the directory that a study was run into")
+
+    def damaged_copies(self, store: Path) -> list[str]:
+        """Names of the files of this manifest that are gone or damaged."""
+        names = []
+        for name in _NAMES:
+            try:
+                _vouched(store / PRIVATE / name)
+            except (ValueError, OSError):
+                names.append(name)
+        return names
 
     def differences(self, other: Manifest) -> list[str]:
-        """What keeps the study of `other` out of this store, a text each; its axes may have grown."""
+        """What keeps the study of `other` out of this store, a text each.
+
+        Its axes may have grown, anywhere, and the order of their values may be another.
+        """
         found = [
             f"{key} was {_short(mine)}, is {_short(yours)}"
             for key, mine, yours in _leaves(self.parts, other.parts)
@@ -176,13 +215,46 @@ class Manifest:
             found.append(f"axes were {', '.join(self.dims)}, are {', '.join(other.dims)}")
             return found
         for mine, yours in zip(self.axes, other.axes, strict=True):
-            if mine.unit != yours.unit or yours.values[: len(mine.values)] != mine.values:
-                found.append(f"axis {mine.name} no longer begins with its {len(mine.values)} old values")
+            lost = sorted(set(mine.values) - set(yours.values))
+            if lost:
+                rest = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
+                told = ", ".join(f"{value:.12g}" for value in lost[:3])
+                found.append(f"axis {mine.name} lacks {told}{rest}, which is stored")
         if not found and (
             self.identity != other.identity or self.keep != other.keep or self.sizes != other.sizes
         ):
             found.append("its identity")
         return found
+
+    def is_other_version(self, other: Manifest) -> bool:
+        """Whether nothing keeps the study of `other` out of this store but the version of the physics."""
+        same = {**self.parts, "physics": other.parts["physics"]}
+        return self.parts != same and not replace(self, parts=same, identity=other.identity).differences(
+            other
+        )
+
+
+class _OtherFormat(Exception):  # noqa: N818 - becomes the text of a StoreError
+    """A manifest that another version wrote."""
+
+
+def manifests(store: Path) -> list[Path]:
+    """Where the manifest of a store may be, the one that counts first."""
+    growth = store / PRIVATE / GROWTH / PRIVATE
+    return [folder / name for folder in (growth, store / PRIVATE) for name in _NAMES]
+
+
+def _vouched(path: Path) -> bytes:
+    """The text of a manifest, if its checksum is right."""
+    head, _, text = path.read_bytes().partition(b"\n")
+    if found := re.fullmatch(rb"rubhpc (\d+) ([0-9a-f]{8})", head):
+        if int(found[1]) != _FORMAT:
+            raise _OtherFormat
+        if int(found[2], 16) == crc32(text):
+            return text
+    elif head.startswith(b"{"):  # of version 1, which kept no checksum
+        raise _OtherFormat
+    raise ValueError("checksum")
 
 
 def _leaves(mine: Any, yours: Any, key: str = "") -> list[tuple[str, Any, Any]]:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE
-from rubhpc.storage.manifest import PRIVATE, Manifest
+from rubhpc.storage.growth import grow, settle
+from rubhpc.storage.manifest import Manifest, manifests
 from rubhpc.storage.store import Store
 from rubhpc.sweep import Sweep
 
@@ -23,26 +24,38 @@ if TYPE_CHECKING:
 
 def is_store(path: Path) -> bool:
     """Whether a store of this program stands at `path`."""
-    return (path / PRIVATE / "manifest.json").is_file()
+    return any(place.is_file() for place in manifests(path))
 
 
-def sweep_for(study: Study) -> Sweep:
+def sweep_for(study: Study, *, accept_version: bool = False) -> Sweep:
     """The study's sweep, with the blocks of the store it goes on with.
 
     Raises
     ------
     StoreError
-        The store at the study's output is of another study; the text lists the differences.
+        The store at the study's output is of another study, or of another version of the physics that is
+        not accepted; the text lists the differences.
     """
     sweep = Sweep(study)
     if not is_store(study.output):
         return sweep
     manifest = Manifest.read(study.output)
-    differences = manifest.differences(Manifest.of(sweep))
-    if differences:
-        told = "; ".join(differences)
-        raise StoreError(f"{study.output}: is the store of another study: {told}; choose another --output")
+    _refuse_other(manifest, Manifest.of(sweep), study.output, accept_version=accept_version)
     return sweep if sweep.chunk == manifest.chunk else Sweep(study, chunk=manifest.chunk)
+
+
+def _refuse_other(mine: Manifest, yours: Manifest, path: Path, *, accept_version: bool) -> None:
+    differences = mine.differences(yours)
+    is_version = mine.is_other_version(yours)
+    if not differences or (is_version and accept_version):
+        return
+    told = "; ".join(differences)
+    if is_version:
+        raise StoreError(
+            f"{path}: was computed by another version of the physics: {told}; "
+            "--accept-version keeps its cases and goes on, another --output starts anew"
+        )
+    raise StoreError(f"{path}: is the store of another study: {told}; choose another --output")
 
 
 def open_store(sweep: Sweep) -> Store:
@@ -58,15 +71,16 @@ def open_store(sweep: Sweep) -> Store:
         raise
 
 
-def bring_up_to_date(store: Store, sweep: Sweep) -> None:
+def bring_up_to_date(store: Store, sweep: Sweep, *, accept_version: bool = False) -> None:
     """Grow the store to the sweep's axes, mend what is damaged beside the cases, remove partial files."""
-    differences = store.manifest.differences(Manifest.of(sweep))
-    if differences:
-        raise StoreError(f"{store.path}: has just become that of another study: {'; '.join(differences)}")
-    if store.manifest.shape != sweep.shape:
-        store.grow(sweep)
-    store.mend_static(sweep)
+    settle(store.path)
+    store.reopen()
+    wanted = Manifest.of(sweep)
+    _refuse_other(store.manifest, wanted, store.path, accept_version=accept_version)
     store.remove_partial_files()
+    if store.manifest.axes != wanted.axes or store.manifest.identity != wanted.identity:
+        grow(store, sweep)
+    store.mend_files(sweep)
 
 
 def find_gone(store: Store, ledger: Ledger) -> list[int]:

@@ -12,8 +12,10 @@ import os
 import shutil
 import socket
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
+from zlib import crc32
 
 import numpy as np
 import zarr
@@ -35,13 +37,16 @@ if TYPE_CHECKING:
 
 
 class Store:
-    """An open store; `arrays` holds its zarr arrays by name."""
+    """An open store."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.manifest = Manifest.read(path)
-        self.arrays: dict[str, zarr.Array[Any]] = {}
-        self._open_arrays()
+
+    def reopen(self) -> None:
+        """Take the manifest as it now is."""
+        self.manifest = Manifest.read(self.path)
+        self.__dict__.pop("arrays", None)
 
     @classmethod
     def create(cls, path: Path, sweep: Sweep) -> Self:
@@ -102,46 +107,45 @@ class Store:
         if flat:
             ledger.status[flat] = MISSING
             with disk_errors(self.journal_directory), self.journal(run, writer) as journal:
-                journal.write(Entry(i, "-", MISSING) for i in flat)
+                journal.write(Entry(i, self.manifest.case_id(i), MISSING) for i in flat)
                 journal.sync()
 
-    def grow(self, sweep: Sweep) -> None:
-        """Lengthen the axes to those of `sweep`, which begin as they do; killed, it can be done again."""
+    def damaged_files(self) -> list[str]:
+        """Paths of the metadata, coordinates and settings that are not what the manifest vouches for."""
+        damaged = []
+        for name, check in self.manifest.files.items():
+            try:
+                if crc32((self.path / name).read_bytes()) == check:
+                    continue
+            except OSError:
+                pass
+            damaged.append(name)
+        return damaged
+
+    def mend_files(self, sweep: Sweep) -> None:
+        """Write metadata, coordinates and settings anew where they are damaged, and the manifest."""
+        damaged = self.damaged_files()
+        if not damaged and not self.manifest.damaged_copies(self.path):
+            return
         with disk_errors(self.path):
-            group = zarr.open_group(self.path, mode="r+", use_consolidated=False)
-            layout.resize(group, Manifest.of(sweep))
-            static = layout.write_static(group, sweep)
-            group.update_attributes({"study": sweep.study.as_dict()})
-            layout.consolidate(self.path)
-            self.forget_packing()
-            self.manifest = replace(Manifest.of(sweep, static=static), chunk=self.manifest.chunk)
+            if damaged:
+                files = layout.skeleton(sweep, accepted=self.manifest.accepted)
+                for name in damaged:
+                    write_whole(self.path / name, files[name])
+                checks = {name: crc32(files[name]) for name in damaged}
+                self.manifest = replace(self.manifest, files=self.manifest.files | checks)
             self.manifest.write(self.path)
-        self._open_arrays()
 
-    def damaged_static(self) -> list[str]:
-        """Names of the coordinates and settings that are not what the manifest vouches for."""
-        return [name for name, check in self.manifest.static.items() if not self._vouched(name, check)]
-
-    def mend_static(self, sweep: Sweep) -> None:
-        """Write coordinates and settings anew where one is damaged."""
-        if self.damaged_static():
-            with disk_errors(self.path):
-                layout.write_static(zarr.open_group(self.path, mode="r+", use_consolidated=False), sweep)
-
-    def _vouched(self, name: str, check: int) -> bool:
-        try:
-            return layout.checksum(np.asarray(self.arrays[name][...])) == check
-        except (RuntimeError, ValueError, OSError):
-            return False
-
-    def _open_arrays(self) -> None:
-        names = [*self.manifest.static, *(v.name for v in (*self.manifest.variables, *layout.PACKED))]
+    @cached_property
+    def arrays(self) -> dict[str, zarr.Array[Any]]:
+        """The zarr arrays by name."""
+        names = sorted({name.partition("/")[0] for name in self.manifest.files if "/" in name})
         try:
             group = zarr.open_group(self.path, mode="r+", use_consolidated=False)
-            self.arrays = {name: layout.get_array(group, name) for name in names}
+            return {name: layout.get_array(group, name) for name in names}
         except (KeyError, ValueError, TypeError, OSError) as error:
             raise StoreError(
-                f"{self.path}: its metadata is damaged ({error}); run into another --output"
+                f"{self.path}: its metadata is damaged ({error}); run its study again to mend it"
             ) from None
 
     def blocks(self) -> Iterator[tuple[int, ...]]:
@@ -166,7 +170,7 @@ class Store:
         """The files that hold a block, one an array."""
         place = [s // c for s, c in zip(start, self.manifest.chunk, strict=True)]
         return [
-            self.path / v.name / self.arrays[v.name].metadata.encode_chunk_key((*place, *[0] * len(v.dims)))
+            self.path.joinpath(v.name, "c", *map(str, (*place, *[0] * len(v.dims))))
             for v in self.manifest.variables
         ]
 
@@ -187,16 +191,19 @@ class Store:
 
     def read_block(self, start: tuple[int, ...]) -> dict[str, NDArray[Any]] | None:
         """The arrays of a block as stored; None where a file is missing or cannot be decoded."""
-        if not self.has_files(start):
-            return None
-        window, extent = self.window(start), self.manifest.extent
-        try:
-            return {
-                v.name: np.ascontiguousarray(self.arrays[v.name][window]).reshape(-1, *extent(v))
-                for v in self.manifest.variables
-            }
-        except (RuntimeError, ValueError, OSError):  # what the codecs raise on damaged bytes
-            return None
+        inside = tuple(slice(w.stop - w.start) for w in self.window(start))
+        block = {}
+        for variable, path in zip(self.manifest.variables, self.chunk_files(start), strict=True):
+            extent = self.manifest.extent(variable)
+            try:
+                data = path.read_bytes()
+            except OSError:
+                return None
+            chunk = layout.decode(data, variable.dtype, (*self.manifest.chunk, *extent))
+            if chunk is None:
+                return None
+            block[variable.name] = np.ascontiguousarray(chunk[inside]).reshape(-1, *extent)
+        return block
 
     def write_block(self, start: tuple[int, ...], data: dict[str, NDArray[Any]]) -> None:
         """Store the arrays of a block; each file appears whole."""

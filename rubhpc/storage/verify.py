@@ -6,10 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import zarr
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, MISSING
+from rubhpc.storage.growth import settle
 from rubhpc.storage.journal import next_run
+from rubhpc.storage.manifest import GROWTH
 from rubhpc.storage.store import Store, case_checksum
 
 if TYPE_CHECKING:
@@ -29,7 +32,7 @@ class Damage:
     cases : dict
         Flat index -> the case's index and coordinates, and what is wrong with it.
     arrays : tuple of str
-        Coordinates, settings and packed arrays; the next run writes them anew without computing.
+        Metadata, coordinates, settings and packed arrays; the next run writes them anew without computing.
     n_checked : int
         Cases that have been compared with their checksum.
     note : str
@@ -48,7 +51,7 @@ class Damage:
     def lines(self) -> list[str]:
         """What is damaged, a line each."""
         return [f"damaged: case {text}" for text in self.cases.values()] + [
-            f"damaged: array {name}; the next run writes it anew" for name in self.arrays
+            f"damaged: {name}; the next run writes it anew" for name in self.arrays
         ]
 
     def complaint(self) -> str:
@@ -60,12 +63,17 @@ class Damage:
 def verify(path: Path) -> Damage:
     """Compare all that a store holds with its checksums; cases found damaged are missing from then on."""
     store = Store(path)
+    note = ""
+    if (store.private / GROWTH).is_dir():  # a run was killed in it
+        with store.lock():
+            settle(path)
+        store.reopen()
     ledger = store.replay()
     spoiled = _spoiled_cases(store, ledger)
     lost = _lost_lines(store, ledger)
     packed = _damaged_packed(store, ledger)
+    files = dict.fromkeys(_named(name) for name in store.damaged_files())
     n_checked = int(np.isin(ledger.status, (DONE, DIVERGED)).sum())
-    note = ""
     if spoiled or packed:
         try:
             with store.lock():
@@ -77,10 +85,18 @@ def verify(path: Path) -> Damage:
     return Damage(
         store=path,
         cases={i: f"{_name(store, i)}: {text}" for i, text in sorted((spoiled | lost).items())},
-        arrays=(*store.damaged_static(), *packed),
+        arrays=(*files, *packed, *store.manifest.damaged_copies(path)),
         n_checked=n_checked,
         note=note,
     )
+
+
+def _named(file: str) -> str:
+    """What a file of metadata, coordinates or settings is to the reader of a store."""
+    array, slash, rest = file.partition("/")
+    if not slash:
+        return "metadata"
+    return f"metadata of {array}" if rest == "zarr.json" else array
 
 
 def _name(store: Store, flat: int) -> str:
@@ -131,6 +147,6 @@ def _damaged_packed(store: Store, ledger: Ledger) -> tuple[str, ...]:
 
 def _read(store: Store, name: str) -> NDArray[np.generic] | None:
     try:
-        return np.ascontiguousarray(store.arrays[name][...])
-    except (RuntimeError, ValueError, OSError):
+        return np.ascontiguousarray(zarr.open_array(store.path / name, mode="r")[...])
+    except Exception:  # whatever zarr and its codecs raise on damaged bytes
         return None

@@ -66,15 +66,16 @@ def test_every_case_lies_in_exactly_one_block(grid, block):
 @settings(max_examples=30, deadline=None)
 @given(grid=grids(), data=st.data())
 def test_growth_keeps_identity_and_ids(grid, data):
-    longer = {name: [*values, max(values) * 1.25 + 0.1] for name, values in grid.items()}
+    """Wherever a new value stands, and whatever the order of the old ones."""
     name = data.draw(st.sampled_from(sorted(grid)))
-    before, after = Sweep(study(grid)), Sweep(study(grid | {name: longer[name]}))
+    longer = data.draw(st.permutations([*grid[name], max(grid[name]) * 1.25 + 0.1]))
+    before, after = Sweep(study(grid)), Sweep(study(grid | {name: longer}))
     assert after.identity == before.identity
-    kept = {before.case(i).id for i in np.ndindex(before.shape)}
-    grown = {after.case(i).id for i in np.ndindex(after.shape)}
-    assert kept < grown
-    for i in itertools.islice(np.ndindex(before.shape), 5):
-        assert after.case(i) == before.case(i)  # appended values leave indices alone
+    kept = {before.case(i).id: before.case(i) for i in np.ndindex(before.shape)}
+    grown = {after.case(i).id: after.case(i) for i in np.ndindex(after.shape)}
+    assert kept.keys() < grown.keys()
+    for name, case in itertools.islice(kept.items(), 5):
+        assert replace(grown[name], index=case.index) == case
 
 
 @pytest.mark.parametrize(
@@ -104,6 +105,7 @@ def test_what_changes_results_changes_the_identity(change):
         {"rig": replace(RIG, name="by another name")},
         {"rig": with_key(RIG, "rotor.bearing.stiffness", 1_000_000)},
         {"grid": SMALL | {"friction": [0.2]}},
+        {"grid": SMALL | {"friction": [0.5, 0.1, 0.3, 0.2]}},
         {"recording": Recording(keep=("section", "spectrum", "waveform"))},
     ],
 )
@@ -111,6 +113,17 @@ def test_what_changes_no_result_leaves_the_identity(change):
     parts = {"title": "t"} | change
     grid, rig, title = parts.pop("grid", SMALL), parts.pop("rig", RIG), parts.pop("title")
     assert Sweep(replace(study(grid, rig, **parts), title=title)).identity == Sweep(study()).identity
+
+
+@pytest.mark.parametrize("key", ["stator.youngs_modulus", "stator.1.length", "rotor.bearing.stiffness"])
+def test_what_the_rig_says_of_a_key_that_is_an_axis_leaves_the_identity(key):
+    """Every case sets it; another key of the same part still counts."""
+    grid = SMALL | {key: [0.05, 0.06]}
+    identity = Sweep(study(grid)).identity
+    assert Sweep(study(grid, with_key(RIG, key, 0.055))).identity == identity
+    assert Sweep(study(SMALL | {key: [0.06, 0.07, 0.05]})).identity == identity
+    assert Sweep(study(grid, with_key(RIG, "stator.width", 0.004))).identity != identity
+    assert Sweep(study(SMALL)).identity != identity
 
 
 def test_ids_do_not_depend_on_the_machine():

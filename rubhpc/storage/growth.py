@@ -1,0 +1,162 @@
+"""Grows a store to other values on its axes, wherever they stand: all of it happens, or nothing.
+
+What changes is put together in a directory of its own: metadata, coordinates, and every block whose cases
+move. One rename of that directory decides on the growth; from then on the manifest in it is the store's, and
+whoever next holds the lock moves its files to their places. A kill before the rename leaves the old store, a
+kill after it leaves the rest of the moving to be done.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from functools import lru_cache
+from typing import TYPE_CHECKING
+from zlib import crc32
+
+import numpy as np
+
+from rubhpc.schema import DIVERGED, DONE, MISSING
+from rubhpc.storage import layout
+from rubhpc.storage.disk import disk_errors, flush_to_disk, write_whole
+from rubhpc.storage.journal import Entry, Journal, next_run
+from rubhpc.storage.manifest import GROWTH, PRIVATE, Manifest, manifests
+from rubhpc.storage.store import Store, case_checksum
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from rubhpc.storage.journal import Ledger
+    from rubhpc.sweep import Sweep
+
+_HELD = 64  # blocks of the old grid kept in memory: neighbours in the new one come from few of them
+
+
+def origins(before: Manifest, after: Manifest) -> NDArray[np.int64]:
+    """Flat index in the grid of `before` of every case of `after`, (n_case,); -1 for a new one."""
+    origin, is_new = np.zeros((), np.int64), np.zeros((), bool)
+    for mine, yours in zip(before.axes, after.axes, strict=True):
+        at = {value: i for i, value in enumerate(mine.values)}
+        place = np.array([at.get(value, -1) for value in yours.values])
+        origin = np.add.outer(origin * len(mine.values), place)
+        is_new = np.logical_or.outer(is_new, place < 0)
+    return np.where(is_new, -1, origin).ravel()
+
+
+def grow(store: Store, sweep: Sweep) -> None:
+    """Give the store the axes and the identity of `sweep`, keeping every case; needs its lock.
+
+    Raises
+    ------
+    StoreError
+        The disk is full, or cannot be written; the store is as it was.
+    """
+    draft = store.private / f"{GROWTH}.draft"
+    with disk_errors(store.path):
+        shutil.rmtree(draft, ignore_errors=True)
+        try:
+            _put_together(draft, store, sweep)
+            os.sync()  # all of it is on the disk before it counts
+            draft.rename(store.private / GROWTH)
+            flush_to_disk(store.private)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+    settle(store.path)
+    store.reopen()
+
+
+def settle(path: Path) -> None:
+    """Finish a growth that was decided on, if there is one; needs the store's lock."""
+    growth = path / PRIVATE / GROWTH
+    if not growth.is_dir():
+        return
+    by_block = {variable.name for variable in Manifest.read(path).variables}
+    with disk_errors(path):
+        (path / PRIVATE / "packed.json").unlink(missing_ok=True)
+        for staged in sorted(growth.iterdir()):
+            if staged.is_dir() and staged.name not in by_block and staged.name != PRIVATE:
+                shutil.rmtree(path / staged.name, ignore_errors=True)  # it comes whole
+                staged.replace(path / staged.name)
+            elif staged.name != PRIVATE:
+                for file in [staged] if staged.is_file() else staged.rglob("*"):
+                    if file.is_file():
+                        _move(file, path / file.relative_to(growth))
+        os.sync()
+        for file in manifests(path):
+            if file.is_relative_to(growth) and file.exists():
+                _move(file, path / file.relative_to(growth))
+        shutil.rmtree(growth)
+
+
+def _move(file: Path, target: Path) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    file.replace(target)
+
+
+def _put_together(draft: Path, store: Store, sweep: Sweep) -> None:
+    """Make in `draft` all that is to change in the store, and a journal of all cases in the new grid."""
+    before, ledger = store.manifest, store.replay()
+    accepted = before.accepted
+    if before.parts["physics"] != sweep.identity_parts["physics"]:
+        accepted = (*accepted, before.parts["physics"])
+    files = layout.skeleton(sweep, accepted=accepted)
+    for name, data in files.items():
+        write_whole(draft / name, data, is_synced=False)
+    checks = {name: crc32(data) for name, data in files.items()}
+    after = Manifest.of(sweep, files=checks, accepted=accepted)
+    after.write(draft)
+    origin = origins(before, after)
+    lost = _stage_blocks(Store(draft), store, ledger, origin)
+    with Journal(
+        store.journal_directory, next_run(store.journal_directory), "growth", after.header
+    ) as journal:
+        journal.write(
+            _carried(ledger, int(origin[flat]), flat, after.case_id(flat), is_lost=flat in lost)
+            for flat in np.flatnonzero((origin >= 0) & ledger.is_known[origin]).tolist()
+        )
+        journal.sync()
+
+
+def _carried(ledger: Ledger, origin: int, flat: int, name: str, *, is_lost: bool) -> Entry:
+    """What the journals say of a case, for its place in the new grid."""
+    status = int(ledger.status[origin])
+    if is_lost or status == MISSING:
+        return Entry(flat, name, MISSING)
+    assert ledger.metrics is not None
+    metrics = ledger.metrics[origin].tobytes() if status in (DONE, DIVERGED) else b""
+    reason = ledger.reasons.get(origin, "")
+    return Entry(flat, name, status, int(ledger.checksum[origin]), metrics, reason)
+
+
+def _stage_blocks(new: Store, old: Store, ledger: Ledger, origin: NDArray[np.int64]) -> set[int]:
+    """Write the blocks of the new grid that are not as they stand in the old; cases found damaged."""
+    read = lru_cache(maxsize=_HELD)(old.read_block)
+    is_stored = np.isin(ledger.status, (DONE, DIVERGED))
+    shape, chunk = old.manifest.shape, old.manifest.chunk
+    lost: set[int] = set()
+    for start in new.blocks() if new.manifest.variables else ():
+        flat = new.flat(start)
+        source = origin[flat]
+        index = np.stack(np.unravel_index(flat, new.manifest.shape))
+        was_inside = (index < np.array(shape)[:, None]).all(axis=0)
+        here = np.where(was_inside, np.ravel_multi_index(tuple(index), shape, mode="clip"), -1)
+        if np.array_equal(here, source):
+            continue  # the block stays as it is
+        wanted = np.flatnonzero((source >= 0) & is_stored[source])
+        if not len(wanted) and not any(file.exists() for file in old.chunk_files(start)):
+            continue
+        data = new.empty_block(start)
+        for i_case in wanted.tolist():
+            place = np.unravel_index(source[i_case], shape)
+            corner = tuple(int(i) // c * c for i, c in zip(place, chunk, strict=True))
+            stored = read(corner)
+            i_stored = int(np.searchsorted(old.flat(corner), source[i_case]))
+            if stored is None or case_checksum(stored, i_stored) != ledger.checksum[source[i_case]]:
+                lost.add(int(flat[i_case]))
+                continue
+            for name, values in stored.items():
+                data[name][i_case] = values[i_stored]
+        new.write_block(start, data)
+    return lost

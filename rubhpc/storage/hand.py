@@ -1,0 +1,156 @@
+"""Which case each rank has in hand, so that a case that kills its rank is found out and left alone.
+
+A rank keeps a small file while it computes: the case in hand, and after it what a fatal signal or an overrun
+leaves behind as evidence. A rank that ends in order removes its file; those that stay tell of deaths.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import re
+import socket
+import uuid
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from types import TracebackType
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rubhpc.storage.manifest import Manifest
+
+DIRECTORY = "hand"
+_RECORD = 64  # bytes of the case in hand; the evidence follows
+_CRASHES = 2  # deaths by a fatal signal or for want of memory after which a case has failed
+_DEATHS = 5  # deaths of unknown cause: the launcher may have been killed, or the power cut
+_OVERRUN = "over its time limit"
+
+
+class Hand:
+    """A rank's record of the case in hand, as a context."""
+
+    def __init__(self, directory: Path, run: int, writer: str) -> None:
+        directory.mkdir(exist_ok=True)
+        # A run that leaves no journal gives its number to the next, but not its record.
+        self._path = directory / f"run{run:06d}-{writer}-{uuid.uuid4().hex[:12]}"
+        self._handle = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+        os.write(self._handle, b" " * (_RECORD - 1) + b"\n")
+        os.write(self._handle, f"{socket.gethostname()} {_oom_kills()}\n".encode())
+        self._has_tracer = not faulthandler.is_enabled()
+        if self._has_tracer:
+            faulthandler.enable(self._handle)
+
+    def take(self, flat: int, name: str) -> None:
+        """Note the case that is computed from now on; it outlives this process, at 1 us."""
+        os.pwrite(self._handle, f"{flat} {name}".ljust(_RECORD - 1).encode(), 0)
+
+    def drop(self) -> None:
+        """Note that no case is in hand."""
+        os.pwrite(self._handle, b" " * (_RECORD - 1), 0)
+
+    def accuse(self, seconds: float) -> None:
+        """Leave it as evidence that the case in hand does not end; from any thread."""
+        os.write(self._handle, f"{_OVERRUN} of {seconds:g} s, in a single step of it\n".encode())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._has_tracer:
+            faulthandler.disable()
+        os.close(self._handle)
+        self._path.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class Suspects:
+    """Cases that were in hand when ranks died.
+
+    Attributes
+    ----------
+    guilty : dict
+        Flat index -> why the case is not to be tried again.
+    doubtful : dict
+        Flat index -> deaths, of cases that are to be computed last, each by itself.
+    """
+
+    guilty: dict[int, str]
+    doubtful: dict[int, int]
+
+
+def find_suspects(directory: Path, manifest: Manifest, is_missing: NDArray[np.bool_]) -> Suspects:
+    """Which missing cases were in hand when ranks died; records of the others are removed."""
+    crashes: Counter[int] = Counter()
+    deaths: Counter[int] = Counter()
+    causes: dict[int, str] = {}
+    guilty: dict[int, str] = {}
+    for record in sorted(directory.glob("run*")) if directory.is_dir() else ():
+        found = _read(record)
+        if found is None or not _is_open(*found[:2], manifest, is_missing):
+            record.unlink(missing_ok=True)  # it died between cases, or has been computed since
+            continue
+        flat, _, evidence = found
+        deaths[flat] += 1
+        if evidence.startswith(_OVERRUN):
+            guilty[flat] = evidence
+        elif evidence:
+            crashes[flat] += 1
+            causes[flat] = evidence
+    for flat, n in deaths.items():
+        if crashes[flat] >= _CRASHES:
+            guilty.setdefault(flat, f"its rank died in it {crashes[flat]} times: {causes[flat]}")
+        elif n >= _DEATHS:
+            guilty.setdefault(flat, f"its rank died in it {n} times, of unknown cause")
+    doubtful = {flat: n for flat, n in deaths.items() if flat not in guilty and (n > 1 or crashes[flat])}
+    return Suspects(guilty, doubtful)
+
+
+def forget(directory: Path, flats: Iterable[int]) -> None:
+    """Remove the records of cases that have been judged."""
+    judged = set(flats)
+    for record in directory.glob("run*"):
+        found = _read(record)
+        if found is not None and found[0] in judged:
+            record.unlink(missing_ok=True)
+
+
+def _is_open(flat: int, name: str, manifest: Manifest, is_missing: NDArray[np.bool_]) -> bool:
+    return flat < len(is_missing) and bool(is_missing[flat]) and manifest.case_id(flat) == name
+
+
+def _read(record: Path) -> tuple[int, str, str] | None:
+    """Flat index and id of the case in hand, and the evidence of what befell it; None where there is none."""
+    data = record.read_bytes()
+    found = re.fullmatch(r"(\d+) ([0-9a-f]{32})", data[:_RECORD].decode(errors="replace").strip())
+    if found is None:
+        return None
+    where, _, evidence = data[_RECORD:].decode(errors="replace").partition("\n")
+    return int(found[1]), found[2], _cause(evidence) or _want_of_memory(where)
+
+
+def _cause(evidence: str) -> str:
+    line = evidence.partition("\n")[0]
+    return line.removeprefix("Fatal Python error: ").lower() if line.startswith("Fatal") else line
+
+
+def _want_of_memory(where: str) -> str:
+    host, _, n_kill = where.partition(" ")
+    is_here = host == socket.gethostname() and n_kill.isdigit()
+    return "killed, as the machine had no memory left" if is_here and _oom_kills() > int(n_kill) else ""
+
+
+def _oom_kills() -> int:
+    """Processes this machine has killed for want of memory since it started; 0 where it does not tell."""
+    try:
+        lines = Path("/proc/vmstat").read_text().splitlines()
+    except OSError:
+        return 0
+    return next((int(line.split()[1]) for line in lines if line.startswith("oom_kill ")), 0)
