@@ -81,20 +81,21 @@ def panels(data: xr.Dataset, axes: Sequence[Axes]) -> list[Axes]:
     axes[0].figure.align_ylabels(list(axes))
     if "contact_force" in data and data["contact_force"].ndim == 1:
         for ax in axes:
-            _shade_contacts(data["contact_force"], ax)
+            shade_contacts(data["contact_force"], ax)
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
         axes[0].figure.legend(handles, labels, loc="outside upper center", ncols=min(len(handles), 4))
     return list(axes)
 
 
-def _abscissa(signal: xr.DataArray) -> xr.DataArray:
-    return signal["time"] if "time" in signal.coords else signal["revolution"]
-
-
-def _shade_contacts(force: xr.DataArray, ax: Axes) -> None:
+def shade_contacts(force: xr.DataArray, ax: Axes) -> None:
+    """Shade the spans of contact behind a waveform, by the force of one stator."""
     x, _ = displayed(_abscissa(force))
     touching = np.diff(np.pad((force.values > 0).astype(int), 1))
     half = (x[1] - x[0]) / 2  # a sample is a mean over its interval
     for first, last in zip(np.flatnonzero(touching == 1), np.flatnonzero(touching == -1) - 1, strict=True):
         ax.axvspan(x[first] - half, x[last] + half, color="0.9", linewidth=0, zorder=0)
+
+
+def _abscissa(signal: xr.DataArray) -> xr.DataArray:
+    return signal["time"] if "time" in signal.coords else signal["revolution"]
