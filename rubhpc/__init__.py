@@ -15,8 +15,9 @@ from rubhpc.version import __version__ as __version__
 if TYPE_CHECKING:
     from postproc.load import open_store as open  # noqa: A004 - the public name
     from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
+    from rubhpc.fem.assemble import assemble
     from rubhpc.integrate.record import Record, State
-    from rubhpc.rig import Rig, read_rig
+    from rubhpc.rig import LumpedStator, MatrixStator, Rig, Stator, Unbalance, read_rig
     from rubhpc.running.driver import run
     from rubhpc.simulate import simulate
     from rubhpc.storage.summary import Summary
@@ -24,14 +25,19 @@ if TYPE_CHECKING:
 
 __all__ = [
     "InputError",
+    "LumpedStator",
+    "MatrixStator",
     "Record",
     "Rig",
     "RubError",
     "State",
+    "Stator",
     "StoppedEarly",
     "StoreError",
     "Study",
     "Summary",
+    "Unbalance",
+    "assemble",
     "open",
     "read_rig",
     "read_study",
@@ -42,14 +48,19 @@ __all__ = [
 # Where each name comes from; imported when it is first asked for, so that `import rubhpc` takes no time.
 _HOMES = {
     "InputError": "rubhpc.errors:InputError",
+    "LumpedStator": "rubhpc.rig:LumpedStator",
+    "MatrixStator": "rubhpc.rig:MatrixStator",
     "Record": "rubhpc.integrate.record:Record",
     "Rig": "rubhpc.rig:Rig",
     "RubError": "rubhpc.errors:RubError",
     "State": "rubhpc.integrate.record:State",
+    "Stator": "rubhpc.rig:Stator",
     "StoppedEarly": "rubhpc.errors:StoppedEarly",
     "StoreError": "rubhpc.errors:StoreError",
     "Study": "rubhpc.study:Study",
     "Summary": "rubhpc.storage.summary:Summary",
+    "Unbalance": "rubhpc.rig:Unbalance",
+    "assemble": "rubhpc.fem.assemble:assemble",
     "open": "postproc.load:open_store",
     "read_rig": "rubhpc.rig:read_rig",
     "read_study": "rubhpc.study:read_study",

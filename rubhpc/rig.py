@@ -5,13 +5,14 @@ Nodes count from 1. Angles count from straight up (+y) towards +z, the sense of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
 from rubhpc.input.dotted import replace_keys
-from rubhpc.input.fields import FieldError, check_fields, nearest, place, text
+from rubhpc.input.fields import FieldError, check_fields, nearest, parse_field, place, text
+from rubhpc.input.foreign import MatrixRotor
 from rubhpc.input.parts import (
     HELD_BY_DRIVE,
     UNDAMPED,
@@ -19,20 +20,23 @@ from rubhpc.input.parts import (
     Damping,
     Disc,
     ShaftSection,
-    Stator,
     Torsion,
     Unbalance,
 )
 from rubhpc.input.reading import build, plain, read_toml
+from rubhpc.input.stators import AnyStator, LumpedStator, MatrixStator, Stator, one_by_one
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from os import PathLike
 
 __all__ = [
     "Bearing",
     "Damping",
     "Disc",
+    "LumpedStator",
+    "MatrixRotor",
+    "MatrixStator",
     "Rig",
     "Rotor",
     "ShaftSection",
@@ -47,6 +51,7 @@ __all__ = [
 ]
 
 PACKAGED = Path(__file__).parent / "rigs"
+DIVERGED_SHARE = 0.1  # of the shaft's length: lateral motion that no rotor survives
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +80,11 @@ class Rotor:
         """Number of nodes along the shaft."""
         return 1 + sum(s.elements for s in self.shaft)
 
+    @property
+    def displacement_limit(self) -> float:
+        """Beyond which a case has diverged, m."""
+        return DIVERGED_SHARE * sum(section.length for section in self.shaft)
+
     def check_node(self, key: str, node: int) -> None:
         """Refuse a node that the shaft does not have."""
         if node > self.n_node:
@@ -83,23 +93,87 @@ class Rotor:
 
 @dataclass(frozen=True, kw_only=True)
 class Rig:
-    """Everything that stands on the bench."""
+    """Everything that stands on the bench; rings of stators are held one by one."""
 
     name: str = text()
-    rotor: Rotor
-    stator: tuple[Stator, ...] = ()
+    rotor: Rotor | MatrixRotor
+    stator: tuple[AnyStator, ...] = ()
 
     def __post_init__(self) -> None:
         check_fields(self)
+        object.__setattr__(self, "stator", one_by_one(tuple(self.stator)))
         for i, stator in enumerate(self.stator, 1):
             self.rotor.check_node(f"stator.{i}.node", stator.node)
+            if isinstance(self.rotor, MatrixRotor) and not self.rotor.moves_along(stator.node, stator.angle):
+                problem = f"node {stator.node} cannot move at {stator.angle:g} rad"
+                raise FieldError(f"stator.{i}.angle", f"{problem}; 0 is along its v, pi / 2 along its w")
             if self.contact_radius(stator) is None:
                 mend = f"give it, or give a disc at node {stator.node} a diameter"
                 raise FieldError(f"stator.{i}.radius", f"missing, and no disc there has a diameter; {mend}")
 
-    def contact_radius(self, stator: Stator) -> float | None:
+    @classmethod
+    def from_matrices(
+        cls,
+        M: object,
+        C: object = None,
+        K: object = None,
+        G: object = None,
+        *,
+        degrees: Sequence[tuple[int, str]],
+        stators: Sequence[AnyStator] = (),
+        unbalance: Sequence[Unbalance] = (),
+        output_node: int | None = None,
+        displacement_limit: float = 100.0,
+        name: str = "matrices",
+    ) -> Rig:
+        """Return a rig whose rotor is any linear body, `M u'' + (C + spin G) u' + K u = f`.
+
+        Parameters
+        ----------
+        M, C, K, G : (n_dof, n_dof) array_like, SI units
+            Mass (symmetric, positive definite), damping, stiffness (no negative one) and gyroscopic matrix
+            (skew, for a spin of 1 rad/s), what is held left out. C and G may be None: zeros.
+        degrees : sequence of (node, name)
+            Which degree each row is: "u", "v", "w" (m), "thx", "thy", "thz" (rad) of a node counted from 1;
+            x along the shaft, "v" up, positive spin from v to w. A stator presses on v and w of its node, and
+            friction on thx where there is one. Coordinates of another kind have names that begin with "q".
+        stators : sequence of Stator, LumpedStator or MatrixStator
+            Each with its node and, as matrices know no disc, its radius of contact, m.
+        unbalance : sequence of Unbalance
+        output_node : int, optional
+            Whose v, w and thx are recorded; default the first stator's.
+        displacement_limit : float
+            Beyond which a case has diverged, m.
+        name : str
+
+        Raises
+        ------
+        InputError
+            When the matrices cannot be those of a body, or a name or node is not there; what and where.
+
+        Examples
+        --------
+        >>> stop = LumpedStator(node=1, mass=1e-4, stiffness=1e6, radius=1.0)
+        >>> rig = Rig.from_matrices([[100.0]], None, [[1e4]], degrees=[(1, "v")], stators=[stop])
+        """
+        if K is None:
+            raise FieldError("K", "missing; give the stiffness matrix")
+        table = {"mass": M, "damping": C, "stiffness": K, "gyroscopic": G}
+        declared = {f.name: f for f in fields(MatrixRotor)}
+        given: Any = {key: value for key, value in table.items() if value is not None}
+        rotor = MatrixRotor(
+            **given,
+            degrees=parse_field(declared["degrees"], degrees, "degrees"),
+            unbalance=tuple(unbalance),
+            output_node=output_node,
+            displacement_limit=displacement_limit,
+        )
+        return cls(name=name, rotor=rotor, stator=tuple(stators))
+
+    def contact_radius(self, stator: AnyStator) -> float | None:
         """Radius at which a stator touches, m: its own, or that of the largest disc at its node."""
-        rims = [d.diameter / 2 for d in self.rotor.disc if d.node == stator.node and d.diameter is not None]
+        discs = self.rotor.disc if isinstance(self.rotor, Rotor) else ()
+        rims = [d.diameter / 2 for d in discs if d.node == stator.node and d.diameter is not None]
         return stator.radius if stator.radius is not None else max(rims, default=None)
 
     def as_dict(self) -> dict[str, Any]:

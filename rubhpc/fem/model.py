@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
+
+NOTHING = 1e-14  # of a matrix's greatest entry: a coupling that is rounding
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -21,6 +29,7 @@ class Body:
     degrees : tuple of (node, name)
         Which degree each row is. Rotor: "u", "v", "w", "thx", "thy", "thz"; stator: "axial"
         (positive outward, compressed), "lateral" (positive with the rim under positive spin), "rotation".
+        A foreign body may have others.
     """
 
     mass: NDArray[np.float64]
@@ -33,6 +42,21 @@ class Body:
     def n_dof(self) -> int:
         """Number of free degrees of freedom."""
         return len(self.degrees)
+
+    @cached_property
+    def part(self) -> NDArray[np.int64]:
+        """Number of the part that each row belongs to, (n_dof,); no matrix couples one part to another."""
+        couples = np.zeros((self.n_dof, self.n_dof), dtype=bool)
+        for matrix in (self.mass, self.damping, self.gyroscopic, self.stiffness):
+            size = np.abs(matrix)
+            couples |= size > NOTHING * size.max(initial=0.0)
+        part: NDArray[np.int64] = connected_components(csr_array(couples), directed=False)[1]
+        return part
+
+    def rows(self, names: Sequence[str]) -> list[int]:
+        """Rows of the degrees with these names, and of all that is coupled to them."""
+        named = [row for row, (_, name) in enumerate(self.degrees) if name in names]
+        return np.flatnonzero(np.isin(self.part, self.part[named])).tolist()
 
     def index(self, node: int, name: str) -> int:
         """Row of a degree of freedom; -1 where it is held or absent."""

@@ -23,12 +23,13 @@ if TYPE_CHECKING:
     Vector = NDArray[np.complex128]
     Pair = tuple[complex, complex, Vector]
 
-# Degrees that the linear bodies couple: each kind of motion is an eigenproblem of its own.
+# What the degrees of a body are part of. Beams do not couple the kinds; a foreign body may.
 KINDS = {
     "lateral": ("v", "w", "thy", "thz", "lateral", "rotation"),
     "torsional": ("thx",),
     "axial": ("u", "axial"),
 }
+OTHER = "other"  # kind of the degrees that only a foreign body has
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,10 +48,12 @@ class Mode:
         one `-(a + b) / (2 sqrt(a b))`, at least 1; -1 tells that a or b grows. A rigid body's mode has 0,
         or 1 where its motion dies out.
     kind : str
-        "lateral", "torsional" or "axial".
+        "lateral", "torsional" or "axial"; where a foreign body couples them, the one with most of the kinetic
+        energy, which may be "other" for coordinates of its own.
     whirl : str
         Lateral modes of a rotor: "forward" (in the sense of the spin), "backward", or "planar" where neither
-        sense leads, as for the two equal modes of an isotropic rotor at standstill. Else "none".
+        sense leads, as for the two equal modes of an isotropic rotor at standstill. Else "none", also where
+        the nodes do not all move in both planes.
     eigenvalue : complex
         rad/s, its imaginary part not negative; of two real ones the slower to decay.
     shape : (n_dof,) complex
@@ -82,24 +85,49 @@ def modes(body: Body, spin: float = 0.0) -> list[Mode]:
         As many as the body has degrees of freedom.
     """
     found = []
-    for kind in KINDS:
-        rows = [row for row, (_, name) in enumerate(body.degrees) if name in KINDS[kind]]
-        if not rows:
-            continue
+    for rows in _groups(body):
         block = np.ix_(rows, rows)
         mass = body.mass[block]
         damping = (body.damping + spin * body.gyroscopic)[block]
         names = [body.degrees[row][1] for row in rows]
         pairs = _eigenpairs(mass, damping, body.stiffness[block])
-        if "v" in names:
+        if _turns([body.degrees[row] for row in rows]):
             pairs, whirls = _whirls(pairs, mass, names, spin)
         else:
             whirls = ["none"] * len(pairs)
         for (first, second, shape), whirl in zip(pairs, whirls, strict=True):
             full = np.zeros(body.n_dof, dtype=np.complex128)
             full[rows] = _normalised(shape, mass)
-            found.append(_mode(first, second, full, kind, whirl))
+            kind = _kind(shape, mass, names)
+            found.append(_mode(first, second, full, kind, whirl if kind == "lateral" else "none"))
     return sorted(found, key=lambda mode: (mode.frequency, mode.damped_frequency))
+
+
+def _groups(body: Body) -> list[list[int]]:
+    """Rows of each kind of motion, those together that the body couples: an eigenproblem each."""
+    kind = np.array([_kind_of(name) for _, name in body.degrees])
+    label = np.unique(kind, return_inverse=True)[1] if body.n_dof else np.zeros(0, dtype=int)
+    for part in range(int(body.part.max(initial=-1)) + 1):
+        met = np.unique(label[body.part == part])
+        label[np.isin(label, met)] = met[0]
+    return [np.flatnonzero(label == value).tolist() for value in np.unique(label)]
+
+
+def _kind_of(name: str) -> str:
+    return next((kind for kind, names in KINDS.items() if name in names), OTHER)
+
+
+def _kind(shape: Vector, mass: NDArray[np.float64], names: list[str]) -> str:
+    """Kind of motion that has most of the kinetic energy."""
+    kinds = [_kind_of(name) for name in names]
+    share = np.real(shape.conj() * (mass @ shape))
+    return max(dict.fromkeys(kinds), key=lambda kind: sum(share[[k == kind for k in kinds]]))
+
+
+def _turns(degrees: list[tuple[int, str]]) -> bool:
+    """Whether every node that moves sideways does so in both planes, in the same order."""
+    places = {name: [node for node, n in degrees if n == name] for name in ("v", "w", "thy", "thz")}
+    return bool(places["v"]) and places["v"] == places["w"] and places["thy"] == places["thz"]
 
 
 def _eigenpairs(

@@ -39,7 +39,7 @@ def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
         If the response has no bound: the spin is a natural frequency of an undamped rotor.
     """
     rotor = model.rotor
-    lateral = [row for row, (_, name) in enumerate(rotor.degrees) if name in KINDS["lateral"]]
+    lateral = rotor.rows(KINDS["lateral"])
     block = np.ix_(lateral, lateral)
     response = np.zeros(rotor.n_dof, dtype=np.complex128)
     if spin == 0.0:
@@ -73,7 +73,8 @@ def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -
     """
     node = model.output_node if node is None else node
     response = steady_response(model, spin)
-    v, w = (response[model.rotor.index(node, name)] for name in ("v", "w"))
+    rows = [model.rotor.index(node, name) for name in ("v", "w")]
+    v, w = (response[row] if row >= 0 else 0.0 for row in rows)
     return float(abs(v + 1j * w) + abs(v - 1j * w)) / 2
 
 
@@ -83,13 +84,17 @@ def first_lateral_frequency(model: Model) -> float:
     A rotor free to move sideways has it at its first bending mode, above those of the rigid body.
     """
     undamped = replace(model.rotor, damping=np.zeros_like(model.rotor.damping))
-    rows = [row for row, (_, name) in enumerate(undamped.degrees) if name in KINDS["lateral"]]
+    rows = undamped.rows(KINDS["lateral"])
     stiffness = undamped.stiffness[np.ix_(rows, rows)]
-    if np.array_equal(stiffness, stiffness.T):
+    is_alone = all(undamped.degrees[row][1] in KINDS["lateral"] for row in rows)
+    if is_alone and np.array_equal(stiffness, stiffness.T):
         square, _ = undamped_modes(undamped.mass[np.ix_(rows, rows)], stiffness)
-        return math.sqrt(square[square > 0.0].min())
-    found = [mode.frequency for mode in modes(undamped) if mode.kind == "lateral"]
-    return 2 * math.pi * min(frequency for frequency in found if frequency > 0.0)
+        found = np.sqrt(square)
+    else:
+        found = 2 * math.pi * np.array([m.frequency for m in modes(undamped) if m.kind == "lateral"])
+    if not (found > 0.0).any():
+        raise InputError("speed_ratio: the rotor has no lateral natural frequency; give the speed instead")
+    return float(found[found > 0.0].min())
 
 
 def step_limit(model: Model) -> float:
@@ -102,7 +107,7 @@ def step_limit(model: Model) -> float:
     energy is a norm, and thus bounds the motion, while `h < 2 / omega_max`. (Damping with the velocity of the
     half step behind would lower the limit.)
     """
-    bodies = [model.rotor, *(stator.body for stator in model.stators)]
+    bodies = [model.rotor, *(stator.body for stator in model.stators if stator.body.n_dof)]
     return 2.0 / math.sqrt(max(_spectral_radius(body) for body in bodies))
 
 

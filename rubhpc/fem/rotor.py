@@ -11,9 +11,11 @@ from rubhpc.fem.damping import rayleigh_coefficients
 from rubhpc.fem.model import Body
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-    from rubhpc.rig import Rotor
+    from rubhpc.rig import Rotor, Unbalance
 
 
 def assemble_rotor(rotor: Rotor) -> Body:
@@ -64,16 +66,21 @@ def assemble_rotor(rotor: Rotor) -> Body:
     )
 
 
-def unbalance_vectors(rotor: Rotor, body: Body) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def unbalance_vectors(
+    unbalances: Sequence[Unbalance], body: Body
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Unbalance per spin squared, (n_dof,) each, kg m: the factors of cos(spin t) and of sin(spin t).
 
-    An unbalance `m e` at the phase p pulls with `m e spin^2 (cos(spin t + p), sin(spin t + p))` on (v, w).
+    An unbalance `m e` at the phase p pulls with `m e spin^2 (cos(spin t + p), sin(spin t + p))` on (v, w); a
+    direction in which the node cannot move does not feel it.
     """
     cosine, sine = np.zeros((2, body.n_dof))
-    for unbalance in rotor.unbalance:
-        rows = [body.index(unbalance.node, "v"), body.index(unbalance.node, "w")]
+    for unbalance in unbalances:
         moment = unbalance.mass * unbalance.radius
         along, across = moment * np.cos(unbalance.phase), moment * np.sin(unbalance.phase)
-        cosine[rows] += [along, across]
-        sine[rows] += [-across, along]
+        for name, parts in (("v", (along, -across)), ("w", (across, along))):
+            row = body.index(unbalance.node, name)
+            if row >= 0:
+                cosine[row] += parts[0]
+                sine[row] += parts[1]
     return cosine, sine

@@ -38,7 +38,8 @@ def whirl_index(shape: Vector, mass: NDArray[np.float64], names: Sequence[str]) 
     V, W = shape[vertical], sign * shape[horizontal]
     forward, backward = V + 1j * W, V - 1j * W
     energy = [float(np.real(part.conj() @ plane_mass @ part)) for part in (forward, backward)]
-    return (energy[0] - energy[1]) / (energy[0] + energy[1])
+    total = energy[0] + energy[1]
+    return (energy[0] - energy[1]) / total if total > 0.0 else 0.0
 
 
 def planar_twins(first: Vector, second: Vector, names: Sequence[str]) -> tuple[Vector, Vector]:

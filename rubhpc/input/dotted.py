@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+_FEW = 12  # keys that an error lists
 _SETTABLE = ("quantity", "count", "flag")  # kinds of fields that one number can set
 
 
@@ -30,17 +31,21 @@ def find_key(owner: object, dotted: str) -> dataclasses.Field[Any]:
         if isinstance(held, tuple) and held and part.isdigit():
             held, declared = (held[int(part) - 1] if 0 < int(part) <= len(held) else None), None
             continue
-        held = held[0] if isinstance(held, tuple) and held else held
+        if isinstance(held, tuple) and held:  # a key of all: each has to have it
+            held = min(held, key=lambda item: part in _fields(type(item)))
         declared = _fields(type(held)).get(part)
         held = getattr(held, part) if declared else None
-    if declared is not None and declared.metadata.get("kind") in _SETTABLE:
+    if declared is not None and _is_settable(declared):
         return declared
+    if declared is not None and declared.metadata.get("kind") in _SETTABLE:
+        raise InputError("is no key for a study to set; write it in the rig")
     known = list(_keys(owner))
     inside = [k for k in known if k.startswith(f"{dotted}.")]
     if inside:
         raise InputError(f"is a table, not a value; did you mean {inside[0]}?")
     mend = nearest(dotted, known)
-    raise InputError(f"unknown key; {mend if '?' in mend else 'see the rig file for its keys'}")
+    is_told = "?" in mend or len(known) <= _FEW
+    raise InputError(f"unknown key; {mend if is_told else 'see the rig file for its keys'}")
 
 
 def replace_keys(owner: T, values: Mapping[str, object]) -> T:
@@ -100,11 +105,16 @@ def _keys(owner: Any, prefix: str = "") -> Iterator[str]:
         if dataclasses.is_dataclass(value):
             yield from _keys(value, f"{name}.")
         elif isinstance(value, tuple) and value and dataclasses.is_dataclass(value[0]):
-            yield from _keys(value[0], f"{name}.")
+            common = set.intersection(*({*_keys(item, f"{name}.")} for item in value))
+            yield from (key for key in _keys(value[0], f"{name}.") if key in common)
             for i, item in enumerate(value, 1):
                 yield from _keys(item, f"{name}.{i}.")
-        elif declared.metadata.get("kind") in _SETTABLE:
+        elif _is_settable(declared):
             yield name
+
+
+def _is_settable(declared: dataclasses.Field[Any]) -> bool:
+    return declared.metadata.get("kind") in _SETTABLE and declared.metadata.get("is_key", True)
 
 
 def _fields(cls: Any) -> dict[str, dataclasses.Field[Any]]:

@@ -9,6 +9,7 @@ from dataclasses import MISSING, field
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
+from rubhpc.input.matrix import parse_matrix
 from rubhpc.input.quantity import brief, parse_quantity
 
 if TYPE_CHECKING:
@@ -42,9 +43,12 @@ def quantity(
     return field(default=default, metadata={"kind": "quantity", "unit": unit, **bounds})
 
 
-def count(*, default: Any = MISSING, at_least: int = 1, at_most: int | None = None) -> Any:
-    """Declare a field that holds a whole number within its bounds."""
-    return field(default=default, metadata={"kind": "count", "at_least": at_least, "at_most": at_most})
+def count(
+    *, default: Any = MISSING, at_least: int = 1, at_most: int | None = None, is_key: bool = True
+) -> Any:
+    """Declare a field that holds a whole number within its bounds; `is_key`: that a study may set."""
+    bounds = {"at_least": at_least, "at_most": at_most}
+    return field(default=default, metadata={"kind": "count", "is_key": is_key, **bounds})
 
 
 def flag(*, default: bool) -> Any:
@@ -67,6 +71,11 @@ def choices(*, of: tuple[str, ...], default: tuple[str, ...]) -> Any:
     return field(default=default, metadata={"kind": "choices", "of": of})
 
 
+def words(*, default: tuple[str, ...]) -> Any:
+    """Declare a field that holds a list of words."""
+    return field(default=default, metadata={"kind": "words"})
+
+
 def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> Any:
     """Return the value that a field takes from a file or a caller; bounds are left to `check_fields`."""
     kind = declared.metadata.get("kind")
@@ -74,6 +83,14 @@ def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> 
         return parse_quantity(value, declared.metadata["unit"], where)
     if kind == "count":
         return _parse_count(value, where)
+    if kind == "matrix":
+        return parse_matrix(value, where)
+    if kind == "degrees":
+        return _parse_degrees(value, where)
+    if kind == "words":
+        if not isinstance(value, list | tuple) or not all(isinstance(word, str) for word in value):
+            raise InputError(f'{where}: {brief(value)} is no list of words; write ["axial", "lateral"]')
+        return tuple(value)
     if kind == "flag":
         if isinstance(value, float) and value in (0.0, 1.0):
             return bool(value)  # an axis holds floats
@@ -136,6 +153,18 @@ def _parse_count(value: object, where: str) -> int:
             f"{where}: {brief(value)} is not a whole number; write one such as 12, without quotes"
         )
     return value
+
+
+def _parse_degrees(value: object, where: str) -> tuple[tuple[int, str], ...]:
+    mend = 'write a node and a name for each row, [[1, "v"], [1, "w"]]'
+    try:
+        pairs = [(node, name) for node, name in value]  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise InputError(f"{where}: {brief(value)} is no list of degrees; {mend}") from None
+    for node, name in pairs:
+        if isinstance(node, bool) or not isinstance(node, int) or node < 1 or not isinstance(name, str):
+            raise InputError(f"{where}: {brief((node, name))} is no degree; {mend}")
+    return tuple(pairs)
 
 
 def _check_quantity(value: object, bounds: Any) -> str:

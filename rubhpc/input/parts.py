@@ -215,31 +215,3 @@ class Torsion:
 
 
 HELD_BY_DRIVE = Torsion(fixed_node=1)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stator:
-    """A cantilever that stands radially over the rotor; its free end faces the rim."""
-
-    node: int = count()
-    angle: float = quantity("rad", default=0.0)
-    length: float = quantity("m", above=0)
-    width: float = quantity("m", above=0)  # along the shaft
-    height: float = quantity("m", above=0)  # along the lateral (tangential) motion
-    elements: int = count(default=6, at_most=1000)
-    youngs_modulus: float = quantity("Pa", above=0)
-    poissons_ratio: float = quantity("", default=0.3, above=-1, below=0.5)
-    density: float = quantity("kg/m^3", above=0)
-    lateral: bool = flag(default=True)
-    radius: float | None = quantity("m", default=None, above=0)  # of contact; None: the disc's
-    clearance_offset: float = quantity("m", default=0.0)
-    damping: Damping = UNDAMPED
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-    @property
-    def euler_load(self) -> float:
-        """Buckling load of the cantilever, pi^2 E I / (4 L^2), N."""
-        least = self.height * self.width * min(self.height, self.width) ** 2 / 12
-        return math.pi**2 * self.youngs_modulus * least / (4 * self.length**2)

@@ -8,10 +8,11 @@ from __future__ import annotations
 import dataclasses
 import re
 import tomllib
-from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
 from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, check_value, nearest, parse_field, place
+from rubhpc.input.matrix import encode_matrix
 from rubhpc.input.quantity import brief, example, parse_quantity
 
 if TYPE_CHECKING:
@@ -104,7 +105,11 @@ def plain(value: Any) -> Any:
     result: dict[str, Any] = {}
     for declared in dataclasses.fields(value):
         held, kind = getattr(value, declared.name), declared.metadata.get("kind")
-        if kind == "pairs":
+        if kind == "matrix":
+            result[declared.name] = encode_matrix(held)
+        elif kind == "degrees":
+            result[declared.name] = [list(degree) for degree in held]
+        elif kind == "pairs":
             result[declared.name] = {repr(float(key)): float(number) for key, number in held}
         elif held is not None:
             result[declared.name] = float(held) if kind == "quantity" else plain(held)
@@ -119,12 +124,19 @@ def _parse(declared: dataclasses.Field[Any], hint: Any, value: object, file: str
         return _parse_pairs(value, declared.metadata["units"], file, inner)
     if kind:
         return parse_field(declared, value, where)
-    if isinstance(hint, type):
-        return build(hint, value, file, inner)
+    if get_origin(hint) is not tuple:
+        return build(_told(hint, value), value, file, inner)
     if not isinstance(value, list):
         raise InputError(f"{where}: not a list of tables; write [[{inner}]], in two brackets")
     item = get_args(hint)[0]
-    return tuple(build(item, v, file, f"{inner}.{i}") for i, v in enumerate(value, 1))
+    return tuple(build(_told(item, v), v, file, f"{inner}.{i}") for i, v in enumerate(value, 1))
+
+
+def _told(hint: Any, table: object) -> Any:
+    """Which of several dataclasses a table describes: the first of those that know most of its keys."""
+    kinds = get_args(hint) or (hint,)
+    keys = set(table) if isinstance(table, dict) else set()
+    return max(kinds, key=lambda kind: len(keys & {f.name for f in dataclasses.fields(kind)}))
 
 
 def _parse_pairs(table: object, units: tuple[str, str], file: str, name: str) -> Any:
@@ -157,6 +169,10 @@ def _mend(declared: dataclasses.Field[Any], hint: Any, name: str) -> str:
         return f"{declared.name} = {example(declared.metadata['unit'])}"
     if kind == "count":
         return f"{declared.name} = 1"
+    if kind == "matrix":
+        return f"{declared.name} = [[1.0]], a row for every degree"
+    if kind == "degrees":
+        return f'{declared.name} = [[1, "v"], [1, "w"]], a node and a name for every row'
     if kind:
         return f'{declared.name} = "..."'
     inner = f"{name}.{declared.name}" if name else declared.name

@@ -112,7 +112,7 @@ def degrees_of(model: Model) -> Ints:
     for i, stator in enumerate(model.stators):
         degree[i, V], degree[i, W] = model.rotor.index(stator.node, "v"), model.rotor.index(stator.node, "w")
         degree[i, TORSION] = model.rotor.index(stator.node, "thx")
-        degree[i, AXIAL] = first[i] + stator.axial
+        degree[i, AXIAL] = first[i] + stator.axial if stator.axial >= 0 else -1
         degree[i, LATERAL] = first[i] + stator.lateral if stator.lateral >= 0 else -1
     return degree
 

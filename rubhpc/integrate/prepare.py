@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from rubhpc.rig import Rig
     from rubhpc.study import Contact, Integrator
 
-DIVERGED_SHARE = 0.1  # of the shaft's length: lateral motion that no rig survives
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CentralDifferenceSetup:
@@ -76,7 +74,6 @@ def prepare(
     if speed == 0.0 or not math.isfinite(speed):
         raise InputError(f"speed: {speed} rad/s; sampling is locked to the shaft, so it has to turn")
     model = assemble(rig)
-    displacement_limit = DIVERGED_SHARE * sum(section.length for section in rig.rotor.shaft)
     if integrator.method == "modal":
         return ModalSetup(
             model=model,
@@ -85,7 +82,7 @@ def prepare(
             step=integrator.contact_step(contact),
             samples_per_revolution=samples_per_revolution,
             is_updated=contact.normal == "updated",
-            displacement_limit=displacement_limit,
+            displacement_limit=rig.rotor.displacement_limit,
         )
     limit = step_limit(model)
     if integrator.step is not None and integrator.step >= limit:
@@ -104,5 +101,5 @@ def prepare(
         steps_per_sample=steps_per_sample,
         samples_per_revolution=samples_per_revolution,
         is_updated=contact.normal == "updated",
-        displacement_limit=displacement_limit,
+        displacement_limit=rig.rotor.displacement_limit,
     )

@@ -124,6 +124,8 @@ def _contact_frequency(mass: Floats, stiffness: Floats, degree: Ints, model: Mod
         for a, share in ((V, np.cos(stator.angle)), (W, np.sin(stator.angle))):
             if degree[i, a] >= 0:
                 along[degree[i, a]] = share
+        if degree[i, AXIAL] < 0:
+            return np.inf  # a rigid wall: no mode is too high
         tip = np.zeros(mass.shape[0])
         tip[degree[i, AXIAL]] = 1.0
         # Inertia of the rotor's static shape under a force at the disc, as that of its first mode.

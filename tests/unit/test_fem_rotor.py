@@ -104,7 +104,7 @@ def test_unbalance_turns_from_y_to_z_ahead_by_its_phase():
     phase, moment = 0.8, 2e-3 * 0.05
     rotor = replace(ROTOR, unbalance=(Unbalance(node=4, mass=2e-3, radius=0.05, phase=phase),))
     body = assemble_rotor(rotor)
-    cosine, sine = unbalance_vectors(rotor, body)
+    cosine, sine = unbalance_vectors(rotor.unbalance, body)
     rows = [body.index(4, "v"), body.index(4, "w")]
     for angle in np.linspace(0, 2 * math.pi, 7):
         pull = cosine * math.cos(angle) + sine * math.sin(angle)
@@ -115,5 +115,5 @@ def test_unbalance_turns_from_y_to_z_ahead_by_its_phase():
 def test_unbalances_on_one_node_add_up():
     pair = tuple(Unbalance(node=4, mass=2e-3, radius=0.05, phase=phase) for phase in (0.3, 0.3 + math.pi))
     rotor = replace(ROTOR, unbalance=pair)
-    vectors = unbalance_vectors(rotor, assemble_rotor(rotor))
+    vectors = unbalance_vectors(rotor.unbalance, assemble_rotor(rotor))
     assert np.abs(vectors).max() < 1e-18

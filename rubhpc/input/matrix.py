@@ -1,0 +1,80 @@
+"""Square matrices from outside: arrays or lists of rows, checked; and as text that keeps every digit."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.input.quantity import brief
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Matrix = NDArray[np.float64]
+
+MATRIX = {"kind": "matrix"}  # metadata of the field that holds one
+ROUNDING = 1e-9  # of the greatest entry: what a matrix may depart from symmetry by
+_ENTRY = np.dtype([("row", "<i4"), ("column", "<i4"), ("value", "<f8")])
+
+
+def parse_matrix(value: object, where: str) -> Matrix:
+    """Return a matrix given as an array, as a list of rows, or as `encode_matrix` wrote it.
+
+    Raises
+    ------
+    InputError
+        When it is not a square matrix of finite real numbers.
+    """
+    if isinstance(value, dict):
+        return _decoded(value, where)
+    mend = "give the rows, [[1.0, 0.0], [0.0, 1.0]]"
+    try:
+        given = np.asarray(value)
+        is_number = given.dtype.kind in "iuf"
+    except ValueError:  # rows of unequal length
+        is_number = False
+    if not is_number:
+        raise InputError(f"{where}: {brief(value)} is no matrix of real numbers; {mend}")
+    if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.size:
+        raise InputError(f"{where}: of shape {given.shape}; it must be square, (n_dof, n_dof)")
+    entries: Matrix = np.array(given, dtype=np.float64) + 0.0  # no negative zeros: they would not be equal
+    if not np.isfinite(entries).all():
+        row, column = np.argwhere(~np.isfinite(entries))[0]
+        raise InputError(f"{where}: the entry in row {row + 1}, column {column + 1} is not finite; mend it")
+    entries.setflags(write=False)
+    return entries
+
+
+def encode_matrix(entries: Matrix) -> dict[str, Any]:
+    """Return a matrix as JSON can hold it: its size, and the entries that are not zero in base64."""
+    row, column = np.nonzero(entries)
+    packed = np.empty(row.size, dtype=_ENTRY)
+    packed["row"], packed["column"], packed["value"] = row, column, entries[row, column]
+    return {"size": len(entries), "nonzero": base64.b64encode(packed.tobytes()).decode()}
+
+
+def symmetric_part(entries: Matrix) -> Matrix:
+    """Half the sum of a matrix and its transpose; read-only."""
+    half: Matrix = 0.5 * (entries + entries.T)
+    half.setflags(write=False)
+    return half
+
+
+def is_symmetric(entries: Matrix, sign: float = 1.0) -> bool:
+    """Whether a matrix is symmetric but for rounding; skew for the sign -1."""
+    return bool(np.abs(entries - sign * entries.T).max() <= ROUNDING * np.abs(entries).max())
+
+
+def _decoded(table: dict[str, Any], where: str) -> Matrix:
+    try:
+        size = int(table["size"])
+        packed = np.frombuffer(base64.b64decode(table["nonzero"], validate=True), dtype=_ENTRY)
+        entries = np.zeros((size, size))
+        entries[packed["row"], packed["column"]] = packed["value"]
+    except (KeyError, TypeError, ValueError, IndexError, binascii.Error):
+        raise InputError(f"{where}: no matrix can be read from it; give its rows") from None
+    return parse_matrix(entries, where)
