@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.march import March
-from rubhpc.integrate.nodes import NodeReader
 from rubhpc.integrate.record import State
 from rubhpc.kernels import phases as kernel
 from rubhpc.kernels.contact import AXIAL, LATERAL, V, W
 from rubhpc.kernels.modal import advance
 from rubhpc.kernels.phases import enter, find_phase
+from rubhpc.kernels.sampling import recorder
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-FINEST_TICK = 1.5e-9  # s, the resolution of events
-LEVELS_PAST_SAMPLE = 3  # longest step: eight samples
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
 FIRST_REVOLUTIONS = 8  # of the first kernel call
 MOST_PHASES = 256  # sets of closed contacts of one speed and friction
@@ -51,31 +49,25 @@ class ModalMarch(March):
         super().__init__(check, FIRST_REVOLUTIONS * setup.samples_per_revolution)
         self._setup, self._book = setup, setup.book(friction)
         self._clearance = np.array([clearance + stator.clearance_offset for stator in setup.model.stators])
-        turn = 2.0 * math.pi / abs(setup.spin)
-        interval = turn / setup.samples_per_revolution
-        sample_level = max(2, math.ceil(math.log2(interval / FINEST_TICK)))
-        tick = interval / 2**sample_level
-        self._sample_level = sample_level
-        self._n_level = sample_level + LEVELS_PAST_SAMPLE + 1
+        turn = setup.interval * setup.samples_per_revolution
         self._clock = kernel.Clock(
             spin=setup.spin,
-            tick=tick,
-            ticks_per_sample=2**sample_level,
+            tick=setup.tick,
+            sample_level=setup.sample_level,
             samples_per_revolution=setup.samples_per_revolution,
-            blind_level=max(0, min(sample_level, math.floor(math.log2(setup.step / tick)))),
-            contact_level=math.floor(math.log2(min(interval / 4, turn / CONTACT_STEPS) / tick)),
-            end_tick=0,
+            blind_level=max(0, min(setup.sample_level, math.floor(math.log2(setup.step / setup.tick)))),
+            contact_level=math.floor(math.log2(min(setup.interval, turn / CONTACT_STEPS) / setup.tick)),
+            n_sample=0,
         )
-        self._bodies = self._book.kernel_reduced()
+        self._bodies = self._book.kernel_reduced(self._clearance)
         self._motion = self._reduce(initial)
+        self._recorder = recorder(self._clearance.size)
+        self._progress = np.zeros(kernel.N_PROGRESS, dtype=np.int64)
+        self._progress[[kernel.WANTED, kernel.SPAN, kernel.ENTERED]] = -1, -1, -(2**61)
         mask = self._first_closed(initial)
-        self._progress = np.array([0, 0, mask, 0, 0, 0, -(2**62)])
-        self._tabulate()
-        self._reader = NodeReader(self._phases, self._bodies, self._clock)
-        if find_phase(self._phases.mask, mask) < 0:
-            self._add(mask)
-        self._progress[[kernel.PHASE, kernel.WANTED]] = find_phase(self._phases.mask, mask), -1
-        enter(self._phases, self._progress[kernel.PHASE], 1.0, 0.0, self._motion, self._z)
+        self._find(mask)
+        self._progress[kernel.PHASE] = find_phase(self._phases.mask, mask)
+        enter(self._phases, self._progress[kernel.PHASE], self._clearance, 1.0, 0.0, self._motion, self._z)
 
     def _first_closed(self, initial: State) -> int:
         """Set of the contacts that are closed at the start."""
@@ -116,28 +108,34 @@ class ModalMarch(March):
         return np.where(self.touching(), force, 0.0)
 
     def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
-        per_sample = self._clock.ticks_per_sample
-        first = self.sample * per_sample
-        self._clock = self._clock._replace(end_tick=samples.rotor.shape[1] * per_sample)
+        per_sample = 1 << self._clock.sample_level
+        first = self._set_clock(samples, is_recorded=is_recorded)
         while True:
-            outcome = self._kernel(first, stop * per_sample, tally, is_recorded=is_recorded)
+            outcome = self._kernel(first, stop * per_sample, samples, tally, is_recorded=is_recorded)
             self.n_step = int(self._progress[kernel.N_STEP])
             first = int(self._progress[kernel.TIME])
-            if is_recorded:
-                n_node = int(self._progress[kernel.N_NODE])
-                self._progress[kernel.N_NODE] = self._reader.read(n_node, samples, tally)
             if outcome == kernel.PHASE_WANTED:
-                if len(self._book.phases) >= MOST_PHASES:
-                    raise EndlessEvents
-                self._add(int(self._progress[kernel.WANTED]))
+                self._find(int(self._progress[kernel.WANTED]))
             elif outcome == kernel.CONTACT_UNSOLVED:
                 raise EndlessEvents
-            elif outcome == kernel.DIVERGED or self._has_diverged():
+            elif outcome == kernel.DIVERGED or self._has_diverged(tally):
                 return f"a displacement passed {self._setup.displacement_limit:.3g} m"
             elif outcome == kernel.FINISHED:
                 return None
 
-    def _kernel(self, first_tick: int, last_tick: int, tally: Tally, *, is_recorded: bool) -> int:
+    def _set_clock(self, samples: Samples, *, is_recorded: bool) -> int:
+        """Count time from the sample reached; returns its tick."""
+        first = self.sample << self._clock.sample_level
+        self._progress[kernel.ENTERED] += first - self._progress[kernel.TIME]
+        self._progress[kernel.NEXT_SAMPLE] = self.sample
+        if not is_recorded:
+            self._progress[kernel.SPAN] = -1
+        self._clock = self._clock._replace(n_sample=samples.rotor.shape[1])
+        return first
+
+    def _kernel(
+        self, first_tick: int, last_tick: int, samples: Samples, tally: Tally, *, is_recorded: bool
+    ) -> int:
         return advance(
             self._phases,
             self._bodies,
@@ -149,30 +147,28 @@ class ModalMarch(March):
             self._z,
             self._z_next,
             self._motion,
-            self._reader.nodes,
+            self._recorder,
+            samples,
             tally,
         )
 
-    def _has_diverged(self) -> bool:
+    def _has_diverged(self, tally: Tally) -> bool:
         """Whether the output node or a contact degree is, or at a sample was, beyond the limit."""
         n, limit = self._bodies.stiffness.shape[0], self._setup.displacement_limit
         displacement = self._current_motion()[:n]
         reduced = self._setup.reduced
-        reached = max(
-            np.abs(reduced.output[:2] @ displacement).max(),
-            np.abs(reduced.degree[:, [V, W, AXIAL, LATERAL]] @ displacement).max(),
-        )
-        return not (reached <= limit and self._reader.greatest <= limit)
+        now = reduced.degree[:, [V, W, AXIAL, LATERAL]] @ displacement
+        sampled = (tally.highest[:2], -tally.lowest[:2], tally.peak_lateral)
+        reached = np.concatenate([np.abs(reduced.output[:2] @ displacement), np.abs(now).ravel(), *sampled])
+        return not np.all(reached <= limit)
 
-    def _add(self, mask: int) -> None:
+    def _find(self, mask: int) -> None:
+        """See that the tables hold a set of contacts; coordinates are widened where it has more modes."""
         if all(phase.mask != mask for phase in self._book.phases):
+            if len(self._book.phases) >= MOST_PHASES:
+                raise EndlessEvents
             self._book.add(mask)
-        self._tabulate()
-        self._reader.widen(self._phases)
-
-    def _tabulate(self) -> None:
-        """Tables of all phases known; modal coordinates are widened where the new ones have more modes."""
-        self._phases = self._book.tables(self._clearance, self._clock.tick, self._n_level)
+        self._phases = self._book.tables()
         self._z = np.zeros((2, self._phases.switch_re.shape[2]))
         self._z_next = np.zeros_like(self._z)
 

@@ -23,25 +23,22 @@ if TYPE_CHECKING:
 
 WORST_CONDITION = 1e11  # of the eigenvectors; beyond it modes coincide and their sum loses its digits
 LANES = 8  # modes are padded to whole vectors
+STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Phase:
     """Motion with one set of pairs closed: `x = Re(motion @ z)`, x (2 n,) displacements, then velocities.
 
-    The last two coordinates are those of the unbalance response, z = exp(i angle), and of the constant,
-    z = 1, whose column is proportional to the clearances.
+    To the m modes come the unbalance response, z = exp(i angle), and the clearances of the q pairs, z in m.
     """
 
     mask: int
-    exponent: Complexes  # (m + 2,), 1/s
-    motion: Complexes  # (2 n, m + 1), without the constant
-    motion_constant: Floats  # (q, 2 n), for a unit clearance of each pair
+    exponent: Complexes  # (m + 1 + q,), 1/s
+    motion: Complexes  # (2 n, m + 1 + q)
     enter: Complexes  # (m, 2 n)
-    enter_response: Complexes  # (2, m), parts of the unbalance response to take off
-    enter_constant: Complexes  # (q, m)
-    switch: Complexes  # (q, m + 1), gap of an open pair or force of a closed one
-    switch_constant: Floats  # (q, q)
+    take_off: Complexes  # (2 + q, m), of the unbalance response, times cosine and sine; of unit clearances
+    switch: Complexes  # (q, m + 1 + q), gap of an open pair or force of a closed one
 
 
 def make_phase(reduced: ReducedModel, push: Floats, pull: Floats, mask: int) -> Phase:
@@ -81,27 +78,22 @@ def make_phase(reduced: ReducedModel, push: Floats, pull: Floats, mask: int) -> 
         load = np.concatenate([np.zeros(n_free), -project @ reduced.stiffness @ offset[i]])
         constant[i] = -np.linalg.solve(system, load)
     expand = block_diag(tangent, tangent)
-    motion = np.hstack([expand @ shape, (expand @ response)[:, None]])
-    motion_constant = constant @ expand.T + np.hstack([offset, np.zeros((q, n))])
-
-    switch = push @ motion[:n]
-    switch_constant = push @ motion_constant[:, :n].T + np.eye(q)
+    still = constant @ expand.T + np.hstack([offset, np.zeros((q, n))])  # (q, 2 n)
+    motion = np.hstack([expand @ shape, (expand @ response)[:, None], still.T])
+    clear = np.hstack([np.zeros((q, exponent.size + 1)), np.eye(q)])
+    switch = push @ motion[:n] + clear
     if closed.size:
         reaction = np.linalg.solve(rate @ force, rate)
-        internal = np.hstack([reduced.stiffness, reduced.damping])
-        switch[closed] = reaction @ (internal @ motion)
-        switch[closed, -1] -= reaction @ phasor
-        switch_constant[closed] = reaction @ (internal @ motion_constant.T)
+        switch[closed] = reaction @ (np.hstack([reduced.stiffness, reduced.damping]) @ motion)
+        switch[closed, exponent.size] -= reaction @ phasor
+    entry = constant + np.hstack([offset @ tangent, np.zeros((q, n_free))])
     return Phase(
         mask=mask,
-        exponent=np.concatenate([exponent, [1j * reduced.spin, 0.0]]),
+        exponent=np.concatenate([exponent, [1j * reduced.spin], np.zeros(q)]),
         motion=motion,
-        motion_constant=motion_constant,
         enter=inverse @ expand.T,
-        enter_response=np.array([inverse @ response.real, -inverse @ response.imag]),
-        enter_constant=(constant + np.hstack([offset @ tangent, np.zeros((q, n_free))])) @ inverse.T,
+        take_off=np.vstack([inverse @ response.real, -inverse @ response.imag, entry @ inverse.T]),
         switch=switch,
-        switch_constant=switch_constant,
     )
 
 
@@ -121,28 +113,46 @@ def _modes(system: Floats) -> tuple[Complexes, Complexes, Complexes]:
 
 
 class PhaseBook:
-    """Phases of one speed and friction, made when first met and shared by all cases."""
+    """Phases of one speed and friction, made when first met and shared by all cases.
 
-    def __init__(self, reduced: ReducedModel, model: Model, friction: float) -> None:
+    Parameters
+    ----------
+    tick : float, s
+    sample_level, n_level : int
+        2^sample_level ticks are the interval of samples; exponentials are tabulated over 1, 2, ...,
+        2^(n_level - 1) ticks.
+    """
+
+    def __init__(
+        self,
+        reduced: ReducedModel,
+        model: Model,
+        friction: float,
+        *,
+        tick: float,
+        sample_level: int,
+        n_level: int,
+    ) -> None:
         """Start with every pair open, and with each closed alone."""
         self.reduced, self.model = reduced, model
         self.push, self.pull, self.slip = directions(reduced, model, friction)
         self.friction = friction
+        self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self.phases: list[Phase] = []
+        self._tables: kernel.Phases | None = None
         for mask in (0, *(1 << i for i in range(self.push.shape[0]))):
             self.add(mask)
 
     def add(self, mask: int) -> None:
         """Make the phase with these pairs closed."""
         self.phases.append(make_phase(self.reduced, self.push, self.pull, mask))
+        self._tables = None
 
-    def kernel_reduced(self) -> kernel.Reduced:
-        """The reduced bodies as the kernel takes them."""
-        stiffness = self.reduced.stiffness
+    def kernel_reduced(self, clearance: Floats) -> kernel.Reduced:
+        """The reduced bodies as the kernel takes them, with the clearances (q,), m, of a case."""
         return kernel.Reduced(
-            stiffness=stiffness,
+            stiffness=self.reduced.stiffness,
             damping=self.reduced.damping,
-            circulation=0.5 * (stiffness - stiffness.T),
             force_cosine=self.reduced.force[0].copy(),
             force_sine=self.reduced.force[1].copy(),
             push=self.push,
@@ -150,42 +160,36 @@ class PhaseBook:
             answer=self.push @ self.pull.T,
             friction=np.full(self.push.shape[0], self.friction),
             radius=np.array([stator.radius for stator in self.model.stators]),
+            clearance=clearance,
         )
 
-    def tables(self, clearance: Floats, tick: float, n_level: int) -> kernel.Phases:
-        """All phases as arrays, with the constants of these clearances (q,), m.
+    def tables(self) -> kernel.Phases:
+        """All phases as arrays."""
+        if self._tables is None:
+            self._tables = self._tabulate()
+        return self._tables
 
-        Parameters
-        ----------
-        tick : float, s
-            Exponentials are tabulated over 1, 2, ..., 2^(n_level - 1) ticks.
-        """
-        n, q = self.reduced.stiffness.shape[0], self.push.shape[0]
+    def _tabulate(self) -> kernel.Phases:
+        n, q, p = self.reduced.stiffness.shape[0], self.push.shape[0], len(self.phases)
         widest = max(phase.exponent.size for phase in self.phases)
         m = -(-widest // LANES) * LANES
-        p = len(self.phases)
         exponent = np.zeros((p, m), dtype=complex)
         motion, enter = np.zeros((2, p, 2 * n, m), dtype=complex)
         switch = np.zeros((p, q, m), dtype=complex)
-        take_off = np.zeros((p, 3, m), dtype=complex)
+        take_off = np.zeros((p, 2 + q, m), dtype=complex)
         used = np.zeros((p, m), dtype=bool)
         for i, phase in enumerate(self.phases):
             end = phase.exponent.size
+            n_mode = end - 1 - q
             exponent[i, :end], used[i, :end] = phase.exponent, True
-            motion[i, :, : end - 1], motion[i, :, end - 1] = phase.motion, clearance @ phase.motion_constant
-            switch[i, :, : end - 1], switch[i, :, end - 1] = phase.switch, phase.switch_constant @ clearance
-            enter[i, :, : end - 2] = phase.enter.T
-            take_off[i, :2, : end - 2] = phase.enter_response
-            take_off[i, 2, : end - 2] = clearance @ phase.enter_constant
-        slip = np.einsum("qn,pnm->pqm", self.slip, motion[:, n:])
-        for i, phase in enumerate(self.phases):
-            radii = [stator.radius for stator in self.model.stators]
-            slip[i, :, phase.exponent.size - 1] += np.multiply(radii, abs(self.reduced.spin))
-        longest = tick * 2.0 ** (n_level - 1)
-        growth = np.exp(np.maximum(exponent.real, 0.0) * longest)
-        steps = tick * 2.0 ** np.arange(n_level)
+            motion[i, :, :end], switch[i, :, :end] = phase.motion, phase.switch
+            enter[i, :, :n_mode] = phase.enter.T
+            take_off[i, :, :n_mode] = phase.take_off
+        steps = self._tick * 2.0 ** np.arange(self._n_level)
+        growth = np.exp(np.maximum(exponent.real, 0.0) * steps[-1])
         power = np.exp(exponent[:, None, :] * steps[:, None]) * used[:, None, :]
-        output = self._outputs(motion, exponent)
+        slip = np.einsum("qn,pnm->pqm", self.slip, motion[:, n:])
+        loss, work, steady_power = self._energies(exponent, motion)
 
         def parts(values: Complexes) -> tuple[Floats, Floats]:
             return np.ascontiguousarray(values.real), np.ascontiguousarray(values.imag)
@@ -193,14 +197,14 @@ class PhaseBook:
         switch_re, switch_im = parts(switch)
         rate_re, rate_im = parts(switch * exponent[:, None, :])
         power_re, power_im = parts(power)
-        output_re, output_im = parts(output)
         slip_re, slip_im = parts(slip)
         motion_re, motion_im = parts(motion)
         enter_re, enter_im = parts(enter)
-        halves = np.stack([take_off.real, take_off.imag], axis=2)  # (p, 3, 2, m)
+        work_re, work_im = parts(work)
+        halves = np.stack([take_off.real, take_off.imag], axis=2)  # (p, 2 + q, 2, m)
         return kernel.Phases(
             mask=np.array([phase.mask for phase in self.phases]),
-            n_mode=np.array([phase.exponent.size - 2 for phase in self.phases]),
+            n_mode=np.array([phase.exponent.size - 1 - q for phase in self.phases]),
             switch_re=switch_re,
             switch_im=switch_im,
             rate_re=rate_re,
@@ -208,8 +212,7 @@ class PhaseBook:
             bound=np.abs(switch) * (np.abs(exponent) ** 2 * growth)[:, None, :],
             power_re=power_re,
             power_im=power_im,
-            output_re=output_re,
-            output_im=output_im,
+            output=self._outputs(motion, exponent),
             slip_re=slip_re,
             slip_im=slip_im,
             motion_re=motion_re,
@@ -218,11 +221,15 @@ class PhaseBook:
             enter_im=enter_im,
             enter_cosine=np.ascontiguousarray(halves[:, 0]),
             enter_sine=np.ascontiguousarray(halves[:, 1]),
-            enter_constant=np.ascontiguousarray(halves[:, 2]),
+            enter_constant=np.ascontiguousarray(halves[:, 2:]),
+            loss=loss,
+            work_re=work_re,
+            work_im=work_im,
+            steady_power=steady_power,
         )
 
-    def _outputs(self, motion: Complexes, exponent: Complexes) -> Complexes:
-        """Rows (p, o, m) in the order of `kernels.phases`."""
+    def _outputs(self, motion: Complexes, exponent: Complexes) -> Floats:
+        """Rows in the order of `kernels.phases`, at the coming samples: (p, 2 m, samples o)."""
         n = self.reduced.stiffness.shape[0]
         displacement = np.einsum("on,pnm->pom", self.reduced.output, motion[:, :n])
         rate = np.einsum("on,pnm->pom", self.reduced.output, motion[:, n:])
@@ -230,4 +237,55 @@ class PhaseBook:
         for degree in self.reduced.degree:
             rows.append(np.einsum("an,pnm->pam", degree[[AXIAL, LATERAL]], motion[:, :n]))
             rows.append(np.einsum("an,pnm->pam", degree[[LATERAL]], motion[:, n:]))
-        return np.concatenate(rows, axis=1)
+        now = np.concatenate(rows, axis=1)
+        later = self._tick * 2.0**self._sample_level * np.arange(kernel.SAMPLES_AT_ONCE)
+        ahead = now[:, None] * np.exp(exponent[:, None, :] * later[:, None])[:, :, None]  # (p, sample, o, m)
+        table = np.moveaxis(ahead.reshape(len(ahead), -1, ahead.shape[-1]), 2, 1)
+        return np.ascontiguousarray(np.concatenate([table.real, -table.imag], axis=1))
+
+    def _energies(self, exponent: Complexes, motion: Complexes) -> tuple[Floats, Complexes, Floats]:
+        """Primitives of the powers of damping and unbalance: (p, 2 m, 2 m), (p, 2, m) and steady (p, 2), W.
+
+        Products of two coordinates go as exp((l_k + l_j) t) or exp((l_k + conj l_j) t). What has no primitive
+        among them is steady: that of the unbalance response with itself. Undamped modes have none either,
+        and nothing to lose.
+        """
+        n = self.reduced.stiffness.shape[0]
+        skew = 0.5 * (self.reduced.stiffness - self.reduced.stiffness.T)
+        shape, rate = motion[:, :n], motion[:, n:]
+        resisting = np.einsum("ij,pjm->pim", self.reduced.damping, rate)
+        resisting += np.einsum("ij,pjm->pim", skew, shape)
+        phasor = self.reduced.force[0] - 1j * self.reduced.force[1]
+        turning = np.full(exponent.shape, 1j * self.reduced.spin)
+        across = np.swapaxes(rate, 1, 2)
+        forms = []
+        for partner, other in ((resisting, exponent), (resisting.conj(), exponent.conj())):
+            forms.append(_primitive(across @ partner, exponent[:, :, None] + other[:, None, :]))
+        with_itself, with_conjugate = forms
+        loss = 0.5 * np.block(
+            [
+                [(with_itself + with_conjugate).real, (with_conjugate - with_itself).imag],
+                [-(with_itself + with_conjugate).imag, (with_conjugate - with_itself).real],
+            ]
+        )
+        work = 0.5 * np.stack(
+            [
+                _primitive(np.einsum("pim,i->pm", rate, phasor), exponent + turning),
+                _primitive(np.einsum("pim,i->pm", rate, phasor.conj()), exponent - turning),
+            ],
+            axis=1,
+        )
+        steady = np.empty((len(exponent), 2))
+        for i, phase in enumerate(self.phases):
+            u = phase.exponent.size - 1 - self.push.shape[0]
+            steady[i] = (
+                0.5 * (rate[i, :, u] @ resisting[i, :, u].conj()).real,
+                0.5 * (rate[i, :, u] @ phasor.conj()).real,
+            )
+        return 0.5 * (loss + np.swapaxes(loss, 1, 2)), work, steady
+
+
+def _primitive(power: Complexes, exponent: Complexes) -> Complexes:
+    """Power over its exponent, 1/s; zero where that is zero."""
+    has_one = np.abs(exponent) > STEADY * np.abs(exponent).max()
+    return np.divide(power, exponent, out=np.zeros_like(power), where=has_one)

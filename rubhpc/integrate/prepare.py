@@ -12,12 +12,15 @@ from rubhpc.fem.response import step_limit
 from rubhpc.integrate.packing import Packed, pack
 from rubhpc.integrate.phases import PhaseBook
 from rubhpc.integrate.reduction import ReducedModel, reduce_model
+from rubhpc.kernels.phases import SAMPLES_AT_ONCE
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.rig import Rig
     from rubhpc.study import Contact, Integrator
 
+FINEST_TICK = 1.5e-9  # s
+FEWEST_STEPS = 16  # a revolution: none is longer than the power of two below it
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CentralDifferenceSetup:
@@ -46,10 +49,33 @@ class ModalSetup:
     displacement_limit: float  # m
     _books: dict[float, PhaseBook] = field(default_factory=dict)
 
+    @property
+    def interval(self) -> float:
+        """Time between samples, s."""
+        return 2.0 * math.pi / (abs(self.spin) * self.samples_per_revolution)
+
+    @property
+    def sample_level(self) -> int:
+        """2^sample_level ticks are the interval of samples."""
+        return max(2, math.ceil(math.log2(self.interval / FINEST_TICK)))
+
+    @property
+    def tick(self) -> float:
+        """Resolution of events, s."""
+        return self.interval / (1 << self.sample_level)
+
     def book(self, friction: float) -> PhaseBook:
         """Phases of a friction, shared by its cases."""
         if friction not in self._books:
-            self._books[friction] = PhaseBook(self.reduced, self.model, friction)
+            past_sample = max(SAMPLES_AT_ONCE, self.samples_per_revolution // FEWEST_STEPS)
+            self._books[friction] = PhaseBook(
+                self.reduced,
+                self.model,
+                friction,
+                tick=self.tick,
+                sample_level=self.sample_level,
+                n_level=self.sample_level + past_sample.bit_length(),
+            )
         return self._books[friction]
 
 

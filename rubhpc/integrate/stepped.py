@@ -10,7 +10,7 @@ import numpy as np
 from rubhpc.integrate.contact_work import workspace
 from rubhpc.integrate.modal import ModalMarch
 from rubhpc.kernels.contact import N_DEGREE, Pairs
-from rubhpc.kernels.phases import CONTACT_UNSOLVED, FINISHED, N_NODE, N_STEP, TIME
+from rubhpc.kernels.phases import CONTACT_UNSOLVED, FINISHED, N_STEP, TIME
 from rubhpc.kernels.stepped import Kicks, advance_stepped
 
 if TYPE_CHECKING:
@@ -84,11 +84,15 @@ class SteppedMarch(ModalMarch):
         degree = setup.reduced.degree.reshape(-1, n)
         motion = phases.motion_re[0] + 1j * phases.motion_im[0]
         enter = phases.enter_re[0] + 1j * phases.enter_im[0]
-        level = max(0, min(self._clock.blind_level, self._sample_level))
+        level = max(0, min(self._clock.blind_level, self._clock.sample_level))
         power = phases.power_re[0, level] + 1j * phases.power_im[0, level]
-        drifted = degree @ enter[n:] * power
+        kick = degree @ enter[n:]
+        drifted = kick * power
         positions = degree @ motion[:n]
-
+        parts = np.hstack([kick.real, kick.imag])
+        loss = parts @ phases.loss[0]
+        # Re(e z_u + e' conj z_u) of the two rows: cosine and sine of the angle apart.
+        ahead, behind = (phases.work_re[0] + 1j * phases.work_im[0]) @ kick.T
         return Kicks(
             level=level,
             degree_re=np.ascontiguousarray(positions.real),
@@ -96,12 +100,14 @@ class SteppedMarch(ModalMarch):
             drifted_re=np.ascontiguousarray(drifted.real),
             drifted_im=np.ascontiguousarray(drifted.imag),
             twist_answer=degree @ setup.reduced.output[2],
+            loss=2.0 * loss,
+            loss_of_pair=loss @ parts.T,
+            work=np.ascontiguousarray(np.column_stack([(ahead + behind).real, (behind - ahead).imag])),
         )
 
     def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
-        per_sample = self._clock.ticks_per_sample
-        first = self.sample * per_sample
-        self._clock = self._clock._replace(end_tick=samples.rotor.shape[1] * per_sample)
+        per_sample = 1 << self._clock.sample_level
+        first = self._set_clock(samples, is_recorded=is_recorded)
         while True:
             outcome = advance_stepped(
                 self._phases,
@@ -115,18 +121,15 @@ class SteppedMarch(ModalMarch):
                 self._progress,
                 self._z,
                 self._z_next,
-                self._reader.nodes,
+                self._recorder,
                 samples,
                 tally,
             )
             self.n_step = int(self._progress[N_STEP])
             first = int(self._progress[TIME])
-            if is_recorded:
-                n_node = int(self._progress[N_NODE])
-                self._progress[N_NODE] = self._reader.read(n_node, samples, tally)
             if outcome == CONTACT_UNSOLVED:
                 return "the contact forces of a step have no solution"
-            if self._has_diverged():
+            if self._has_diverged(tally):
                 return f"a displacement passed {self._setup.displacement_limit:.3g} m"
             if outcome == FINISHED:
                 return None

@@ -24,29 +24,35 @@ from rubhpc.kernels.phases import (
     DIVERGED,
     ENTERED,
     FINISHED,
-    N_NODE,
     N_STEP,
-    NODES_FULL,
+    NEXT_SAMPLE,
     PHASE,
     PHASE_WANTED,
-    SAMPLED,
+    SAMPLES_AT_ONCE,
+    SPAN,
     TIME,
     WANTED,
     Clock,
-    Nodes,
     Phases,
     Reduced,
     dot,
     enter,
     find_phase,
     floor_log2,
-    keep_node,
     propagate,
     proved_time,
 )
+from rubhpc.kernels.sampling import (
+    Recorder,
+    begin_contact,
+    begin_span,
+    end_span,
+    observe_step,
+    take_samples,
+)
 
 if TYPE_CHECKING:
-    from rubhpc.kernels.observe import Tally
+    from rubhpc.kernels.observe import Samples, Tally
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -68,7 +74,8 @@ def advance(
     z: Floats,
     z_next: Floats,
     motion: Floats,
-    nodes: Nodes,
+    recorder: Recorder,
+    samples: Samples,
     tally: Tally,
 ) -> int:
     """Advance a case from `first_tick` to `last_tick`; sample 0 is tick 0.
@@ -76,37 +83,36 @@ def advance(
     While a gap is open or a force compressive, the switch function s obeys `s + s' t - b t^2 / 2 > 0` for a
     time that the bound b on its second derivative gives: steps up to it miss no event. Shorter steps than
     `2^blind_level` ticks are taken without that proof and checked at their end; where they fail, halving
-    finds the event to the tick.
+    finds the event to the tick. While the record finds no contact closed, a step may pass several samples:
+    they are read from its beginning.
 
     Parameters
     ----------
     is_recorded : bool
-        Whether to keep `nodes` and impacts.
+        Whether to fill `samples` and `tally`.
     progress : (7,)
-        Tick reached, phase, set of pairs wanted next (-1: none), steps taken, whether the sample at the tick
-        reached is kept, nodes kept, tick at which the phase began. Where a set is met that is not tabulated,
-        PHASE_WANTED is returned with the motion in `motion` (2 n,); the caller adds the phase and calls
-        again.
+        See `kernels.phases`. Where a set of contacts is met that is not tabulated, PHASE_WANTED is returned
+        with the motion in `motion` (2 n,); the caller adds the phase and calls again.
     z, z_next : (2, m)
         Modal coordinates, real and imaginary, and work space.
 
     Returns
     -------
     int
-        FINISHED, DIVERGED (not finite), CONTACT_UNSOLVED, PHASE_WANTED or NODES_FULL.
+        FINISHED, DIVERGED (not finite), CONTACT_UNSOLVED or PHASE_WANTED.
     """
     q, n = reduced.push.shape
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
     mask, switch_re, switch_im = phases.mask, phases.switch_re, phases.switch_im
     rate_re, rate_im, bound = phases.rate_re, phases.rate_im, phases.bound
     power_re, power_im = phases.power_re, phases.power_im
-    tick, ticks_per_sample = clock.tick, clock.ticks_per_sample
-    ticks_per_revolution = ticks_per_sample * clock.samples_per_revolution
+    tick, sample_level = clock.tick, clock.sample_level
+    interval = tick * (1 << sample_level)
+    ticks_per_revolution = clock.samples_per_revolution << sample_level
+    end_tick = clock.n_sample << sample_level
     sense = 1.0 if clock.spin >= 0.0 else -1.0
-    node_tick, node_phase, node_z = nodes.tick, nodes.phase, nodes.z
-    node_sample, node_entry, n_room = nodes.is_sample, nodes.is_entry, nodes.tick.size - 3
     highest_level = power_re.shape[1] - 1
-    force, speed = np.zeros(q), np.zeros(q)
+    force, speed, impulse = np.zeros(q), np.zeros(q), np.zeros(q)
     active, elimination = np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
     crossing_at = np.zeros(q, dtype=np.bool_)
     t, p = first_tick, progress[PHASE]
@@ -115,63 +121,40 @@ def advance(
     is_forced = False
     n_event = 0
     wanted = progress[WANTED]
-    is_sampled = progress[SAMPLED] == 1
-    progress[SAMPLED] = 0
+    if is_recorded and wanted < 0:
+        if progress[SPAN] < 0:
+            begin_span(phases, p, t, z, progress, recorder)
+        begin_contact(phases, reduced, p, clock.spin, z_re, z_im, recorder)
     while True:
         if wanted >= 0:  # go over to another set of contacts
             angle = sense * 2.0 * np.pi * (t % ticks_per_revolution) / ticks_per_revolution
             found = find_phase(mask, wanted)
             progress[TIME], progress[WANTED] = t, wanted
             if found < 0:
-                progress[SAMPLED] = 1 if is_sampled else 0
                 return PHASE_WANTED
             p = found
-            enter(phases, p, np.cos(angle), np.sin(angle), motion, z)
+            enter(phases, p, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
             progress[PHASE], progress[WANTED], progress[ENTERED] = p, -1, t
             wanted = -1
             is_forced, is_halving = True, False
-            if is_recorded and mask[p] != 0:
-                keep_node(
-                    node_tick,
-                    node_phase,
-                    node_sample,
-                    node_entry,
-                    node_z,
-                    progress,
-                    t,
-                    p,
-                    False,
-                    True,
-                    z,
-                )
-        if is_recorded:
-            if progress[N_NODE] > n_room:
-                progress[TIME], progress[SAMPLED] = t, 1 if is_sampled else 0
-                return NODES_FULL
-            is_due = t % ticks_per_sample == 0 and (t < last_tick or t == clock.end_tick)
-            if is_due and not is_sampled:
-                is_sampled = True
-                keep_node(
-                    node_tick,
-                    node_phase,
-                    node_sample,
-                    node_entry,
-                    node_z,
-                    progress,
-                    t,
-                    p,
-                    True,
-                    False,
-                    z,
-                )
+            if is_recorded:
+                begin_span(phases, p, t, z, progress, recorder)
+                begin_contact(phases, reduced, p, clock.spin, z_re, z_im, recorder)
+        is_sample = is_recorded and t == progress[NEXT_SAMPLE] << sample_level
         if t >= last_tick:
+            if is_recorded and t == end_tick:
+                if is_sample:  # it closes the last interval
+                    take_samples(phases, p, z_re, z_im, clock.n_sample, 1, interval, recorder, samples, tally)
+                end_span(phases, p, clock, t, z, progress, recorder, tally)
             progress[TIME] = t
             return FINISHED
+        is_free = mask[p] == 0
         limit = last_tick
         if is_recorded:
-            limit = min(limit, (t // ticks_per_sample + 1) * ticks_per_sample)
+            reach = SAMPLES_AT_ONCE if is_sample and is_free else 1
+            limit = min(limit, ((t >> sample_level) + reach) << sample_level)
         level = min(highest_level, floor_log2(limit - t))
-        if is_recorded and mask[p] != 0:
+        if is_recorded and not is_free:
             # What an impact sets off is fast at first: no step is longer than the contact has lasted.
             age = floor_log2(max(1, t - progress[ENTERED]))
             level = min(level, clock.contact_level, max(age, clock.blind_level))
@@ -196,25 +179,30 @@ def advance(
         if is_crossed and level > 0:
             is_halving, ceiling = True, level - 1
             continue
+        if is_sample:
+            count = 1 if is_crossed else max(1, (1 << level) >> sample_level)
+            first = progress[NEXT_SAMPLE]
+            take_samples(phases, p, z_re, z_im, first, count, interval, recorder, samples, tally)
+            progress[NEXT_SAMPLE] = first + count
         if not is_crossed:
             for k in range(z_re.size):
                 z_re[k], z_im[k] = next_re[k], next_im[k]
-            t += 1 << level
-            is_sampled = False
-            if is_recorded and mask[p] != 0 and t % ticks_per_sample != 0:
-                keep_node(
-                    node_tick,
-                    node_phase,
-                    node_sample,
-                    node_entry,
-                    node_z,
-                    progress,
-                    t,
+            if is_recorded and not is_free:
+                observe_step(
+                    phases,
+                    reduced,
                     p,
-                    False,
-                    False,
-                    z,
+                    clock.spin,
+                    (1 << level) * tick,
+                    z_re,
+                    z_im,
+                    t >> sample_level,
+                    1.0 / interval,
+                    recorder,
+                    samples,
+                    tally,
                 )
+            t += 1 << level
             if is_halving:
                 ceiling -= 1
                 is_halving = ceiling >= 0
@@ -230,6 +218,9 @@ def advance(
             if not abs(motion[k]) < np.inf:
                 progress[TIME] = t
                 return DIVERGED
+        if is_recorded:
+            end_span(phases, p, clock, t, z, progress, recorder, tally)
+            impulse[:] = tally.impulse
         angle = sense * 2.0 * np.pi * (t % ticks_per_revolution) / ticks_per_revolution
         wanted = change_contacts(
             reduced,
@@ -252,6 +243,7 @@ def advance(
             return CONTACT_UNSOLVED
         if is_recorded:
             for i in range(q):
+                samples.force[i, t >> sample_level] += (tally.impulse[i] - impulse[i]) / interval
                 is_new = (wanted >> i) & 1 and not tally.is_touching[i]
                 tally.n_contact[i] += 1 if is_new else 0
                 tally.is_touching[i] = (wanted >> i) & 1 == 1

@@ -19,20 +19,26 @@ TWIST_ACCELERATION_ROW = 6
 LATERAL_ROW, LATERAL_RATE = 1, 2
 
 
-FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED, NODES_FULL = range(5)  # outcomes
+FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED = range(4)  # outcomes
 
-# What a call leaves in `progress` (7,) for the next one.
-TIME, PHASE, WANTED, N_STEP, SAMPLED, N_NODE, ENTERED = range(7)
+# What a call leaves in `progress` (7,) for the next one: tick reached, phase, set of pairs wanted next (-1:
+# none), steps taken, next sample to take, tick at which the phase began, and that from which energies are
+# still to be added (-1: none).
+N_PROGRESS = 7
+TIME, PHASE, WANTED, N_STEP, NEXT_SAMPLE, ENTERED, SPAN = range(N_PROGRESS)
+
+SAMPLES_AT_ONCE = 8  # read from one set of modal coordinates
 
 
 class Phases(NamedTuple):
     """Modal form of every set of closed contacts met so far; complex arrays as (real, imaginary) pairs.
 
-    p phases, m modes (padded), q pairs, n reduced degrees, o output rows.
+    p phases, m coordinates (padded), q pairs, n reduced degrees, o output rows. The coordinates are those of
+    the modes, then that of the unbalance response, exp(i angle), then the clearance of each pair, m.
     """
 
     mask: Ints  # (p,), bit i set: pair i is closed
-    n_mode: Ints  # (p,), the modes proper; then the unbalance response, then the constant
+    n_mode: Ints  # (p,), the modes proper
     switch_re: Floats  # (p, q, m), gap of an open pair, m; force of a closed one, N
     switch_im: Floats
     rate_re: Floats  # (p, q, m), its time derivative
@@ -40,9 +46,8 @@ class Phases(NamedTuple):
     bound: Floats  # (p, q, m), bound on its second time derivative for a unit coordinate
     power_re: Floats  # (p, n_level, m), exponential of each mode over 2^level ticks
     power_im: Floats
-    output_re: Floats  # (p, o, m)
-    output_im: Floats
-    slip_re: Floats  # (p, q, m), slip speed, m/s
+    output: Floats  # (p, 2 m, SAMPLES_AT_ONCE o), of the real, then the imaginary parts, sample by sample
+    slip_re: Floats  # (p, q, m), slip speed, m/s, but for that of the steady spin
     slip_im: Floats
     motion_re: Floats  # (p, 2 n, m), reduced displacements, then velocities
     motion_im: Floats
@@ -50,17 +55,11 @@ class Phases(NamedTuple):
     enter_im: Floats
     enter_cosine: Floats  # (p, 2, m), part of the unbalance response to take off, times cos(angle)
     enter_sine: Floats  # (p, 2, m), times sin(angle)
-    enter_constant: Floats  # (p, 2, m)
-
-
-class Nodes(NamedTuple):
-    """Instants kept for what is measured later: every sample, and both ends of every step in contact."""
-
-    tick: Ints  # (n_node,)
-    phase: Ints  # (n_node,)
-    is_sample: NDArray[np.bool_]  # (n_node,)
-    is_entry: NDArray[np.bool_]  # (n_node,), the phase begins here: no step leads to it
-    z: Floats  # (n_node, 2, m), modal coordinates
+    enter_constant: Floats  # (p, q, 2, m), for a unit clearance of each pair
+    loss: Floats  # (p, 2 m, 2 m), form of the coordinates whose growth is the loss by damping, J
+    work_re: Floats  # (p, 2, m), the same for the work of the unbalance: times exp(i angle), its conjugate
+    work_im: Floats
+    steady_power: Floats  # (p, 2), W, of damping and of the unbalance, that no form of coordinates holds
 
 
 class Reduced(NamedTuple):
@@ -68,7 +67,6 @@ class Reduced(NamedTuple):
 
     stiffness: Floats  # (n, n)
     damping: Floats  # (n, n), D + spin G
-    circulation: Floats  # (n, n), skew part of K
     force_cosine: Floats  # (n,)
     force_sine: Floats  # (n,)
     push: Floats  # (q, n), rate of a gap with the motion
@@ -76,6 +74,7 @@ class Reduced(NamedTuple):
     answer: Floats  # (q, q), push @ pull.T, 1/kg
     friction: Floats  # (q,), coefficient, not negative
     radius: Floats  # (q,), m
+    clearance: Floats  # (q,), m
 
 
 class Clock(NamedTuple):
@@ -83,11 +82,11 @@ class Clock(NamedTuple):
 
     spin: float  # rad/s
     tick: float  # s
-    ticks_per_sample: int
+    sample_level: int  # 2^level ticks are the interval of samples
     samples_per_revolution: int
     blind_level: int  # steps up to 2^level ticks need no bound; they are checked at their end
     contact_level: int  # longest step with a pair closed while recording
-    end_tick: int  # the record's end
+    n_sample: int  # samples of the record; it ends where the next one would stand
 
 
 @jit_inline_sum
@@ -118,16 +117,18 @@ def propagate(re: Floats, im: Floats, z_re: Floats, z_im: Floats, next_re: Float
 
 
 @jit_sum
-def enter(phases: Phases, p: int, cosine: float, sine: float, motion: Floats, z: Floats) -> None:
-    """Modal coordinates `z` (2, m) in phase p of a motion (2 n,) at the shaft's angle."""
+def enter(
+    phases: Phases, p: int, clearance: Floats, cosine: float, sine: float, motion: Floats, z: Floats
+) -> None:
+    """Modal coordinates `z` (2, m) in phase p of a motion (2 n,) at the shaft's angle; clearance (q,), m."""
     for part in range(2):
         rows = phases.enter_re[p] if part == 0 else phases.enter_im[p]
         target = z[part]
-        target[:] = (
-            -phases.enter_cosine[p, part] * cosine
-            - phases.enter_sine[p, part] * sine
-            - phases.enter_constant[p, part]
-        )
+        target[:] = -phases.enter_cosine[p, part] * cosine - phases.enter_sine[p, part] * sine
+        for i in range(clearance.size):
+            source = phases.enter_constant[p, i, part]
+            for k in range(target.size):
+                target[k] -= source[k] * clearance[i]
         for row in range(motion.size):
             value = motion[row]
             source = rows[row]
@@ -135,7 +136,8 @@ def enter(phases: Phases, p: int, cosine: float, sine: float, motion: Floats, z:
                 target[k] += source[k] * value
     first = phases.n_mode[p]
     z[0, first], z[1, first] = cosine, sine
-    z[0, first + 1], z[1, first + 1] = 1.0, 0.0
+    for i in range(clearance.size):
+        z[0, first + 1 + i], z[1, first + 1 + i] = clearance[i], 0.0
 
 
 @jit_sum
@@ -145,29 +147,6 @@ def find_phase(mask: Ints, wanted: int) -> int:
         if mask[p] == wanted:
             return p
     return -1
-
-
-@jit_inline_sum
-def keep_node(
-    tick: Ints,
-    phase: Ints,
-    is_sample: NDArray[np.bool_],
-    is_entry: NDArray[np.bool_],
-    kept: Floats,
-    progress: Ints,
-    t: int,
-    p: int,
-    sampled: bool,
-    entered: bool,
-    z: Floats,
-) -> None:
-    """Append an instant to the nodes, whose fields come one by one for speed."""
-    k = progress[N_NODE]
-    tick[k], phase[k], is_sample[k], is_entry[k] = t, p, sampled, entered
-    for part in range(2):
-        for i in range(z.shape[1]):
-            kept[k, part, i] = z[part, i]
-    progress[N_NODE] = k + 1
 
 
 @jit_inline_sum

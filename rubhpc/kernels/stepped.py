@@ -13,26 +13,32 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_sum
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact import N_DEGREE, Pairs, Workspace, is_any_closed, solve_contact
-from rubhpc.kernels.observe import TWIST_ACCELERATION, Samples, Tally, observe_contact
+from rubhpc.kernels.observe import (
+    DAMPING_LOSS,
+    TWIST_ACCELERATION,
+    UNBALANCE_WORK,
+    Samples,
+    Tally,
+    observe_contact,
+)
 from rubhpc.kernels.phases import (
     CONTACT_UNSOLVED,
     FINISHED,
-    N_NODE,
     N_STEP,
-    NODES_FULL,
+    NEXT_SAMPLE,
+    SPAN,
     TIME,
     Clock,
-    Nodes,
     Phases,
     dot,
     floor_log2,
-    keep_node,
     propagate,
     proved_time,
 )
+from rubhpc.kernels.sampling import Recorder, begin_span, end_span, take_samples
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -47,6 +53,31 @@ class Kicks(NamedTuple):
     drifted_re: Floats  # (5 q, m), modal coordinates a contact step after a unit impulse on each degree
     drifted_im: Floats
     twist_answer: Floats  # (5 q,), torsional acceleration of the output node for a unit force
+    loss: Floats  # (5 q, 2 m), growth of `Phases.loss` with a unit impulse, for unit coordinates
+    loss_of_pair: Floats  # (5 q, 5 q), and with two of them, whatever the coordinates
+    work: Floats  # (5 q, 2), growth of the form of the unbalance's work, times cosine and sine
+
+
+@jit_inline_sum
+def take_off_kick(
+    kicks: Kicks, impulses: Floats, z_re: Floats, z_im: Floats, turning: int, energy: Floats
+) -> None:
+    """Take from the sums of energy what the forms of `sampling` grow by a kick's impulses (5 q,), N s.
+
+    `z` are the coordinates before it, and `turning` the place of exp(i angle) among them.
+    """
+    for b in range(impulses.size):
+        if impulses[b] == 0.0:
+            continue
+        growth = 0.0
+        for k in range(z_re.size):
+            growth += kicks.loss[b, k] * z_re[k] + kicks.loss[b, z_re.size + k] * z_im[k]
+        for a in range(impulses.size):
+            growth += kicks.loss_of_pair[b, a] * impulses[a]
+        energy[DAMPING_LOSS] -= impulses[b] * growth
+        energy[UNBALANCE_WORK] -= impulses[b] * (
+            kicks.work[b, 0] * z_re[turning] + kicks.work[b, 1] * z_im[turning]
+        )
 
 
 @jit_sum
@@ -62,7 +93,7 @@ def advance_stepped(
     progress: Ints,
     z: Floats,
     z_next: Floats,
-    nodes: Nodes,
+    recorder: Recorder,
     samples: Samples,
     tally: Tally,
 ) -> int:
@@ -77,38 +108,30 @@ def advance_stepped(
     power_re, power_im = phases.power_re, phases.power_im
     degree_re, degree_im = kicks.degree_re, kicks.degree_im
     n_degree = q * N_DEGREE
-    node_tick, node_phase, node_z = nodes.tick, nodes.phase, nodes.z
-    node_sample, node_entry = nodes.is_sample, nodes.is_entry
-    position, rate = np.zeros(n_degree), np.zeros(n_degree)
+    position, rate, impulses = np.zeros(n_degree), np.zeros(n_degree), np.zeros(n_degree)
     step = clock.tick * (1 << kicks.level)
+    interval = clock.tick * (1 << clock.sample_level)
+    end_tick = clock.n_sample << clock.sample_level
     highest_level = phases.power_re.shape[1] - 1
     t = first_tick
     was_touching = bool(np.any(work.force > 0.0))
+    if is_recorded and progress[SPAN] < 0:
+        begin_span(phases, 0, t, z, progress, recorder)
     while True:
-        is_sample = is_recorded and t % clock.ticks_per_sample == 0 and (t < last_tick or t == clock.end_tick)
-        if is_sample:
-            if progress[N_NODE] >= node_tick.size:
-                progress[TIME] = t
-                return NODES_FULL
-            keep_node(
-                node_tick,
-                node_phase,
-                node_sample,
-                node_entry,
-                node_z,
-                progress,
-                t,
-                0,
-                True,
-                False,
-                z,
-            )
-        if t >= last_tick:
+        is_sample = is_recorded and t == progress[NEXT_SAMPLE] << clock.sample_level
+        is_end = t >= last_tick
+        if is_sample and (not is_end or t == end_tick):
+            i_sample = t >> clock.sample_level
+            take_samples(phases, 0, z_re, z_im, i_sample, 1, interval, recorder, samples, tally)
+            progress[NEXT_SAMPLE] = i_sample + 1
+        if is_end:
+            if is_recorded and t == end_tick:
+                end_span(phases, 0, clock, t, z, progress, recorder, tally)
             progress[TIME] = t
             return FINISHED
         limit = last_tick
         if is_recorded:
-            limit = min(limit, (t // clock.ticks_per_sample + 1) * clock.ticks_per_sample)
+            limit = min(limit, ((t >> clock.sample_level) + 1) << clock.sample_level)
         level = min(highest_level, floor_log2(limit - t))
         proved = proved_time(switch_re, switch_im, rate_re, rate_im, bound, 0, z_re, z_im)
         while level > kicks.level and (1 << level) * clock.tick > proved:
@@ -137,9 +160,10 @@ def advance_stepped(
                 return CONTACT_UNSOLVED
             for i in range(q):
                 for d in range(N_DEGREE):
+                    b = i * N_DEGREE + d
                     impulse = step * work.force[i] * work.pull[i, d]
+                    impulses[b] = impulse
                     if impulse != 0.0:
-                        b = i * N_DEGREE + d
                         if is_sample:
                             twist_acceleration += kicks.twist_answer[b] * impulse / step
                         for k in range(z_re.size):
@@ -148,7 +172,9 @@ def advance_stepped(
         elif was_touching:
             work.force[:] = 0.0
         if is_sample:
-            samples.rotor[TWIST_ACCELERATION, t // clock.ticks_per_sample] += twist_acceleration
+            samples.rotor[TWIST_ACCELERATION, t >> clock.sample_level] += twist_acceleration
+        if is_recorded and is_touching:
+            take_off_kick(kicks, impulses, z_re, z_im, phases.n_mode[0], tally.energy)
         if is_recorded and (is_touching or was_touching):
             # The force works on the mean velocity of the step; a kick's own burst dies out within it.
             for a in range(n_degree):
@@ -158,9 +184,7 @@ def advance_stepped(
                 ) / step
             observe_contact(pairs, work, clock.spin, step, rate, rate, tally)
             for i in range(q):
-                samples.force[i, t // clock.ticks_per_sample] += (
-                    work.force[i] * (1 << kicks.level) / clock.ticks_per_sample
-                )
+                samples.force[i, t >> clock.sample_level] += work.force[i] * step / interval
         was_touching = is_touching
         for k in range(z_re.size):
             z_re[k], z_im[k] = next_re[k], next_im[k]

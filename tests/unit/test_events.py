@@ -22,7 +22,6 @@ def bodies(rng, q, friction=0.0):
     return Reduced(
         stiffness=1e4 * root @ root.T,
         damping=rng.normal(size=(N, N)),
-        circulation=np.zeros((N, N)),
         force_cosine=rng.normal(size=N),
         force_sine=rng.normal(size=N),
         push=push,
@@ -30,6 +29,7 @@ def bodies(rng, q, friction=0.0):
         answer=push @ pull.T,
         friction=np.full(q, friction),
         radius=np.full(q, 0.06),
+        clearance=np.full(q, 1e-4),
     )
 
 

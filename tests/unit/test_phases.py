@@ -14,16 +14,18 @@ from rubhpc.kernels.phases import (
     LATERAL_RATE,
     LATERAL_ROW,
     N_ROTOR_ROW,
+    SAMPLES_AT_ONCE,
     TWIST_ACCELERATION_ROW,
     enter,
     find_phase,
     floor_log2,
     proved_time,
 )
+from rubhpc.kernels.sampling import energy_forms
 
 CLEARANCE = np.array([80e-6, 95e-6])
 FRICTION = 0.3
-TICK, N_LEVEL = 1e-7, 12
+TICK, SAMPLE_LEVEL, N_LEVEL = 1e-7, 9, 12
 MASKS = (0, 1, 2, 3)
 
 
@@ -33,11 +35,9 @@ def case(request):
     spin = request.param
     model = assemble(trial_rig(2, cross=1e5))
     reduced = reduce_model(model, spin, 1e-30)
-    book = PhaseBook(reduced, model, FRICTION)
+    book = PhaseBook(reduced, model, FRICTION, tick=TICK, sample_level=SAMPLE_LEVEL, n_level=N_LEVEL)
     book.add(3)
-    return SimpleNamespace(
-        spin=spin, model=model, reduced=reduced, book=book, tables=book.tables(CLEARANCE, TICK, N_LEVEL)
-    )
+    return SimpleNamespace(spin=spin, model=model, reduced=reduced, book=book, tables=book.tables())
 
 
 def closed_pairs(mask):
@@ -76,7 +76,7 @@ def entered(case, mask, motion, angle):
     """Modal coordinates as complex numbers."""
     p = find_phase(case.tables.mask, mask)
     z = np.zeros((2, case.tables.switch_re.shape[2]))
-    enter(case.tables, p, np.cos(angle), np.sin(angle), motion, z)
+    enter(case.tables, p, CLEARANCE, np.cos(angle), np.sin(angle), motion, z)
     return p, z[0] + 1j * z[1]
 
 
@@ -112,14 +112,13 @@ def test_motion_obeys_the_equations_with_the_gaps_held(case, mask):
         motion = admissible(case, mask, rng)
         p, z = entered(case, mask, motion, angle)
         z = z[: phase.exponent.size]
-        columns = np.column_stack([phase.motion, CLEARANCE @ phase.motion_constant])
-        x, v = np.split((columns @ z).real, 2)
-        drift, acceleration = np.split((columns @ (phase.exponent * z)).real, 2)
+        x, v = np.split((phase.motion @ z).real, 2)
+        drift, acceleration = np.split((phase.motion @ (phase.exponent * z)).real, 2)
         expected, force = constrained(case, mask, x, v, np.cos(angle), np.sin(angle))
         assert drift == pytest.approx(v, abs=1e-8 * abs(v).max())
         # Stiffness times displacement is 1e6 times the rest and more: its rounding is what is left.
         assert acceleration == pytest.approx(expected, abs=1e-7 * abs(case.reduced.stiffness @ x).max())
-        switch = (phase.switch @ z[:-1]).real + phase.switch_constant @ CLEARANCE * z[-1].real
+        switch = (phase.switch @ z).real
         gap = case.book.push @ x + CLEARANCE
         assert gap[closed] == pytest.approx(0.0, abs=1e-15)
         opened = [i for i in range(len(CLEARANCE)) if i not in closed]
@@ -165,7 +164,8 @@ def test_rows_of_the_tables_are_read_off_the_motion(case, mask):
     x, v = np.split(motion, 2)
     reduced, tables = case.reduced, case.tables
     acceleration, _ = constrained(case, mask, x, v, np.cos(angle), np.sin(angle))
-    found = (joined(tables, "output", p) @ z).real
+    table = tables.output[p].reshape(2, z.size, SAMPLES_AT_ONCE, -1)
+    found = read(table[:, :, 0], z)
     expected = np.empty_like(found)
     expected[:3], expected[3:6] = reduced.output @ x, reduced.output @ v
     expected[TWIST_ACCELERATION_ROW] = reduced.output[2] @ acceleration
@@ -175,9 +175,45 @@ def test_rows_of_the_tables_are_read_off_the_motion(case, mask):
     tight = np.arange(found.size) != TWIST_ACCELERATION_ROW
     assert found[tight] == pytest.approx(expected[tight], rel=1e-7, abs=1e-11)
     assert found[~tight] == pytest.approx(expected[~tight], rel=1e-5)
-    radii = [stator.radius for stator in case.model.stators]
-    slip = case.book.slip @ v + np.multiply(radii, abs(case.spin))
-    assert (joined(tables, "slip", p) @ z).real == pytest.approx(slip)
+    assert (joined(tables, "slip", p) @ z).real == pytest.approx(case.book.slip @ v)
+    for i in range(SAMPLES_AT_ONCE):  # those at later samples
+        later = z * np.exp(exponents(tables, p) * TICK * 2**SAMPLE_LEVEL * i)
+        assert read(table[:, :, i], z)[tight] == pytest.approx(
+            read(table[:, :, 0], later)[tight], rel=1e-6, abs=1e-11
+        )
+
+
+def read(table, z):
+    """Output rows from a table (2, m, rows) of real and imaginary parts."""
+    return table[0].T @ z.real + table[1].T @ z.imag
+
+
+@pytest.mark.parametrize("mask", MASKS)
+def test_forms_grow_by_the_energy_lost_and_given(case, mask):
+    """Powers of damping (with cross-coupled bearings) and unbalance, by Gauss's rule along a motion."""
+    rng = np.random.default_rng(400 + mask)
+    tables, reduced = case.tables, case.reduced
+    skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
+    angle, duration = 1.3, 2e-3
+    p, z = entered(case, mask, admissible(case, mask, rng), angle)
+    exponent = make_phase(reduced, case.book.push, case.book.pull, mask).exponent
+    exponent = np.concatenate([exponent, np.zeros(z.size - exponent.size)])
+    node, weight = np.polynomial.legendre.leggauss(20)
+    panels = np.linspace(0, duration, 401)
+    time = (0.5 * (panels[1:] + panels[:-1])[:, None] + 0.5 * np.diff(panels)[:, None] * node).ravel()
+    weight = (0.5 * np.diff(panels)[:, None] * weight).ravel()
+    x, v = np.split((joined(tables, "motion", p) @ (z[:, None] * np.exp(np.outer(exponent, time)))).real, 2)
+    lost = weight @ np.einsum("it,it->t", v, reduced.damping @ v + skew @ x)
+    turn = angle + case.spin * time
+    given = weight @ np.einsum(
+        "it,it->t", v, np.outer(reduced.force[0], np.cos(turn)) + np.outer(reduced.force[1], np.sin(turn))
+    )
+    before, after = np.empty(2), np.empty(2)
+    energy_forms(tables, p, np.stack([z.real, z.imag]), before)
+    z = z * np.exp(exponent * duration)
+    energy_forms(tables, p, np.stack([z.real, z.imag]), after)
+    grown = after - before + tables.steady_power[p] * duration
+    assert grown == pytest.approx([lost, given], rel=1e-6)
 
 
 @pytest.mark.parametrize("mask", MASKS)
