@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 FINEST_TICK = 1.5e-9  # s
 FEWEST_STEPS = 16  # a revolution: none is longer than the power of two below it
 
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CentralDifferenceSetup:
     """All that the cases of one rig and speed share."""
