@@ -47,7 +47,7 @@ def waterfall(
     spectra = hold_rows(below(spectra, limit, abscissa), _ROWS).compute()
     need_results(spectra, spectra.to_dataset(name="spectra"))
     rows, label = displayed(spectra[spectra.dims[0]])
-    spectra = spectra.where(spectra["order"] > 0)  # the mean is no line
+    spectra = spectra.where(np.abs(spectra["order"]) > 1e-9)  # the mean is no line
     peak = float(spectra.max())
     span = float(np.ptp(rows)) or 1.0
     gain = height * span / (peak or 1.0)
@@ -59,10 +59,11 @@ def waterfall(
         order = 3 + (rows.max() - rows[i]) / span
         ax.fill_between(at, rows[i], rows[i] + line, color="white", linewidth=0, zorder=order)
         ax.plot(at, rows[i] + line, color="C0", linewidth=0.5, zorder=order)
-    ax.set(xlim=(0, limit), xlabel=_NAMES[abscissa], ylabel=label)
+    ax.set(xlim=(_start(spectra, limit), limit), xlabel=_NAMES[abscissa], ylabel=label)
     ax.set_ylim(rows.min() - 0.04 * span, rows.max() + (height + 0.02) * span)
     ax.set_yticks([t for t in ax.get_yticks() if abs(t - rows.mean()) <= 0.55 * span])
     _scale_bar(spectra, ax, peak, gain)
+    _name_senses(ax)
     return ax
 
 
@@ -73,7 +74,9 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
     """
     from matplotlib.colors import LogNorm
 
-    lines = spectra.where(spectra["order"] > 0, 0.0).where(spectra.notnull())  # the mean is no line
+    lines = spectra.where(np.abs(spectra["order"]) > 1e-9, 0.0).where(
+        spectra.notnull()
+    )  # the mean is no line
     held = hold_rows(hold_peaks(lines, limit, _PIXELS[0], abscissa), _PIXELS[1]).compute()
     need_results(held, held.to_dataset(name="spectra"))
     rows, label = displayed(held[held.dims[0]])
@@ -82,7 +85,7 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
     peak = float(np.nanmax(values)) or 1.0
     ascending = np.argsort(rows)
     mesh = ax.pcolormesh(
-        np.linspace(0, limit, values.shape[1] + 1),
+        np.linspace(_start(spectra, limit), limit, values.shape[1] + 1),
         cell_edges(rows[ascending]),
         np.ma.masked_invalid(np.maximum(values[ascending], peak * 10 ** (-_DECADES - 1))),
         norm=LogNorm(peak * 10**-_DECADES, peak),
@@ -90,7 +93,8 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
         rasterized=True,
     )
     ax.set_facecolor("0.85")  # shows where a case is missing
-    ax.set(xlim=(0, limit), xlabel=_NAMES[abscissa], ylabel=label)
+    ax.set(xlim=(_start(spectra, limit), limit), xlabel=_NAMES[abscissa], ylabel=label)
+    _name_senses(ax, "0.9")
     bar = ax.figure.colorbar(mesh, ax=ax, pad=0.02, aspect=30, extend="min")
     bar.set_label(scale.label(f"{short_name(held)} amplitude"))
     return ax
@@ -103,13 +107,17 @@ def draw_orders(
     abscissa: str = "frequency",
     color: str = "0.35",
 ) -> Axes:
-    """Add the lines on which multiples of the spin speed lie, named at their upper ends."""
+    """Add the lines on which multiples of the spin speed lie, named at their upper ends.
+
+    In full spectra each has its twin on the backward side.
+    """
     rows, rate = _rows_and_rate(spectra)
     left, right = ax.get_xlim()
     style: dict[str, Any] = {"color": color, "linewidth": 0.4, "linestyle": (0, (4, 3)), "zorder": 2.5}
     tagged: list[float] = []
     # Whole multiples first, so that they keep their names where there is no room for all.
-    for order in sorted(orders, key=lambda o: (o.denominator, o)):
+    signed = [*orders, *(-o for o in orders)] if left < 0 else list(orders)
+    for order in sorted(signed, key=lambda o: (o.denominator, abs(o))):
         x = float(order) * (rate if abscissa == "frequency" else np.ones_like(rate))
         inside = np.flatnonzero((x >= left) & (x <= right))
         if inside.size < max(2, 0.08 * rows.size):
@@ -120,7 +128,8 @@ def draw_orders(
                 _tag(ax, float(x[-1]), float(rows[-1]), f"{order}X", color, "center")
                 tagged.append(float(x[-1]))
         else:
-            _tag(ax, right, float(np.interp(right, x, rows)), f"{order}X", color, "right")
+            end, side = (right, "right") if order > 0 else (left, "left")
+            _tag(ax, end, float(np.interp(abs(end), np.abs(x), rows)), f"{order}X", color, side)
     return ax
 
 
@@ -131,7 +140,10 @@ def draw_frequencies(
     abscissa: str = "frequency",
     color: str = "C1",
 ) -> Axes:
-    """Add natural frequencies (Hz) as dashed lines named beside; they may vary along it."""
+    """Add natural frequencies (Hz) as dashed lines named beside; they may vary along it.
+
+    In full spectra each has its twin, without a name, on the backward side.
+    """
     rows, rate = _rows_and_rate(spectra)
     left, right = ax.get_xlim()
     ends = ax.get_ylim()
@@ -143,7 +155,9 @@ def draw_frequencies(
         if not ((x >= left) & (x <= right)).any():
             continue
         y = np.concatenate((ends[:1], rows, ends[1:]))
-        ax.plot(np.concatenate((x[:1], x, x[-1:])), y, scalex=False, scaley=False, **style)
+        curve = np.concatenate((x[:1], x, x[-1:]))
+        for twin in (curve, -curve) if left < 0 else (curve,):
+            ax.plot(twin, y, scalex=False, scaley=False, **style)
         text: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6.5, "color": color, "zorder": 6}
         if abscissa == "frequency":
             at = float(np.clip(x[-1], left + 0.1 * (right - left), right - 0.14 * (right - left)))
@@ -169,6 +183,19 @@ def default_limit(spectra: xr.DataArray, frequencies: Mapping[str, xr.DataArray 
     return min(math.ceil(limit / 10) * 10, float(np.nanmax(spectra["frequency"].values)))
 
 
+def _start(spectra: xr.DataArray, limit: float) -> float:
+    """Return where the abscissa begins: at 0, or as far backward as forward for full spectra."""
+    return -limit if float(spectra["order"].min()) < 0 else 0.0
+
+
+def _name_senses(ax: Axes, color: str = "k") -> None:
+    """Say which side of full spectra whirls backward, at the lower ends of the axes."""
+    if ax.get_xlim()[0] < 0:
+        style: dict[str, Any] = {"va": "bottom", "transform": ax.transAxes, "color": color, "zorder": 7}
+        ax.text(0.02, 0.02, "backward", ha="left", **style)
+        ax.text(0.98, 0.02, "forward", ha="right", **style)
+
+
 def _rows_and_rate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the displayed ordinates, ascending, and the spin rate (Hz) at each."""
     rows, _ = displayed(spectra[spectra.dims[0]])
@@ -185,7 +212,7 @@ def _tag(ax: Axes, x: float, y: float, text: str, color: str, ha: str) -> None:
         (x, y),
         xytext=(0, 1) if has_room and ha == "center" else (-1, 1 if has_room else -1),
         textcoords="offset points",
-        ha=ha if has_room else "right",
+        ha=ha if has_room or ha == "left" else "right",
         va="bottom" if has_room else "top",
         fontsize=6,
         color=color,

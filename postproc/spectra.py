@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+WHIRL = "whirl"  # the motion of the disc's centre, v + i w
+
+
 def samples_per_revolution(waveform: xr.DataArray) -> int:
     """Return how many samples a waveform has in a revolution, from its `revolution` coordinate."""
     revolution = waveform["revolution"].values
@@ -60,7 +63,7 @@ def full_spectrum(vertical: xr.DataArray, horizontal: xr.DataArray) -> xr.DataAr
     n = vertical.sizes["sample"]
     orders = np.fft.fftshift(np.fft.fftfreq(n, d=1 / samples_per_revolution(vertical)))
     spectrum = _over_orders(_two_sided, orders, vertical, horizontal)
-    spectrum.name = "whirl"
+    spectrum.name = WHIRL
     spectrum.attrs = {"units": vertical.attrs.get("units", "m"), "long_name": "whirl amplitude"}
     return spectrum
 
@@ -98,7 +101,15 @@ def periodic_spectrum(
     ----------
     store : Dataset
         All axes of more than one value must have been selected, but those in `spread`.
+    signal : str
+        A recorded one, or "whirl": the full spectrum of the orbit, from its waveforms.
     """
+    if signal == WHIRL:
+        names = ["vertical", "horizontal", "spin_speed", *(n for n in ("period",) if n in store)]
+        data = narrow(store, names, spread)
+        vertical, horizontal = (whole_periods(data[n], data.get("period")) for n in names[:2])
+        return full_spectrum(vertical, horizontal), data
+    check_signal(signal)
     known = [n for n in (signal, f"spectrum_{signal}", "period") if n in store]
     data = narrow(store, [*known, "spin_speed"], spread)
     if signal in data:
@@ -125,15 +136,7 @@ def spectrum_data(store: xr.Dataset, signal: str, over: str | None = None) -> xr
     store : Dataset
         One case (and one stator, for a stator's signals), or cases along the axis `over`.
     """
-    spread = [find_axis(store, over)] if over else []
-    if signal == "whirl":
-        names = ["vertical", "horizontal", "spin_speed", *(n for n in ("period",) if n in store)]
-        data = narrow(store, names, spread)
-        vertical, horizontal = (whole_periods(data[n], data.get("period")) for n in names[:2])
-        spectrum = full_spectrum(vertical, horizontal)
-    else:
-        check_signal(signal)
-        spectrum, data = periodic_spectrum(store, signal, spread)
+    spectrum, data = periodic_spectrum(store, signal, [find_axis(store, over)] if over else [])
     return with_frequency(spectrum, data["spin_speed"].compute())
 
 

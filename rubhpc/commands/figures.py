@@ -14,12 +14,16 @@ if TYPE_CHECKING:
 
 _SIGNAL = click.option("--signal", default="torsion", show_default=True, help="Which recorded signal.")
 _ORDERS = click.option("--orders", "is_order", is_flag=True, help="Draw over orders instead of Hz.")
+_FULL = click.option(
+    "--full", is_flag=True, help="Forward and backward whirl of the orbit instead of a signal."
+)
 _OVER = click.option("--over", metavar="AXIS", help="Draw the cases along AXIS over one another.")
 
 
 @click.command()
 @of_store
 @_SIGNAL
+@_FULL
 @click.option("--along", metavar="AXIS", help="The axis of the cascade [default: the speed].")
 @click.option("--form", type=click.Choice(["waterfall", "intensity"]), default="waterfall", show_default=True)
 @click.option("--max-frequency", metavar="HZ", help="End of the abscissa [default: beyond modes and 1X].")
@@ -33,6 +37,7 @@ def cascade(
     figure: str | None,
     data: str | None,
     signal: str,
+    full: bool,
     along: str | None,
     form: str,
     max_frequency: str | None,
@@ -51,8 +56,10 @@ def cascade(
 
     cases = open_cases(store, selection)
     orders = parse_orders(order_lines, "--order-lines")
-    spectra = gather(cases, signal, along)
+    spectra = gather(cases, "whirl" if full else signal, along)
     frequencies: dict[str, Any] = dict(natural_frequencies(cases, str(spectra.dims[0])))
+    if full:
+        frequencies.pop("torsional", None)
     for name, value in pairs(marks, "--mark"):
         frequencies[name] = parse_quantity(number(value), "Hz", f"--mark {name}")
     abscissa = "order" if is_order else "frequency"
@@ -127,7 +134,7 @@ def orbit(
 @click.command()
 @of_store
 @_SIGNAL
-@click.option("--full", is_flag=True, help="Forward and backward whirl of the orbit instead of a signal.")
+@_FULL
 @_ORDERS
 @click.option("--max", "end", type=click.FloatRange(min=0, min_open=True), help="End of the abscissa.")
 @click.option(

@@ -52,6 +52,7 @@ def run(tmp_path, monkeypatch):
             [*options(CLEARANCE, FRICTION, MODULUS), "--form", "intensity", "--mark", "stiff=53.5 Hz"],
         ),
         ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--orders", "--signal", "vertical"]),
+        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--full"]),
         ("map", []),
         ("map", ["--value", "regime", "--x", "clearance", "--y", "friction"]),
         ("orbit", ONE),
