@@ -5,7 +5,7 @@ Nodes count from 1. Angles count from straight up (+y) towards +z, the sense of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,8 @@ from rubhpc.input.parts import (
     Torsion,
     Unbalance,
 )
+from rubhpc.input.python_rig import call_rig_function, python_function
+from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build, plain, read_toml
 from rubhpc.input.stators import AnyStator, LumpedStator, MatrixStator, Stator, one_by_one
 
@@ -170,6 +172,53 @@ class Rig:
         )
         return cls(name=name, rotor=rotor, stator=tuple(stators))
 
+    @classmethod
+    def from_ross(
+        cls,
+        rotor: Any,
+        *,
+        stators: Sequence[AnyStator] = (),
+        unbalance: Sequence[Unbalance] = (),
+        speed: float | str | None = None,
+        torsion: Torsion = HELD_BY_DRIVE,
+        output_node: int | None = None,
+        name: str = "ross",
+    ) -> Rig:
+        """Return a rig whose rotor is a `ross.Rotor` (https://ross.readthedocs.io), with stators around it.
+
+        Node n of ROSS, which counts from 0, is node n + 1 here. Up is ROSS's y; angles count from there in
+        the sense of positive spin, towards -x of ROSS. Axial motion is held at the first node where ROSS
+        leaves it free.
+
+        Parameters
+        ----------
+        rotor : ross.Rotor
+            With six degrees of freedom a node. The matrices are taken as they are at this moment.
+        stators : sequence of Stator, LumpedStator or MatrixStator
+            Each with its node (from 1) and its radius of contact.
+        unbalance : sequence of Unbalance
+            At nodes from 1; ROSS keeps none in its rotor.
+        speed : float (rad/s) or str with a unit, optional
+            At which bearings are taken whose coefficients depend on it.
+        torsion : Torsion
+            Where the drive holds torsion, which ROSS leaves free; node 1 unless told.
+        output_node : int, optional
+            Whose motion is recorded; default the first stator's.
+        name : str
+
+        Raises
+        ------
+        InputError
+            When it is no such rotor, or something is missing that the rig needs.
+        """
+        from rubhpc.input.ross import rotor_from_ross
+
+        at = None if speed is None else parse_quantity(speed, "rad/s", "from_ross: speed")
+        found = rotor_from_ross(rotor, speed=at, torsion=torsion, unbalance=unbalance)
+        if output_node is not None:
+            found = replace(found, output_node=output_node)
+        return cls(name=name, rotor=found, stator=tuple(stators))
+
     def contact_radius(self, stator: AnyStator) -> float | None:
         """Radius at which a stator touches, m: its own, or that of the largest disc at its node."""
         discs = self.rotor.disc if isinstance(self.rotor, Rotor) else ()
@@ -192,24 +241,40 @@ def packaged_rigs() -> list[str]:
     return sorted(p.stem for p in PACKAGED.glob("*.toml"))
 
 
-def read_rig(name_or_path: str | PathLike[str], relative_to: Path | None = None, where: str = "rig") -> Rig:
-    """Return a packaged rig by its name, or the rig of a TOML file.
+def read_rig(
+    name_or_path: str | PathLike[str],
+    relative_to: Path | None = None,
+    where: str = "rig",
+    *,
+    trust_rig: bool = False,
+) -> Rig:
+    """Return a packaged rig by its name, the rig of a TOML file, or the one that a Python function returns.
 
     Parameters
     ----------
     name_or_path : str or Path
-        "mokhtar2017", or the path of a rig file.
+        "mokhtar2017", the path of a rig file, or "my_rig.py:build", a function called without arguments.
     relative_to : Path, optional
         Folder from which a relative path counts; the working directory by default.
     where : str
         What asks for the rig, for the error when there is none.
+    trust_rig : bool
+        Whether Python code may be run for the rig.
 
     Raises
     ------
     InputError
-        When there is no such rig, or its file cannot be used as it stands.
+        When there is no such rig, its file cannot be used as it stands, or it is code that is not trusted.
     """
     name = str(name_or_path)
+    if code := python_function(name):
+        if not trust_rig:
+            problem = f"{place(name)} is Python code, which is run only when you trust it"
+            raise InputError(f"{where}: {problem}; add --trust-rig (in Python, trust_rig=True)")
+        rig = call_rig_function((relative_to or Path()) / code[0], code[1], where)
+        if not isinstance(rig, Rig):
+            raise InputError(f"{where}: {place(name)} returned a {type(rig).__name__}; return a rubhpc.Rig")
+        return rig
     if name in packaged_rigs():
         path = PACKAGED / f"{name}.toml"
         return build(Rig, read_toml(path), f"{name}.toml")

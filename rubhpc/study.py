@@ -164,7 +164,9 @@ class Study:
         }
 
 
-def read_study(path: str | PathLike[str], output: str | PathLike[str] | None = None) -> Study:
+def read_study(
+    path: str | PathLike[str], output: str | PathLike[str] | None = None, *, trust_rig: bool = False
+) -> Study:
     """Return the study of a TOML file.
 
     Parameters
@@ -173,6 +175,8 @@ def read_study(path: str | PathLike[str], output: str | PathLike[str] | None = N
         The study file; a relative path of a rig file in it counts from its folder.
     output : path, optional
         The store, in place of the one that the file names.
+    trust_rig : bool
+        Whether a rig that is Python code, `rig = "my_rig.py:build"`, may be run.
 
     Raises
     ------
@@ -189,7 +193,7 @@ def read_study(path: str | PathLike[str], output: str | PathLike[str] | None = N
         raise InputError(
             f'{place(file, "", "rig")}: missing; add rig = "mokhtar2017", or the path of a rig file'
         )
-    rig = read_rig(_text(table, "rig", "", file), source.parent, place(file, "", "rig"))
+    rig = read_rig(_text(table, "rig", "", file), source.parent, place(file, "", "rig"), trust_rig=trust_rig)
     rig = _overridden(rig, _table(table, "override", file), file)
     axes = _read_axes(_table(table, "grid", file), rig, file)
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():

@@ -27,10 +27,19 @@ N_SPEED = 61  # of a Campbell diagram: curves are smooth, and each speed is an e
 @click.option(
     "--figure", type=click.Path(dir_okay=False), help="Draw a Campbell diagram up to the highest speed."
 )
-def modes(rig: str, speeds: tuple[str, ...], count: int | None, as_json: bool, figure: str | None) -> None:
+@click.option("--trust-rig", is_flag=True, help="Run the Python code of a RIG that is FILE.py:FUNCTION.")
+def modes(
+    rig: str,
+    speeds: tuple[str, ...],
+    count: int | None,
+    as_json: bool,
+    figure: str | None,
+    trust_rig: bool,
+) -> None:
     """Natural frequencies, damping ratios, kind and whirl of the modes of RIG.
 
-    RIG is the name of a packaged rig or the path of a rig file. Without --speed the rotor stands still.
+    RIG is the name of a packaged rig, the path of a rig file, or FILE.py:FUNCTION. Without --speed the rotor
+    stands still.
     """
     from postproc.style import check_figure_path
     from rubhpc.fem.assemble import assemble
@@ -40,7 +49,7 @@ def modes(rig: str, speeds: tuple[str, ...], count: int | None, as_json: bool, f
 
     spins = [parse_quantity(_number(speed), "rad/s", "--speed") for speed in speeds] or [0.0]
     path = check_figure_path(figure) if figure else None
-    model = assemble(read_rig(rig))
+    model = assemble(read_rig(rig, trust_rig=trust_rig))
     # stators do not spin: their modes hold at every speed
     stators = [find_modes(stator.body)[:count] for stator in model.stators]
     found = [(spin, find_modes(model.rotor, spin)[:count]) for spin in spins]

@@ -1,0 +1,59 @@
+"""Rigs that a Python function makes, "my_rig.py:build": code of the user, run only where it is trusted."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+import traceback
+from typing import TYPE_CHECKING, Any
+
+from rubhpc.errors import InputError, RubError
+from rubhpc.input.fields import place
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_FORM = re.compile(r"(?P<path>.+\.py):(?P<function>[A-Za-z_]\w*)")
+
+
+def python_function(name: str) -> tuple[str, str] | None:
+    """Return path and function of "my_rig.py:build"; None where it is no such thing."""
+    found = _FORM.fullmatch(name)
+    return (found["path"], found["function"]) if found else None
+
+
+def call_rig_function(path: Path, function: str, where: str) -> Any:
+    """Return what a function of a Python file returns, called without arguments.
+
+    Its folder is searched for modules first while it runs, as that of a script is.
+
+    Raises
+    ------
+    InputError
+        When there is no such file or function, or it raises; with the line where it did.
+    """
+    named = place(f"{where}: {path}" if where else str(path))
+    if not path.is_file():
+        raise InputError(f"{named}: no such file; check the path")
+    spec = importlib.util.spec_from_file_location(f"rubhpc_rig_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{named}: cannot be read as Python; check the file")
+    module = importlib.util.module_from_spec(spec)
+    folder = str(path.resolve().parent)
+    sys.path.insert(0, folder)
+    try:
+        spec.loader.exec_module(module)
+        build = getattr(module, function, None)
+        if not callable(build):
+            raise InputError(f"{named}: no function {function} in it; name the one that returns the rig")
+        return build()
+    except RubError as error:
+        raise InputError(str(error) if str(error).startswith(named) else f"{named}: {error}") from error
+    except Exception as error:
+        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
+        line = getattr(error, "lineno", None) or (lines[-1] if lines else "?")
+        told = " ".join(str(error).split())[:200]
+        raise InputError(f"{named}: line {line}: {type(error).__name__}: {told}; mend it") from error
+    finally:
+        sys.path.remove(folder)
