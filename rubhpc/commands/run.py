@@ -12,11 +12,15 @@ from rubhpc.running.launch import launch
 _OUTPUT = click.option(
     "--output", type=click.Path(path_type=Path), metavar="STORE", help="The store, instead of the study's."
 )
+_TRUST = click.option(
+    "--trust-rig", is_flag=True, help='Run the Python code of a study whose rig is "FILE.py:FUNCTION".'
+)
 
 
 @click.command()
 @click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
 @_OUTPUT
+@_TRUST
 @click.option("--retry-failed", is_flag=True, help="Compute the cases anew that have failed before.")
 @click.option(
     "--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more than N cases fail."
@@ -26,6 +30,7 @@ _OUTPUT = click.option(
 def run(
     study: Path,
     output: Path | None,
+    trust_rig: bool,
     retry_failed: bool,
     max_failures: int | None,
     time_limit: str | None,
@@ -41,6 +46,7 @@ def run(
         summary = run_study(
             study,
             output=output,
+            trust_rig=trust_rig,
             retry_failed=retry_failed,
             max_failures=max_failures,
             time_limit=None
@@ -52,14 +58,17 @@ def run(
     if launch().rank == 0 and not quiet:
         click.echo(summary.text())
     if summary.exit_code:
-        raise RubError(summary.complaint())
+        error = RubError(summary.complaint())
+        error.exit_code = summary.exit_code
+        raise error
     return 0
 
 
 @click.command()
 @click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
 @_OUTPUT
-def plan(study: Path, output: Path | None) -> int:
+@_TRUST
+def plan(study: Path, output: Path | None, trust_rig: bool) -> int:
     """Tell what STUDY.toml takes and what of it is done; writes nothing.
 
     Core-hours come from a few short pilot cases, timed on this machine and scaled by the predicted steps.
@@ -67,7 +76,7 @@ def plan(study: Path, output: Path | None) -> int:
     from rubhpc.running.plan import make_plan
     from rubhpc.study import read_study
 
-    click.echo(make_plan(read_study(study, output)).text())
+    click.echo(make_plan(read_study(study, output, trust_rig=trust_rig)).text())
     return 0
 
 

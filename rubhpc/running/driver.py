@@ -4,27 +4,28 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.errors import RubError, StoppedEarly
-from rubhpc.integrate.case import compile_kernels
-from rubhpc.integrate.prepare import prepare
 from rubhpc.running.crash import crash
-from rubhpc.running.pool import Pool, Tally, connect
+from rubhpc.running.job import Order, prepare_job
+from rubhpc.running.launch import move_to
+from rubhpc.running.pool import Pool, RankLost, Tally, connect
 from rubhpc.running.progress import Progress
-from rubhpc.running.stopping import Stopped, Stopping
+from rubhpc.running.stopping import Stopping
+from rubhpc.running.watch import Watch
 from rubhpc.running.worker import Worker
 from rubhpc.schema import FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
-from rubhpc.storage.journal import Ledger, count, next_run
+from rubhpc.storage.hand import Hand
+from rubhpc.storage.journal import count
 from rubhpc.storage.manifest import PRIVATE
-from rubhpc.storage.resume import bring_up_to_date, find_gone, missing_share, open_store, sweep_for
-from rubhpc.storage.runs import record_run
+from rubhpc.storage.resume import missing_share
 from rubhpc.storage.store import Store
 from rubhpc.storage.summary import Summary
 from rubhpc.study import Study, read_study
@@ -32,26 +33,13 @@ from rubhpc.sweep import Sweep
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
-    from numpy.typing import NDArray
-
+    from rubhpc.running.job import Job
     from rubhpc.sweep import Block
 
 _PACKING_GAP = 600.0  # s between packings while a run is on; one takes 5 s for a million cases
 _REASONS = 100  # failed cases a summary names, at most
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Job:
-    """What the first rank tells the others; `pending` are positions in Sweep.blocks() that lack a case."""
-
-    study: Study
-    chunk: tuple[int, ...]
-    run: int
-    ledger: Ledger
-    missing: NDArray[np.bool_]
-    pending: NDArray[np.int64]
 
 
 def run(
@@ -61,6 +49,8 @@ def run(
     retry_failed: bool = False,
     max_failures: int | None = None,
     time_limit: float | None = None,
+    accept_version: bool = False,
+    trust_rig: bool = False,
     quiet: bool = False,
     stopping: Stopping | None = None,
 ) -> Summary:
@@ -78,6 +68,10 @@ def run(
         Stop when more cases than this have failed in this run; overrides the study's.
     time_limit : float, optional
         Stop after so many seconds; overrides the study's.
+    accept_version : bool
+        Keep the cases of a store that another version of the physics has computed, and go on.
+    trust_rig : bool
+        Whether a rig that is Python code, `rig = "my_rig.py:build"`, may be run.
     quiet : bool
         Print no progress.
     stopping : Stopping, optional
@@ -98,7 +92,7 @@ def run(
     """
 
     def resolve() -> Study:
-        found = study if isinstance(study, Study) else read_study(Path(study))
+        found = study if isinstance(study, Study) else read_study(Path(study), trust_rig=trust_rig)
         limits = replace(
             found.run,
             time_limit=found.run.time_limit if time_limit is None else time_limit,
@@ -111,7 +105,18 @@ def run(
     try:
         with stopping or Stopping() as watch, ExitStack() as held:
             resolved = pool.from_first(resolve)
-            summary = _run(resolved, pool, watch, held, retry_failed=retry_failed, quiet=quiet)
+            watch.watch(resolved.output / "STOP", resolved.run.time_limit)
+            order = Order(
+                study=resolved,
+                stopping=watch,
+                retry_failed=retry_failed,
+                accept_version=accept_version,
+                quiet=quiet,
+                held=held,
+            )
+            summary = _run(order, pool)
+    except RankLost as error:  # and nobody can go on
+        pool.abort(error.exit_code)
     except RubError:  # raised on all ranks alike
         pool.close()
         raise
@@ -125,19 +130,29 @@ def run(
     return summary
 
 
-def _run(
-    study: Study, pool: Pool, stopping: Stopping, held: ExitStack, *, retry_failed: bool, quiet: bool
-) -> Summary:
-    began = time.monotonic()
-    stopping.watch(study.output / "STOP", study.run.time_limit)
-    job = pool.from_first(lambda: _prepare(study, stopping, held, retry_failed=retry_failed))
-    if job.pending.size:
-        pool.from_first(lambda: _record(study.output, job.run, pool.size))
-    error = _compute(job, pool, stopping, quiet=quiet)
-    for other in pool.gather(error):
-        if other is not None:
-            raise other
-    reason = next((told for told in pool.gather(stopping.verdict) if told), "")
+def _run(order: Order, pool: Pool) -> Summary:
+    """Run the study, again on those that are left where ranks are lost on the way."""
+    began, n_rank = time.monotonic(), pool.size
+    is_broken = False
+    while True:
+        try:
+            if is_broken:
+                pool.leave_lost()
+                move_to(pool.rank, pool.size)
+                is_broken = False
+            return replace(_round(order, pool, began), lost=n_rank - pool.size)
+        except RankLost:
+            is_broken = True
+
+
+def _round(order: Order, pool: Pool, began: float) -> Summary:
+    """Compute what is missing, together."""
+    job = pool.from_first(lambda: prepare_job(order, pool.size))
+    order.token = job.token
+    _together(pool, lambda: _compute(job, pool, order))
+    if job.doubtful and not order.stopping.look():
+        _together(pool, lambda: _try_doubtful(job, pool, order.stopping))
+    reason = next((told for told in pool.gather(order.stopping.verdict) if told), "")
     summary = pool.from_first(lambda: _finish(job, pool.sums().n_case, time.monotonic() - began))
     n_missing = summary.counts[MISSING]
     if n_missing and reason:
@@ -148,101 +163,92 @@ def _run(
     return summary
 
 
-def _prepare(study: Study, stopping: Stopping, held: ExitStack, *, retry_failed: bool) -> _Job:
-    """Find or make the store, lock it, see what is missing, compile the kernels: the first rank's part."""
-    sweep = sweep_for(study)
-    store = open_store(sweep)
-    with disk_errors(study.output):
-        held.enter_context(store.lock(on_loss=lambda: stopping.ask("the loss of its lock")))
-    bring_up_to_date(store, sweep)
-    ledger = store.replay(with_metrics=not store.is_packed())
-    store.pack(ledger)  # readers see what a killed run has left, from now on
-    ledger.metrics = None  # the other ranks need none
-    run = next_run(store.journal_directory)
-    store.take_back(ledger, find_gone(store, ledger), run, "gone")
-    missing = ledger.status == MISSING
-    if retry_failed:
-        missing |= ledger.status == FAILED
-    blocks = sweep.blocks()
-    grid = missing.reshape(sweep.shape)
-    pending = [i for i, block in enumerate(blocks) if missing_share(block, grid)]
-    if pending:
-        _warm_up(sweep, blocks[pending[-1]], stopping)
-    return _Job(
-        study=study,
-        chunk=sweep.chunk,
-        run=run,
-        ledger=ledger,
-        missing=missing,
-        pending=np.array(pending, dtype=np.int64),
-    )
-
-
-def _record(store: Path, run: int, n_rank: int) -> None:
-    with disk_errors(store):
-        record_run(store, run, n_rank)
-
-
-def _warm_up(sweep: Sweep, block: Block, stopping: Stopping) -> None:
-    """Compile every kernel once, on two revolutions: concurrent compilations into one cache have crashed."""
-
-    def check() -> None:
-        if stopping.look():
-            raise Stopped
-
-    study = sweep.study
-    with suppress(Exception):  # what is wrong with this case will be its reason to fail
-        case = sweep.cases(block)[0]
-        setup = prepare(
-            case.rig,
-            case.speed,
-            contact=study.contact,
-            integrator=study.integrator,
-            samples_per_revolution=study.recording.samples_per_revolution,
-        )
-        compile_kernels(
-            setup,
-            clearance=case.clearance,
-            friction=case.friction,
-            recording=study.recording,
-            check=check,
-        )
-
-
-def _compute(job: _Job, pool: Pool, stopping: Stopping, *, quiet: bool) -> RubError | None:
-    """Compute blocks until there are none left; what keeps this rank from its store, to be told to all."""
+def _together(pool: Pool, work: Callable[[], None]) -> None:
+    """Do this rank's part; what keeps any rank from its store is raised on all."""
+    error = None
     try:
-        sweep = Sweep(job.study, chunk=job.chunk)
-        store = Store(job.study.output)
-        every = sweep.blocks()
-        blocks = [every[i] for i in job.pending]
-        with (
-            store.journal(job.run, f"rank{pool.rank:05d}") as journal,
-            _progress(job, sweep, blocks, quiet=quiet or pool.rank > 0, has_bar=pool.size == 1) as progress,
-        ):
-
-            def attend() -> None:
-                if pool.rank == 0:
-                    progress.update(pool.sums())
-
-            worker = Worker(sweep, store, job.ledger, job.missing, journal, stopping, pool.add, attend)
-            next_packing = time.monotonic() + _PACKING_GAP
-            for i_block in _claimed(job, pool, stopping):
-                worker.work(blocks[i_block])
-                attend()
-                if pool.rank == 0 and time.monotonic() > next_packing:
-                    store.pack(store.replay())  # for readers who look on
-                    next_packing = time.monotonic() + _PACKING_GAP
-            worker.sync()
-    except RubError as error:
+        work()
+    except RankLost:
+        raise
+    except RubError as trouble:
         pool.add(Tally(stop=1))
-        return error
+        error = trouble
+    for other in pool.gather(error):
+        if other is not None:
+            raise other
+
+
+def _compute(job: Job, pool: Pool, order: Order) -> None:
+    """Compute blocks until there are none left."""
+    stopping = order.stopping
+    sweep = Sweep(job.study, chunk=job.chunk)
+    store = Store(job.study.output)
+    every = sweep.blocks()
+    blocks = [every[i] for i in job.pending]
+    quiet = order.quiet or pool.rank > 0
+    with (
+        _progress(job, sweep, blocks, quiet=quiet, has_bar=pool.size == 1) as progress,
+        _desk(job, pool, sweep, store, stopping, "rank", progress) as worker,
+    ):
+        next_packing = time.monotonic() + _PACKING_GAP
+        for i_block in _claimed(job, pool, stopping):
+            worker.work(blocks[i_block])
+            worker.attend()
+            if pool.rank == 0 and time.monotonic() > next_packing:
+                store.pack(store.replay())  # for readers who look on
+                next_packing = time.monotonic() + _PACKING_GAP
     if stopping.reason:
         pool.add(Tally(stop=1))
-    return None
 
 
-def _claimed(job: _Job, pool: Pool, stopping: Stopping) -> Iterator[int]:
+def _try_doubtful(job: Job, pool: Pool, stopping: Stopping) -> None:
+    """Compute the cases that were in hand when ranks died: last, and each stored before the next begins.
+
+    Those that have seen the fewest deaths come first, so that the guilty ones end up alone.
+    """
+    sweep = Sweep(job.study, chunk=job.chunk)
+    store = Store(job.study.output)
+    job = replace(job, ledger=store.replay(with_metrics=False))
+    blocks = {block.start: block for block in sweep.blocks()}
+    with _desk(job, pool, sweep, store, stopping, "tail") as worker:
+        for flat in sorted(job.doubtful, key=lambda i: job.doubtful[i]):
+            index = np.unravel_index(flat, sweep.shape)
+            block = blocks[tuple(int(i) // c * c for i, c in zip(index, sweep.chunk, strict=True))]
+            if block.number % pool.size == pool.rank and not stopping.look():  # a block has one writer
+                worker.missing = np.arange(sweep.n_case) == flat
+                worker.work(block)
+
+
+@contextmanager
+def _desk(
+    job: Job,
+    pool: Pool,
+    sweep: Sweep,
+    store: Store,
+    stopping: Stopping,
+    kind: str,
+    progress: Progress | None = None,
+) -> Iterator[Worker]:
+    """A worker with its journal and its record of the case in hand; all is on the disk at the end."""
+
+    def attend() -> None:
+        if pool.rank == 0 and progress is not None:
+            progress.update(pool.sums())
+
+    writer = f"{kind}{pool.rank:05d}"
+    with disk_errors(store.path):
+        hand = Hand(store.hand_directory, job.run, writer)
+    with (
+        hand,
+        Watch(job.study.run.case_time_limit, hand) as watch,
+        store.journal(job.run, writer) as journal,
+    ):
+        worker = Worker(sweep, store, job.ledger, job.missing, journal, watch, stopping, pool.add, attend)
+        yield worker
+        worker.sync()
+
+
+def _claimed(job: Job, pool: Pool, stopping: Stopping) -> Iterator[int]:
     """Positions of the blocks this rank is to compute, until there are none, or reason to stop."""
     most_failures = job.study.run.max_failures
     while not stopping.look():
@@ -253,7 +259,7 @@ def _claimed(job: _Job, pool: Pool, stopping: Stopping) -> Iterator[int]:
         yield sums.claimed
 
 
-def _progress(job: _Job, sweep: Sweep, blocks: list[Block], *, quiet: bool, has_bar: bool) -> Progress:
+def _progress(job: Job, sweep: Sweep, blocks: list[Block], *, quiet: bool, has_bar: bool) -> Progress:
     grid = job.missing.reshape(sweep.shape)
     return Progress(
         sweep.n_case,
@@ -264,7 +270,7 @@ def _progress(job: _Job, sweep: Sweep, blocks: list[Block], *, quiet: bool, has_
     )
 
 
-def _finish(job: _Job, computed: int, seconds: float) -> Summary:
+def _finish(job: Job, computed: int, seconds: float) -> Summary:
     """Pack what the journals tell, and count it: the first rank's part."""
     store = Store(job.study.output)
     ledger = store.replay()

@@ -13,8 +13,6 @@ _VARIABLES = (
     ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"),
     ("SLURM_PROCID", "SLURM_STEP_NUM_TASKS"),
 )
-_LOOK = 0.5  # s between looks at whether the launcher still lives
-_ORPHANED = 75  # exit code of a rank whose launcher is gone: run the same command again
 
 
 class Launch(NamedTuple):
@@ -25,12 +23,24 @@ class Launch(NamedTuple):
     is_open_mpi: bool = False  # its own launcher, which no other library can be started by
 
 
+_moved: list[Launch] = []
+_LOOK = 0.5  # s between looks at whether the launcher still lives
+_ORPHANED = 75  # exit code of a rank whose launcher is gone: run the same command again
+
+
 def launch() -> Launch:
-    """What the environment says; rank 0 of 1 without a launcher."""
+    """What the environment says, or where this process stands since; rank 0 of 1 without a launcher."""
+    if _moved:
+        return _moved[-1]
     for rank, size in _VARIABLES:
         if os.environ.get(rank, "").isdigit() and os.environ.get(size, "").isdigit():
             return Launch(int(os.environ[rank]), int(os.environ[size]), rank.startswith("OMPI_"))
     return Launch(0, 1)
+
+
+def move_to(rank: int, size: int) -> None:
+    """Have `launch` tell this place from now on: other ranks were lost, and the first one may be another."""
+    _moved.append(launch()._replace(rank=rank, size=size))
 
 
 def end_with_launcher() -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.prepare import prepare
+from rubhpc.running.worker import set_up
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 from rubhpc.storage.duration import duration
 from rubhpc.storage.growth import origins
@@ -140,13 +140,7 @@ def _pilot(sweep: Sweep, block: Block) -> float:
     steps = block.cost / math.prod(block.shape)
     share = min(1.0, _PILOT_STEPS / steps)
     transient, revolutions = round(share * whole.transient), max(1, round(share * whole.revolutions))
-    setup = prepare(
-        case.rig,
-        case.speed,
-        contact=study.contact,
-        integrator=study.integrator,
-        samples_per_revolution=whole.samples_per_revolution,
-    )
+    setup = set_up(study, case)
 
     def seconds(transient: int, revolutions: int) -> float:
         recording = replace(whole, transient=transient, revolutions=revolutions)

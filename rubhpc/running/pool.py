@@ -10,6 +10,7 @@ import os
 import sys
 import time
 import warnings
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar
 
 import numpy as np
@@ -18,7 +19,7 @@ from rubhpc.errors import InputError, RubError
 from rubhpc.running.launch import Launch, end_with_launcher, launch
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 T = TypeVar("T")
 
@@ -44,6 +45,12 @@ class Tally(NamedTuple):
         return self.done + self.failed + self.diverged
 
 
+class RankLost(RubError):  # noqa: N818 - it is news, and most runs go on
+    """A rank has died, and the others may go on without it."""
+
+    exit_code = 71
+
+
 class Pool(Protocol):
     """The processes that share a run."""
 
@@ -65,8 +72,8 @@ class Pool(Protocol):
     def gather(self, value: T) -> list[T]:
         """The values of all ranks, on all of them."""
 
-    def agree(self, make: Callable[[], T]) -> T:
-        """What `make` returns on this rank; what it raises of RubErrors on any rank, on all of them."""
+    def leave_lost(self) -> None:
+        """Go on without the ranks that were lost; ranks, size and sums begin anew."""
 
     def close(self) -> None:
         """End the run together with all ranks."""
@@ -106,9 +113,8 @@ class Alone:
         """See Pool."""
         return [value]
 
-    def agree(self, make: Callable[[], T]) -> T:
+    def leave_lost(self) -> None:
         """See Pool."""
-        return make()
 
     def close(self) -> None:
         """See Pool."""
@@ -119,20 +125,30 @@ class Alone:
 
 
 class Ranks:
-    """The ranks of an MPI communicator, with the sums in a window of the first."""
+    """The ranks of an MPI communicator, with the sums in a window of the first.
+
+    Where the library survives the loss of a rank (Open MPI under `mpirun --with-ft ulfm`), the others learn
+    of it at their next meeting as a RankLost; elsewhere the launcher ends them all.
+    """
 
     def __init__(self) -> None:
         from mpi4py import MPI
 
-        self._sum, self._comm = MPI.SUM, MPI.COMM_WORLD
+        self._mpi = MPI
+        self._comm: Any = MPI.COMM_WORLD
+        self._open()
+
+    def _open(self) -> None:
+        """Make the window of the sums."""
         self.rank, self.size = self._comm.rank, self._comm.size
-        n_byte = 8 * len(Tally()) if self.rank == 0 else 0
-        self._window = MPI.Win.Allocate(n_byte, 8, comm=self._comm)
-        if self.rank == 0:
-            memory: Any = self._window.tomemory()
-            np.frombuffer(memory, np.int64)[:] = 0
-        self._comm.Barrier()
-        self._window.Lock_all()
+        with self._losses():
+            n_byte = 8 * len(Tally()) if self.rank == 0 else 0
+            self._window = self._mpi.Win.Allocate(n_byte, 8, comm=self._comm)
+            if self.rank == 0:
+                memory: Any = self._window.tomemory()
+                np.frombuffer(memory, np.int64)[:] = 0
+            self._comm.Barrier()
+            self._window.Lock_all()
 
     def from_first(self, make: Callable[[], T]) -> T:
         """See Pool."""
@@ -143,7 +159,8 @@ class Ranks:
             except RubError as error:
                 told = (None, error)
         self._meet()
-        value, trouble = self._comm.bcast(told)
+        with self._losses():
+            value, trouble = self._comm.bcast(told)
         if trouble is not None:
             raise trouble
         result: T = value
@@ -164,26 +181,22 @@ class Ranks:
     def gather(self, value: T) -> list[T]:
         """See Pool."""
         self._meet()
-        values: list[T] = self._comm.allgather(value)
+        with self._losses():
+            values: list[T] = self._comm.allgather(value)
         return values
 
-    def agree(self, make: Callable[[], T]) -> T:
+    def leave_lost(self) -> None:
         """See Pool."""
-        value, mine = None, None
-        try:
-            value = make()
-        except RubError as error:
-            mine = error
-        for told in self.gather(mine):
-            if told is not None:
-                raise told
-        result: T = value  # type: ignore[assignment]
-        return result
+        self._comm.Revoke()  # the others learn of it, whatever they wait for
+        with self._losses():
+            self._comm = self._comm.Shrink()
+        self._open()  # the old window stays: to free it takes all ranks
 
     def close(self) -> None:
         """See Pool."""
-        self._window.Unlock_all()
-        self._window.Free()
+        with suppress(self._mpi.Exception):
+            self._window.Unlock_all()
+            self._window.Free()
 
     def abort(self, code: int) -> NoReturn:
         """See Pool."""
@@ -194,17 +207,30 @@ class Ranks:
 
     def _meet(self) -> None:
         """Wait for all ranks, asleep: MPI's own waiting takes the core from ranks that still compute."""
-        request = self._comm.Ibarrier()
-        while not request.Test():
-            time.sleep(_NAP)
+        with self._losses():
+            request = self._comm.Ibarrier()
+            while not request.Test():
+                time.sleep(_NAP)
 
     def _accumulate(self, tally: Tally) -> Tally:
         """Add to the sums and return what they were, in one atomic message."""
         more = np.array(tally, np.int64)
         before = np.zeros_like(more)
-        self._window.Get_accumulate(more, before, 0, op=self._sum)
-        self._window.Flush(0)
+        with self._losses():
+            self._window.Get_accumulate(more, before, 0, op=self._mpi.SUM)
+            self._window.Flush(0)
         return Tally(*before.tolist())
+
+    @contextmanager
+    def _losses(self) -> Iterator[None]:
+        """Raise RankLost for what MPI says of ranks that have died."""
+        try:
+            yield
+        except self._mpi.Exception as error:
+            lost = (getattr(self._mpi, name, None) for name in ("ERR_PROC_FAILED", "ERR_REVOKED"))
+            if error.Get_error_class() in lost:
+                raise RankLost("a rank was lost; run the same command again") from None
+            raise
 
 
 def connect() -> Pool:

@@ -28,17 +28,28 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import Record
     from rubhpc.rig import Rig
     from rubhpc.running.stopping import Stopping
+    from rubhpc.running.watch import Watch
     from rubhpc.storage.journal import Journal, Ledger
     from rubhpc.storage.store import Store
+    from rubhpc.study import Study
     from rubhpc.sweep import Block, Case, Sweep
 
     Arrays = dict[str, NDArray[Any]]
 
-_SYNC_GAP, _SYNC_SHARE = (
-    1.0,
-    50.0,
-)  # s between syncs, at least, and times what the last took: slow disks cost 2 %
+# Seconds between syncs, at least, and times what the last took: slow disks cost 2 %.
+_SYNC_GAP, _SYNC_SHARE = 1.0, 50.0
 _SETUPS = 4  # prepared setups a rank keeps; a block shares one, and neighbours often do
+
+
+def set_up(study: Study, case: Case) -> Setup:
+    """What the cases of this rig and speed share."""
+    return prepare(
+        case.rig,
+        case.speed,
+        contact=study.contact,
+        integrator=study.integrator,
+        samples_per_revolution=study.recording.samples_per_revolution,
+    )
 
 
 class _OverTime(Exception):  # noqa: N818 - becomes the reason of a failed case
@@ -64,6 +75,7 @@ class Worker:
     ledger: Ledger
     missing: NDArray[np.bool_]
     journal: Journal
+    watch: Watch
     stopping: Stopping
     report: Callable[[Tally], None]
     attend: Callable[[], None]
@@ -74,7 +86,6 @@ class Worker:
         self._unsynced: list[Path] = []
         self._next_sync = time.monotonic() + _SYNC_GAP
         self._seconds, self._cost = 0.0, 0.0
-        self._case_limit = self.sweep.study.run.case_time_limit
 
     def work(self, block: Block) -> None:
         """Compute, store and journal what is missing of a block; what is finished when a stop comes is kept.
@@ -122,10 +133,13 @@ class Worker:
             )
         if entries:
             lost = set(flat[spoiled].tolist()) - {entry.flat for entry in entries}
-            entries += [Entry(i, "-", MISSING) for i in lost]
+            entries += [Entry(i, self.store.manifest.case_id(i), MISSING) for i in lost]
             self.store.write_block(block.start, data)
             with disk_errors(self.store.path):
                 self.journal.write(entries)
+            for entry in entries:
+                self.ledger.status[entry.flat] = entry.status
+                self.ledger.checksum[entry.flat] = entry.checksum
             self._unsynced += self.store.chunk_files(block.start)
             if time.monotonic() > self._next_sync:
                 self.sync()
@@ -170,6 +184,7 @@ class Worker:
 
     def _enter(self, case: Case, flat: int, data: Arrays, i_case: int) -> Entry:
         """Compute a case and put its arrays in the block's; what goes wrong in it is its reason to fail."""
+        self.watch.begin(flat, case.id)
         try:
             record = self._compute(case)
             if record.status == DONE:
@@ -181,6 +196,8 @@ class Worker:
             for values in data.values():
                 values[i_case] = np.nan
             return Entry(flat, case.id, FAILED, reason=_told(error))
+        finally:
+            self.watch.end()
         return Entry(flat, case.id, record.status, case_checksum(data, i_case), metrics, record.reason)
 
     def _compute(self, case: Case) -> Record:
@@ -192,24 +209,19 @@ class Worker:
         if key in self._setups:
             setup = self._setups[key][1]
         else:
-            setup = prepare(
-                case.rig,
-                case.speed,
-                contact=study.contact,
-                integrator=study.integrator,
-                samples_per_revolution=study.recording.samples_per_revolution,
-            )
+            setup = set_up(study, case)
             self._setups[key] = (case.rig, setup)
             if len(self._setups) > _SETUPS:
                 self._setups.popitem(last=False)
-        end = time.monotonic() + self._case_limit if self._case_limit else float("inf")
+        limit = self.watch.limit
+        end = time.monotonic() + limit if limit else float("inf")
 
         def check() -> None:
             self.attend()
             if self.stopping.look():
                 raise Stopped
             if time.monotonic() > end:
-                raise _OverTime(f"over its time limit of {self._case_limit:g} s")
+                raise _OverTime(f"over its time limit of {limit:g} s")
 
         return run_case(
             setup, clearance=case.clearance, friction=case.friction, recording=study.recording, check=check

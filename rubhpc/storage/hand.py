@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.manifest import Manifest
 
-DIRECTORY = "hand"
 _RECORD = 64  # bytes of the case in hand; the evidence follows
 _CRASHES = 2  # deaths by a fatal signal or for want of memory after which a case has failed
 _DEATHS = 5  # deaths of unknown cause: the launcher may have been killed, or the power cut

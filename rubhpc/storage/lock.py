@@ -111,11 +111,15 @@ def _is_orphan(holder: Holder) -> bool:
 
 
 class Lock:
-    """Exclusive use of a store, as a context; `on_loss` is called if another run has taken it over."""
+    """Exclusive use of a store, as a context; `on_loss` is called if another run has taken it over.
 
-    def __init__(self, path: Path, on_loss: Callable[[], None] = lambda: None) -> None:
+    A holder with the token `heir_of` is a lost rank of this very run: its lock passes on at once.
+    """
+
+    def __init__(self, path: Path, on_loss: Callable[[], None] = lambda: None, heir_of: str = "") -> None:
         self.path = path
         self._on_loss = on_loss
+        self._heir_of = heir_of
         self._me = Holder.myself()
         self._ended = threading.Event()
         self._heart = threading.Thread(target=self._beat, name="lock heartbeat", daemon=True)
@@ -143,6 +147,11 @@ class Lock:
             ):  # on a disk gone read-only the lock stays, and is stale once this process ends
                 self.path.unlink()
 
+    @property
+    def token(self) -> str:
+        """What tells this lock from any other."""
+        return self._me.token
+
     def _is_mine(self) -> bool:
         holder = read_holder(self.path)
         return holder is not None and holder.token == self._me.token
@@ -152,7 +161,7 @@ class Lock:
         ready = self.path.with_name(f"{self.path.name}.{self._me.token}")
         with _guard(self.path):
             holder = read_holder(self.path)
-            if holder is not None and is_alive(holder, self.path):
+            if holder is not None and holder.token != self._heir_of and is_alive(holder, self.path):
                 return False
             try:
                 ready.write_text(json.dumps(asdict(self._me)))

@@ -89,9 +89,14 @@ class Store:
         """Where the journals lie."""
         return self.private / "journal"
 
-    def lock(self, on_loss: Callable[[], None] = lambda: None) -> Lock:
+    @property
+    def hand_directory(self) -> Path:
+        """Where each rank notes the case it has in hand."""
+        return self.private / "hand"
+
+    def lock(self, on_loss: Callable[[], None] = lambda: None, heir_of: str = "") -> Lock:
         """Exclusive use of the store, as a context."""
-        return Lock(self.private / "lock", on_loss)
+        return Lock(self.private / "lock", on_loss, heir_of)
 
     def journal(self, run: int, writer: str) -> Journal:
         """A new journal of this store."""

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+_LOST = 71
+
+
 @dataclass(frozen=True, kw_only=True)
 class Summary:
     """How a run ended.
@@ -26,6 +29,8 @@ class Summary:
         What the run took.
     reasons : tuple of (str, str)
         Coordinates and reason of each failed case, the first hundred.
+    lost : int
+        Ranks that died on the way; the others have done their work.
     """
 
     store: Path
@@ -33,11 +38,12 @@ class Summary:
     computed: int
     seconds: float
     reasons: tuple[tuple[str, str], ...] = ()
+    lost: int = 0
 
     @property
     def exit_code(self) -> int:
-        """0 where every case has a result (a diverged one is a result), 1 where some failed."""
-        return 1 if self.counts[FAILED] else 0
+        """0: every case has a result (a diverged one is a result); 1: some failed; 71: a rank was lost."""
+        return 1 if self.counts[FAILED] else _LOST if self.lost else 0
 
     def text(self) -> str:
         """The summary in a line."""
@@ -47,6 +53,11 @@ class Summary:
 
     def complaint(self) -> str:
         """What failed, in a line with the mend."""
+        if not self.counts[FAILED]:
+            lost = "a rank was lost" if self.lost == 1 else f"{self.lost} ranks were lost"
+            return (
+                f"{self.store}: {lost} on the way, the others finished the study; nothing is left to be done"
+            )
         case, reason = self.reasons[0]
         rest = (
             f" and {self.counts[MISSING]} were not computed (--max-failures)" if self.counts[MISSING] else ""

@@ -17,7 +17,7 @@ import numpy as np
 
 from rubhpc.axes import Axis
 from rubhpc.rig import read_rig
-from rubhpc.running import driver, plan, worker
+from rubhpc.running import driver, job, plan, worker
 from rubhpc.schema import DONE
 from rubhpc.storage.journal import METRICS
 from rubhpc.storage.status import read_status
@@ -33,7 +33,7 @@ stub = {
     "run_case": lambda *_, **__: record,
     "prepare": lambda *_, **__: None,
 }
-for module in (driver, plan, worker):
+for module in (job, plan, worker):
     vars(module).update({name: value for name, value in stub.items() if name in vars(module)})
 
 

@@ -16,7 +16,7 @@ from running import journalled_cases, write_study
 
 from rubhpc.errors import InputError, StoppedEarly, StoreError
 from rubhpc.integrate.record import Record
-from rubhpc.running import driver, stopping, worker
+from rubhpc.running import driver, job, stopping, worker
 from rubhpc.running.driver import run
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
 from rubhpc.storage.journal import METRICS
@@ -91,7 +91,7 @@ def physics(monkeypatch: pytest.MonkeyPatch) -> Physics:
     stub = Physics()
     monkeypatch.setattr(worker, "prepare", stub.prepare)
     monkeypatch.setattr(worker, "run_case", stub.run_case)
-    monkeypatch.setattr(driver, "_warm_up", lambda *_: None)
+    monkeypatch.setattr(job, "_warm_up", lambda *_: None)
     return stub
 
 
