@@ -145,7 +145,7 @@ def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
         mend = nearest(name, _OWN)
         if "." not in name and "?" in mend:
             raise InputError(f"{where}: unknown axis; {mend}") from None
-        if "?" not in str(error):
+        if str(error).startswith("unknown key") and "?" not in str(error):
             raise InputError(
                 f"{where}: unknown axis; there is {', '.join(_OWN)} and any key of the rig"
             ) from None

@@ -12,6 +12,7 @@ import numpy as np
 from rubhpc.axes import CLEARANCE_AXES, SPEED_AXES
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
+from rubhpc.fem.held import find_free
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
 from rubhpc.rig import with_keys
 
@@ -41,7 +42,8 @@ class Settings:
     Raises
     ------
     InputError
-        When the step asked for is above the stability limit of a rig.
+        When the step asked for is above the stability limit of a rig, or nothing holds a rig that the modal
+        scheme is to solve.
     """
 
     def __init__(self, study: Study) -> None:
@@ -68,6 +70,8 @@ class Settings:
         self._limit_at = lru_cache(maxsize=4096)(self._make_limit)
         if study.integrator.step is not None and study.integrator.method == "central-difference":
             self._check_step(study.integrator.step)
+        if study.integrator.method == "modal":
+            self._check_held()
 
     def rig(self, index: Index) -> Rig:
         """Rig of a case."""
@@ -197,6 +201,22 @@ class Settings:
                 where = ", ".join(f"{name} = {value:g}" for name, value in told)
                 problem = f"{step:g} s is above the stability limit{f' at {where}' if where else ''}"
                 raise InputError(f"[integrator] step: {problem}; take less than {limit:.3g} s")
+
+    def _check_held(self) -> None:
+        """Refuse the modal scheme for a body that nothing holds: it has no constant response."""
+        every = (range(len(self._values[i]) if self._is_few else 1) for i in self._response_axes)
+        for at in itertools.product(*every):
+            if free := find_free(self._model_at(at)):
+                told = zip(
+                    (self.study.axes[i].name for i in self._response_axes),
+                    self._at(self._response_axes, at),
+                    strict=True,
+                )
+                where = ", ".join(f"{name} = {value:g}" for name, value in told)
+                problem = f"modal needs bodies that are held, and {free}{f' at {where}' if where else ''}"
+                raise InputError(
+                    f'[integrator] method: {problem}; hold it, or take method = "central-difference"'
+                )
 
     def _check_gap(self, least: float) -> None:
         """Refuse a least clearance that a stator's own offset closes."""

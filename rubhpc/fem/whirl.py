@@ -63,5 +63,4 @@ def _planes(names: Sequence[str]) -> tuple[list[int], list[int], NDArray[np.floa
     """Rows of either plane in the same order, and the signs of the horizontal ones (-thy bends w up)."""
     vertical = [row for name in ("v", "thz") for row, n in enumerate(names) if n == name]
     horizontal = [row for name in ("w", "thy") for row, n in enumerate(names) if n == name]
-    half = len(horizontal) // 2
-    return vertical, horizontal, np.repeat([1.0, -1.0], half)
+    return vertical, horizontal, np.array([-1.0 if names[row] == "thy" else 1.0 for row in horizontal])

@@ -51,9 +51,11 @@ def call_rig_function(path: Path, function: str, where: str) -> Any:
     except RubError as error:
         raise InputError(str(error) if str(error).startswith(named) else f"{named}: {error}") from error
     except Exception as error:
-        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
-        line = getattr(error, "lineno", None) or (lines[-1] if lines else "?")
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [frame.lineno for frame in frames if frame.filename == module.__file__]
+        line = getattr(error, "lineno", None) or (lines[-1] if lines else None)
+        at = f"line {line}: " if line else ""
         told = " ".join(str(error).split())[:200]
-        raise InputError(f"{named}: line {line}: {type(error).__name__}: {told}; mend it") from error
+        raise InputError(f"{named}: {at}{type(error).__name__}: {told}; mend it") from error
     finally:
         sys.path.remove(folder)
