@@ -36,6 +36,11 @@ PACKED = (
     *METRICS,
 )  # what is packed from the journals, in the order of the schema's roles
 _PACKED_CHUNK = 2**20  # values in a chunk of a packed array, at most
+# Where the stators stand: coordinate, key of the stator, unit, long name.
+_PLACES = (
+    ("stator_angle", "angle", "rad", "angle of the stator, from straight up in the sense of positive spin"),
+    ("stator_node", "node", "1", "node of the rotor at which the stator stands"),
+)
 _PACKAGES = ("numpy", "numba", "scipy", "zarr")
 # Periodic waveforms shrink to 2 %, those of a chaotic rub to 80 %, at 3 GB/s and more; zstd gains nothing on
 # either that would be worth a third of the speed.
@@ -176,6 +181,10 @@ def _static(sweep: Sweep) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict
     for name, (values, text) in own.items():
         dim = "sample" if name == "revolution" else name
         static[name] = ((dim,), values, {"units": "1", "long_name": text})
+    for name, attribute, unit, text in _PLACES:
+        if not any(axis.name.endswith(f".{attribute}") for axis in sweep.study.axes):  # or it is many places
+            at = np.array([getattr(stator, attribute) for stator in sweep.study.rig.stator])
+            static[name] = (("stator",), at, {"units": unit, "long_name": text})
     for name, (dims, values) in sweep.settings().items():
         if name not in static:  # a clearance axis is its own setting
             variable = VARIABLES[name]
@@ -200,7 +209,8 @@ def _attributes(sweep: Sweep, *, accepted: tuple[int, ...]) -> dict[str, Any]:
             "python": platform.python_version(),
             **{name: _version(name) for name in _PACKAGES},
         },
-        "coordinates": "revolution",  # also where no array over the samples is kept
+        # also where no array over the samples is kept
+        "coordinates": " ".join(("revolution", *(name for name, *_ in _PLACES))),
         **({"accepted_physics": list(accepted)} if accepted else {}),
     }
 
