@@ -45,6 +45,7 @@ COMMANDS = {
     "waveform": ("rubhpc.commands.figures:waveform", "Signals over the revolutions."),
     "section": ("rubhpc.commands.figures:section", "Poincaré section, or bifurcation diagram along an axis."),
     "hht": ("rubhpc.commands.signals:hht", "Hilbert-Huang analysis of a signal."),
+    "claims": ("rubhpc.commands.claims:claims", "The paper's claims against the stores of jobs/paper."),
 }
 
 
@@ -76,9 +77,11 @@ class _Commands(click.Group):
 
 def _refuse_slip(word: str) -> None:
     """Tell a mistyped command from a study that is not there."""
+    if word.startswith("-") or "." in word or "/" in word or os.path.exists(word):
+        return
     near = difflib.get_close_matches(word, COMMANDS, n=1)
-    if near and "." not in word and not os.path.exists(word):
-        raise click.UsageError(f"{word}: no such command or study; did you mean {near[0]}?")
+    mend = f"did you mean {near[0]}?" if near else "see rubhpc --help"
+    raise click.UsageError(f"{word}: no such command or study; {mend}")
 
 
 @click.group(
@@ -93,8 +96,8 @@ def commands() -> None:
 
     `mpirun -n N rubhpc STUDY.toml` runs a study on N ranks; the same command goes on after a stop.
 
-    Exit codes: 0 complete; 1 finished, some cases failed; 2 bad input; 3 store cannot be used; 75 stopped
-    early, run the same command again.
+    Exit codes: 0 complete; 1 finished, some cases failed; 2 bad input; 3 store cannot be used; 70 an error of
+    the program's own; 71 complete, but a rank was lost; 75 stopped early, run the same command again.
     """
 
 

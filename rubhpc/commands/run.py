@@ -26,6 +26,16 @@ _TRUST = click.option(
     "--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more than N cases fail."
 )
 @click.option("--time-limit", metavar="TIME", help='Stop after TIME: "2 h", or seconds.')
+@click.option(
+    "--accept-version",
+    is_flag=True,
+    help="Keep the cases that another version of the physics has computed, and go on.",
+)
+@click.option(
+    "--only",
+    metavar="ID",
+    help="Compute one case, print it and compare it with the store, bit for bit; nothing is written.",
+)
 @click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 def run(
     study: Path,
@@ -34,9 +44,17 @@ def run(
     retry_failed: bool,
     max_failures: int | None,
     time_limit: str | None,
+    accept_version: bool,
+    only: str | None,
     quiet: bool,
 ) -> int:
-    """Run STUDY.toml, or what is left of it; under mpirun, on all its ranks."""
+    """Run STUDY.toml, or what is left of it; under mpirun, on all its ranks.
+
+    It stops in order, with code 75, on SIGTERM, SIGINT or SIGUSR1, at its time limit, or when a file STOP is
+    made in the store; the same command goes on.
+    """
+    if only is not None:
+        return _reproduce(study, output, only, trust_rig=trust_rig)
     from rubhpc.running.stopping import Stopping
 
     with Stopping() as stopping:  # signals are answered from here on, whatever the imports below take
@@ -52,6 +70,7 @@ def run(
             time_limit=None
             if time_limit is None
             else parse_quantity(_number(time_limit), "s", "--time-limit"),
+            accept_version=accept_version,
             quiet=quiet,
             stopping=stopping,
         )
@@ -61,6 +80,15 @@ def run(
         error = RubError(summary.complaint())
         error.exit_code = summary.exit_code
         raise error
+    return 0
+
+
+def _reproduce(study: Path, output: Path | None, name: str, *, trust_rig: bool) -> int:
+    from rubhpc.running.only import reproduce
+    from rubhpc.study import read_study
+
+    if launch().rank == 0:
+        click.echo(reproduce(read_study(study, output, trust_rig=trust_rig), name).text())
     return 0
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _PILOT_STEPS = 400_000  # of one pilot case, about; enough for the caches to be warm
 _LINE = 400  # bytes of a case in a journal, about, for one stator
-_FIXED_FILES = 60  # metadata, packed arrays and coordinates
+_FIXED_FILES = 85  # metadata, packed arrays and coordinates
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +45,8 @@ class Plan:
         Predicted integration steps of what is missing.
     core_hours : float
         For what is missing, from the pilot cases; NaN where they failed.
+    failures : tuple of str
+        Coordinates of the pilot cases that failed, and why.
     """
 
     title: str
@@ -57,6 +59,7 @@ class Plan:
     n_byte: int
     steps: int
     core_hours: float
+    failures: tuple[str, ...] = ()
 
     def text(self) -> str:
         """The plan for people, a few lines."""
@@ -76,6 +79,7 @@ class Plan:
                 "so far      "
                 + ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING)),
                 f"to compute  {self.steps:.3g} steps, {cost}",
+                *(f"failed      a pilot case: {text}" for text in self.failures),
             ]
         )
 
@@ -103,7 +107,7 @@ def make_plan(study: Study) -> Plan:
     missing = (status == MISSING).reshape(sweep.shape)
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
     steps = sum(block.cost * share for block, share in left)
-    pace = _pace(sweep, [block for block, _ in left])
+    pace, failures = _pace(sweep, manifest, [block for block, _ in left])
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
     return Plan(
         title=study.title,
@@ -116,18 +120,23 @@ def make_plan(study: Study) -> Plan:
         n_byte=sweep.n_case * (per_case + 2 * _LINE),
         steps=round(steps),
         core_hours=steps * pace / 3600 if left else 0.0,
+        failures=tuple(failures),
     )
 
 
-def _pace(sweep: Sweep, blocks: list[Block]) -> float:
-    """Seconds a predicted step takes: the mean over a case of the longest, the middle and the last block."""
-    paces = []
+def _pace(sweep: Sweep, manifest: Manifest, blocks: list[Block]) -> tuple[float, list[str]]:
+    """Seconds a predicted step takes, and what failed.
+
+    The mean over a case of the longest, the middle and the last block.
+    """
+    paces, failures = [], []
     for block in [blocks[i] for i in sorted({0, len(blocks) // 2, len(blocks) - 1})] if blocks else []:
         try:
             paces.append(_pilot(sweep, block))
-        except Exception:  # noqa: S112 - the run will tell what is wrong with the case
-            continue
-    return float(np.mean(paces)) if paces else math.nan
+        except Exception as error:  # whatever is wrong with the case: the others are asked all the same
+            where = manifest.name_case(int(np.ravel_multi_index(block.start, sweep.shape)))
+            failures.append(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}")
+    return (float(np.mean(paces)) if paces else math.nan), failures
 
 
 def _pilot(sweep: Sweep, block: Block) -> float:

@@ -187,9 +187,8 @@ class Worker:
         self.watch.begin(flat, case.id)
         try:
             record = self._compute(case)
-            if record.status == DONE:
-                self._place(record, data, i_case)
-            metrics = self._metrics(record)
+            put(record, data, i_case)
+            metrics = metrics_of(record, self._record_type).tobytes()
         except Stopped:
             raise
         except Exception as error:
@@ -227,18 +226,30 @@ class Worker:
             setup, clearance=case.clearance, friction=case.friction, recording=study.recording, check=check
         )
 
-    def _place(self, record: Record, data: Arrays, i_case: int) -> None:
-        told = {**record.signals, **record.spectra, **record.sections}
-        for name, values in data.items():
-            if not np.isfinite(told[name]).all():
-                raise FloatingPointError(f"{name} is not finite")
-            values[i_case] = told[name]
 
-    def _metrics(self, record: Record) -> bytes:
-        row = np.zeros((), self._record_type)
-        for name in self._record_type.names or ():
-            row[name] = record.scalars[name]
-        return row.tobytes()
+def put(record: Record, data: Arrays, i_case: int) -> None:
+    """Put the arrays of a record that is done into those of a block.
+
+    Raises
+    ------
+    FloatingPointError
+        One of them is not finite.
+    """
+    if record.status != DONE:
+        return
+    told = {**record.signals, **record.spectra, **record.sections}
+    for name, values in data.items():
+        if not np.isfinite(told[name]).all():
+            raise FloatingPointError(f"{name} is not finite")
+        values[i_case] = told[name]
+
+
+def metrics_of(record: Record, kind: np.dtype[np.void]) -> NDArray[np.void]:
+    """The metrics of a record, packed."""
+    row = np.zeros((), kind)
+    for name in kind.names or ():
+        row[name] = record.scalars[name]
+    return row
 
 
 def _told(error: Exception) -> str:

@@ -36,7 +36,7 @@ class StoreStatus:
     n_recent : int
         Cases journalled by the latest run.
     failures : tuple of (str, str)
-        Coordinates and reason of each failed or diverged case.
+        Id, coordinates and reason of each failed or diverged case.
     """
 
     title: str
@@ -100,7 +100,10 @@ def read_status(path: Path) -> StoreStatus:
         n_recent=ledger.n_recent,
         torn=ledger.torn,
         failures=tuple(
-            (f"{manifest.name_case(i)}: {STATUS[ledger.status[i]]}", ledger.reasons.get(i, ""))
+            (
+                f"{manifest.case_id(i)[:12]} {manifest.name_case(i)}: {STATUS[ledger.status[i]]}",
+                ledger.reasons.get(i, ""),
+            )
             for i in troubled
         ),
     )
