@@ -5,8 +5,9 @@ BIN := $(VENV)/bin
 RANKS ?= 2
 STORE := quickstart.zarr
 FIGURES := figures
+PAPER := paper
 
-.PHONY: help demo test lint bench clean
+.PHONY: help demo paper test lint bench clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -18,6 +19,13 @@ demo: $(VENV)/.installed ## a first study on two cores, and two figures of it
 	$(BIN)/rubhpc cascade $(STORE) --select clearance_ratio=0.7 --figure $(FIGURES)/torsion_cascade.png
 	$(BIN)/rubhpc map $(STORE) --figure $(FIGURES)/contact_force_map.png
 	@echo "The study is in $(CURDIR)/$(STORE), its figures in $(CURDIR)/$(FIGURES)."
+
+# The folder is the one that the studies themselves name.
+paper: $(VENV)/.installed ## the studies behind the paper's figures, its figures, and its claims checked
+	@for study in jobs/paper/*.toml; do \
+		echo "$$study"; $(BIN)/mpirun -n $(RANKS) $(BIN)/rubhpc "$$study" --quiet || exit; \
+	done
+	$(BIN)/rubhpc claims --draw $(PAPER)/figures
 
 test: $(VENV)/.ready ## all tests
 	$(BIN)/python -m pytest
@@ -31,8 +39,8 @@ lint: $(VENV)/.ready ## style, types and the layers of imports
 bench: $(VENV)/.ready ## timings
 	$(BIN)/python -m pytest tests/bench -m bench --benchmark-columns=min,median,rounds
 
-clean: ## remove .venv, caches, and what the demo made
-	rm -rf $(VENV) $(STORE) $(FIGURES) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \
+clean: ## remove .venv, caches, and what demo and paper made
+	rm -rf $(VENV) $(STORE) $(FIGURES) $(PAPER) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \
 		.benchmarks .hypothesis
 	find rubhpc postproc tests -name __pycache__ -type d -prune -exec rm -rf {} +
 

@@ -1,0 +1,56 @@
+"""`rubhpc claims`: the paper's claims against the stores of `jobs/paper`, and its figures drawn from them."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import click
+
+from rubhpc.errors import InputError
+
+FOLDER = "paper"  # where the studies of jobs/paper put their stores
+
+
+@click.command()
+@click.option("--figure", "number", type=click.IntRange(min=1), metavar="N", help="Only Fig. N of the paper.")
+@click.option(
+    "--stores",
+    metavar="FOLDER",
+    default=FOLDER,
+    show_default=True,
+    help="Where the stores of jobs/paper are.",
+)
+@click.option("--json", "is_json", is_flag=True, help="Print JSON instead of a table.")
+@click.option("--document", metavar="FILE", help="Write the table as a document, such as docs/claims.md.")
+@click.option("--draw", metavar="FOLDER", help="Draw the figures of the paper into a folder, as PNG.")
+def claims(number: int | None, stores: str, is_json: bool, document: str | None, draw: str | None) -> int:
+    """Check every claim of the paper against the stores of its studies; exit 1 when one fails.
+
+    `make paper` runs the studies. What the paper leaves open or contradicts itself on is reported only.
+    """
+    from postproc.claims.index import CLAIMS, FAILS, evaluate, on_figure, open_studies
+    from postproc.claims.table import as_json, document_of, text
+    from postproc.paper.index import FIGURES, draw_figures
+
+    if document and number is not None:
+        raise InputError("--document: is of all claims; leave out --figure")
+    chosen = on_figure(number) if number is not None else list(CLAIMS)
+    figures = [n for n in FIGURES if number in (None, n)] if draw else []
+    needed = [*(s for c in chosen for s in c.studies), *(s for n in figures for s in FIGURES[n].studies)]
+    opened = open_studies(stores, needed)
+    results = evaluate(chosen, opened)
+    click.echo(as_json(results) if is_json else text(results, shutil.get_terminal_size((120, 24)).columns))
+    if document:
+        _write(Path(document), document_of(results))
+    if draw:
+        for path in draw_figures(figures, opened, draw):
+            click.echo(str(path), err=is_json)
+    return int(any(result.verdict == FAILS for result in results))
+
+
+def _write(path: Path, content: str) -> None:
+    try:
+        path.write_text(content)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another --document") from error
