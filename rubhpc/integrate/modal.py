@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
 FIRST_REVOLUTIONS = 8  # of the first kernel call
-MOST_PHASES = 256  # sets of closed contacts of one speed and friction
 
 
 class EndlessEvents(Exception):  # noqa: N818 - a state of the motion, never seen by users
@@ -164,8 +163,8 @@ class ModalMarch(March):
 
     def _find(self, mask: int) -> None:
         """See that the tables hold a set of contacts; coordinates are widened where it has more modes."""
-        if all(phase.mask != mask for phase in self._book.phases):
-            if len(self._book.phases) >= MOST_PHASES:
+        if mask not in self._book.masks:
+            if self._book.is_full:
                 raise EndlessEvents
             self._book.add(mask)
         self._phases = self._book.tables()

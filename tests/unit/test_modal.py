@@ -12,7 +12,7 @@ from rubhpc import State, read_rig, simulate
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import steady_response
-from rubhpc.integrate import march, modal
+from rubhpc.integrate import march, modal, tables
 from rubhpc.integrate.phases import PhaseBook
 from rubhpc.kernels.phases import CONTACT_UNSOLVED
 from rubhpc.rig import Torsion, with_keys
@@ -64,7 +64,7 @@ def test_endless_events_are_left_to_short_steps(monkeypatch, too_many):
     """More sets of contacts, or more events, than allowed: the case is done in steps, to the same answer."""
     exact = simulate(trial_rig(3), **CLOSE)
     if too_many == "sets":
-        monkeypatch.setattr(modal, "MOST_PHASES", 4)
+        monkeypatch.setattr(tables, "MOST_PHASES", 4)
     else:
         monkeypatch.setattr(modal, "advance", lambda *_: CONTACT_UNSOLVED)
     stepped = simulate(trial_rig(3), step="0.25 us", **CLOSE)

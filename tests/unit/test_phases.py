@@ -8,7 +8,8 @@ from scipy.linalg import expm
 from trial_rig import trial_rig
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.integrate.phases import PhaseBook, make_phase
+from rubhpc.integrate.phase import make_phase
+from rubhpc.integrate.phases import PhaseBook
 from rubhpc.integrate.reduction import reduce_model
 from rubhpc.kernels.phases import (
     LATERAL_RATE,
