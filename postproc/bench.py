@@ -36,10 +36,12 @@ def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
         raise InputError(f"{source(case)}: tells no rig; only a store that rubhpc has written does")
     rig = rig_from_dict(table, f"{source(case)}: rig")
     chosen = {
-        str(n): float(c.item()) for n, c in case.coords.items() if c.size == 1 and c.dtype.kind in "fiu"
+        str(n): float(c.values.item())
+        for n, c in case.coords.items()
+        if c.size == 1 and c.dtype.kind in "fiu"
     }
     chosen |= values or {}
-    return with_keys(rig, {key: chosen[dim] for dim, key in _rig_axes(case).items() if dim in chosen})
+    return with_keys(rig, {key: chosen[dim] for dim, key in rig_axes(case).items() if dim in chosen})
 
 
 def natural_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str, xr.DataArray]:
@@ -76,7 +78,7 @@ def _over_rig(
     case: xr.Dataset, along: str | None, frequencies_of: Callable[[Rig], dict[str, float]]
 ) -> dict[str, xr.DataArray]:
     """Return the frequencies of a case's rig, Hz, as arrays over `along` where that is one of its keys."""
-    is_rig_axis = along in _rig_axes(case) and along in case.dims
+    is_rig_axis = along in rig_axes(case) and along in case.dims
     points: list[dict[str, float]] = (
         [{along: float(v)} for v in case[along].values] if is_rig_axis and along else [{}]
     )
@@ -103,7 +105,7 @@ def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
     return [(s.angle, s.clearance_offset) for s in stators if s.node == stators[0].node]
 
 
-def _rig_axes(case: xr.Dataset) -> dict[str, str]:
+def rig_axes(case: xr.Dataset) -> dict[str, str]:
     """Return the axes of the study that are keys of the rig: dimension to dotted key."""
     study: dict[str, Any] = case.attrs.get("study", {})
     return {name.replace(".", "_"): name for name in study.get("grid", {}) if "." in name}

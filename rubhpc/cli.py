@@ -45,6 +45,10 @@ COMMANDS = {
     "waveform": ("rubhpc.commands.figures:waveform", "Signals over the revolutions."),
     "section": ("rubhpc.commands.figures:section", "Poincaré section, or bifurcation diagram along an axis."),
     "hht": ("rubhpc.commands.signals:hht", "Hilbert-Huang analysis of a signal."),
+    "indicators": (
+        "rubhpc.commands.signals:indicators",
+        "How often the vibration tells rub from no rub, under noise.",
+    ),
     "claims": ("rubhpc.commands.claims:claims", "The paper's claims against the stores of jobs/paper."),
 }
 

@@ -10,6 +10,7 @@ from rubhpc.commands.drawing import REVOLUTIONS, finish, number, of_store, open_
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
 
 
@@ -79,4 +80,56 @@ def hht(
         )
 
 
-COMMANDS = (hht,)
+@click.command()
+@of_store
+@click.option("--noise", "levels", multiple=True, type=float, help="Level of noise; may be repeated.")
+@click.option("--draws", type=click.IntRange(min=1), default=3, show_default=True, help="Of noise, a case.")
+@click.option(
+    "--false-alarms", type=float, default=0.05, show_default=True, help="Share that sets the thresholds."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of noise and halves.")
+@click.option("--scores", metavar="FILE", help="Write every case's scores and verdict: .zarr or .nc.")
+def indicators(
+    store: str,
+    selection: tuple[str, ...],
+    figure: str | None,
+    data: str | None,
+    levels: tuple[float, ...],
+    draws: int,
+    false_alarms: float,
+    seed: int,
+    scores: str | None,
+) -> None:
+    """How often torsion, whirl and stator vibration tell rub from no rub, under measurement noise.
+
+    Noise of level 1 is as strong as the median vibration of the cases that touch. Thresholds for one half of
+    the cases come from those of the other half that do not touch.
+    """
+    from postproc.detection import judge
+    from postproc.detection_figure import panels
+    from postproc.export import check_data_path, write_data
+    from postproc.indicators import LEVELS, indicator_scores
+
+    scores_path = check_data_path(scores) if scores else None
+    noise = tuple(sorted(set(levels))) or LEVELS
+    judged = judge(indicator_scores(open_cases(store, selection), noise, draws, seed), false_alarms, seed)
+    shown = judged[["detection_rate", "false_alarm_rate", "area_under_curve"]]
+    _print_table(judged)
+    finish("indicators", store, figure, data, shown, lambda axes: panels(judged, axes), n_panel=2, height=110)
+    if scores_path:
+        click.echo(str(write_data(judged, scores_path)))
+
+
+def _print_table(judged: xr.Dataset) -> None:
+    done = judged["verdict"].notnull().all(("indicator", "level"))
+    n_rub, n_free = int((done & judged["rub"]).sum()), int((done & ~judged["rub"]).sum())
+    click.echo(f"Detection rate and area under the ROC curve, of {n_rub} cases with rub and {n_free} without")
+    names = [str(name) for name in judged["indicator"].values]
+    click.echo(f"{'noise':>6}" + "".join(f"{name:>22}" for name in names))
+    for level in judged["level"].values:
+        row = judged.sel(level=level)
+        cells = zip(row["detection_rate"].values, row["area_under_curve"].values, strict=True)
+        click.echo(f"{level:6g}" + "".join(f"{f'{rate:.3f}  {area:.3f}':>22}" for rate, area in cells))
+
+
+COMMANDS = (hht, indicators)

@@ -1,10 +1,13 @@
 """Hilbert-Huang analysis of signals whose frequencies are known at every instant."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+import synthetic_store
 import xarray as xr
+from click.testing import CliRunner
 
 from postproc.hilbert_huang import (
     analytic,
@@ -18,6 +21,7 @@ from postproc.hilbert_huang import (
 from postproc.hilbert_huang_figure import energy_time_frequency, panels
 from postproc.style import house_style, new_figure
 from rubhpc import simulate
+from rubhpc.commands.signals import hht as command
 from rubhpc.errors import InputError
 
 N = 1024  # samples a revolution
@@ -231,3 +235,49 @@ def test_a_figure_without_oscillation_is_refused():
         _, (ax,) = new_figure()
     with pytest.raises(InputError, match="does not oscillate between contacts"):
         energy_time_frequency(hht, ax)
+
+
+ONE = ["speed_ratio=1.5", "clearance=84 um", "friction=0.3", "stator.youngs_modulus=3 GPa"]
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    made = synthetic_store.make()
+    twist = np.sin(8 * math.pi * made["revolution"])  # 4X: three cycles between contacts
+    made["torsion"] = made["torsion"].copy(data=np.broadcast_to(twist, made["torsion"].shape))
+    synthetic_store.write(tmp_path / "study.zarr", made)
+    monkeypatch.chdir(tmp_path)
+
+    def invoke(*args):
+        words = [word for choice in ONE for word in ("--select", choice)]
+        return CliRunner().invoke(command, ["study.zarr", *words, *args], catch_exceptions=False).output
+
+    return invoke
+
+
+def test_the_command_tells_the_frequency_and_writes_what_it_draws(run):
+    said = run("--data", "hht.nc").splitlines()
+    assert said[:2] == ["study_hht.png", "hht.nc"]
+    median = float(said[2].split()[5])
+    assert median == pytest.approx(4 * 1.5 * synthetic_store.FIRST_LATERAL, rel=0.03)
+    with xr.open_dataset("hht.nc") as hht:
+        assert set(hht.data_vars) == {"signal", "imf", "amplitude", "frequency", "energy"}
+        assert hht["frequency"].attrs["units"] == "Hz"
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (["--signal", "twist"], "twist: no such signal"),
+        (["--max-frequency", "-5"], "out of range"),
+        (["--max-frequency", "1 kg"], "--max-frequency"),
+        (["--mode", "7"], "does not oscillate"),
+        (["--figure", "hht.bmp"], "a figure is one of"),
+    ],
+)
+def test_the_command_refuses_bad_input(run, args, said):
+    with pytest.raises(InputError) as refusal:
+        run(*args)
+    assert said in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert not list(Path().glob("*.png"))
