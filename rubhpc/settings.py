@@ -129,7 +129,7 @@ class Settings:
         )
 
         def predict(index: Index) -> float:
-            if is_modal and self.study.contact.normal == "fixed":
+            if is_modal and not self.study.contact.is_stepped:
                 return float(modal_steps)
             unit = self._unit_speed_at(tuple(index[i] for i in self._response_axes))
             speed = abs(self._values[self.speed_axis][index[self.speed_axis]]) * unit

@@ -29,6 +29,12 @@ def simulate(
     clearance_ratio: float | None = None,
     friction: float = 0.3,
     overrides: dict[str, float | str] | None = None,
+    law: str = "lagrange",
+    stiffness: float | str | None = None,
+    damping: float | str | None = None,
+    restitution: float | None = None,
+    friction_law: str = "sliding",
+    static_friction_ratio: float | None = None,
     normal: str = "fixed",
     method: str = "modal",
     step: float | str | None = None,
@@ -53,13 +59,20 @@ def simulate(
         Coefficient of friction.
     overrides : dict, optional
         Single keys of the rig: `{"stator.youngs_modulus": "30 GPa"}`.
+    law : {"lagrange", "penalty"}
+        Gaps closed exactly, or by a spring of `stiffness` (N/m) and a damper of `damping` (N s/m).
+    restitution : float, optional
+        Normal velocity after an impact over that before it, 0 to 1; default none.
+    friction_law : {"sliding", "coulomb"}
+        Steady sliding; or set-valued, with stick, and `static_friction_ratio` (1 or more) at rest.
     normal : {"fixed", "updated"}
         Contact normal along the stator's axis, or along the line of centres.
     method : {"modal", "central-difference"}
         Integrator: the exact modal one, or the paper's.
     step : float (s) or str, optional
-        Time step in contact (modal; default 1 us, 0.25 us with the updated normal) or everywhere (central
-        difference; default 0.5 us, or 0.9 of the stability limit where that is less).
+        Time step in contact (modal; default 1 us; 0.25 us with the updated normal, set-valued friction or a
+        penalty) or everywhere (central difference; default 0.5 us, or 0.9 of the stability limit where that
+        is less).
     accuracy : float
         Relative accuracy of the modal integrator: how many modes it keeps.
     transient, revolutions, samples_per_revolution : int
@@ -114,10 +127,20 @@ def simulate(
     mu = parse_quantity(friction, "", "simulate: friction")
     if mu < 0:
         raise InputError(f"simulate: friction: {mu:g} is out of range; it must be at least 0")
+    numbers = {
+        name: None if value is None else parse_quantity(value, unit, f"simulate: {name}")
+        for name, value, unit in (
+            ("stiffness", stiffness, "N/m"),
+            ("damping", damping, "N*s/m"),
+            ("restitution", restitution, ""),
+            ("static_friction_ratio", static_friction_ratio, ""),
+        )
+    }
+    contact = Contact(law=law, friction_law=friction_law, normal=normal, **numbers)
     setup = prepare(
         rig,
         spin,
-        contact=Contact(normal=normal),
+        contact=contact,
         integrator=Integrator(
             method=method,
             step=None if step is None else parse_quantity(step, "s", "simulate: step"),

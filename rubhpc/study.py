@@ -26,7 +26,7 @@ _TABLES = ("title", "rig", "output", "grid", "override", "contact", "integrator"
 PAPER_STEP = 0.5e-6  # s
 SAFE_SHARE = 0.9  # of the stability limit
 BLIND_STEP = 1e-6  # s, of the modal scheme with the fixed normal
-TURNING_STEP = 0.25e-6  # s, with the updated one
+TURNING_STEP = 0.25e-6  # s, with the updated one, set-valued friction or a penalty
 # Names that a store takes for itself; an axis `clearance` is the very setting of that name.
 _RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution"}) - {"clearance"}
 _MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
@@ -34,23 +34,63 @@ _MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
 
 @dataclass(frozen=True, kw_only=True)
 class Contact:
-    """Law of contact and friction, and which way the normal points."""
+    """Laws of contact and friction, and which way the normal points.
 
-    law: str = choice(of=("lagrange",), default="lagrange")
-    friction_law: str = choice(of=("sliding",), default="sliding")
+    Attributes
+    ----------
+    law : {"lagrange", "penalty"}
+        Gaps closed exactly, by multipliers; or the conventional spring and damper in the closed gap.
+    stiffness, damping : float, N/m and N s/m
+        Of the penalty.
+    restitution : float
+        Normal velocity after an impact over that before it, 0 to 1. Default: none, the gap is closed at once.
+    friction_law : {"sliding", "coulomb"}
+        Steady sliding, in the sense of the spin; or set-valued, with stick and reversal of the slip.
+    static_friction_ratio : float
+        Coefficient of friction at rest over that in sliding, 1 or more. Default 1.
+    normal : {"fixed", "updated"}
+        Along the stator's axis, or along the line of centres.
+    """
+
+    law: str = choice(of=("lagrange", "penalty"), default="lagrange")
+    stiffness: float | None = quantity("N/m", default=None, above=0)
+    damping: float | None = quantity("N*s/m", default=None, at_least=0)
+    restitution: float | None = quantity("", default=None, at_least=0)
+    friction_law: str = choice(of=("sliding", "coulomb"), default="sliding")
+    static_friction_ratio: float | None = quantity("", default=None, at_least=1)
     normal: str = choice(of=("fixed", "updated"), default="fixed")
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if self.law == "penalty":
+            if self.stiffness is None:
+                raise FieldError("stiffness", "missing; a penalty needs one, such as stiffness = 1e8")
+            if self.restitution is not None:
+                problem = "a penalty's rebound comes from its spring and damper; leave it out"
+                raise FieldError("restitution", problem)
+        for key in ("stiffness", "damping"):
+            if self.law == "lagrange" and getattr(self, key) is not None:
+                raise FieldError(key, 'a multiplier has none; take law = "penalty", or leave it out')
+        if self.restitution is not None and self.restitution > 1:
+            raise FieldError("restitution", f"{self.restitution:g} is out of range; it must be at most 1")
+        if self.static_friction_ratio is not None and self.friction_law != "coulomb":
+            problem = 'steady sliding never sticks; take friction_law = "coulomb", or leave it out'
+            raise FieldError("static_friction_ratio", problem)
+
+    @property
+    def is_stepped(self) -> bool:
+        """Whether closed contacts have no closed form, so that the modal scheme takes short steps."""
+        is_plain = self.law == "lagrange" and not self.restitution and self.friction_law == "sliding"
+        return self.normal == "updated" or not is_plain
 
 
 @dataclass(frozen=True, kw_only=True)
 class Integrator:
     """Scheme, time step and accuracy.
 
-    Without a step the modal scheme takes 1 us in contact (0.25 us with the updated normal), the central
-    difference 0.5 us, or 0.9 of the stability limit where that is less. The accuracy (relative) sets how many
-    modes the modal scheme keeps.
+    Without a step the modal scheme takes 1 us in contact (0.25 us with the updated normal, set-valued
+    friction or a penalty), the central difference 0.5 us, or 0.9 of the stability limit where that is less.
+    The accuracy (relative) sets how many modes the modal scheme keeps.
     """
 
     method: str = choice(of=("modal", "central-difference"), default="modal")
@@ -64,7 +104,7 @@ class Integrator:
         """Step in contact, s, of the modal scheme."""
         if self.step is not None:
             return self.step
-        return TURNING_STEP if contact.normal == "updated" else BLIND_STEP
+        return TURNING_STEP if contact.is_stepped else BLIND_STEP
 
     def step_within(self, limit: float) -> float:
         """Time step, s, of the central difference for matrices that are stable up to `limit`, s."""
@@ -158,7 +198,7 @@ class Study:
             "title": self.title,
             "rig": self.rig.name,
             "grid": {axis.name: {"unit": axis.unit, "values": list(axis.values)} for axis in self.axes},
-            "contact": asdict(self.contact),
+            "contact": {key: value for key, value in asdict(self.contact).items() if value is not None},
             "integrator": asdict(self.integrator),
             "record": asdict(self.recording) | {"keep": list(self.recording.keep)},
         }

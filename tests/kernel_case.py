@@ -13,6 +13,7 @@ from rubhpc.integrate.contact_work import workspace
 from rubhpc.integrate.gather import empty_samples, empty_tally
 from rubhpc.integrate.packing import pack, pairs_of
 from rubhpc.kernels.central_difference import advance
+from rubhpc.kernels.contact import MULTIPLIER
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
@@ -37,19 +38,36 @@ class KernelCase:
     tally: Tally
 
     @classmethod
-    def of(cls, rig, spin, per_revolution, *, clearance=1.0, friction=0.3, is_updated=False, n_sample=0):
+    def of(
+        cls,
+        rig,
+        spin,
+        per_revolution,
+        *,
+        clearance=1.0,
+        friction=0.3,
+        is_updated=False,
+        law=MULTIPLIER,
+        n_sample=0,
+    ):
         model = assemble(rig)
         step = 2 * math.pi / (abs(spin) * per_revolution)
         packed = pack(model, spin, step)
         pairs = pairs_of(
-            model, packed, clearance=clearance, friction=friction, spin=spin, is_updated=is_updated
+            model,
+            packed,
+            clearance=clearance,
+            friction=friction,
+            spin=spin,
+            is_updated=is_updated,
+            law=law,
         )
         return cls(
             model=model,
             per_revolution=per_revolution,
             packed=packed,
             pairs=pairs,
-            work=workspace(pairs),
+            work=workspace(pairs, step),
             spin=spin,
             step=step,
             state=np.zeros((2, packed.mass.shape[0])),

@@ -137,6 +137,6 @@ def _march(
     """Start the case with the integrator that its set-up is for."""
     if isinstance(setup, CentralDifferenceSetup):
         return CentralDifferenceMarch(setup, clearance, friction, initial, check)
-    if setup.is_updated:
+    if setup.is_stepped:
         return SteppedMarch(setup, clearance, friction, initial, check)
     return ModalMarch(setup, clearance, friction, initial, check)

@@ -50,8 +50,9 @@ class CentralDifferenceMarch(March):
             friction=friction,
             spin=setup.spin,
             is_updated=setup.is_updated,
+            law=setup.law,
         )
-        self._work = workspace(self._pairs)
+        self._work = workspace(self._pairs, setup.step)
         self._state = _start(setup, initial, self._pairs, self._work)
         self._scratch = np.zeros((3, self._state.shape[1]))
 

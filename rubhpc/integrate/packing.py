@@ -11,13 +11,14 @@ from scipy.linalg import block_diag
 from scipy.sparse import csr_array, dia_array
 from scipy.sparse.csgraph import connected_components
 
-from rubhpc.kernels.contact import AXIAL, LATERAL, N_DEGREE, TORSION, Pairs, V, W
+from rubhpc.kernels.contact import AXIAL, LATERAL, MULTIPLIER, N_DEGREE, TORSION, Law, Pairs, V, W
 from rubhpc.kernels.linear import Linear
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
+    from rubhpc.study import Contact
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
@@ -122,8 +123,26 @@ def output_degrees(model: Model) -> Ints:
     return np.array([model.rotor.index(model.output_node, name) for name in ("v", "w", "thx")])
 
 
+def law_of(contact: Contact) -> Law:
+    """Laws of a study as the kernels take them; what it leaves out is zero, or one."""
+    return Law(
+        stiffness=contact.stiffness or 0.0,
+        damping=contact.damping or 0.0,
+        restitution=contact.restitution or 0.0,
+        is_set_valued=contact.friction_law == "coulomb",
+        static_ratio=contact.static_friction_ratio or 1.0,
+    )
+
+
 def pairs_of(
-    model: Model, packed: Packed, *, clearance: float, friction: float, spin: float, is_updated: bool
+    model: Model,
+    packed: Packed,
+    *,
+    clearance: float,
+    friction: float,
+    spin: float,
+    is_updated: bool,
+    law: Law = MULTIPLIER,
 ) -> Pairs:
     """Contact pairs of a case; clearance in m, friction positive, spin (rad/s) gives its sense."""
     angle = np.array([stator.angle for stator in model.stators])
@@ -137,6 +156,7 @@ def pairs_of(
         friction=np.full(angle.size, np.copysign(friction, spin)),
         compliance=packed.compliance,
         is_updated=is_updated,
+        law=law,
     )
 
 

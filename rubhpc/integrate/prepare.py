@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, TypeAlias
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import step_limit
-from rubhpc.integrate.packing import Packed, pack
+from rubhpc.integrate.packing import Packed, law_of, pack
 from rubhpc.integrate.phases import PhaseBook
 from rubhpc.integrate.reduction import ReducedModel, reduce_model
+from rubhpc.kernels.contact import MULTIPLIER
 from rubhpc.kernels.phases import SAMPLES_AT_ONCE
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
+    from rubhpc.kernels.contact import Law
     from rubhpc.rig import Rig
     from rubhpc.study import Contact, Integrator
 
@@ -35,6 +37,7 @@ class CentralDifferenceSetup:
     samples_per_revolution: int
     is_updated: bool  # normal
     displacement_limit: float  # m
+    law: Law = MULTIPLIER
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,11 +47,17 @@ class ModalSetup:
     model: Model
     reduced: ReducedModel
     spin: float  # rad/s
-    step: float  # s, up to which steps are taken without a bound; with the updated normal, step in contact
+    step: float  # s, up to which steps are taken without a bound; where stepped, step in contact
     samples_per_revolution: int
     is_updated: bool  # normal
     displacement_limit: float  # m
+    law: Law = MULTIPLIER
     _books: dict[float, PhaseBook] = field(default_factory=dict)
+
+    @property
+    def is_stepped(self) -> bool:
+        """Whether closed contacts have no closed form, so that contact is taken in short steps."""
+        return self.is_updated or self.law != MULTIPLIER
 
     @property
     def interval(self) -> float:
@@ -109,6 +118,7 @@ def prepare(
             step=integrator.contact_step(contact),
             samples_per_revolution=samples_per_revolution,
             is_updated=contact.normal == "updated",
+            law=law_of(contact),
             displacement_limit=rig.rotor.displacement_limit,
         )
     limit = step_limit(model)
@@ -128,5 +138,6 @@ def prepare(
         steps_per_sample=steps_per_sample,
         samples_per_revolution=samples_per_revolution,
         is_updated=contact.normal == "updated",
+        law=law_of(contact),
         displacement_limit=rig.rotor.displacement_limit,
     )

@@ -1,4 +1,4 @@
-"""A case by the modal integrator in short contact steps: the updated normal, or endless events."""
+"""A case by the modal integrator in short contact steps: laws without closed form, or endless events."""
 
 from __future__ import annotations
 
@@ -62,8 +62,10 @@ class SteppedMarch(ModalMarch):
             friction=np.full(q, math.copysign(friction, setup.spin)),
             compliance=np.ascontiguousarray(drifted.reshape(q, N_DEGREE, q, N_DEGREE)),
             is_updated=setup.is_updated,
+            law=setup.law,
         )
-        self._work = workspace(self._pairs)
+        self._work = workspace(self._pairs, step)
+        self._ends = np.full((2, q * N_DEGREE), np.nan)
         self._work.force[:] = initial.contact_force  # a contact under way does not begin anew
 
     def touching(self) -> NDArray[np.bool_]:
@@ -86,23 +88,19 @@ class SteppedMarch(ModalMarch):
         enter = phases.enter_re[0] + 1j * phases.enter_im[0]
         level = max(0, min(self._clock.blind_level, self._clock.sample_level))
         power = phases.power_re[0, level] + 1j * phases.power_im[0, level]
-        kick = degree @ enter[n:]
-        drifted = kick * power
-        positions = degree @ motion[:n]
-        parts = np.hstack([kick.real, kick.imag])
-        loss = parts @ phases.loss[0]
-        # Re(e z_u + e' conj z_u) of the two rows: cosine and sine of the angle apart.
-        ahead, behind = (phases.work_re[0] + 1j * phases.work_im[0]) @ kick.T
+        drifted, shifted = degree @ enter[n:] * power, degree @ enter[:n]
+        positions, rates = degree @ motion[:n], degree @ motion[n:]
         return Kicks(
             level=level,
             degree_re=np.ascontiguousarray(positions.real),
             degree_im=np.ascontiguousarray(positions.imag),
+            rate_re=np.ascontiguousarray(rates.real),
+            rate_im=np.ascontiguousarray(rates.imag),
             drifted_re=np.ascontiguousarray(drifted.real),
             drifted_im=np.ascontiguousarray(drifted.imag),
+            shifted_re=np.ascontiguousarray(shifted.real),
+            shifted_im=np.ascontiguousarray(shifted.imag),
             twist_answer=degree @ setup.reduced.output[2],
-            loss=2.0 * loss,
-            loss_of_pair=loss @ parts.T,
-            work=np.ascontiguousarray(np.column_stack([(ahead + behind).real, (behind - ahead).imag])),
         )
 
     def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
@@ -111,6 +109,7 @@ class SteppedMarch(ModalMarch):
         while True:
             outcome = advance_stepped(
                 self._phases,
+                self._bodies,
                 self._clock,
                 self._kicks,
                 self._pairs,
@@ -121,6 +120,7 @@ class SteppedMarch(ModalMarch):
                 self._progress,
                 self._z,
                 self._z_next,
+                self._ends,
                 self._recorder,
                 samples,
                 tally,

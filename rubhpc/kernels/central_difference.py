@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit, jit_inline
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact import N_DEGREE, TORSION, Pairs, Workspace, is_any_closed, solve_contact
+from rubhpc.kernels.contact import N_DEGREE, TORSION, Pairs, Workspace, fill_start, is_any_closed
+from rubhpc.kernels.contact_step import is_plain, solve_contact
 from rubhpc.kernels.linear import Linear, circulatory_power, free_velocity
 from rubhpc.kernels.observe import (
     DAMPING_LOSS,
@@ -37,18 +38,22 @@ def apply_contact(
     pull: Floats,
     force: Floats,
     step: float,
-    velocity: Floats,
+    share: Floats,
+    motion: Floats,
 ) -> None:
-    """Add the contact forces' change of velocity over a step, the correction of Eqs. 23 and 24."""
+    """Add the contact forces' change of velocity over a step, the correction of Eqs. 23 and 24.
+
+    `share` (q,) of it is added to `motion`: one for velocities.
+    """
     for i in range(force.size):
-        if force[i] > 0.0:
+        if force[i] > 0.0 and share[i] != 0.0:
             for a in range(N_DEGREE):
                 b = block[i, a]
                 if b >= 0 and pull[i, a] != 0.0:
-                    impulse = step * pull[i, a] * force[i]
+                    impulse = share[i] * step * pull[i, a] * force[i]
                     # Row of the transpose: how the block answers to a force on this degree.
                     answer = inverse[b, row[i, a] - start[b]]
-                    target = velocity[start[b] : start[b + 1]]
+                    target = motion[start[b] : start[b + 1]]
                     for k in range(target.size):
                         target[k] += impulse * answer[k]
 
@@ -108,12 +113,18 @@ def advance(
         pairs.clearance,
     )
     is_updated, at, gap, contact_force = pairs.is_updated, work.at, work.gap, work.force
+    friction, traction = pairs.friction, work.traction
     block, pull, matrix, start, inverse = pairs.block, work.pull, work.matrix, linear.start, linear.inverse
     highest, lowest, peak_lateral, energy = tally.highest, tally.lowest, tally.peak_lateral, tally.energy
     force_row, force_cosine, force_sine = linear.force_row, linear.force_cosine, linear.force_sine
     n_dof, q = displacement.size, gap.size
     twist = output_row[2]
-    is_linear_pair = q == 1 and not is_updated  # one division solves it
+    is_direct = is_plain(pairs.law)
+    is_linear_pair = q == 1 and not is_updated and is_direct  # one division solves it
+    is_springy = pairs.law.stiffness > 0.0  # a force may act with the gap open at the step's end
+    is_bouncing = pairs.law.restitution > 0.0
+    start_position, start_rate, delay = work.now, work.rate, work.delay
+    whole, late = np.ones(q), np.zeros(q)
     turn_cosine, turn_sine = np.cos(spin * step), np.sin(spin * step)
     sense = 1.0 if spin >= 0.0 else -1.0
     was_touching = True
@@ -129,12 +140,18 @@ def advance(
             for k in range(n_dof):
                 residual[k] = displacement[k] + step * velocity_next[k]
             is_touching = is_any_closed(row, axis_y, axis_z, radius, clearance, is_updated, residual, at, gap)
-            if is_touching:
+            if is_touching or (is_springy and was_touching):
                 if is_linear_pair and matrix[0, 0] > 0.0:
                     contact_force[0] = -gap[0] / matrix[0, 0]
-                elif solve_contact(pairs, work) == UNSOLVED:
-                    return CONTACT_UNSOLVED
-                apply_contact(start, inverse, row, block, pull, contact_force, step, velocity_next)
+                    traction[0] = friction[0] * contact_force[0]
+                else:
+                    if not is_direct:
+                        fill_start(row, displacement, velocity, start_position, start_rate)
+                    n_touching = solve_contact(pairs, work, step, spin)
+                    if n_touching == UNSOLVED:
+                        return CONTACT_UNSOLVED
+                    is_touching = n_touching > 0
+                apply_contact(start, inverse, row, block, pull, contact_force, step, whole, velocity_next)
             elif was_touching:
                 contact_force[:] = 0.0
             if is_recorded:
@@ -154,6 +171,9 @@ def advance(
                     samples.rotor[TWIST_ACCELERATION, i_sample] = (
                         velocity_next[twist] - velocity[twist]
                     ) / step
+            if is_touching and is_bouncing:  # what a force has moved before its impact was due
+                late[:] = -delay
+                apply_contact(start, inverse, row, block, pull, contact_force, step, late, displacement)
             for k in range(n_dof):
                 displacement[k] += step * velocity_next[k]
                 velocity[k] = velocity_next[k]

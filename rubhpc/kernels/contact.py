@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit, jit_inline
-from rubhpc.kernels.complementarity import UNSOLVED, solve_complementarity
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -17,8 +16,18 @@ Ints = NDArray[np.int64]
 V, W, TORSION, AXIAL, LATERAL = range(5)
 N_DEGREE = 5
 
-GAP_TOLERANCE = 1e-14  # m, to which a closed gap is zero
-N_NEWTON = 25  # passes for the curved gap; two or three are taken
+
+class Law(NamedTuple):
+    """What ties the forces of a pair to its gap and its slip."""
+
+    stiffness: float  # of the penalty, N/m; 0: the gap is closed exactly, by a multiplier
+    damping: float  # of the penalty, N s/m
+    restitution: float  # normal velocity after an impact over that before; 0: the gap is closed at once
+    is_set_valued: bool  # friction may stick and turn round; else it is that of steady sliding
+    static_ratio: float  # coefficient of friction at rest over that in sliding
+
+
+MULTIPLIER = Law(stiffness=0.0, damping=0.0, restitution=0.0, is_set_valued=False, static_ratio=1.0)
 
 
 class Pairs(NamedTuple):
@@ -33,20 +42,34 @@ class Pairs(NamedTuple):
     friction: Floats  # (q,), coefficient, with the sign of the spin
     compliance: Floats  # (q, 5, q, 5), displacement of a degree for a unit force on another over a step, m/N
     is_updated: bool  # the normal follows the line of centres
+    law: Law
 
 
 class Workspace(NamedTuple):
     """Arrays of one contact solution."""
 
-    at: Floats  # (q, 5), displacement of each degree, m or rad
-    pull: Floats  # (q, 5), generalised force on each degree for a unit normal force
-    push: Floats  # (q, 5), change of the gap with each degree
+    at: Floats  # (q, 5), displacement of each degree at the end of the step without forces, m or rad
+    now: Floats  # (q, 5), at its beginning (for the laws that look at velocities or at the step before)
+    rate: Floats  # (q, 5), velocity before the forces of the step, m/s or rad/s (likewise)
+    pull: Floats  # (q, 5), generalised force on each degree for a unit normal force, friction included
+    push: Floats  # (q, 5), change of the gap with each degree; force of a unit normal force alone
+    drag: Floats  # (q, 5), force of a unit friction; its negative is the change of the slip with each degree
     matrix: Floats  # (q, q), m/N
     gap: Floats  # (q,), m
-    force: Floats  # (q,), N
+    force: Floats  # (q,), normal, N
+    traction: Floats  # (q,), of the friction, positive against a rim that outruns the tip, N
     active: NDArray[np.bool_]  # (q,)
+    is_sticking: NDArray[np.bool_]  # (q,), at the end of the step
     elimination: Floats  # (q, q + 1)
     moved: Floats  # (5,), degrees of one pair after contact
+    target: Floats  # (q,), gap that the law asks for at the end of the step, m
+    delay: Floats  # (q,), time from the beginning of the step to an impact with restitution, s; else 0
+    slip: Floats  # (q,), slip over the step without forces, m
+    cone: Floats  # (q,), largest friction for a unit normal force
+    coupling: Floats  # (q, q), m/N, change of a gap for a unit friction
+    tangential: Floats  # (2, q, q), m/N, change of a slip for a unit normal force, for a unit friction
+    tableau: Floats  # (3 q, 6 q + 2)
+    basis: Ints  # (3 q,)
 
 
 @jit_inline
@@ -81,7 +104,7 @@ def normal_and_gap(
 
 @jit_inline
 def fill_directions(pairs: Pairs, i: int, ny: float, nz: float, pull: Floats, push: Floats) -> None:
-    """Directions of pair i for normal (ny, nz): `pull` (5,) the force's, `push` (5,) the gap's.
+    """Directions of pair i for normal (ny, nz): `pull` (5,) that of sliding forces, `push` (5,) the gap's.
 
     Displacements of the tip: axial along the stator's axis e, lateral along x_hat x e.
     """
@@ -94,16 +117,24 @@ def fill_directions(pairs: Pairs, i: int, ny: float, nz: float, pull: Floats, pu
 
 
 @jit
-def fill_matrix(pairs: Pairs, work: Workspace) -> None:
-    """Change of each gap for a unit force in each pair over a step, G_N Mt^-1 G_NT^T of Eq. 24, m/N."""
+def fill_drag(pairs: Pairs, i: int, ny: float, nz: float, drag: Floats) -> None:
+    """Direction `drag` (5,) of a unit friction of pair i: -t on the rotor, +t on the tip."""
+    ey, ez = pairs.axis_y[i], pairs.axis_z[i]
+    drag[V], drag[W], drag[TORSION] = nz, -ny, -pairs.radius[i]
+    drag[AXIAL], drag[LATERAL] = -nz * ey + ny * ez, nz * ez + ny * ey
+
+
+@jit
+def fill_matrix(pairs: Pairs, rows: Floats, columns: Floats, matrix: Floats) -> None:
+    """Motion along `rows` (q, 5) for unit forces along `columns` over a step, `rows Mt^-1 columns^T`, m/N."""
     q = pairs.radius.size
     for i in range(q):
         for j in range(q):
             total = 0.0
             for a in range(N_DEGREE):
                 for b in range(N_DEGREE):
-                    total += work.push[i, a] * pairs.compliance[i, a, j, b] * work.pull[j, b]
-            work.matrix[i, j] = total
+                    total += rows[i, a] * pairs.compliance[i, a, j, b] * columns[j, b]
+            matrix[i, j] = total
 
 
 @jit
@@ -116,6 +147,16 @@ def fill_moved(pairs: Pairs, work: Workspace, i: int) -> None:
                 for b in range(N_DEGREE):
                     total += pairs.compliance[i, a, j, b] * work.pull[j, b] * work.force[j]
         work.moved[a] = total
+
+
+@jit_inline
+def fill_start(row: Ints, displacement: Floats, velocity: Floats, now: Floats, rate: Floats) -> None:
+    """Degrees `now` and their `rate` (q, 5) at the beginning of a step, from those of the system (n_dof,)."""
+    for i in range(row.shape[0]):
+        for a in range(N_DEGREE):
+            k = row[i, a]
+            now[i, a] = displacement[k] if k >= 0 else 0.0
+            rate[i, a] = velocity[k] if k >= 0 else 0.0
 
 
 @jit_inline
@@ -150,44 +191,3 @@ def pair_normal_and_gap(pairs: Pairs, i: int, at: Floats) -> tuple[float, float,
     return normal_and_gap(
         pairs.axis_y[i], pairs.axis_z[i], pairs.radius[i], pairs.clearance[i], pairs.is_updated, at
     )
-
-
-@jit
-def solve_contact(pairs: Pairs, work: Workspace) -> int:
-    """Contact forces that leave no pair penetrating; returns the pairs in contact, or UNSOLVED.
-
-    Called once `is_any_closed` has filled the workspace. With the fixed normal the gap is linear and one
-    complementarity problem solves it; the updated normal is taken at the free update, and the gap's
-    curvature by Newton's method on |AB| - r_d, so that the gap closes to rounding.
-    """
-    q = pairs.radius.size
-    for i in range(q):
-        work.force[i] = 0.0
-        work.active[i] = work.gap[i] < 0.0
-    if pairs.is_updated:
-        for i in range(q):
-            ny, nz, _ = pair_normal_and_gap(pairs, i, work.at[i])
-            fill_directions(pairs, i, ny, nz, work.pull[i], work.push[i])
-        fill_matrix(pairs, work)
-    for _ in range(N_NEWTON):
-        pivots = solve_complementarity(
-            work.matrix, work.gap, GAP_TOLERANCE, work.force, work.active, work.elimination
-        )
-        if pivots == UNSOLVED:
-            return UNSOLVED
-        error = 0.0
-        if pairs.is_updated:
-            for i in range(q):
-                fill_moved(pairs, work, i)
-                _, _, gap = pair_normal_and_gap(pairs, i, work.moved)
-                linear = gap
-                for j in range(q):
-                    linear -= work.matrix[i, j] * work.force[j]
-                work.gap[i] = linear
-                error = max(error, abs(gap) if work.active[i] else -gap)
-        if error <= 10 * GAP_TOLERANCE:
-            n_touching = 0
-            for i in range(q):
-                n_touching += 1 if work.force[i] > 0.0 else 0
-            return n_touching
-    return UNSOLVED

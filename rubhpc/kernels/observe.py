@@ -121,7 +121,7 @@ def observe_contact(
         opening = ny * (tip_v - rate_v) + nz * (tip_w - rate_w)
         sense = 1.0 if spin >= 0.0 else -1.0
         slip = sense * (pairs.radius[i] * (spin + rate_twist) - nz * (rate_v - tip_v) + ny * (rate_w - tip_w))
-        friction_force = abs(pairs.friction[i]) * force
+        friction_force = sense * work.traction[i]
         if not tally.is_touching[i]:
             tally.n_contact[i] += 1
             tally.is_touching[i] = True

@@ -1,9 +1,10 @@
-"""The modal integrator where the contact normal turns: closed-form motion between short contact steps.
+"""The modal integrator in steps: closed-form motion between short contact steps, for every law and normal.
 
-With the updated normal the gap is no linear function of the motion, so that closed contacts have no modes.
-The contact force of a step acts as a kick at its beginning, as in the central difference, and the motion
-drifts freely (exactly, in the modes of the open system) to its end, where the gap must not be negative. Far
-from contact, bounded long steps are taken: the gap along the stator's axis is never the larger one.
+With the updated normal the gap is no linear function of the motion, and with set-valued friction or a penalty
+a contact has more states than open and closed: closed contacts have no modes. The contact force of a step
+acts as a kick at its beginning, as in the central difference, and the motion drifts freely (exactly, in the
+modes of the open system) to its end, where the laws of contact hold. Far from contact, bounded long steps are
+taken: the gap along the stator's axis is never the larger one.
 """
 
 from __future__ import annotations
@@ -13,9 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels._jit import jit_sum
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact import N_DEGREE, Pairs, Workspace, is_any_closed, solve_contact
+from rubhpc.kernels.contact import N_DEGREE, Pairs, Workspace, fill_start, is_any_closed
+from rubhpc.kernels.contact_step import is_plain, solve_contact
 from rubhpc.kernels.observe import (
     DAMPING_LOSS,
     TWIST_ACCELERATION,
@@ -33,6 +35,7 @@ from rubhpc.kernels.phases import (
     TIME,
     Clock,
     Phases,
+    Reduced,
     dot,
     floor_log2,
     propagate,
@@ -50,39 +53,44 @@ class Kicks(NamedTuple):
     level: int  # steps in contact last 2^level ticks
     degree_re: Floats  # (5 q, m), displacement of each degree
     degree_im: Floats
+    rate_re: Floats  # (5 q, m), velocity of each degree
+    rate_im: Floats
     drifted_re: Floats  # (5 q, m), modal coordinates a contact step after a unit impulse on each degree
     drifted_im: Floats
+    shifted_re: Floats  # (5 q, m), those of the displacement that a unit impulse makes in a second
+    shifted_im: Floats
     twist_answer: Floats  # (5 q,), torsional acceleration of the output node for a unit force
-    loss: Floats  # (5 q, 2 m), growth of `Phases.loss` with a unit impulse, for unit coordinates
-    loss_of_pair: Floats  # (5 q, 5 q), and with two of them, whatever the coordinates
-    work: Floats  # (5 q, 2), growth of the form of the unbalance's work, times cosine and sine
 
 
-@jit_inline_sum
-def take_off_kick(
-    kicks: Kicks, impulses: Floats, z_re: Floats, z_im: Floats, turning: int, energy: Floats
+@jit_sum
+def book_step(
+    reduced: Reduced, step: float, angle: float, x: Floats, x_after: Floats, energy: Floats
 ) -> None:
-    """Take from the sums of energy what the forms of `sampling` grow by a kick's impulses (5 q,), N s.
+    """Add what damping took and the unbalance gave in a step of contact (s), at its mean velocity.
 
-    `z` are the coordinates before it, and `turning` the place of exp(i angle) among them.
+    `x` and `x_after` (n,) are the reduced displacements at its ends, `angle` is that of the shaft amid it. A
+    kick sets off a burst of the fastest modes, which force spread over the step would not: the mean leaves it
+    out.
     """
-    for b in range(impulses.size):
-        if impulses[b] == 0.0:
-            continue
-        growth = 0.0
-        for k in range(z_re.size):
-            growth += kicks.loss[b, k] * z_re[k] + kicks.loss[b, z_re.size + k] * z_im[k]
-        for a in range(impulses.size):
-            growth += kicks.loss_of_pair[b, a] * impulses[a]
-        energy[DAMPING_LOSS] -= impulses[b] * growth
-        energy[UNBALANCE_WORK] -= impulses[b] * (
-            kicks.work[b, 0] * z_re[turning] + kicks.work[b, 1] * z_im[turning]
-        )
+    n = x.size
+    loss, gain = 0.0, 0.0
+    for k in range(n):
+        drawn = 0.0
+        for j in range(n):
+            drawn += reduced.damping[k, j] * (x_after[j] - x[j]) / step
+            skew = 0.5 * (reduced.stiffness[k, j] - reduced.stiffness[j, k])
+            drawn += skew * 0.5 * (x_after[j] + x[j])
+        loss += (x_after[k] - x[k]) * drawn
+        force = reduced.force_cosine[k] * np.cos(angle) + reduced.force_sine[k] * np.sin(angle)
+        gain += (x_after[k] - x[k]) * force
+    energy[DAMPING_LOSS] += loss
+    energy[UNBALANCE_WORK] += gain
 
 
 @jit_sum
 def advance_stepped(
     phases: Phases,
+    reduced: Reduced,
     clock: Clock,
     kicks: Kicks,
     pairs: Pairs,
@@ -93,30 +101,35 @@ def advance_stepped(
     progress: Ints,
     z: Floats,
     z_next: Floats,
+    ends: Floats,
     recorder: Recorder,
     samples: Samples,
     tally: Tally,
 ) -> int:
     """Advance a case from `first_tick` to `last_tick`, as `modal.advance` does with the fixed normal.
 
-    `phases` holds the open phase alone; `pairs.row` numbers the 5 q degrees of `kicks`.
+    `phases` holds the open phase alone; `pairs.row` numbers the 5 q degrees of `kicks`. `ends` (2, 5 q) keeps
+    the degrees at the beginning and the end of the step before, where that was as short; else NaN.
     """
     q = pairs.radius.size
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
     switch_re, switch_im = phases.switch_re, phases.switch_im
-    rate_re, rate_im, bound = phases.rate_re, phases.rate_im, phases.bound
+    gap_rate_re, gap_rate_im, bound = phases.rate_re, phases.rate_im, phases.bound
     power_re, power_im = phases.power_re, phases.power_im
-    degree_re, degree_im = kicks.degree_re, kicks.degree_im
+    degree_re, degree_im, rate_re, rate_im = kicks.degree_re, kicks.degree_im, kicks.rate_re, kicks.rate_im
+    motion_re, motion_im = phases.motion_re, phases.motion_im
     n_degree = q * N_DEGREE
-    position, rate, impulses = np.zeros(n_degree), np.zeros(n_degree), np.zeros(n_degree)
+    before, now, after, rate = ends[0], ends[1], np.zeros(n_degree), np.zeros(n_degree)
+    x, x_after = np.zeros(reduced.push.shape[1]), np.zeros(reduced.push.shape[1])
     step = clock.tick * (1 << kicks.level)
     interval = clock.tick * (1 << clock.sample_level)
     end_tick = clock.n_sample << clock.sample_level
     highest_level = phases.power_re.shape[1] - 1
+    per_revolution = clock.samples_per_revolution << clock.sample_level
+    is_direct, is_springy = is_plain(pairs.law), pairs.law.stiffness > 0.0
+    is_followed = is_recorded or not is_direct  # the steps before and after a force are looked at
     t = first_tick
     was_touching = bool(np.any(work.force > 0.0))
-    if is_recorded and progress[SPAN] < 0:
-        begin_span(phases, 0, t, z, progress, recorder)
     while True:
         is_sample = is_recorded and t == progress[NEXT_SAMPLE] << clock.sample_level
         is_end = t >= last_tick
@@ -133,16 +146,15 @@ def advance_stepped(
         if is_recorded:
             limit = min(limit, ((t >> clock.sample_level) + 1) << clock.sample_level)
         level = min(highest_level, floor_log2(limit - t))
-        proved = proved_time(switch_re, switch_im, rate_re, rate_im, bound, 0, z_re, z_im)
+        proved = proved_time(switch_re, switch_im, gap_rate_re, gap_rate_im, bound, 0, z_re, z_im)
         while level > kicks.level and (1 << level) * clock.tick > proved:
             level -= 1
         progress[N_STEP] += 1
         propagate(power_re[0, level], power_im[0, level], z_re, z_im, next_re, next_im)
-        is_touching = False
-        twist_acceleration = 0.0
-        if level <= kicks.level:
+        is_near, is_touching = level <= kicks.level, False
+        if is_near:
             for a in range(n_degree):
-                position[a] = dot(degree_re[a], degree_im[a], next_re, next_im)
+                after[a] = dot(degree_re[a], degree_im[a], next_re, next_im)
             is_touching = is_any_closed(
                 pairs.row,
                 pairs.axis_y,
@@ -150,42 +162,65 @@ def advance_stepped(
                 pairs.radius,
                 pairs.clearance,
                 pairs.is_updated,
-                position,
+                after,
                 work.at,
                 work.gap,
             )
-        if is_touching:
-            if solve_contact(pairs, work) == UNSOLVED:
+            if is_followed and np.isnan(before[0]):
+                for a in range(n_degree):
+                    now[a] = dot(degree_re[a], degree_im[a], z_re, z_im)
+                    before[a] = now[a] - step * dot(rate_re[a], rate_im[a], z_re, z_im)
+        if is_touching or (is_near and is_springy and was_touching):
+            if not is_direct:
+                for a in range(n_degree):
+                    rate[a] = (now[a] - before[a]) / step
+                fill_start(pairs.row, now, rate, work.now, work.rate)
+            n_touching = solve_contact(pairs, work, step, clock.spin)
+            if n_touching == UNSOLVED:
                 progress[TIME] = t
                 return CONTACT_UNSOLVED
+            is_touching = n_touching > 0
             for i in range(q):
                 for d in range(N_DEGREE):
                     b = i * N_DEGREE + d
                     impulse = step * work.force[i] * work.pull[i, d]
-                    impulses[b] = impulse
                     if impulse != 0.0:
+                        late = impulse * work.delay[i]  # what it has moved before its impact was due
                         if is_sample:
-                            twist_acceleration += kicks.twist_answer[b] * impulse / step
+                            samples.rotor[TWIST_ACCELERATION, t >> clock.sample_level] += (
+                                kicks.twist_answer[b] * impulse / step
+                            )
                         for k in range(z_re.size):
-                            next_re[k] += kicks.drifted_re[b, k] * impulse
-                            next_im[k] += kicks.drifted_im[b, k] * impulse
+                            next_re[k] += kicks.drifted_re[b, k] * impulse - kicks.shifted_re[b, k] * late
+                            next_im[k] += kicks.drifted_im[b, k] * impulse - kicks.shifted_im[b, k] * late
+            if is_followed:
+                for a in range(n_degree):
+                    after[a] = dot(degree_re[a], degree_im[a], next_re, next_im)
         elif was_touching:
             work.force[:] = 0.0
-        if is_sample:
-            samples.rotor[TWIST_ACCELERATION, t >> clock.sample_level] += twist_acceleration
+            work.traction[:] = 0.0
+            work.is_sticking[:] = False
         if is_recorded and is_touching:
-            take_off_kick(kicks, impulses, z_re, z_im, phases.n_mode[0], tally.energy)
+            if progress[SPAN] >= 0:
+                end_span(phases, 0, clock, t, z, progress, recorder, tally)
+            for k in range(x.size):
+                x[k] = dot(motion_re[0, k], motion_im[0, k], z_re, z_im)
+                x_after[k] = dot(motion_re[0, k], motion_im[0, k], next_re, next_im)
+            angle = clock.spin * clock.tick * (t % per_revolution) + 0.5 * clock.spin * step
+            book_step(reduced, step, angle, x, x_after, tally.energy)
+        elif is_recorded and progress[SPAN] < 0:
+            begin_span(phases, 0, t, z, progress, recorder)
         if is_recorded and (is_touching or was_touching):
-            # The force works on the mean velocity of the step; a kick's own burst dies out within it.
             for a in range(n_degree):
-                rate[a] = (
-                    dot(degree_re[a], degree_im[a], next_re, next_im)
-                    - dot(degree_re[a], degree_im[a], z_re, z_im)
-                ) / step
+                rate[a] = 0.5 * (after[a] - before[a]) / step
             observe_contact(pairs, work, clock.spin, step, rate, rate, tally)
             for i in range(q):
                 samples.force[i, t >> clock.sample_level] += work.force[i] * step / interval
         was_touching = is_touching
+        for a in range(n_degree):
+            before[a], now[a] = now[a], after[a]
+        if not (is_near and is_followed):
+            before[0] = np.nan
         for k in range(z_re.size):
             z_re[k], z_im[k] = next_re[k], next_im[k]
         t += 1 << level

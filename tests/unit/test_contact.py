@@ -13,6 +13,7 @@ from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact import (
     AXIAL,
     LATERAL,
+    MULTIPLIER,
     N_DEGREE,
     TORSION,
     Pairs,
@@ -22,10 +23,11 @@ from rubhpc.kernels.contact import (
     force_on_disc,
     is_any_closed,
     normal_and_gap,
-    solve_contact,
 )
+from rubhpc.kernels.contact_step import solve_contact
 
 RADIUS, CLEARANCE = 0.06, 1e-4
+STEP, SPIN = 1e-6, 150.0  # s, rad/s
 angles = st.floats(0.0, 2 * math.pi)
 displacements = st.lists(st.floats(-5e-3, 5e-3), min_size=N_DEGREE, max_size=N_DEGREE).map(np.array)
 
@@ -45,6 +47,7 @@ def make_pairs(angle, friction=0.3, *, is_updated=False, compliance=None):
         friction=np.full(q, friction),
         compliance=np.zeros((q, N_DEGREE, q, N_DEGREE)) if compliance is None else compliance,
         is_updated=is_updated,
+        law=MULTIPLIER,
     )
 
 
@@ -112,7 +115,7 @@ def test_pair_of_forces_is_in_balance(angle, whirl, friction):
 def test_held_degrees_stand_still():
     pairs = make_pairs(0.4)
     pairs.row[0, LATERAL] = pairs.row[0, W] = -1
-    work = workspace(pairs)
+    work = workspace(pairs, STEP)
     displacement = np.full(N_DEGREE, 2e-4)
     is_closed = is_any_closed(
         pairs.row,
@@ -133,7 +136,7 @@ def test_held_degrees_stand_still():
 
 def closed(pairs, displacement):
     """The workspace when the free update leads to `displacement` (5 q,)."""
-    work = workspace(pairs)
+    work = workspace(pairs, STEP)
     is_closed = is_any_closed(
         pairs.row,
         pairs.axis_y,
@@ -167,7 +170,7 @@ def test_forces_close_the_gaps_of_those_that_touch(seed, is_updated):
     work, is_closed = closed(pairs, at)
     assert is_closed
     free = at.reshape(q, 5)
-    n_touching = solve_contact(pairs, work)
+    n_touching = solve_contact(pairs, work, STEP, SPIN)
     assert n_touching == np.count_nonzero(work.force)
     assert n_touching > 0
     assert work.force.min() >= 0.0
@@ -192,7 +195,7 @@ def test_curved_gap_is_closed_as_by_a_general_solver(seed):
     at[:, AXIAL] -= 4e-4
     at[:, LATERAL] = [2e-3, -1e-3]
     work, _ = closed(pairs, at.ravel())
-    assert solve_contact(pairs, work) == 2
+    assert solve_contact(pairs, work, STEP, SPIN) == 2
     axis = pairs.axis_y + 1j * pairs.axis_z
     normals = np.array([line_of_centres(axis[i], at[i]) for i in range(2)])
     normals /= abs(normals)
@@ -214,4 +217,4 @@ def test_pair_that_no_force_can_part_is_reported():
     pairs = make_pairs(0.0)  # nothing yields: compliance zero
     work, is_closed = closed(pairs, np.array([5e-4, 0.0, 0.0, 0.0, 0.0]))
     assert is_closed
-    assert solve_contact(pairs, work) == UNSOLVED
+    assert solve_contact(pairs, work, STEP, SPIN) == UNSOLVED

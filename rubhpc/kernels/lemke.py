@@ -1,0 +1,82 @@
+"""Linear complementarity without a P-matrix, by Lemke's method: what set-valued friction needs.
+
+Find `z >= 0` with `w = A z + b >= 0` and one of the two zero in every row. Pivots run through a tableau
+`w - A z - z0 = b` whose artificial column z0 makes every row feasible at first; the method ends when z0
+leaves the basis (Cottle, Pang, Stone, The Linear Complementarity Problem, SIAM 2009, Algorithm 4.4.5).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit
+from rubhpc.kernels.complementarity import UNSOLVED
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+PIVOT = 1e-13  # relative to the entries of the tableau, which are of order one: less counts as zero
+TIE = 1e-12
+PIVOTS_A_ROW = 20
+
+
+@jit
+def exchange(tableau: Floats, basis: Ints, row: int, column: int) -> int:
+    """Take the variable of `column` into the basis at `row`; returns the one that leaves."""
+    n, width = tableau.shape
+    pivot = tableau[row, column]
+    for k in range(width):
+        tableau[row, k] /= pivot
+    for i in range(n):
+        factor = tableau[i, column]
+        if i != row and factor != 0.0:
+            for k in range(width):
+                tableau[i, k] -= factor * tableau[row, k]
+    leaving = basis[row]
+    basis[row] = column
+    return int(leaving)
+
+
+@jit
+def solve_lemke(tableau: Floats, basis: Ints) -> int:
+    """Pivots taken until the problem of a tableau is solved, or UNSOLVED.
+
+    Parameters
+    ----------
+    tableau : (n, 2 n + 2)
+        Columns of w (the identity), of z (-A), of z0 (-1), and b. On return the last column holds the values
+        of the basic variables.
+    basis : (n,)
+        Filled with the basic variable of each row: k for w_k, n + k for z_k. All others are zero.
+    """
+    n = basis.size
+    z0, last = 2 * n, 2 * n + 1
+    row = 0
+    for i in range(n):
+        basis[i] = i
+        if tableau[i, last] < tableau[row, last]:
+            row = i
+    if not tableau[row, last] < 0.0:
+        return 0
+    leaving = exchange(tableau, basis, row, z0)
+    for n_pivot in range(1, PIVOTS_A_ROW * n):
+        entering = leaving + n if leaving < n else leaving - n
+        row, finish = -1, -1
+        least = np.inf
+        for i in range(n):
+            if tableau[i, entering] > PIVOT:
+                ratio = tableau[i, last] / tableau[i, entering]
+                if ratio < least:
+                    row, least = i, ratio
+                if basis[i] == z0:
+                    finish = i
+        if row < 0:
+            return UNSOLVED
+        # Of rows that are equal but for rounding that of z0 leaves: then all is done.
+        if finish >= 0 and tableau[finish, last] <= least * (1.0 + TIE) * tableau[finish, entering]:
+            row = finish
+        leaving = exchange(tableau, basis, row, entering)
+        if leaving == z0:
+            return n_pivot
+    return UNSOLVED

@@ -1,0 +1,62 @@
+"""Bodies of a few degrees against walls, belts and springs: central differences without a rig."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rubhpc.fem.model import Body, Model, StatorModel
+from rubhpc.integrate.packing import law_of, pack
+from rubhpc.integrate.prepare import CentralDifferenceSetup
+
+
+def body(mass, stiffness, degrees, damping=0.0):
+    """Body of the given matrices; a damping factor is that of the mass."""
+    mass, stiffness = np.atleast_2d(mass).astype(float), np.atleast_2d(stiffness).astype(float)
+    return Body(
+        mass=mass,
+        damping=damping * mass,
+        gyroscopic=np.zeros_like(mass),
+        stiffness=stiffness,
+        degrees=degrees,
+    )
+
+
+def tip(stator_body, angle, *, radius=1.0, axial=0, lateral=-1):
+    """A stator of any body, at an angle (rad) around node 1 of the other; rows of -1 are held."""
+    return StatorModel(
+        body=stator_body,
+        node=1,
+        angle=angle,
+        radius=radius,
+        clearance_offset=0.0,
+        length=1.0,
+        euler_load=math.inf,
+        axial=axial,
+        lateral=lateral,
+    )
+
+
+def set_up(rotor, stators, spin, per_revolution, contact, *, force=None, steps_per_sample=1):
+    """Central difference of a body and its stators; `force` (n_dof,), N, goes with the cosine of spin t."""
+    none = np.zeros(rotor.n_dof)
+    model = Model(
+        rotor=rotor,
+        unbalance_cosine=none if force is None else np.asarray(force) / spin**2,
+        unbalance_sine=none,
+        stators=tuple(stators),
+        output_node=1,
+    )
+    step = 2 * math.pi / (abs(spin) * per_revolution * steps_per_sample)
+    return CentralDifferenceSetup(
+        model=model,
+        packed=pack(model, spin, step),
+        spin=spin,
+        step=step,
+        steps_per_sample=steps_per_sample,
+        samples_per_revolution=per_revolution,
+        is_updated=contact.normal == "updated",
+        displacement_limit=math.inf,
+        law=law_of(contact),
+    )

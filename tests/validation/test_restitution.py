@@ -1,0 +1,96 @@
+"""Impacts with a coefficient of restitution: known answers of oscillators that meet walls and each other."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lone_bodies import body, set_up, tip
+
+from rubhpc import State
+from rubhpc.integrate.case import run_case
+from rubhpc.study import Contact, Recording
+
+WALL = body(1e12, 0.0, ((1, "axial"),))
+
+
+# Frequency, wall, restitution, and the speed of the one impact a period: I2, in closed form.
+SHAW_HOLMES = [(2.2, 0.7, 1.860859), (2.4, 0.8, 0.858441), (2.0, 0.6, 3.333333)]
+
+
+@pytest.mark.parametrize(("frequency", "restitution", "speed"), SHAW_HOLMES)
+def test_driven_oscillator_meets_its_wall_once_a_period(frequency, restitution, speed):
+    """x'' + x = cos w t, wall in the middle: S. W. Shaw and P. Holmes, J. Sound Vib. 90 (1983) 129-155."""
+    contact = Contact(restitution=restitution)
+    oscillator = body(1.0, 1.0, ((1, "v"),))
+    setup = set_up(oscillator, [tip(WALL, 0.0)], frequency, 256, contact, force=[1.0], steps_per_sample=20)
+    record = run_case(
+        setup,
+        clearance=0.0,
+        friction=0.0,
+        recording=Recording(transient=150, revolutions=10, samples_per_revolution=256),
+    )
+    assert record.period == 1
+    assert record.contacts_per_revolution[0] == 1
+    assert record.contact_impulse[0] / (1 + restitution) == pytest.approx(speed, rel=1e-5)
+    assert record.energy_residual < 1e-5
+
+
+def released(restitution, per_revolution, *, mass=1.0, other=1e12, clearance=1.0, turns=1, at=0.0):
+    """Record of a mass on a spring of as many N/m as it has kg, let go at -3 m/s above a body on none."""
+    contact = Contact(restitution=restitution)
+    ball = body(mass, mass, ((1, "v"),))
+    setup = set_up(ball, [tip(body(other, 0.0, ((1, "axial"),)), math.pi)], 0.5, per_revolution, contact)
+    start = replace(
+        State.at_rest(setup.model), rotor_displacement=np.array([at]), rotor_velocity=np.array([-3.0])
+    )
+    recording = Recording(transient=0, revolutions=turns, samples_per_revolution=per_revolution)
+    return run_case(setup, clearance=clearance, friction=0.0, recording=recording, initial=start)
+
+
+def test_each_bounce_keeps_its_share_of_the_energy():
+    """Three bounces in 4 pi s: the wall, 1 m below, is met at sqrt 8 m/s and then 0.7 times the last."""
+    errors = []
+    for per_revolution in (2000, 4000):
+        record = released(0.7, per_revolution)
+        first = math.sqrt(8.0)
+        assert record.contacts_per_revolution[0] == 3
+        assert record.contact_impulse[0] == pytest.approx(1.7 * first * (1 + 0.7 + 0.49), rel=1e-4)
+        energy = record.final.rotor_velocity[0] ** 2 + record.final.rotor_displacement[0] ** 2
+        errors.append(abs(energy - (1 + 8 * 0.7**6)))
+    assert errors[0] < 2e-4
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_full_restitution_returns_all():
+    record = released(1.0, 4000, turns=5)
+    energy = record.final.rotor_velocity[0] ** 2 + record.final.rotor_displacement[0] ** 2
+    assert record.contacts_per_revolution[0] > 1
+    assert energy == pytest.approx(9.0, rel=1e-4)
+
+
+@pytest.mark.parametrize("restitution", [0.3, 0.9])
+def test_two_bodies_share_momentum(restitution):
+    """Newton's cradle of two: 2 kg meet 0.5 kg."""
+    record = released(restitution, 4000, mass=2.0, other=0.5)
+    arrives = math.sqrt(8.0)
+    common = 2.0 * arrives / 2.5
+    leaves = common + restitution * arrives * 2.0 / 2.5
+    assert record.contacts_per_revolution[0] == 1
+    assert record.final.stator_velocity[0][0] == pytest.approx(leaves, rel=1e-6)
+    assert record.contact_impulse[0] == pytest.approx(0.5 * leaves, rel=1e-6)
+
+
+def test_no_restitution_is_the_multiplier():
+    plain, zero = released(None, 1000), released(0.0, 1000)
+    assert np.array_equal(plain.vertical, zero.vertical)
+    assert np.array_equal(plain.contact_force, zero.contact_force)
+
+
+def test_bounces_die_out_into_contact():
+    """A mass on a spring that presses it onto a wall: after the last flight it rests there."""
+    record = released(0.5, 4000, clearance=-0.5, turns=3, at=0.6)
+    at_rest = record.vertical[-4000:]
+    assert record.contacts_per_revolution[0] > 1
+    assert at_rest == pytest.approx(np.full(4000, 0.5), abs=1e-6)
+    assert record.contact_force[0, -4000:] == pytest.approx(np.full(4000, 0.5), rel=1e-3)
