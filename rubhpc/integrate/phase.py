@@ -111,8 +111,9 @@ def _modes(system: Floats) -> tuple[Complexes, Complexes, Complexes]:
     """
     n_state = len(system)
     _, part = connected_components(csr_array(system != 0.0), directed=False)
-    exponents, shapes, inverses = [], [], []
-    for number in range(part.max() + 1):
+    exponents: list[Complexes] = [np.zeros(0, dtype=np.complex128)]  # a mass on a rigid wall has no modes
+    shapes, inverses = [np.zeros((n_state, 0))], [np.zeros((0, n_state))]
+    for number in np.unique(part):
         rows = np.flatnonzero(part == number)
         exponent, shape = np.linalg.eig(system[np.ix_(rows, rows)])
         if np.linalg.cond(shape) > WORST_CONDITION:
