@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from rubhpc.integrate.central import CentralDifferenceMarch
 from rubhpc.integrate.gather import (
+    by_name,
     diverged_record,
     empty_samples,
     empty_tally,
-    named_signals,
     scalars_of,
 )
 from rubhpc.integrate.measures import amplitude_spectrum
@@ -26,9 +26,15 @@ from rubhpc.schema import DONE, SECTION_NAMES
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from rubhpc.integrate.march import March
     from rubhpc.integrate.prepare import Setup
+    from rubhpc.kernels.observe import Samples
     from rubhpc.study import Recording
+
+    Floats = NDArray[np.float64]
 
 
 def run_case(
@@ -104,14 +110,12 @@ def _integrate(march: March, setup: Setup, clearance: float, recording: Recordin
             f"{reason} in revolution {revolution}", n_stator, recording, settings, march.final()
         )
     else:
-        signals = named_signals(samples)
+        signals = by_name(samples.whole)
         record = Record(
             status=DONE,
             samples_per_revolution=per_revolution,
             signals=signals,
-            spectra={f"spectrum_{name}": amplitude_spectrum(signal) for name, signal in signals.items()}
-            if "spectrum" in recording.keep
-            else {},
+            spectra=_spectra(samples) if "spectrum" in recording.keep else {},
             sections={f"section_{name}": signals[name][::per_revolution].copy() for name in SECTION_NAMES}
             if "section" in recording.keep
             else {},
@@ -129,6 +133,12 @@ def _integrate(march: March, setup: Setup, clearance: float, recording: Recordin
         if "waveform" not in recording.keep:
             record.signals.clear()
     return record
+
+
+def _spectra(samples: Samples) -> dict[str, Floats]:
+    """Spectra of all signals, by their names in the schema."""
+    spectra = by_name(amplitude_spectrum(samples.whole))
+    return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items()}
 
 
 def _march(

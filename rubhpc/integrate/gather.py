@@ -33,13 +33,10 @@ if TYPE_CHECKING:
 
 
 def empty_samples(n_stator: int, n_sample: int) -> Samples:
-    """Room for the samples of a record."""
-    return Samples(
-        rotor=np.zeros((4, n_sample)),
-        axial=np.zeros((n_stator, n_sample)),
-        lateral=np.zeros((n_stator, n_sample)),
-        force=np.zeros((n_stator, n_sample)),
-    )
+    """Room for the samples of a record: one array, so that their spectra are taken together."""
+    whole = np.zeros((4 + 3 * n_stator, n_sample))
+    rotor, axial, lateral, force = np.split(whole, [4, 4 + n_stator, 4 + 2 * n_stator])
+    return Samples(rotor=rotor, axial=axial, lateral=lateral, force=force, whole=whole)
 
 
 def empty_tally(n_stator: int) -> Tally:
@@ -60,16 +57,18 @@ def empty_tally(n_stator: int) -> Tally:
     )
 
 
-def named_signals(samples: Samples) -> dict[str, Floats]:
-    """Samples by their names in the schema, (n_sample,) or (n_stator, n_sample)."""
+def by_name(whole: Floats) -> dict[str, Floats]:
+    """Rows of `Samples.whole`, or their spectra, by their names in the schema: (n,) or (n_stator, n)."""
+    n_stator = (len(whole) - 4) // 3
+    axial, lateral, force = whole[4:].reshape(3, n_stator, -1)
     return {
-        "vertical": samples.rotor[VERTICAL],
-        "horizontal": samples.rotor[HORIZONTAL],
-        "torsion": samples.rotor[TWIST],
-        "torsion_acceleration": samples.rotor[TWIST_ACCELERATION],
-        "stator_axial": samples.axial,
-        "stator_lateral": samples.lateral,
-        "contact_force": samples.force,
+        "vertical": whole[VERTICAL],
+        "horizontal": whole[HORIZONTAL],
+        "torsion": whole[TWIST],
+        "torsion_acceleration": whole[TWIST_ACCELERATION],
+        "stator_axial": axial,
+        "stator_lateral": lateral,
+        "contact_force": force,
     }
 
 

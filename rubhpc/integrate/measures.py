@@ -49,12 +49,15 @@ def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) ->
     ----------
     vertical, horizontal : (n_revolution * samples_per_revolution,), m
     """
-    orbit = (vertical + 1j * horizontal).reshape(-1, samples_per_revolution)
-    size = np.sqrt(np.mean(np.abs(orbit - orbit.mean()) ** 2))
-    n_revolution = orbit.shape[0]
+    size = float(np.var(vertical) + np.var(horizontal))
+    n_revolution = vertical.size // samples_per_revolution
     for n in range(1, min(LONGEST_PERIOD, n_revolution - 1) + 1):
-        distance = np.sqrt(np.mean(np.abs(orbit[n:] - orbit[:-n]) ** 2))
-        if distance <= PERIOD_TOLERANCE * size:
+        shift = n * samples_per_revolution
+        distance = 0.0
+        for signal in (vertical, horizontal):
+            change = signal[shift:] - signal[:-shift]
+            distance += float(change @ change) / change.size
+        if distance <= PERIOD_TOLERANCE**2 * size:
             return n
     return 0
 

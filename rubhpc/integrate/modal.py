@@ -10,7 +10,6 @@ import numpy as np
 from rubhpc.integrate.march import March
 from rubhpc.integrate.record import State
 from rubhpc.kernels import phases as kernel
-from rubhpc.kernels.contact import AXIAL, LATERAL, V, W
 from rubhpc.kernels.modal import advance
 from rubhpc.kernels.phases import enter, find_phase
 from rubhpc.kernels.sampling import recorder
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
-FIRST_REVOLUTIONS = 8  # of the first kernel call
+FIRST_REVOLUTIONS = 32  # of the first kernel call
 
 
 class EndlessEvents(Exception):  # noqa: N818 - a state of the motion, never seen by users
@@ -153,13 +152,9 @@ class ModalMarch(March):
 
     def _has_diverged(self, tally: Tally) -> bool:
         """Whether the output node or a contact degree is, or at a sample was, beyond the limit."""
-        n, limit = self._bodies.stiffness.shape[0], self._setup.displacement_limit
-        displacement = self._current_motion()[:n]
-        reduced = self._setup.reduced
-        now = reduced.degree[:, [V, W, AXIAL, LATERAL]] @ displacement
-        sampled = (tally.highest[:2], -tally.lowest[:2], tally.peak_lateral)
-        reached = np.concatenate([np.abs(reduced.output[:2] @ displacement), np.abs(now).ravel(), *sampled])
-        return not np.all(reached <= limit)
+        seen = self._setup.reduced.translations @ self._current_motion()[: self._bodies.stiffness.shape[0]]
+        reached = np.concatenate([np.abs(seen), tally.highest[:2], -tally.lowest[:2], tally.peak_lateral])
+        return not np.all(reached <= self._setup.displacement_limit)
 
     def _find(self, mask: int) -> None:
         """See that the tables hold a set of contacts; coordinates are widened where it has more modes."""
@@ -179,7 +174,7 @@ class ModalMarch(March):
 
     def _reduce(self, state: State) -> Floats:
         """Reduced coordinates and velocities of a state."""
-        project = self._setup.reduced.basis.T @ self._setup.reduced.mass
+        project = self._setup.reduced.project
         displacement = np.concatenate([state.rotor_displacement, *state.stator_displacement])
         velocity = np.concatenate([state.rotor_velocity, *state.stator_velocity])
         return np.concatenate([project @ displacement, project @ velocity])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.packing import degrees_of, output_degrees, whole_system
-from rubhpc.kernels.contact import AXIAL, N_DEGREE, V, W
+from rubhpc.kernels.contact import AXIAL, LATERAL, N_DEGREE, V, W
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,7 +41,7 @@ class ReducedModel:
     basis : (n_all, n)
         Degrees of rotor, then stators, for unit coordinates.
     mass : (n_all, n_all)
-        Mass matrix of the full model: `basis.T @ mass` takes a motion to its coordinates.
+        Mass matrix of the full model.
     stiffness, damping : (n, n)
         K and D + spin G.
     force : (2, n)
@@ -59,6 +60,17 @@ class ReducedModel:
     force: Floats
     degree: Floats
     output: Floats
+
+    @cached_property
+    def translations(self) -> Floats:
+        """Lateral motion of the output node, then motion of rims and tips, (2 + 4 q, n)."""
+        pairs = self.degree[:, [V, W, AXIAL, LATERAL]].reshape(-1, self.degree.shape[2])
+        return np.concatenate([self.output[:2], pairs])
+
+    @cached_property
+    def project(self) -> Floats:
+        """`basis.T @ mass` (n, n_all), which takes a motion to its coordinates."""
+        return self.basis.T @ self.mass
 
 
 def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:

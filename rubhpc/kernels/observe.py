@@ -24,6 +24,7 @@ class Samples(NamedTuple):
     axial: Floats  # (q, n_sample), m
     lateral: Floats  # (q, n_sample), m
     force: Floats  # (q, n_sample), N
+    whole: Floats  # (4 + 3 q, n_sample), of which the others are rows, in this order
 
 
 class Tally(NamedTuple):
