@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.decay import decaying_sine
-from postproc.load import source
+from postproc.load import need_results, source
 from postproc.selection import narrow
 from postproc.spectra import check_signal, samples_per_revolution
 from rubhpc.errors import InputError
@@ -37,7 +37,9 @@ def signal_of(case: xr.Dataset, signal: str, stator: int | None = None) -> xr.Da
     check_signal(signal)
     if stator is not None and "stator" in case.dims:
         case = case.isel(stator=[_place(case, stator)])
-    return narrow(case, [signal])[signal].astype(float).load()
+    wave: xr.DataArray = narrow(case, [signal])[signal].astype(float).load()
+    need_results(wave.values, case)
+    return wave
 
 
 def touching(case: xr.Dataset, stator: int | None = None) -> xr.DataArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def panels(
     time = scale_for("s", float(hht["time"].values[-1]))
     x = hht["time"].values * time.factor
     upper.plot(x, hht["signal"].values * scale.factor, color="0.55", linewidth=0.7, label="recorded")
-    name = f"mode {mode}" + (", under its windows" if hht.attrs["contact"] == "masked" else "")
+    name = f"mode {mode}" + (", windowed" if hht.attrs["contact"] == "masked" else "")
     upper.plot(x, hht["imf"].sel(mode=mode).values * scale.factor, color="C0", label=name)
     label = scale.label(short_name(hht["signal"].rename(hht.attrs["signal"])))
     upper.set_ylabel(fill(label, _LABEL_WIDTH))
@@ -111,21 +111,12 @@ def _draw_energy(
     ax.set(xlim=(0, float(hht["time"].values[-1]) * time.factor), ylim=(0, limit))
     ax.set(xlabel=time.label("Time"), ylabel=fill("Instantaneous frequency (Hz)", _LABEL_WIDTH))
     for name, frequency in natural.items():
-        _mark(ax, name, float(frequency), limit)
+        if 0 < frequency < limit:
+            label = f"{name} {frequency:.4g} Hz"
+            ax.axhline(frequency, color="C1", linewidth=0.7, linestyle="--", zorder=1, label=label)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc="upper right", handlelength=2.2)
     return mesh
-
-
-def _mark(ax: Axes, name: str, frequency: float, limit: float) -> None:
-    if not 0 < frequency < limit:
-        return
-    ax.axhline(frequency, color="C1", linewidth=0.7, linestyle="--", zorder=1)
-    text: dict[str, Any] = {"xytext": (-2, 5), "ha": "right", "va": "bottom", "color": "C1", "zorder": 4}
-    text["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.85}
-    where = (1.0, frequency)
-    label = f"{name} {frequency:.4g} Hz"
-    ax.annotate(
-        label, where, xycoords=("axes fraction", "data"), textcoords="offset points", fontsize=6.5, **text
-    )
 
 
 def _shade(hht: xr.Dataset, ax: Axes, factor: float) -> None:

@@ -66,8 +66,7 @@ def narrow(store: xr.Dataset, names: Iterable[str], spread: Iterable[str] = ()) 
         example = f"--select {several[0]}={_written(store[several[0]], 0)!r}".replace("'", '"')
         raise InputError(f"{source(store)}: select one value of {which}, as in {example}")
     data = data.isel(dict.fromkeys(free, 0))
-    # The only stator there is need not be named in captions.
-    return data.drop_vars("stator", errors="ignore") if "stator" in free else data
+    return data.drop_vars(_of_stator(store), errors="ignore") if "stator" in free else data
 
 
 def first_of_rest(store: xr.Dataset, keep: Iterable[str], variable: str) -> tuple[xr.Dataset, list[str]]:
@@ -84,7 +83,13 @@ def first_of_rest(store: xr.Dataset, keep: Iterable[str], variable: str) -> tupl
         if store.sizes[d] > 1
     ]
     first = store.isel(dict.fromkeys(rest, 0))
-    return first.drop_vars([d for d in rest if d == "stator" and store.sizes[d] == 1]), notes
+    is_only = "stator" in rest and store.sizes["stator"] == 1
+    return first.drop_vars(_of_stator(store)) if is_only else first, notes
+
+
+def _of_stator(store: xr.Dataset) -> list[str]:
+    """Return the coordinates of stators: the only one there is, and its place, need not stand in captions."""
+    return [str(name) for name, values in store.coords.items() if "stator" in values.dims]
 
 
 def written_values(axis: xr.DataArray, around: float | None = None) -> str:

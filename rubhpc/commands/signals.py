@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import click
@@ -73,8 +74,8 @@ def hht(
     each = ", ".join(f"{f:.1f}" for f in span_frequencies(shown, mode).dropna("span").values)
     finish("hht", store, figure, data, shown, draw, n_panel=2, height=85)
     click.echo(f"median frequency out of contact {middle:.2f} Hz (span by span: {each})")
-    if shown.attrs["contact"] == "kept" and bool(shown["contact"].any()):
-        spread = {name: float(width) for name, width in contact_bandwidth(shown, mode).items()}
+    spread = {str(name): float(width) for name, width in contact_bandwidth(shown, mode).items()}
+    if math.isfinite(spread["contact"]):
         click.echo(
             f"interquartile spread {spread['contact']:.0f} Hz in contact, {spread['free']:.0f} Hz free"
         )

@@ -222,7 +222,7 @@ def test_figures_show_the_energy_at_its_frequency():
         mesh = ax.collections[0].get_array().filled(-np.inf)
         rows = np.flatnonzero(mesh.max(axis=1) == mesh.max())
         assert (rows + 0.5) * 300 / mesh.shape[0] == pytest.approx(128, abs=3)
-        assert [t.get_text() for t in ax.texts] == ["torsional 128 Hz"]
+        assert [t.get_text() for t in ax.get_legend().get_texts()] == ["torsional 128 Hz"]
         assert ax.get_ylim() == (0.0, 300.0)
         _, axes = new_figure(2)
         panels(hht, axes)
