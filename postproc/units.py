@@ -70,6 +70,7 @@ _SHORT = {
     "period": "Period (revolutions)",
     "regime": "Regime",
     "status": "Status",
+    "energy_residual": "Energy balance residual",
 }
 _SYMBOLS = {
     "speed_ratio": "r",

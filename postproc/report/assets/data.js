@@ -1,0 +1,110 @@
+"use strict";
+// What the page is told, and its data: in the page itself, or fetched from the server that gave it.
+const byId = (id) => document.getElementById(id);
+const told = JSON.parse(byId("told").textContent);
+const shape = told.axes.map((axis) => axis.values.length);
+const nCase = shape.reduce((product, n) => product * n, 1);
+const variable = Object.fromEntries(told.variables.map((v) => [v.name, v]));
+const FAILED = 2, DIVERGED = 3, MISSING = 0;
+
+function fromBase64(text) {
+  const raw = atob(text);
+  const bytes = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
+  return bytes;
+}
+
+async function inflate(bytes) {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Response(stream).arrayBuffer();
+}
+
+async function fetched(path) {
+  let answer;
+  try {
+    answer = await fetch(path);
+  } catch {
+    throw new Error("rubhpc view does not answer; start it again and reload the page");
+  }
+  if (!answer.ok) throw new Error((await answer.text()).trim());
+  return new Uint8Array(await answer.arrayBuffer());
+}
+
+const embedded = {};
+for (const id of ["values", "records"]) embedded[id] = JSON.parse(byId(id).textContent);
+
+function remembered(most, make) {
+  const known = new Map();
+  return (key) => {
+    if (!known.has(key)) {
+      if (known.size >= most) known.delete(known.keys().next().value);
+      const made = make(key);
+      made.catch(() => known.delete(key));
+      known.set(key, made);
+    }
+    return known.get(key);
+  };
+}
+
+// A measure of all cases, SI, in the order of the grid; the stators run fastest.
+const valuesOf = remembered(64, async (name) => {
+  const bytes = told.isServed ? await fetched("values/" + name) : fromBase64(embedded.values[name]);
+  const planes = new Uint8Array(await inflate(bytes));
+  const n = planes.length / 4;
+  const whole = new Uint8Array(planes.length);
+  for (let i = 0; i < n; i++) for (let k = 0; k < 4; k++) whole[4 * i + k] = planes[k * n + i];
+  return new Float32Array(whole.buffer);
+});
+
+// Waveforms, spectra and sections of one case in display units; null where the page has none.
+const recordOf = remembered(200, async (flat) => {
+  if (!told.kept.length) return null;
+  const text = embedded.records[flat];
+  if (!told.isServed && text === undefined) return null;
+  const buffer = await inflate(told.isServed ? await fetched("record/" + flat) : fromBase64(text));
+  const length = new DataView(buffer).getUint32(0, true);
+  const record = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  let at = 4 + length;
+  for (const entry of [...record.waves, ...record.spectra, ...record.section]) {
+    const codes = new Uint16Array(buffer, at, entry.n);
+    at += 2 * entry.n;
+    entry.values = Array.from(codes, entry.top === undefined
+      ? (q) => entry.low + q * entry.step
+      : (q) => (q ? entry.top * 10 ** (5 * (q / 65535 - 1)) : 0));
+  }
+  return record;
+});
+
+const flatOf = (at) => at.reduce((flat, i, k) => flat * shape[k] + i, 0);
+
+function placeOf(flat) {
+  const at = [];
+  for (let k = shape.length - 1; k >= 0; k--) {
+    at[k] = flat % shape[k];
+    flat = Math.floor(flat / shape[k]);
+  }
+  return at;
+}
+
+function written(x, digits = 4) {
+  if (!Number.isFinite(x)) return "–";
+  if (x !== 0 && (Math.abs(x) >= 1e6 || Math.abs(x) < 1e-4)) return x.toExponential(digits - 2).replace("e", " e");
+  return String(Number(x.toPrecision(digits)));
+}
+
+function withUnit(x, unit) {
+  return written(x) + (unit && Number.isFinite(x) ? "\u00a0" + unit : "");
+}
+
+function axisValue(axis, i) {
+  return written(axis.values[i], 6) + (axis.unit ? "\u00a0" + axis.unit : "");
+}
+
+// A value as people read it: the name of a category, or a number with its unit.
+function valueText(v, x) {
+  if (v.categories.length) {
+    const found = v.categories.find((c) => c.code === x);
+    return found ? found.name : "–";
+  }
+  return withUnit(x * v.factor, v.unit);
+}

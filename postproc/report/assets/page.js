@@ -1,0 +1,266 @@
+// What is chosen, the controls that choose it, and what follows from it.
+const state = { at: shape.map(() => 0), value: null, x: null, y: null, stator: 0, isLog: false, signal: null, isLogSpectrum: false, isOrder: false };
+const panels = {};
+let map = null;
+
+function element(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name in made && name !== "list") made[name] = value;
+    else made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+function choice(label, options, chosen, onChange) {
+  const select = element("select", {}, ...options.map(([value, text]) => element("option", { value, textContent: text })));
+  select.value = chosen;
+  select.addEventListener("change", () => onChange(select.value));
+  return element("label", {}, label, select);
+}
+
+function check(label, isOn, onChange) {
+  const box = element("input", { type: "checkbox", checked: isOn });
+  box.addEventListener("change", () => onChange(box.checked));
+  return element("label", { className: "check" }, box, label);
+}
+
+function setAxes(x, y) {
+  if (x === y) [x, y] = [y, x === state.x ? state.y : state.x];
+  state.x = x;
+  state.y = y;
+}
+
+function buildControls() {
+  const place = byId("controls");
+  const several = told.free.map((name) => [told.axes.findIndex((a) => a.name === name), name]).map(([k]) => [String(k), told.axes[k].label]);
+  place.replaceChildren(choice("Show", told.variables.map((v) => [v.name, v.label]), state.value, (value) => update({ value })));
+  const swap = (which) => (k) => {
+    const other = which === "x" ? "y" : "x";
+    const old = state[which];
+    state[which] = Number(k);
+    if (state[other] === Number(k)) state[other] = old;
+    buildControls();
+    update({});
+  };
+  if (several.length > 1) {
+    place.append(choice("Across", several, String(state.x), swap("x")), choice("Up", several, String(state.y), swap("y")));
+  }
+  if (told.nStator > 1) {
+    const numbers = Array.from({ length: told.nStator }, (_, i) => [String(i), `Stator ${i + 1}`]);
+    place.append(choice("Of", numbers, String(state.stator), (i) => update({ stator: Number(i) })));
+  }
+  if (told.free.length > 1) place.append(check("Logarithmic colours", state.isLog, (isLog) => update({ isLog })));
+  byId("panel-controls").replaceChildren(
+    choice("Signal of spectrum and waveform", Object.entries(told.signals), state.signal, (signal) => update({ signal })),
+    check("Logarithmic amplitudes", state.isLogSpectrum, (isLogSpectrum) => update({ isLogSpectrum })),
+    check("Orders instead of Hz", state.isOrder, (isOrder) => update({ isOrder })),
+  );
+  byId("panel-controls").hidden = !told.kept.length;
+}
+
+function buildSliders() {
+  const place = byId("sliders");
+  told.axes.forEach((axis, k) => {
+    if (axis.values.length < 2) return;
+    const output = element("output", {});
+    const slider = element("input", { type: "range", min: 0, max: axis.values.length - 1, step: 1, id: `axis-${k}` });
+    slider.addEventListener("input", () => move({ [k]: axis.order[Number(slider.value)] }));
+    place.append(element("label", {}, axis.label, output, slider));
+    axis.slider = slider;
+    axis.output = output;
+  });
+  place.hidden = !place.children.length;
+}
+
+function move(places) {
+  for (const [k, i] of Object.entries(places)) state.at[k] = i;
+  return update({});
+}
+
+// Arrow keys move on the map, by cells.
+function onKey(event) {
+  const across = told.axes[state.x], up = state.y === null ? null : told.axes[state.y];
+  const step = (axis, k, by) => {
+    if (!axis) return null;
+    const next = Math.min(Math.max(axis.order.indexOf(state.at[k]) + by, 0), axis.values.length - 1);
+    return { [k]: axis.order[next] };
+  };
+  const moves = {
+    ArrowLeft: () => step(across, state.x, -1), ArrowRight: () => step(across, state.x, 1),
+    ArrowDown: () => step(up, state.y, -1), ArrowUp: () => step(up, state.y, 1),
+    Home: () => step(across, state.x, -Infinity), End: () => step(across, state.x, Infinity),
+    PageDown: () => step(up, state.y, -Infinity), PageUp: () => step(up, state.y, Infinity),
+  };
+  const found = moves[event.key]?.();
+  if (!found || event.ctrlKey || event.metaKey || event.altKey) return;
+  event.preventDefault();
+  move(found);
+}
+
+const caseWords = () => told.axes.map((axis, k) => `${axis.label.toLowerCase()} ${axisValue(axis, state.at[k])}`).join(", ");
+
+// Updates follow one another; of those that wait, only the last is drawn.
+let updating = false, again = false;
+async function update(changes) {
+  Object.assign(state, changes);
+  if (updating) { again = true; return; }
+  updating = true;
+  do {
+    again = false;
+    try {
+      await redraw();
+    } catch (error) {
+      byId("broken").textContent = error.message;
+      byId("broken").hidden = false;
+    }
+  } while (again);
+  updating = false;
+  document.body.dataset.ready = String(flatOf(state.at));
+}
+
+async function redraw() {
+  const flat = flatOf(state.at);
+  byId("broken").hidden = true;
+  told.axes.forEach((axis, k) => {
+    if (!axis.slider) return;
+    axis.slider.value = axis.order.indexOf(state.at[k]);
+    axis.slider.setAttribute("aria-valuetext", axisValue(axis, state.at[k]));
+    axis.output.textContent = axisValue(axis, state.at[k]);
+  });
+  if (map) {
+    const cells = await map.draw({ ...state, at: state.at.slice() });
+    drawLegend(variable[state.value], cells);
+  }
+  await drawCase(flat);
+  rememberPlace();
+}
+
+function drawLegend(v, cells) {
+  const kinds = new Set(cells.kind);
+  const words = { beyond: "out of the model's range", missing: "missing", failed: "failed", diverged: "diverged", empty: "no value" };
+  const present = new Set(cells.value);
+  const swatches = v.categories.filter((c) => present.has(c.code)).map((c) => {
+    const swatch = element("i");
+    swatch.style.background = c.color;
+    return element("span", {}, swatch, c.name);
+  });
+  for (const [kind, text] of Object.entries(words)) {
+    if (kinds.has(kind)) swatches.push(element("span", {}, element("i", { className: kind }), text));
+  }
+  byId("legend").replaceChildren(...swatches);
+  byId("map-title").textContent = v.label + (v.by_stator && told.nStator > 1 ? `, stator ${state.stator + 1}` : "");
+}
+
+async function drawCase(flat) {
+  const status = (await valuesOf("status"))[flat], validity = (await valuesOf("validity"))[flat];
+  const spin = variable.spin_speed ? (await valuesOf("spin_speed"))[flat] : NaN;
+  const words = await caseTable(flat);
+  const meaning = ["not computed yet", "done", "failed", "diverged"][status];
+  const reason = told.reasons[flat] ? `: ${told.reasons[flat]}` : "";
+  const range = status === 1 ? (validity > 0 ? `; out of the model's range: ${told.validity[validity]}` : "; within the model's range") : "";
+  byId("case-text").textContent = `${caseWords() || "The only case"} – ${status === 1 ? words : meaning + reason}${range}`.replace(/^./, (c) => c.toUpperCase());
+  const record = status === 1 ? await recordOf(flat) : null;
+  if (!record) {
+    const why = status !== 1 ? `This case is ${meaning}${reason}`
+      : told.kept.length ? "Left out to keep this page small; rubhpc view shows it"
+      : 'The store keeps neither waveforms nor spectra nor sections: see [record] keep';
+    for (const panel of Object.values(panels)) panel.say(why);
+    return;
+  }
+  panels.orbit.draw(record, await clearanceOf(flat));
+  panels.section.draw(record);
+  panels.spectrum.draw(record, { signal: state.signal, spin, isLog: state.isLogSpectrum, isOrder: state.isOrder });
+  panels.waveform.draw(record, { signal: state.signal, spin });
+}
+
+// The clearance, m: a setting of the case, or an axis of the study.
+async function clearanceOf(flat) {
+  if (variable.clearance) return (await valuesOf("clearance"))[flat];
+  const k = told.axes.findIndex((axis) => axis.name === "clearance");
+  return k < 0 ? 0 : Number(told.axes[k].typed[state.at[k]]);
+}
+
+// Fill the table of measures; what matters most in words.
+async function caseTable(flat) {
+  const said = [];
+  const rows = [];
+  for (const v of told.variables) {
+    const values = await valuesOf(v.name);
+    const n = v.by_stator ? told.nStator : 1;
+    const texts = Array.from({ length: n }, (_, i) => valueText(v, values[flat * n + i]));
+    rows.push(element("tr", {}, element("th", { scope: "row", textContent: v.label }), ...texts.map((t) => element("td", { className: "number", textContent: t, colSpan: n === 1 ? told.nStator : 1 }))));
+    if (["regime", "peak_contact_force", "peak_torsion"].includes(v.name) || v.name === state.value) said.push(`${v.label.toLowerCase()} ${texts[v.by_stator ? state.stator : 0]}`);
+    if (told.isServed && !v.by_stator && rows.length > 40) break;
+  }
+  const head = told.nStator > 1
+    ? [element("thead", {}, element("tr", {}, element("th", { textContent: "" }), ...Array.from({ length: told.nStator }, (_, i) => element("th", { scope: "col", className: "number", textContent: `Stator ${i + 1}` }))))]
+    : [];
+  byId("case-table").replaceChildren(...head, element("tbody", {}, ...rows));
+  return said.join(", ");
+}
+
+// The place on the page stands in its address, so that a link leads back to it.
+function rememberPlace() {
+  const text = new URLSearchParams({ at: state.at.join("."), show: state.value, across: state.x ?? "", up: state.y ?? "" });
+  history.replaceState(null, "", "#" + text);
+}
+
+function recallPlace() {
+  const asked = new URLSearchParams(location.hash.slice(1));
+  const at = (asked.get("at") ?? "").split(".").map(Number);
+  if (at.length === shape.length && at.every((i, k) => Number.isInteger(i) && i >= 0 && i < shape[k])) state.at = at;
+  if (variable[asked.get("show")]) state.value = asked.get("show");
+  const free = told.free.map((name) => String(told.axes.findIndex((a) => a.name === name)));
+  if (free.includes(asked.get("across")) && free.includes(asked.get("up")) && asked.get("across") !== asked.get("up")) {
+    state.x = Number(asked.get("across"));
+    state.y = Number(asked.get("up"));
+  }
+}
+
+async function startAt() {
+  const status = await valuesOf("status");
+  let flat = [...status.keys()].find((i) => status[i] === 1) ?? 0;
+  const shown = told.isServed ? null : Object.keys(embedded.records).map(Number);
+  if (shown?.length) flat = shown[Math.floor(shown.length / 2)];
+  state.at = placeOf(flat);
+  const axes = told.free.slice(0, 2).map((name) => told.axes.findIndex((a) => a.name === name));
+  // The speed runs across, wherever it stands in the grid.
+  axes.sort((i, k) => told.axes[k].name.startsWith("speed") - told.axes[i].name.startsWith("speed"));
+  [state.x = null, state.y = null] = axes;
+  state.value = ["regime", "peak_contact_force", "status"].find((name) => variable[name]);
+  state.signal = Object.keys(told.signals).includes("torsion") ? "torsion" : Object.keys(told.signals)[0] ?? "";
+}
+
+async function begin() {
+  await loadLibrary();
+  await startAt();
+  recallPlace();
+  buildControls();
+  buildSliders();
+  Object.assign(panels, { orbit: new Orbit("orbit"), section: new Section("section"), spectrum: new Spectrum("spectrum"), waveform: new Waveform("waveform") });
+  for (const panel of Object.values(panels)) await panel.begin();
+  if (state.x === null) {
+    byId("map-card").hidden = true;
+    byId("controls").hidden = true;
+  } else {
+    byId("map").classList.toggle("low", state.y === null);
+    map = new CaseMap(byId("map"), move);
+    byId("map").addEventListener("keydown", onKey);
+  }
+  for (const button of document.querySelectorAll(".goto")) {
+    button.addEventListener("click", () => {
+      if (variable[button.dataset.value]) state.value = button.dataset.value;
+      buildControls();
+      move(placeOf(Number(button.dataset.flat)));
+      byId("explore").scrollIntoView();
+    });
+  }
+  await update({});
+}
+
+begin().catch((error) => {
+  byId("broken").textContent = `The maps cannot be drawn: ${error.message}`;
+  byId("broken").hidden = false;
+});

@@ -1,0 +1,115 @@
+"""What of a store goes onto a page of limited size, and what is said of the rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from postproc.report.cases import spread
+from postproc.report.detail import LEVELS
+from postproc.report.packing import pack_floats
+from postproc.report.page import Page, least_size, text_size
+from rubhpc.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+
+    from postproc.report.detail import Detail
+
+_NEEDED = ("status", "validity")  # without which a page shows nothing
+_SHARE_OF_MEASURES = 0.5  # of the room for data, at most
+_PILOTS = 64  # cases that are packed to foresee the size of all
+
+
+@dataclass
+class Load:
+    """What a page is to carry, and what is said of what it does not."""
+
+    values: dict[str, bytes] = field(default_factory=dict)
+    records: dict[int, bytes] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def write_report(store: xr.Dataset, path: Path, limit: float) -> Load:
+    """Write a page of at most `limit` bytes that needs nothing else, and return what is on it.
+
+    Measures come first, the most asked for before the others. Of the rest every case gets the same share:
+    as much detail as fits all of them, or, where the least detail does not, cases evenly spread.
+
+    Raises
+    ------
+    InputError
+        The limit is below what a page takes at least, or the file cannot be written.
+    """
+    page = Page(store)
+    # What the notes will say of the rest takes some room too.
+    room = limit - least_size(page) - 4096
+    load = Load()
+    _load_measures(page, load, room, limit)
+    room -= sum(text_size(packed) for packed in load.values.values())
+    _load_records(page, load, room)
+    text = page.html(load.values, load.records, load.notes)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}; choose another") from error
+    return load
+
+
+def _load_measures(page: Page, load: Load, room: float, limit: float) -> None:
+    left_out = []
+    used = 0
+    for name in page.measures.names:
+        packed = pack_floats(page.measures.values(name))
+        size = text_size(packed)
+        share = room if name in _NEEDED else room * _SHARE_OF_MEASURES
+        if used + size <= share:
+            load.values[name] = packed
+            used += size
+        elif name in _NEEDED:
+            least = (limit - room + used + size) / 1e6 + 0.1
+            raise InputError(
+                f"--limit: {limit / 1e6:.3g} MB is too small for this store; give {least:.1f} MB or more, or "
+                "look at it with rubhpc view"
+            )
+        else:
+            left_out.append(page.measures.label(name).lower())
+    if left_out:
+        load.notes.append(f"Measures left out: {', '.join(left_out)}.")
+
+
+def _load_records(page: Page, load: Load, room: float) -> None:
+    cases = page.cases
+    done = [int(i) for i in cases.done]
+    if not cases.kept:
+        load.notes.append("The store keeps neither waveforms nor spectra nor sections.")
+        return
+    if not done:
+        return
+    pilots = spread(done, _PILOTS)
+    margin = 1.0 if pilots == done else 1.05  # pilots foretell the size of all only so well
+    for level in LEVELS:
+        tried = dict(cases.records(pilots, level))
+        each = margin * sum(map(text_size, tried.values())) / len(pilots)
+        if each * len(done) <= room:
+            break
+    chosen = spread(done, max(0, int(room / each)))
+    for flat, packed in tried.items() if chosen == pilots else cases.records(chosen, level):
+        room -= text_size(packed)
+        if room < 0:
+            break
+        load.records[flat] = packed
+    _tell(level, load, len(done))
+
+
+def _tell(level: Detail, load: Load, n_done: int) -> None:
+    n_kept = len(load.records)
+    if n_kept:
+        which = "all" if n_kept == n_done else f"{n_kept} of {n_done}"
+        load.notes.append(f"On this page, of {which} cases with a result: {level.text()}.")
+    if n_kept < n_done:
+        load.notes.append(
+            f"Left out to stay within the size: waveforms, spectra and sections of {n_done - n_kept} cases."
+        )

@@ -1,0 +1,87 @@
+"""Records of single cases out of a store: block by block for a page, one by one for a server."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.bench import stator_places
+from postproc.load import LONG_ROLES, axes_of
+from postproc.report.detail import pack_case
+from rubhpc.schema import DONE, VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    import xarray as xr
+
+    from postproc.report.detail import Detail
+
+_READ_AT_ONCE = 64_000_000  # bytes
+_MOVED = re.compile(r"stator(\.\d+)?\.(angle|clearance_offset|node)")
+
+
+class Cases:
+    """The cases of a store by their flat index in its grid; `done` are those that have a result."""
+
+    def __init__(self, store: xr.Dataset) -> None:
+        self._axes = axes_of(store)
+        self._shape = tuple(store.sizes[a] for a in self._axes)
+        kept = [n for n, v in VARIABLES.items() if v.role in LONG_ROLES and n in store]
+        self.kept = tuple(sorted({VARIABLES[n].role for n in kept}))
+        self._arrays = store[[*kept, *(n for n in ("period",) if n in store)]]
+        self.status = store["status"].values.ravel()
+        self.done = np.flatnonzero(self.status == DONE)
+        self._window = self._whole_chunks(store[kept]) if kept else [1] * len(self._axes)
+        study = store.attrs.get("study")
+        grid = study.get("grid", {}) if isinstance(study, dict) else {}
+        self.stators_move = any(_MOVED.fullmatch(name) for name in grid)
+
+    def has_record(self, flat: int) -> bool:
+        """Whether there is anything to be read of a case."""
+        return bool(self.kept) and 0 <= flat < self.status.size and self.status[flat] == DONE
+
+    def record(self, flat: int, detail: Detail) -> bytes:
+        """Return one case as `pack_case` packs it."""
+        case = self._arrays.isel(dict(zip(self._axes, self._place(flat), strict=True)))
+        return self._pack(case.compute(), detail)
+
+    def records(self, flats: Iterable[int], detail: Detail) -> Iterator[tuple[int, bytes]]:
+        """Yield cases with their flat index; what lies in one chunk of the store is read at once."""
+        blocks: dict[tuple[int, ...], list[int]] = {}
+        for flat in flats:
+            corner = tuple(i // n for i, n in zip(self._place(flat), self._window, strict=True))
+            blocks.setdefault(corner, []).append(flat)
+        for corner, members in blocks.items():
+            start = [c * n for c, n in zip(corner, self._window, strict=True)]
+            window = {a: slice(s, s + n) for a, s, n in zip(self._axes, start, self._window, strict=True)}
+            block = self._arrays.isel(window).compute()
+            for flat in members:
+                inside = (i - s for i, s in zip(self._place(flat), start, strict=True))
+                yield flat, self._pack(block.isel(dict(zip(self._axes, inside, strict=True))), detail)
+
+    def _whole_chunks(self, arrays: xr.Dataset) -> list[int]:
+        """Return the cases along each axis that are read at once: chunks of the store, some at a time."""
+        first = next(iter(arrays.data_vars.values()))
+        window = [int(c[0]) for c in (first.chunks or ())[: len(self._axes)]] or [1] * len(self._axes)
+        case_bytes = max(arrays.nbytes // max(math.prod(self._shape), 1), 1)
+        for k in reversed(range(len(window))):
+            room = _READ_AT_ONCE // (case_bytes * math.prod(window))
+            window[k] *= max(1, min(room, math.ceil(self._shape[k] / window[k])))
+        return window
+
+    def _place(self, flat: int) -> tuple[int, ...]:
+        return tuple(int(i) for i in np.unravel_index(flat, self._shape)) if self._shape else ()
+
+    def _pack(self, case: xr.Dataset, detail: Detail) -> bytes:
+        return pack_case(case, detail, stator_places(case) if self.stators_move else None)
+
+
+def spread(flats: list[int], n: int) -> list[int]:
+    """Return `n` of some cases, evenly spread over them."""
+    if n >= len(flats):
+        return flats
+    return [flats[math.floor((i + 0.5) * len(flats) / n)] for i in range(n)]

@@ -1,0 +1,192 @@
+"""What the page says in words: the study, how it stands, what failed, where the model leaves its range."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from postproc.load import axes_of
+from postproc.maps import VALIDITY
+from postproc.report.grid import plain
+from postproc.units import Scale, scale_for, short_name
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, SIGNAL_NAMES, STATUS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from postproc.report.grid import Measures
+
+_MOST_FAILURES = 200  # listed, of each kind
+_NOTABLE_RESIDUAL = 0.01  # of the energy that goes through a case
+_LIMITS = {
+    "minimum_slip_speed": "below 0: the rim does not outrun the stator, steady sliding is wrong",
+    "force_over_euler_load": "above 1: the stator would buckle",
+    "tip_deflection_ratio": "above a tenth: the stator is no linear beam any more",
+}
+
+
+def counts(status: NDArray[np.float64]) -> list[dict[str, Any]]:
+    """Return state and number of cases, the done ones first."""
+    return [
+        {"state": STATUS[code], "n": int((status == code).sum())}
+        for code in (DONE, FAILED, DIVERGED, MISSING)
+    ]
+
+
+def case_text(axes: list[dict[str, Any]], flat: int) -> str:
+    """Return where a case stands on the grid, as in `speed ratio 1.7, clearance 84 µm`."""
+    at = np.unravel_index(flat, [len(axis["values"]) for axis in axes]) if axes else ()
+    places = (
+        f"{axis['label'][:1].lower()}{axis['label'][1:]} {axis['values'][i]:.6g} {axis['unit']}".rstrip()
+        for axis, i in zip(axes, at, strict=True)
+    )
+    return ", ".join(places)
+
+
+def failures(store: xr.Dataset, axes: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the cases that failed, and those that diverged: how many, and the first of them with reasons."""
+    reasons = store.attrs.get("reasons", {})
+    status = store["status"].values.ravel()
+    told = []
+    for code, meaning in (
+        (FAILED, "failed: no result"),
+        (DIVERGED, "diverged: the motion grew without bound, which is a result"),
+    ):
+        flats = np.flatnonzero(status == code)
+        if flats.size:
+            listed = [
+                {
+                    "flat": int(i),
+                    "case": case_text(axes, int(i)),
+                    "reason": reasons.get(int(i), "not recorded"),
+                }
+                for i in flats[:_MOST_FAILURES]
+            ]
+            told.append(
+                {"meaning": meaning, "n": flats.size, "cases": listed, "more": flats.size - len(listed)}
+            )
+    return told
+
+
+def validity_rows(measures: Measures, axes: list[dict[str, Any]], n_done: int) -> list[dict[str, Any]]:
+    """Return a row for each monitor: its limit, how many cases are beyond it, and the worst of them."""
+    rows = []
+    for name, (_, text, is_bad) in VALIDITY.items():
+        if name not in measures.names:
+            continue
+        values = measures.values(name)
+        bad = is_bad(xr.DataArray(values)).values  # NaN is beyond nothing
+        worst = np.nanargmin if name == "minimum_slip_speed" else np.nanargmax
+        rows.append(_row(measures, axes, name, bad, worst, n_done, _LIMITS.get(name, f"{text} out of range")))
+    if "energy_residual" in measures.names:
+        bad = measures.values("energy_residual") > _NOTABLE_RESIDUAL
+        limit = "no limit of the model; above 1 % the step, or the sampling, deserves a look"
+        rows.append(_row(measures, axes, "energy_residual", bad, np.nanargmax, n_done, limit))
+    return rows
+
+
+def _row(
+    measures: Measures,
+    axes: list[dict[str, Any]],
+    name: str,
+    bad: NDArray[np.bool_],
+    worst: Any,
+    n_done: int,
+    limit: str,
+) -> dict[str, Any]:
+    values = measures.values(name)
+    by_stator = measures.is_by_stator(name)
+    n_bad = int((bad.any(axis=-1) if by_stator else bad).sum())
+    row: dict[str, Any] = {"name": name, "label": measures.label(name), "limit": limit, "n": n_bad}
+    row |= {"share": f"{100 * n_bad / n_done:.3g} %" if n_done else "", "worst": "", "flat": None}
+    if np.isfinite(values).any():
+        place = int(worst(values))
+        flat = place // values.shape[-1] if by_stator else place
+        scale = measures.scale(name)
+        number = f"{values.ravel()[place] * scale.factor:.3g} {scale.unit}".rstrip()
+        row |= {"worst": number, "flat": flat, "case": case_text(axes, flat)}
+    return row
+
+
+def axis_rows(axes: list[dict[str, Any]]) -> list[dict[str, str]]:
+    """Return name, values and their number of each axis."""
+    rows = []
+    for axis in axes:
+        shown = [f"{v:.6g}" for v in axis["values"]]
+        text = ", ".join(shown) if len(shown) <= 8 else f"{shown[0]}, {shown[1]}, … {shown[-1]}"
+        rows.append(
+            {"label": axis["label"], "listed": f"{text} {axis['unit']}".rstrip(), "n": str(len(shown))}
+        )
+    return rows
+
+
+def study_rows(store: xr.Dataset) -> list[tuple[str, str]]:
+    """Return how contact, integration and recording were set, as the store tells it."""
+    study = store.attrs.get("study")
+    told = study if isinstance(study, dict) else {}
+    rows = []
+    for table in ("contact", "integrator", "record"):
+        settings = told.get(table)
+        if isinstance(settings, dict):
+            text = ", ".join(
+                f"{k.replace('_', ' ')} {_value(v)}" for k, v in settings.items() if v is not None
+            )
+            rows.append((table.capitalize(), text))
+    return rows
+
+
+def run_rows(store: xr.Dataset, measures: Measures) -> list[tuple[str, str]]:
+    """Return machine, versions and times of what ran, as far as the store tells them."""
+    rows = []
+    for run in store.attrs.get("runs", []):
+        began, wrote = (time.strftime("%Y-%m-%d %H:%M", time.localtime(run[k])) for k in ("began", "wrote"))
+        ranks = f"{run['n_rank']} rank{'s' if run['n_rank'] > 1 else ''}"
+        machine = f"{run['host']}: {run['processor']}, {run['n_core']} cores, {run['system']}"
+        lasted = seconds_text(max(run["wrote"] - run["began"], 0.0))
+        end = wrote if wrote[:10] != began[:10] else wrote[11:]
+        text = f"{ranks} on {machine}; {began} to {end} ({lasted}), rubhpc {run['version']}"
+        rows.append((f"Run {run['number']}", text))
+    versions = store.attrs.get("versions")
+    if isinstance(versions, dict):
+        rows.append(("Store made with", ", ".join(f"{name} {number}" for name, number in versions.items())))
+    if "wall_time" in measures.names:
+        wall = measures.values("wall_time")
+        wall = wall[np.isfinite(wall)]
+        if wall.size:
+            total, median, most = (seconds_text(float(f(wall))) for f in (np.sum, np.median, np.max))
+            rows.append(
+                ("Computing time", f"{total} of one core for {wall.size} cases; median {median}, most {most}")
+            )
+    if "identity" in store.attrs:
+        rows.append(("Identity", str(store.attrs["identity"])))
+    return rows
+
+
+def seconds_text(seconds: float) -> str:
+    """Return a time as people say it."""
+    if seconds < 100:
+        scale = scale_for("s", seconds) if seconds else Scale(1.0, "s")
+        return f"{seconds * scale.factor:.3g} {scale.unit}"
+    if seconds < 5400:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h"
+
+
+def signal_labels(store: xr.Dataset) -> dict[str, str]:
+    """Return what each recorded signal is called."""
+    names = {str(n).removeprefix("spectrum_").removeprefix("section_"): n for n in store.data_vars}
+    return {n: plain(short_name(store[names[n]].rename(n))) for n in SIGNAL_NAMES if n in names}
+
+
+def free_axes(store: xr.Dataset) -> list[str]:
+    """Return the axes of several values, the longest first."""
+    return sorted((a for a in axes_of(store) if store.sizes[a] > 1), key=lambda a: -store.sizes[a])
+
+
+def _value(value: object) -> str:
+    if isinstance(value, list):
+        return " and ".join(str(v) for v in value) or "nothing"
+    return f"{value:g}" if isinstance(value, float) else str(value)

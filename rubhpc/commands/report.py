@@ -1,0 +1,66 @@
+"""`rubhpc report` and `rubhpc view`: a store as a page in a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+_STORE = click.argument("store", type=click.Path(path_type=Path))
+
+
+@click.command()
+@_STORE
+@click.option(
+    "--output", type=click.Path(path_type=Path), metavar="FILE", help="The page [default: STORE.html here]."
+)
+@click.option("--limit", default="20 MB", show_default=True, metavar="SIZE", help="The page's size, at most.")
+def report(store: Path, output: Path | None, limit: str) -> None:
+    """Write one HTML page on STORE that needs nothing else: no network, no server, no store.
+
+    It tells the study, the rig, what ran, what failed and where the model leaves its range; in its maps each
+    case shows its orbit, spectrum, waveform and Poincaré section. Works while a run is on.
+    """
+    from postproc.report.budget import write_report
+    from rubhpc.errors import InputError
+    from rubhpc.input.quantity import parse_quantity
+    from rubhpc.storage.latest import latest
+
+    size = parse_quantity(_number(limit), "byte", "--limit")
+    path = output or Path(f"{store.resolve().stem}.html")
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{path}: a report is an HTML page; name it {path.stem}.html")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: no directory {path.parent}; make it first")
+    load = write_report(latest(store), path, size)
+    click.echo(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")
+    for note in load.notes:
+        click.echo(note)
+
+
+@click.command()
+@_STORE
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, show_default="any that is free", help="To listen on."
+)
+def view(store: Path, port: int) -> None:
+    """Serve the page of `rubhpc report` over STORE, however big, to this machine alone; Ctrl-C ends it.
+
+    Every case is there in full, read when it is looked at. Reload the page to see what a run has added.
+    """
+    import contextlib
+
+    from postproc.report.server import Library, Server
+    from rubhpc.storage.latest import latest
+
+    with Server(Library(lambda: latest(store)), port) as server, contextlib.suppress(KeyboardInterrupt):
+        click.echo(f"{store} is at {server.url} until Ctrl-C")
+        server.serve_forever()
+
+
+def _number(text: str) -> float | str:
+    """Return a plain number of the command line as one, bytes; other text as it stands."""
+    try:
+        return float(text)
+    except ValueError:
+        return text

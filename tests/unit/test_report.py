@@ -1,0 +1,339 @@
+"""The report's data and words, without a browser: what is packed can be unpacked, what is said is so."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import zlib
+from html.parser import HTMLParser
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import synthetic_store
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from postproc.load import open_store
+from postproc.report.budget import write_report
+from postproc.report.cases import Cases, spread
+from postproc.report.detail import FULL, LEVELS
+from postproc.report.grid import axes_told
+from postproc.report.packing import pack_floats, quantised, quantised_spectrum
+from postproc.report.page import Page
+from rubhpc.commands.report import report
+from rubhpc.errors import InputError
+from rubhpc.rig import Rig, read_rig
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MB = 1e6
+
+
+def unpacked_floats(data: bytes) -> np.ndarray:
+    planes = np.frombuffer(zlib.decompress(data), np.uint8)
+    return np.ascontiguousarray(planes.reshape(4, -1).T).view("<f4").ravel()
+
+
+def unpacked_record(data: bytes) -> dict:
+    body = zlib.decompress(data)
+    length = int.from_bytes(body[:4], "little")
+    header = json.loads(body[4 : 4 + length])
+    at = 4 + length
+    for entry in [*header["waves"], *header["spectra"], *header["section"]]:
+        codes = np.frombuffer(body, "<u2", entry["n"], at).astype(float)
+        at += 2 * entry["n"]
+        if "top" in entry:
+            entry["values"] = np.where(codes > 0, entry["top"] * 10 ** (5 * (codes / 65535 - 1)), 0.0)
+        else:
+            entry["values"] = entry["low"] + codes * entry["step"]
+    assert at == len(body)
+    return header
+
+
+class Elements(HTMLParser):
+    """Elements of a page with their attributes, and the text of its scripts by their id."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: dict[str | None, str] = {}
+        self._script: str | bool | None = False
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+        if tag == "script":
+            self._script = dict(attrs).get("id")
+
+    def handle_data(self, data: str) -> None:
+        if self._script is not False:
+            self.scripts[self._script] = self.scripts.get(self._script, "") + data
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag == "script":
+            self._script = False
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("stores") / "study.zarr"
+    synthetic_store.write(path, synthetic_store.make(n_stator=2))
+    return path
+
+
+@pytest.fixture(scope="module")
+def written(store: Path) -> Elements:
+    path = store.with_suffix(".html")
+    write_report(open_store(store), path, 20 * MB)
+    return Elements(path.read_text())
+
+
+@given(arrays(np.float32, st.integers(0, 40), elements=st.floats(width=32)))
+def test_floats_keep_four_digits(values: np.ndarray) -> None:
+    values = np.where(np.abs(values) > 1e38, 0, values)  # rounding may not carry into infinity
+    back = unpacked_floats(pack_floats(values))
+    assert np.array_equal(np.isnan(back), np.isnan(values))
+    usual = np.abs(values) > 1e-37
+    assert back[usual] == pytest.approx(values[usual], rel=2**-13 * (1 + 1e-9))
+
+
+def test_codes_of_a_flag_are_kept_exactly() -> None:
+    codes = np.array([np.nan, -1, 0, 1, 2, 3, 16, 4095])
+    assert np.array_equal(unpacked_floats(pack_floats(codes)), codes.astype(np.float32), equal_nan=True)
+
+
+def test_a_waveform_is_kept_to_a_step_of_its_range() -> None:
+    wave = 3.0 + np.sin(np.linspace(0, 20, 700))
+    told, codes = quantised(wave)
+    assert told["low"] + codes * told["step"] == pytest.approx(wave, abs=0.51 * np.ptp(wave) / 65535)
+    told, codes = quantised(np.full(5, 7.0))
+    assert (told["low"] + codes * told["step"] == 7.0).all()
+
+
+def test_a_spectrum_is_kept_to_four_digits_over_five_decades() -> None:
+    amplitude = np.array([0.0, 1e-9, 2e-5, 3.3e-3, 0.5, 1.0]) * 42
+    told, codes = quantised_spectrum(amplitude)
+    back = np.where(codes > 0, told["top"] * 10 ** (5 * (codes / 65535 - 1)), 0)
+    assert back[2:] == pytest.approx(amplitude[2:], rel=1e-4)
+    assert (back[:2] == 0).all()
+
+
+@pytest.mark.parametrize("detail", [FULL, *LEVELS])
+def test_a_record_holds_what_the_store_does(store: Path, detail) -> None:
+    cases = Cases(open_store(store))
+    flat = int(np.ravel_multi_index((0, 1, 1, 0), (5, 3, 2, 2)))  # of period 2
+    record = unpacked_record(cases.record(flat, detail))
+    waves = {(w["name"], w["stator"]): w for w in record["waves"]}
+    vertical = waves["vertical", 0]
+    turn = 2 * np.pi * np.arange(vertical["n"]) / record["samples"]
+    wanted = sum(a * np.cos(o * turn) for o, a in synthetic_store.AMPLITUDES.items())
+    assert vertical["n"] == 2 * record["samples"]  # one period
+    assert vertical["unit"] == "µm"
+    assert vertical["values"] == pytest.approx(1e6 * wanted, abs=0.01)
+    spectra = {(s["name"], s["stator"]): s for s in record["spectra"]}
+    lines = spectra["vertical", 0]["values"]
+    for order, amplitude in synthetic_store.AMPLITUDES.items():
+        line = round(order / record["spacing"]) - 1
+        assert lines[line] == pytest.approx(1e6 * amplitude, rel=1e-3)
+    if "contact_force" in detail.signals:
+        assert {stator for name, stator in waves if name == "contact_force"} == {1, 2}
+        assert waves["contact_force", 2]["values"].max() == pytest.approx(5.0, rel=1e-4)
+        assert waves["contact_force", 2]["values"].min() == 0.0
+    assert len(record["section"]) == 3
+
+
+def test_of_forces_the_highest_samples_are_kept(store: Path) -> None:
+    dataset = open_store(store).load()
+    dataset["contact_force"][...] = 0.0
+    dataset["contact_force"][..., 3::8] = 5.0
+    dataset["period"][...] = 1
+    few = LEVELS[0].__class__(samples=4, revolutions=2, lines=8, signals=("contact_force",))
+    dataset = dataset.chunk()
+    record = unpacked_record(Cases(dataset).record(50, few))
+    assert record["samples"] == 4
+    assert record["waves"][0]["values"] == pytest.approx(np.full(8, 5.0))
+
+
+def test_cases_come_block_by_block_as_they_come_alone(store: Path) -> None:
+    cases = Cases(open_store(store))
+    some = [int(i) for i in cases.done[::7]]
+    found = dict(cases.records(some, LEVELS[1]))
+    assert sorted(found) == some
+    assert all(found[i] == cases.record(i, LEVELS[1]) for i in some[:4])
+
+
+@given(st.integers(1, 60), st.integers(0, 70))
+def test_cases_are_spread_evenly(n: int, wanted: int) -> None:
+    chosen = spread(list(range(n)), wanted)
+    assert len(chosen) == len(set(chosen)) == min(n, wanted)
+    assert max(np.diff([-1, *chosen, n]), default=0) <= n / max(wanted, 1) + 2
+
+
+def test_the_page_needs_nothing_else(written: Elements) -> None:
+    kinds = {tag for tag, _ in written.found}
+    assert not {"img", "iframe", "object", "audio"} & kinds
+    links = [
+        value for tag, a in written.found for name, value in a.items() if name in ("src", "href", "action")
+    ]
+    assert all(link.startswith(("#", "data:")) for link in links if link)
+
+
+def test_the_page_carries_every_case_that_is_done(written: Elements) -> None:
+    records = json.loads(written.scripts["records"])
+    status = synthetic_store.make()["status"].values.ravel()
+    assert sorted(map(int, records)) == np.flatnonzero(status == 1).tolist()
+    values = json.loads(written.scripts["values"])
+    assert np.array_equal(unpacked_floats(base64.b64decode(values["status"])), status)
+    told = json.loads(written.scripts["told"])
+    assert [axis["key"] for axis in told["axes"]][-1] == "stator.youngs_modulus"
+    assert [len(axis["values"]) for axis in told["axes"]] == [5, 3, 2, 2]
+    assert told["nStator"] == 2
+
+
+def test_every_control_and_drawing_has_a_name(written: Elements) -> None:
+    by_role = [(tag, a) for tag, a in written.found if a.get("role") in ("img", "application")]
+    assert len(by_role) >= 6
+    assert all(a.get("aria-label") or a.get("aria-labelledby") for _, a in by_role)
+    ids = [a["id"] for _, a in written.found if "id" in a]
+    assert len(ids) == len(set(ids))
+    named = {
+        word
+        for _, a in written.found
+        for k in ("aria-labelledby", "aria-describedby")
+        for word in (a.get(k) or "").split()
+    }
+    assert named <= set(ids)
+
+
+def test_failures_are_told_with_their_reasons(store: Path) -> None:
+    dataset = open_store(store).assign_attrs(reasons={0: "ran away <b>", 12: "worker died"})
+    text = Page(dataset).html(values={})
+    assert "1 case diverged" in text
+    assert "1 case failed" in text
+    assert "ran away &lt;b&gt;" in text
+    assert "worker died" in text
+    assert "speed ratio 1, clearance 70 µm, friction coefficient 0.1, stator modulus 3 GPa" in text
+
+
+def test_validity_counts_what_is_out_of_range(store: Path) -> None:
+    text = Page(open_store(store)).html(values={})
+    rows = re.findall(r'scope="row">([^<]+)</th><td>[^<]+</td>\D*?data-label="Cases">(\d+)<', text)
+    told = {name: int(n) for name, n in rows}
+    # Of 60 cases those at the speeds 1.5 and 1.7 slip back, and those at 1.7 are over the Euler load.
+    assert told["Lowest slip speed"] == 24
+    assert told["Contact force over Euler load"] == 12
+    assert told["Tip deflection over length"] == 0
+
+
+@pytest.mark.parametrize("limit", [0.75, 0.9])
+def test_the_size_is_kept_and_what_is_left_out_is_said(store: Path, tmp_path: Path, limit: float) -> None:
+    path = tmp_path / "small.html"
+    load = write_report(open_store(store), path, limit * MB)
+    assert path.stat().st_size <= limit * MB
+    n_kept = len(json.loads(Elements(path.read_text()).scripts["records"]))
+    assert n_kept == len(load.records)
+    if n_kept < 57:
+        assert any(f"sections of {57 - n_kept} cases" in note for note in load.notes)
+        assert f"sections of {57 - n_kept} cases" in path.read_text()
+
+
+def test_a_limit_that_nothing_fits_is_refused(store: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"--limit: 0\.1 MB is too small for this store; give 0\.\d MB"):
+        write_report(open_store(store), tmp_path / "none.html", 0.1 * MB)
+    assert not (tmp_path / "none.html").exists()
+
+
+@pytest.mark.parametrize("keep", [(), ("spectrum",), ("section",), ("waveform",)])
+def test_a_store_that_keeps_less_has_a_page_too(tmp_path: Path, keep: tuple[str, ...]) -> None:
+    synthetic_store.write(tmp_path / "less.zarr", synthetic_store.make(keep=keep))
+    load = write_report(open_store(tmp_path / "less.zarr"), tmp_path / "less.html", 20 * MB)
+    if not keep:
+        assert load.records == {}
+        assert "neither waveforms nor spectra nor sections" in (tmp_path / "less.html").read_text()
+        return
+    record = unpacked_record(next(iter(load.records.values())))
+    kinds = {kind for kind in ("waves", "spectra", "section") if record[kind]}
+    assert (
+        kinds
+        == {"spectrum": {"spectra"}, "section": {"section"}, "waveform": {"waves", "spectra", "section"}}[
+            keep[0] if keep else ""
+        ]
+    )
+
+
+def test_an_unsorted_axis_has_its_cells_in_order() -> None:
+    dataset = synthetic_store.make(keep=()).isel(clearance=[2, 0, 1])
+    axis = axes_told(dataset)[1]
+    assert axis["values"] == pytest.approx([100, 70, 84])
+    assert axis["order"] == [1, 2, 0]
+    assert axis["edges"] == sorted(axis["edges"])
+    assert axis["unit"] == "µm"
+
+
+RINGS = {
+    "several": {"angle": 2.0, "count": 5},
+    "wall": {"angle": 0.5, "rigid": True},
+    "lumped": {"mass": 0.1, "stiffness": 1e6},
+}
+
+
+@pytest.mark.parametrize("kind", RINGS)
+def test_every_kind_of_stator_is_drawn(kind: str) -> None:
+    from postproc.report.end_view import end_view
+    from postproc.report.side_view import side_view
+    from rubhpc.rig import LumpedStator
+
+    rig = read_rig("mokhtar2017")
+    told = RINGS[kind]
+    if kind == "several":
+        stator = type(rig.stator[0])(**{**vars(rig.stator[0]), **told})
+    else:
+        stator = LumpedStator(node=8, **told)
+    rig = Rig(name="ring", rotor=rig.rotor, stator=(stator,))
+    n_drawn = end_view(rig).count("rotate(") - 1  # the arrow of the spin is turned too
+    assert n_drawn == (5 if kind == "several" else 1)
+    assert "1 disc, 2 bearings" in side_view(rig)
+
+
+def test_a_rotor_of_matrices_is_told_in_words() -> None:
+    from postproc.report.end_view import end_view
+    from postproc.report.side_view import description, side_view
+    from rubhpc.rig import LumpedStator
+
+    stop = LumpedStator(node=1, mass=1e-4, stiffness=1e6, radius=1.0)
+    rig = Rig.from_matrices([[100.0]], None, [[1e4]], degrees=[(1, "v")], stators=[stop])
+    assert side_view(rig) == ""
+    assert "<svg" in end_view(rig)
+    assert description(rig) == "rotor of 1 degree of freedom, by its matrices; 1 stator"
+
+
+def test_the_command_writes_the_page_and_says_what_is_on_it(store: Path, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = CliRunner().invoke(report, [str(store), "--limit", "3 MB"], catch_exceptions=False).output
+    assert said.startswith("study.html (")
+    assert "all cases with a result" in said
+    assert (tmp_path / "study.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("args", "told"),
+    [
+        (["--output", "page.pdf"], "name it page.html"),
+        (["--output", "no/page.html"], "no directory no"),
+        (["--limit", "20 kg"], "--limit"),
+        (["--limit", "much"], "--limit"),
+    ],
+)
+def test_wrong_input_is_one_line(
+    store: Path, tmp_path: Path, monkeypatch, args: list[str], told: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError) as refusal:
+        CliRunner().invoke(report, [str(store), *args], catch_exceptions=False)
+    assert told in str(refusal.value)
+    assert list(tmp_path.iterdir()) == []
