@@ -63,6 +63,36 @@ def test_mass_meets_a_spring(method, step, given):
     assert leaves == pytest.approx(1.0, rel=1e-4)
 
 
+@pytest.mark.parametrize("method", ["central-difference", "modal"])
+@pytest.mark.parametrize(
+    ("frequency", "restitution", "speed"), [(2.2, 0.7, 1.860859), (2.4, 0.8, 0.858441), (2.0, 0.6, 3.333333)]
+)
+def test_forced_oscillator_strikes_a_wall_once_a_period(method, frequency, restitution, speed):
+    """I2: x'' + x = cos(w t), a wall at 0 (S. W. Shaw, P. J. Holmes, J. Sound Vib. 90 (1983) 129-155)."""
+    rig = Rig.from_matrices(
+        [[1.0]],
+        None,
+        [[1.0]],
+        degrees=[(1, "v")],
+        stators=[LumpedStator(node=1, rigid=True, radius=1.0)],
+        unbalance=[Unbalance(node=1, mass=1.0, radius=1.0 / frequency**2)],
+    )
+    record = simulate(
+        rig,
+        speed=frequency,
+        clearance=SMALL,
+        friction=0.0,
+        restitution=restitution,
+        method=method,
+        step=1e-3,
+        transient=100,
+        revolutions=2,
+        samples_per_revolution=512,
+    )
+    assert (record.period, record.contacts_per_revolution[0]) == (1, 1)
+    assert record.contact_impulse[0] / (1 + restitution) == pytest.approx(speed, rel=1e-4)
+
+
 def bar(n_element, wall):
     """The bar of Doyen, Ern and Piperno, SIAM J. Sci. Comput. 33 (2011) 223-249, in lumped masses."""
     length, stiffness = 10.0 / n_element, 900.0 * n_element / 10.0

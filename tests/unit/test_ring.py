@@ -1,0 +1,84 @@
+"""Rings of stators: one table with a count, held one by one."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rubhpc import InputError, Rig, read_rig
+from rubhpc.input.stators import MOST_STATORS
+from rubhpc.rig import rig_from_dict, with_key
+from rubhpc.study import make_axis
+
+PACKAGED = read_rig("mokhtar2017")
+ONE = PACKAGED.stator[0]
+
+
+def ring(count, **changed):
+    return replace(PACKAGED, stator=(replace(ONE, count=count, **changed),))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 12, 32, MOST_STATORS])
+def test_a_ring_is_so_many_equal_stators(count):
+    rig = ring(count, angle=0.4)
+    assert len(rig.stator) == count
+    assert [s.angle for s in rig.stator] == pytest.approx(0.4 + 2 * math.pi * np.arange(count) / count)
+    assert all(replace(s, angle=0.0) == ONE for s in rig.stator)
+
+
+def test_a_ring_is_the_same_rig_as_its_stators_written_out():
+    single = tuple(replace(ONE, angle=2 * math.pi * i / 3) for i in range(3))
+    assert ring(3) == replace(PACKAGED, stator=single)
+    assert rig_from_dict(ring(3).as_dict()) == ring(3)
+    assert "count" not in ring(3).as_dict()["stator"][0]
+
+
+def test_rig_file_takes_a_ring_among_others(tmp_path):
+    text = (tmp_path.parent / "x").name  # any name
+    table = PACKAGED.as_dict() | {"name": text}
+    table["stator"] = [table["stator"][0] | {"count": 4, "angle": "45 deg"}, table["stator"][0]]
+    rig = rig_from_dict(table)
+    assert [round(math.degrees(s.angle)) for s in rig.stator] == [45, 135, 225, 315, 0]
+
+
+def test_stators_of_a_ring_have_keys_of_their_own():
+    rig = with_key(with_key(ring(4), "stator.length", "50 mm"), "stator.3.angle", "170 deg")
+    assert [s.length for s in rig.stator] == [0.05] * 4
+    assert [round(math.degrees(s.angle)) for s in rig.stator] == [0, 90, 170, 270]
+    assert make_axis("stator.4.clearance_offset", ["1 um"], rig).values == (1e-6,)
+    with pytest.raises(InputError, match=r"stator\.5\.angle: unknown key; did you mean stator"):
+        with_key(rig, "stator.5.angle", 0.0)
+    for key in ("stator.count", "stator.2.count"):
+        with pytest.raises(InputError, match="no key for a study to set; write it in the rig"):
+            with_key(rig, key, 3)
+        with pytest.raises(InputError, match="no key for a study to set; write it in the rig"):
+            make_axis(key, [3, 4], rig)
+
+
+@pytest.mark.parametrize(
+    ("count", "told"),
+    [
+        (0, "count: 0 is out of range; it must be at least 1"),
+        (-3, "count: -3 is out of range"),
+        (1.5, "count: 1.5 is not a whole number"),
+        ("12", 'count: "12" is not a whole number'),
+        (True, "count: true is not a whole number"),
+        (10**9, "count: 1000000000 is out of range; it must be at most 62"),
+    ],
+)
+def test_senseless_counts_are_refused(count, told):
+    table = PACKAGED.as_dict()
+    table["stator"] = [table["stator"][0] | {"count": count}]
+    with pytest.raises(InputError, match=told):
+        rig_from_dict(table)
+
+
+def test_stators_of_a_ring_do_not_stand_in_each_other():
+    with pytest.raises(InputError, match=r"stator\.5\.angle: stands where stator\.1 does, at 0 deg"):
+        replace(PACKAGED, stator=(replace(ONE, count=4), replace(ONE, angle=2 * math.pi)))
+    two = (replace(ONE, count=4, angle=0.2), replace(ONE, count=4))
+    assert len(replace(PACKAGED, stator=two).stator) == 8
+    with pytest.raises(InputError, match="stator: 80 of them; there may be 62"):
+        replace(PACKAGED, stator=(replace(ONE, count=40), replace(ONE, count=40, angle=0.01)))
+    assert isinstance(ring(3), Rig)
