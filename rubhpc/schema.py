@@ -95,6 +95,7 @@ _SCALARS = (
     _scalar("peak_to_peak_vertical", "m", "peak-to-peak vertical displacement"),
     _scalar("peak_to_peak_horizontal", "m", "peak-to-peak horizontal displacement"),
     _scalar("energy_residual", "1", "residual of the energy balance over the recorded revolutions"),
+    _scalar("transient_revolutions", "1", "revolutions thrown away", dtype="int64"),
     _scalar("steps", "1", "integration steps", dtype="int64"),
     _scalar("wall_time", "s", "wall time of the case"),
 )

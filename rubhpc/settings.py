@@ -121,10 +121,10 @@ class Settings:
         """Predicted integration steps of a case, with length 1 along the axes that do not change them."""
         axes = [self.speed_axis, *(self.rig_axes if self._is_few else ())]
         recording = self.study.recording
-        turns = recording.transient + recording.revolutions
+        turns = recording.longest_transient + recording.revolutions
 
         is_modal = self.study.integrator.method == "modal"
-        modal_steps = recording.transient * _EVENT_STEPS + recording.revolutions * (
+        modal_steps = recording.longest_transient * _EVENT_STEPS + recording.revolutions * (
             _EVENT_STEPS + recording.samples_per_revolution
         )
 

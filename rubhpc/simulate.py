@@ -39,7 +39,9 @@ def simulate(
     method: str = "modal",
     step: float | str | None = None,
     accuracy: float = 1e-3,
-    transient: int = 120,
+    transient: int | str = 120,
+    transient_limit: int | None = None,
+    transient_tolerance: float | None = None,
     revolutions: int = 64,
     samples_per_revolution: int = 256,
     keep: str | tuple[str, ...] = ("waveform", "spectrum", "section"),
@@ -75,8 +77,11 @@ def simulate(
         is less).
     accuracy : float
         Relative accuracy of the modal integrator: how many modes it keeps.
-    transient, revolutions, samples_per_revolution : int
+    transient : int or "auto", revolutions : int, samples_per_revolution : int
         Revolutions thrown away, revolutions kept, samples in each.
+    transient_limit : int, transient_tolerance : float, optional
+        With `transient="auto"`, revolutions are thrown away until displacements repeat themselves after 8 or
+        12 revolutions to this share of their largest value (1e-4), but no more than the limit (240).
     keep : tuple of {"waveform", "spectrum", "section"}
         What the record holds besides its scalars.
     initial : State, optional
@@ -150,6 +155,8 @@ def simulate(
     )
     recording = Recording(
         transient=transient,
+        transient_limit=transient_limit,
+        transient_tolerance=transient_tolerance,
         revolutions=revolutions,
         samples_per_revolution=samples_per_revolution,
         keep=tuple(keep),

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 __all__ = ["Axis", "Contact", "Integrator", "Recording", "Run", "Study", "make_axis", "read_study"]
 
 _TABLES = ("title", "rig", "output", "grid", "override", "contact", "integrator", "record", "run")
+AUTO = "auto"  # transient until the motion has settled
+LONGEST_TRANSIENT, SETTLED_WITHIN = 240, 1e-4  # then
 PAPER_STEP = 0.5e-6  # s
 SAFE_SHARE = 0.9  # of the stability limit
 BLIND_STEP = 1e-6  # s, of the modal scheme with the fixed normal
@@ -115,7 +117,9 @@ class Integrator:
 class Recording:
     """How long a case runs, in revolutions, and what is kept of it."""
 
-    transient: int = count(default=120, at_least=0, at_most=1_000_000)
+    transient: int | str = count(default=120, at_least=0, at_most=1_000_000, or_word=AUTO)
+    transient_limit: int | None = count(default=None, at_most=1_000_000)  # with "auto": 240
+    transient_tolerance: float | None = quantity("", default=None, above=0, below=1)  # with "auto": 1e-4
     revolutions: int = count(default=64, at_most=100_000)
     samples_per_revolution: int = count(default=256, at_least=16, at_most=65_536)
     keep: tuple[str, ...] = choices(of=KEEPABLE, default=KEEPABLE)
@@ -125,6 +129,26 @@ class Recording:
         if self.samples_per_revolution % 2:
             problem = f"{self.samples_per_revolution} is odd; give an even number such as 256"
             raise FieldError("samples_per_revolution", problem)
+        for key in ("transient_limit", "transient_tolerance"):
+            if self.transient != AUTO and getattr(self, key) is not None:
+                raise FieldError(key, f'it goes with transient = "{AUTO}"; leave it out, or set that')
+
+    @property
+    def is_transient_auto(self) -> bool:
+        """Whether the transient ends where the motion has settled."""
+        return self.transient == AUTO
+
+    @property
+    def longest_transient(self) -> int:
+        """Revolutions thrown away at most."""
+        if isinstance(self.transient, str):
+            return LONGEST_TRANSIENT if self.transient_limit is None else self.transient_limit
+        return self.transient
+
+    @property
+    def settled_within(self) -> float:
+        """Share of a signal's largest value by which cycles may differ for the motion to have settled."""
+        return SETTLED_WITHIN if self.transient_tolerance is None else self.transient_tolerance
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -44,10 +44,18 @@ def quantity(
 
 
 def count(
-    *, default: Any = MISSING, at_least: int = 1, at_most: int | None = None, is_key: bool = True
+    *,
+    default: Any = MISSING,
+    at_least: int = 1,
+    at_most: int | None = None,
+    is_key: bool = True,
+    or_word: str = "",
 ) -> Any:
-    """Declare a field that holds a whole number within its bounds; `is_key`: that a study may set."""
-    bounds = {"at_least": at_least, "at_most": at_most}
+    """Declare a field that holds a whole number within its bounds; `is_key`: that a study may set.
+
+    It may hold `or_word` instead.
+    """
+    bounds = {"at_least": at_least, "at_most": at_most, "or_word": or_word}
     return field(default=default, metadata={"kind": "count", "is_key": is_key, **bounds})
 
 
@@ -82,7 +90,7 @@ def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> 
     if kind == "quantity":
         return parse_quantity(value, declared.metadata["unit"], where)
     if kind == "count":
-        return _parse_count(value, where)
+        return _parse_count(value, where, declared.metadata["or_word"])
     if kind == "matrix":
         return parse_matrix(value, where)
     if kind == "degrees":
@@ -145,12 +153,15 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return f"did you mean {close[0]}?" if close else f"there is {', '.join(known)}"
 
 
-def _parse_count(value: object, where: str) -> int:
+def _parse_count(value: object, where: str, or_word: str) -> int | str:
+    if or_word and value == or_word:
+        return or_word
     if isinstance(value, float) and value.is_integer():
         return int(value)  # an axis holds floats
     if isinstance(value, bool) or not isinstance(value, int):
         raise InputError(
             f"{where}: {brief(value)} is not a whole number; write one such as 12, without quotes"
+            + (f', or "{or_word}"' if or_word else "")
         )
     return value
 
@@ -183,6 +194,8 @@ def _check_quantity(value: object, bounds: Any) -> str:
 
 
 def _check_count(value: object, bounds: Any) -> str:
+    if bounds["or_word"] and value == bounds["or_word"]:
+        return ""
     if isinstance(value, bool) or not isinstance(value, int):
         return f"{brief(value)} is not a whole number; give one such as 12"
     if value < bounds["at_least"]:

@@ -19,6 +19,7 @@ from rubhpc.integrate.measures import amplitude_spectrum
 from rubhpc.integrate.modal import EndlessEvents, ModalMarch
 from rubhpc.integrate.prepare import CentralDifferenceSetup, ModalSetup
 from rubhpc.integrate.record import Record, State
+from rubhpc.integrate.settle import pass_transient
 from rubhpc.integrate.stepped import SteppedMarch
 from rubhpc.kernels.observe import IMPACT_STEPS
 from rubhpc.schema import DONE, SECTION_NAMES
@@ -98,14 +99,14 @@ def _integrate(march: March, setup: Setup, clearance: float, recording: Recordin
     samples, tally = empty_samples(n_stator, n_sample), empty_tally(n_stator)
     settings = {"spin_speed": setup.spin, "clearance": clearance}
 
-    reason = march.advance(-recording.transient * per_revolution, 0, samples, tally, is_recorded=False)
+    reason, n_transient = pass_transient(march, recording)
     if reason is None:
         energy_before = march.energy()
         tally.is_touching[:] = march.touching()  # a contact under way did not begin in the record
         tally.age[tally.is_touching] = IMPACT_STEPS
         reason = march.advance(0, n_sample, samples, tally, is_recorded=True)
     if reason is not None:
-        revolution = math.floor(recording.transient + march.sample / per_revolution) + 1
+        revolution = math.floor(n_transient + march.sample / per_revolution) + 1
         record = diverged_record(
             f"{reason} in revolution {revolution}", n_stator, recording, settings, march.final()
         )
@@ -132,6 +133,7 @@ def _integrate(march: March, setup: Setup, clearance: float, recording: Recordin
         )
         if "waveform" not in recording.keep:
             record.signals.clear()
+    record.scalars["transient_revolutions"] = n_transient
     return record
 
 

@@ -148,7 +148,7 @@ def _pilot(sweep: Sweep, block: Block) -> float:
     whole = study.recording
     steps = block.cost / math.prod(block.shape)
     share = min(1.0, _PILOT_STEPS / steps)
-    transient, revolutions = round(share * whole.transient), max(1, round(share * whole.revolutions))
+    transient, revolutions = round(share * whole.longest_transient), max(1, round(share * whole.revolutions))
     setup = set_up(study, case)
 
     def seconds(transient: int, revolutions: int) -> float:
@@ -157,7 +157,7 @@ def _pilot(sweep: Sweep, block: Block) -> float:
         return float(record.scalars["wall_time"])
 
     seconds(0, 1)  # compiles
-    done = (transient + revolutions) / (whole.transient + whole.revolutions)
+    done = (transient + revolutions) / (whole.longest_transient + whole.revolutions)
     return seconds(transient, revolutions) / (steps * done)
 
 
