@@ -82,8 +82,7 @@ class Contact:
     @property
     def is_stepped(self) -> bool:
         """Whether closed contacts have no closed form, so that the modal scheme takes short steps."""
-        is_plain = self.law == "lagrange" and not self.restitution and self.friction_law == "sliding"
-        return self.normal == "updated" or not is_plain
+        return self.normal == "updated" or self.law == "penalty" or self.friction_law == "coulomb"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -123,7 +123,7 @@ def _integrate(march: March, setup: Setup, clearance: float, recording: Recordin
             scalars=scalars_of(
                 tally,
                 signals,
-                energy_change=march.energy() - energy_before,
+                energy=(energy_before, march.energy()),
                 stators=setup.model.stators,
                 spin=setup.spin,
                 samples_per_revolution=per_revolution,

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
+LEAST_EXCHANGE = 1e-6  # of the mechanical energy: a motion that exchanges less is balanced against that
+
+
 def empty_samples(n_stator: int, n_sample: int) -> Samples:
     """Room for the samples of a record: one array, so that their spectra are taken together."""
     whole = np.zeros((4 + 3 * n_stator, n_sample))
@@ -76,7 +79,7 @@ def scalars_of(
     tally: Tally,
     signals: dict[str, Floats],
     *,
-    energy_change: float,
+    energy: tuple[float, float],
     stators: tuple[StatorModel, ...],
     spin: float,
     samples_per_revolution: int,
@@ -85,19 +88,25 @@ def scalars_of(
 
     Parameters
     ----------
-    energy_change : float, J
-        Mechanical energy at the end of the record less that at its beginning.
+    energy : (float, float), J
+        Mechanical energy at the beginning and at the end of the record.
     spin : float, rad/s
     """
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution
     duration = 2.0 * np.pi * n_revolution / abs(spin)
-    has_touched = tally.contact_time > 0
+    has_touched = tally.impulse > 0
     n_contact = np.maximum(tally.n_contact, 1)  # one that lasts throughout never begins in the record
     orbit_period = period(signals["vertical"], signals["horizontal"], samples_per_revolution)
-    given = tally.energy[UNBALANCE_WORK] + tally.energy[DRIVE_WORK]
-    lost = tally.energy[[DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS]]
-    exchanged = max(abs(tally.energy).sum(), np.finfo(float).tiny)
+    # Drive and friction exchange a hundred times what the vibration feels of them: only their difference
+    # counts.
+    flows = [
+        tally.energy[UNBALANCE_WORK],
+        tally.energy[DRIVE_WORK] - tally.energy[FRICTION_LOSS],
+        -tally.energy[DAMPING_LOSS],
+        -tally.energy[IMPACT_LOSS],
+    ]
+    exchanged = max(0.5 * np.abs(flows).sum(), LEAST_EXCHANGE * max(energy), np.finfo(float).tiny)
     return {
         "period": orbit_period,
         "regime": regime(orbit_period, bool(has_touched.any())),
@@ -107,13 +116,13 @@ def scalars_of(
         "peak_contact_force": tally.peak_force,
         "contact_impulse": tally.impulse / n_revolution,
         "friction_work": tally.friction_work / n_revolution,
-        "minimum_slip_speed": np.where(has_touched, tally.least_slip, np.nan),
+        "minimum_slip_speed": np.where(np.isfinite(tally.least_slip), tally.least_slip, np.nan),
         "force_over_euler_load": tally.peak_force / [stator.euler_load for stator in stators],
         "tip_deflection_ratio": tally.peak_lateral / [stator.length for stator in stators],
         "peak_torsion": float(max(tally.highest[TWIST], -tally.lowest[TWIST])),
         "peak_to_peak_vertical": float(tally.highest[VERTICAL] - tally.lowest[VERTICAL]),
         "peak_to_peak_horizontal": float(tally.highest[HORIZONTAL] - tally.lowest[HORIZONTAL]),
-        "energy_residual": float(abs(given - lost.sum() - energy_change) / (0.5 * exchanged)),
+        "energy_residual": float(abs(sum(flows) - (energy[1] - energy[0])) / exchanged),
     }
 
 

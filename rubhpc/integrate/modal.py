@@ -57,7 +57,7 @@ class ModalMarch(March):
             contact_level=math.floor(math.log2(min(setup.interval, turn / CONTACT_STEPS) / setup.tick)),
             n_sample=0,
         )
-        self._bodies = self._book.kernel_reduced(self._clearance)
+        self._bodies = self._book.kernel_reduced(self._clearance, setup.law.restitution)
         self._motion = self._reduce(initial)
         self._recorder = recorder(self._clearance.size)
         self._progress = np.zeros(kernel.N_PROGRESS, dtype=np.int64)

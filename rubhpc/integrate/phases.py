@@ -86,8 +86,8 @@ class PhaseBook:
             )
         )
 
-    def kernel_reduced(self, clearance: Floats) -> kernel.Reduced:
-        """The reduced bodies as the kernel takes them, with the clearances (q,), m, of a case."""
+    def kernel_reduced(self, clearance: Floats, restitution: float = 0.0) -> kernel.Reduced:
+        """The reduced bodies as the kernel takes them, with a case's clearances (q,), m, and restitution."""
         return kernel.Reduced(
             stiffness=self.reduced.stiffness,
             damping=self.reduced.damping,
@@ -98,6 +98,7 @@ class PhaseBook:
             answer=self.push @ self.pull.T,
             friction=np.full(self.push.shape[0], self.friction),
             radius=np.array([stator.radius for stator in self.model.stators]),
+            restitution=restitution,
             clearance=clearance,
         )
 

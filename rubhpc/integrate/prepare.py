@@ -57,7 +57,7 @@ class ModalSetup:
     @property
     def is_stepped(self) -> bool:
         """Whether closed contacts have no closed form, so that contact is taken in short steps."""
-        return self.is_updated or self.law != MULTIPLIER
+        return self.is_updated or self.law.stiffness > 0.0 or self.law.is_set_valued
 
     @property
     def interval(self) -> float:

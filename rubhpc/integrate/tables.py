@@ -104,6 +104,8 @@ def tabulate(
         output=_outputs(reduced, exponent, motion, tick * 2.0**sample_level),
         slip_re=sliding.real,
         slip_im=sliding.imag,
+        slip_rate_re=(sliding * exponent).real,
+        slip_rate_im=(sliding * exponent).imag,
         motion_re=motion.real,
         motion_im=motion.imag,
         enter_re=enter.real,

@@ -44,8 +44,8 @@ def change_contacts(
     """Impact, then the set of closed pairs that goes on; -1 where there is none.
 
     `closed` are the pairs closed before, `crossing` those whose gap closes or whose force vanishes now. The
-    impact leaves no candidate closing (inelastic); among those that do not part for longer than
-    `moment` (s), the accelerations decide.
+    impact sends every candidate that closes back at its restitution (0: inelastic); among those that do not
+    part for longer than `moment` (s), the accelerations decide.
     """
     q, n = reduced.push.shape
     candidates = (closed & ~crossing) | (crossing & ~closed)
@@ -53,6 +53,8 @@ def change_contacts(
     for i in range(q):
         speed[i] = product(reduced.push[i], velocity) if (candidates >> i) & 1 else np.inf
         active[i] = speed[i] < 0.0
+        if active[i]:
+            speed[i] *= 1.0 + reduced.restitution
     if solve_complementarity(reduced.answer, speed, 1e-14, force, active, elimination) == UNSOLVED:
         return -1
     for i in range(q):
@@ -82,6 +84,8 @@ def change_contacts(
     for i in range(q):
         if force[i] > 0.0:
             remaining |= 1 << i
+        elif is_recorded and reduced.restitution > 0.0 and (crossing & ~closed) >> i & 1:
+            tally.n_contact[i] += 1  # it has bounced off
     return remaining
 
 
@@ -95,6 +99,11 @@ def observe_impact(
     closing = product(reduced.push[i], velocity) + 0.5 * impulse * reduced.answer[i, i]
     total = product(reduced.pull[i], velocity) + 0.5 * impulse * product(reduced.pull[i], reduced.pull[i])
     drive = friction * reduced.radius[i] * abs(spin)
+    if reduced.friction[i] > 0.0:
+        change = impulse * (product(reduced.pull[i], reduced.pull[i]) - reduced.answer[i, i])
+        gain = (total - closing - 0.5 * change) / reduced.friction[i]  # of the slip on the rim's own speed
+        slip = reduced.radius[i] * abs(spin) - gain
+        tally.least_slip[i] = min(tally.least_slip[i], slip, slip - change / reduced.friction[i])
     tally.impulse[i] += impulse
     tally.friction_work[i] += drive - (total - closing) * impulse
     tally.energy[DRIVE_WORK] += drive

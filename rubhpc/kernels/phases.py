@@ -49,6 +49,8 @@ class Phases(NamedTuple):
     output: Floats  # (p, 2 m, SAMPLES_AT_ONCE o), of the real, then the imaginary parts, sample by sample
     slip_re: Floats  # (p, q, m), slip speed, m/s, but for that of the steady spin
     slip_im: Floats
+    slip_rate_re: Floats  # (p, q, m), its time derivative
+    slip_rate_im: Floats
     motion_re: Floats  # (p, 2 n, m), reduced displacements, then velocities
     motion_im: Floats
     enter_re: Floats  # (p, 2 n, m), modal coordinates of a unit displacement or velocity
@@ -74,6 +76,7 @@ class Reduced(NamedTuple):
     answer: Floats  # (q, q), push @ pull.T, 1/kg
     friction: Floats  # (q,), coefficient, not negative
     radius: Floats  # (q,), m
+    restitution: float  # normal velocity after an impact over that before it
     clearance: Floats  # (q,), m
 
 

@@ -37,7 +37,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 LANES = 8  # outputs are read in whole vectors
-FORCE, FORCE_RATE, SLIP = range(3)  # rows of `Recorder.node`
+FORCE, FORCE_RATE, SLIP, SLIP_RATE = range(4)  # rows of `Recorder.node`
 
 
 class Recorder(NamedTuple):
@@ -45,7 +45,7 @@ class Recorder(NamedTuple):
 
     value: Floats  # (SAMPLES_AT_ONCE o,), outputs sample by sample
     last: Floats  # (2, 3 + q), watched signals and their rates at the last sample; NaN before the first
-    node: Floats  # (3, q), force (N), its rate (N/s) and slip speed (m/s) of closed pairs at the last step
+    node: Floats  # (4, q), force, slip speed (N, m/s) and their rates of closed pairs at the last step
     entry: Floats  # (2,), J, forms of damping loss and unbalance work where the span began
 
 
@@ -55,7 +55,7 @@ def recorder(q: int) -> Recorder:
     return Recorder(
         value=np.zeros(SAMPLES_AT_ONCE * n_row),
         last=np.full((2, 3 + q), np.nan),
-        node=np.zeros((3, q)),
+        node=np.zeros((4, q)),
         entry=np.zeros(2),
     )
 
@@ -154,12 +154,13 @@ def take_samples(
 @jit_inline_sum
 def read_contact(
     phases: Phases, reduced: Reduced, p: int, i: int, spin: float, z_re: Floats, z_im: Floats
-) -> tuple[float, float, float]:
-    """Force (N), its rate (N/s) and slip speed (m/s) of pair i, closed in phase p."""
+) -> tuple[float, float, float, float]:
+    """Force (N), its rate, slip speed (m/s) and its rate, of pair i, closed in phase p."""
     return (
         dot(phases.switch_re[p, i], phases.switch_im[p, i], z_re, z_im),
         dot(phases.rate_re[p, i], phases.rate_im[p, i], z_re, z_im),
         abs(spin) * reduced.radius[i] + dot(phases.slip_re[p, i], phases.slip_im[p, i], z_re, z_im),
+        dot(phases.slip_rate_re[p, i], phases.slip_rate_im[p, i], z_re, z_im),
     )
 
 
@@ -170,8 +171,9 @@ def begin_contact(
     """Read the pairs closed in phase p, at its beginning or where a record begins."""
     for i in range(reduced.radius.size):
         if (phases.mask[p] >> i) & 1:
-            force, rate, slip = read_contact(phases, reduced, p, i, spin, z_re, z_im)
-            recorder.node[FORCE, i], recorder.node[FORCE_RATE, i], recorder.node[SLIP, i] = force, rate, slip
+            force, rate, slip, slip_rate = read_contact(phases, reduced, p, i, spin, z_re, z_im)
+            recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = force, rate
+            recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip, slip_rate
 
 
 @jit_inline_sum
@@ -189,7 +191,7 @@ def observe_step(
     samples: Samples,
     tally: Tally,
 ) -> None:
-    """Add a step (s) to the pairs closed in phase p: force as a cubic, Simpson's rule for friction.
+    """Add a step (s) to the pairs closed in phase p: force and slip as cubics, Simpson's rule for friction.
 
     `z` are the coordinates at its end; `share` (1/s) takes an impulse to the mean force of sample `i_sample`.
     """
@@ -197,14 +199,15 @@ def observe_step(
         if not (phases.mask[p] >> i) & 1:
             continue
         before, rate_before = recorder.node[FORCE, i], recorder.node[FORCE_RATE, i]
-        slip_before = recorder.node[SLIP, i]
-        after, rate_after, slip_after = read_contact(phases, reduced, p, i, spin, z_re, z_im)
+        slip_before, slip_rate_before = recorder.node[SLIP, i], recorder.node[SLIP_RATE, i]
+        after, rate_after, slip_after, slip_rate_after = read_contact(phases, reduced, p, i, spin, z_re, z_im)
         recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = after, rate_after
-        recorder.node[SLIP, i] = slip_after
+        recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip_after, slip_rate_after
         bend = step * (rate_before - rate_after)
         impulse = step * (0.5 * (before + after) + bend / 12.0)
         middle = 0.5 * (before + after) + 0.125 * bend
-        work = before * slip_before + 2.0 * middle * (slip_before + slip_after) + after * slip_after
+        slip_middle = 0.5 * (slip_before + slip_after) + 0.125 * step * (slip_rate_before - slip_rate_after)
+        work = before * slip_before + 4.0 * middle * slip_middle + after * slip_after
         friction_work = reduced.friction[i] * work * step / 6.0
         peak = max(before, after)
         if rate_before * rate_after < 0.0:

@@ -1,4 +1,4 @@
-"""Bodies of a few degrees against walls, belts and springs: central differences without a rig."""
+"""Bodies of a few degrees against walls, belts and springs: set-ups without a rig."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 
 from rubhpc.fem.model import Body, Model, StatorModel
 from rubhpc.integrate.packing import law_of, pack
-from rubhpc.integrate.prepare import CentralDifferenceSetup
+from rubhpc.integrate.prepare import CentralDifferenceSetup, ModalSetup
+from rubhpc.integrate.reduction import reduce_model
 
 
 def body(mass, stiffness, degrees, damping=0.0):
@@ -38,16 +39,20 @@ def tip(stator_body, angle, *, radius=1.0, axial=0, lateral=-1):
     )
 
 
-def set_up(rotor, stators, spin, per_revolution, contact, *, force=None, steps_per_sample=1):
-    """Central difference of a body and its stators; `force` (n_dof,), N, goes with the cosine of spin t."""
+def _model(rotor, stators, spin, force):
     none = np.zeros(rotor.n_dof)
-    model = Model(
+    return Model(
         rotor=rotor,
         unbalance_cosine=none if force is None else np.asarray(force) / spin**2,
         unbalance_sine=none,
         stators=tuple(stators),
         output_node=1,
     )
+
+
+def set_up(rotor, stators, spin, per_revolution, contact, *, force=None, steps_per_sample=1):
+    """Central difference of a body and its stators; `force` (n_dof,), N, goes with the cosine of spin t."""
+    model = _model(rotor, stators, spin, force)
     step = 2 * math.pi / (abs(spin) * per_revolution * steps_per_sample)
     return CentralDifferenceSetup(
         model=model,
@@ -55,6 +60,21 @@ def set_up(rotor, stators, spin, per_revolution, contact, *, force=None, steps_p
         spin=spin,
         step=step,
         steps_per_sample=steps_per_sample,
+        samples_per_revolution=per_revolution,
+        is_updated=contact.normal == "updated",
+        displacement_limit=math.inf,
+        law=law_of(contact),
+    )
+
+
+def set_up_modal(rotor, stators, spin, per_revolution, contact, *, force=None, step=1e-4):
+    """Modal scheme of a body and its stators; `step` (s) is that in contact."""
+    model = _model(rotor, stators, spin, force)
+    return ModalSetup(
+        model=model,
+        reduced=reduce_model(model, spin, 1e-3),
+        spin=spin,
+        step=step,
         samples_per_revolution=per_revolution,
         is_updated=contact.normal == "updated",
         displacement_limit=math.inf,
