@@ -34,23 +34,24 @@ def loops_of(case: xr.Dataset) -> int:
 def count_loops(path: NDArray[np.complex128]) -> int:
     """Return the number of loops of a closed curve, given by points along it, (n,)."""
     first, second = _crossings(path)
-    partner = dict(zip(np.append(first, second), np.append(second, first), strict=True))
-    places = sorted(partner)
-    if not places:
+    if first.size == 0:
         return 1
-    following = dict(zip(places, [*places[1:], places[0]], strict=True))
+    # Passages through crossings: i and i + n are those of one crossing, in places along the curve.
+    places = np.concatenate((first, second))
+    partner = np.roll(np.arange(places.size), first.size)
+    order = np.argsort(places, kind="stable")
+    following = np.empty_like(order)
+    following[order] = np.roll(order, -1)
     smallest = _SMALLEST * _size(path)
     count = 0
-    unseen = set(places)
+    unseen = set(range(places.size))
     while unseen:
-        place = start = min(unseen)
+        passage = min(unseen)
         loop: list[NDArray[np.complex128]] = []
-        while True:
-            unseen.discard(place)
-            loop.append(_between(path, place, following[place]))
-            place = partner[following[place]]
-            if place == start:
-                break
+        while passage in unseen:
+            unseen.discard(passage)
+            loop.append(_between(path, places[passage], places[following[passage]]))
+            passage = int(partner[following[passage]])
         count += _size(np.concatenate(loop)) > smallest
     return count
 

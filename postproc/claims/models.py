@@ -1,4 +1,4 @@
-"""Models of the stator (Figs. 3 and 4): what freedom to bend does to the orbit."""
+"""Models of the stator (Figs. 3 and 4): free to bend or held, and a fixed wall with a contact stiffness."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.claims.cases import cases
+from postproc.claims.cases import SMALL_GAP_CASE, cases
 from postproc.claims.claim import Claim, report
+from postproc.claims.measures import MICRO, peak_to_peak, written
+from postproc.spectra import samples_per_revolution
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,4 +45,31 @@ def freedom_to_bend_tilts_the_orbit(store: xr.Dataset) -> str:
     return "; ".join(found)
 
 
-CLAIMS: tuple[Claim, ...] = (freedom_to_bend_tilts_the_orbit,)
+def unevenness(signal: xr.DataArray) -> float:
+    """Return the range of the highest value of each revolution, over their mean."""
+    peaks = signal.values.reshape(-1, samples_per_revolution(signal)).max(axis=1)
+    return float(np.ptp(peaks) / peaks.mean())
+
+
+@report(
+    "C81",
+    "4",
+    "penalty",
+    "subcritical",
+    says="Conventional law (fixed wall, contact stiffness, Coulomb friction) against the multiplier: "
+    "vertical motion close, torsion larger and less regular",
+    reason=f"{_OTHER_RIG}, nor is its contact stiffness",
+)
+def conventional_law_twists_more(penalty: xr.Dataset, multiplier: xr.Dataset) -> str:
+    """Tell sizes, periods and the unevenness of successive revolutions with either law."""
+    found = []
+    for name, case in (("wall", cases(penalty)), ("multiplier", cases(multiplier, **SMALL_GAP_CASE))):
+        told = [f"{name}: period {int(case['period'])}"]
+        for signal, unit in (("vertical", "µm"), ("torsion", "µrad")):
+            size = written(peak_to_peak(case[signal]), unit, MICRO)
+            told.append(f"{signal} {size} (uneven by {100 * unevenness(case[signal]):.2g} %)")
+        found.append(", ".join(told))
+    return "; ".join(found)
+
+
+CLAIMS: tuple[Claim, ...] = (freedom_to_bend_tilts_the_orbit, conventional_law_twists_more)

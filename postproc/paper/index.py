@@ -27,6 +27,7 @@ class PaperFigure:
 
 FIGURES: dict[int, PaperFigure] = {
     3: PaperFigure(stiffness.lateral_freedom, ("lateral_freedom",)),
+    4: PaperFigure(stiffness.conventional_law, ("penalty", "subcritical")),
     5: PaperFigure(speed.resonances, ("speed",)),
     6: PaperFigure(subcritical.larger_gap, ("subcritical",)),
     7: PaperFigure(subcritical.contacts, ("subcritical",)),

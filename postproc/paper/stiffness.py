@@ -1,4 +1,4 @@
-"""Figures of the stator: free to bend or not (3), and of several moduli (17 to 19)."""
+"""Figures of the stator: free to bend or not (3), a fixed wall (4), and of several moduli (17 to 19)."""
 
 from __future__ import annotations
 
@@ -24,6 +24,20 @@ def lateral_freedom(store: xr.Dataset) -> Figure:
         orbits(every, panel, "stator_1_lateral", names=names, gap=float(every["clearance"]))
         title(panel, f"$r$ = {speed:g}")
     ax["a"].legend(loc="upper right")
+    return figure
+
+
+def conventional_law(penalty: xr.Dataset, multiplier: xr.Dataset) -> Figure:
+    """Fig. 4: vertical motion and torsion of a fixed wall with a contact stiffness, and of the multiplier."""
+    figure, ax = page("ab cd", 105)
+    over_time(cases(penalty), {"vertical": ax["a"], "torsion": ax["c"]}, 6)
+    over_time(cases(multiplier, **SMALL_GAP_CASE), {"vertical": ax["b"], "torsion": ax["d"]}, 6)
+    for left, right in (("a", "b"), ("c", "d")):
+        low, high = zip(ax[left].get_ylim(), ax[right].get_ylim(), strict=True)
+        for panel in (ax[left], ax[right]):
+            panel.set_ylim(min(low), max(high))
+    title(ax["a"], "fixed wall, contact stiffness")
+    title(ax["b"], "multiplier, stator that moves")
     return figure
 
 
