@@ -110,17 +110,10 @@ def _modes(system: Floats) -> tuple[Complexes, Complexes, Complexes]:
     What nothing couples is solved by itself: of a ring of stators only those that touch move with the rotor.
     """
     n_state = len(system)
-<<<<<<< HEAD
-    n_part, part = connected_components(csr_array(system != 0.0), directed=False)
-    exponents = [np.zeros(0, dtype=np.complex128)]  # one mass against a wall: closed, it has no mode at all
-    shapes, inverses = [np.zeros((n_state, 0), dtype=np.complex128)], [np.zeros((0, n_state), dtype=complex)]
-    for number in range(n_part):
-=======
     _, part = connected_components(csr_array(system != 0.0), directed=False)
     exponents: list[Complexes] = [np.zeros(0, dtype=np.complex128)]  # a mass on a rigid wall has no modes
     shapes, inverses = [np.zeros((n_state, 0))], [np.zeros((0, n_state))]
     for number in np.unique(part):
->>>>>>> main
         rows = np.flatnonzero(part == number)
         exponent, shape = np.linalg.eig(system[np.ix_(rows, rows)])
         if np.linalg.cond(shape) > WORST_CONDITION:
