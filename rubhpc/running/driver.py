@@ -22,7 +22,7 @@ from rubhpc.running.watch import Watch
 from rubhpc.running.worker import Worker
 from rubhpc.schema import FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
-from rubhpc.storage.hand import Hand
+from rubhpc.storage.hand import Hand, forget
 from rubhpc.storage.journal import count
 from rubhpc.storage.manifest import PRIVATE
 from rubhpc.storage.resume import missing_share
@@ -277,6 +277,7 @@ def _finish(job: Job, computed: int, seconds: float) -> Summary:
     store.pack(ledger)
     with disk_errors(store.path):
         (store.path / "STOP").unlink(missing_ok=True)
+        forget(store.hand_directory, ledger.status != MISSING)
     failed = np.flatnonzero(ledger.status == FAILED)[:_REASONS].tolist()
     return Summary(
         store=store.path,

@@ -126,7 +126,7 @@ def _judge(store: Store, ledger: Ledger, missing: NDArray[np.bool_], run: int) -
         ledger.status[guilty] = FAILED
         ledger.reasons |= suspects.guilty
         missing[guilty] = False
-        forget(store.hand_directory, guilty)
+        forget(store.hand_directory, ~missing)
     return suspects.doubtful
 
 

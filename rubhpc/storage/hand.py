@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
     from types import TracebackType
 
     import numpy as np
@@ -112,12 +111,11 @@ def find_suspects(directory: Path, manifest: Manifest, is_missing: NDArray[np.bo
     return Suspects(guilty, doubtful)
 
 
-def forget(directory: Path, flats: Iterable[int]) -> None:
-    """Remove the records of cases that have been judged."""
-    judged = set(flats)
+def forget(directory: Path, is_judged: NDArray[np.bool_]) -> None:
+    """Remove the records of cases that have an outcome, (n_case,), and of those that are of no case."""
     for record in directory.glob("run*"):
         found = _read(record)
-        if found is not None and found[0] in judged:
+        if found is None or found[0] >= len(is_judged) or is_judged[found[0]]:
             record.unlink(missing_ok=True)
 
 

@@ -43,3 +43,19 @@ def test_a_million_cases_take(times, what, most):
 def test_a_million_cases_fit_in_a_gigabyte(times):
     few, many = times
     assert few["memory"] + (many["memory"] - few["memory"]) / (N_MANY - N_FEW) * MILLION < 1000
+
+
+@pytest.mark.long
+def test_a_million_cases_in_earnest(tmp_path):
+    """Nothing is extrapolated."""
+    told = took(MILLION, tmp_path)
+    each = told["run"] / MILLION * 1e6
+    print(
+        f"\na million cases: plan {told['plan']:.1f} s, status {told['status']:.1f} s, plan when done "
+        f"{told['plan_again']:.1f} s, {each:.0f} us a case beside its physics, {told['memory']:.0f} MB"
+    )
+    assert told["plan"] < 10
+    assert told["plan_again"] < 10
+    assert told["status"] < 5
+    assert each < 50
+    assert told["memory"] < 1000

@@ -11,26 +11,50 @@ import sys
 import time
 from pathlib import Path
 
-from running import command, environment, journalled_cases, run, start, write_slow_study, write_study
+from running import (
+    command,
+    complaint,
+    each_launcher,
+    environment,
+    journalled_cases,
+    run,
+    start,
+    write_slow_study,
+    write_study,
+)
 
+from rubhpc.schema import DONE, FAILED
+from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
 
 POISONED = Path(__file__).with_name("poisoned.py")
 
 
-def test_poisoned_cases_fail_and_the_others_finish(tmp_path):
-    study = write_study(tmp_path, run='case_time_limit = "1 s"')
-    done = run("cases", study, ranks=2, script=POISONED)
+@each_launcher
+def test_poisoned_cases_fail_and_the_others_finish(tmp_path, launcher):
+    study = write_study(tmp_path, friction=[0.1, 0.3, 0.5, 0.7], run='case_time_limit = "2 s"')
+    done = run("cases", study, ranks=2, script=POISONED, launcher=launcher)
     assert done.returncode == 1, done.stderr
-    (line,) = [line for line in done.stderr.splitlines() if line]
-    assert line.startswith(f"rubhpc: {tmp_path / 'tiny.zarr'}: 8 of 12 cases failed; the first, ")
+    line = complaint(done.stderr)
+    assert line.startswith(f"rubhpc: {tmp_path / 'tiny.zarr'}: 12 of 16 cases failed; the first, ")
     told = run("status", tmp_path / "tiny.zarr").stdout
-    assert "12 cases: 4 done, 8 failed, 0 diverged, 0 missing" in told
-    assert told.count("friction=0.3: failed: ZeroDivisionError: a poisoned case") == 4
-    assert told.count("friction=0.5: failed: over its time limit of 1 s") == 4
+    assert "16 cases: 4 done, 12 failed, 0 diverged, 0 missing" in told
+    reasons = {
+        0.3: "ZeroDivisionError: a poisoned case",
+        0.5: "over its time limit of 2 s",
+        0.7: "FloatingPointError: torsion is not finite",
+    }
+    ledger = Store(tmp_path / "tiny.zarr").replay()
+    manifest = Store(tmp_path / "tiny.zarr").manifest
+    for flat, status in enumerate(ledger.status.tolist()):
+        friction = manifest.point(flat)[2]
+        assert (status, ledger.reasons.get(flat)) == (
+            (DONE, None) if friction == 0.1 else (FAILED, reasons[friction])
+        )
+    assert not verify(tmp_path / "tiny.zarr")
     healthy = run(study, "--retry-failed")
     assert healthy.returncode == 0, healthy.stderr
-    assert "12 done; 8 computed" in healthy.stdout
+    assert "16 done; 12 computed" in healthy.stdout
 
 
 def test_a_second_run_on_a_store_is_refused_and_status_tells_of_the_first(tmp_path):

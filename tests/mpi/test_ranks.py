@@ -7,25 +7,24 @@ import signal
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-import psutil
 import pytest
 from running import (
     command,
+    each_launcher,
     environment,
     journalled_cases,
+    processes_of,
     run,
     start,
     stored_bytes,
+    wait_for_a_case,
     write_slow_study,
     write_study,
 )
 
 from rubhpc.running.launch import launch
-
-if TYPE_CHECKING:
-    import subprocess
+from rubhpc.storage.verify import verify
 
 LONG = {"transient": 100, "revolutions": 64, "block": 1}
 POISONED = Path(__file__).parents[1] / "faults" / "poisoned.py"
@@ -40,10 +39,11 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return stored_bytes(folder / "tiny.zarr")
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3])
-def test_any_number_of_ranks_stores_equal_bytes(tmp_path, alone, ranks):
-    done = run(write_slow_study(tmp_path), ranks=ranks)
-    assert (done.returncode, done.stderr) == (0, "")
+@each_launcher
+@pytest.mark.parametrize("ranks", [1, 2, 3, 4])
+def test_any_number_of_ranks_stores_equal_bytes(tmp_path, alone, ranks, launcher):
+    done = run(write_slow_study(tmp_path), ranks=ranks, launcher=launcher)
+    assert done.returncode == 0, done.stderr
     assert done.stdout.count("12 done; 12 computed") == 1  # one rank speaks
     assert stored_bytes(tmp_path / "tiny.zarr") == alone
 
@@ -162,28 +162,28 @@ def test_a_rank_that_slips_ends_the_job(tmp_path):
     assert "a slip" in log.read_text()
 
 
-def ranks_of(job: subprocess.Popen[str]) -> dict[int, psutil.Process]:
-    """The ranks that a launcher has started so far, by number."""
-    return {
-        int(child.environ()["PMI_RANK"]): child
-        for child in psutil.Process(job.pid).children(recursive=True)
-        if child.name().startswith("python") and "PMI_RANK" in child.environ()
-    }
+def kill_rank(rank: int, store: Path) -> None:
+    """Kill a rank as the kernel does for want of memory."""
+    processes_of(store)[rank].kill()
 
 
+@each_launcher
 @pytest.mark.parametrize("rank", [0, 1])
-def test_a_rank_that_is_killed_ends_the_job_and_the_next_run_completes(tmp_path, rank):
+def test_a_rank_that_is_killed_ends_the_job_and_the_next_run_completes(tmp_path, alone, rank, launcher):
     study, store = write_slow_study(tmp_path), tmp_path / "tiny.zarr"
-    job = start(study, ranks=2)
-    while journalled_cases(store) == 0:
-        time.sleep(0.02)
-        assert job.poll() is None
-    os.kill(ranks_of(job)[rank].pid, signal.SIGKILL)
+    arguments = (study, "--output", store)
+    job = start(*arguments, ranks=2, launcher=launcher)
+    wait_for_a_case(job, store)
+    began = time.monotonic()
+    kill_rank(rank, store)
     job.communicate(timeout=5)
+    print(f"\n{launcher.name}: rank {rank} killed, the job ended after {time.monotonic() - began:.1f} s")
     assert job.returncode != 0
-    done = run(study, ranks=2)
+    assert not verify(store)
+    done = run(*arguments, ranks=2, launcher=launcher)
     assert done.returncode == 0, done.stderr
     assert "12 done" in done.stdout
+    assert stored_bytes(store) == alone
 
 
 def test_the_tests_start_the_launcher_that_comes_with_the_program():

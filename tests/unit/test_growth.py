@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from running import write_study
 
@@ -171,9 +171,21 @@ def growths(draw: st.DrawFn) -> list[dict[str, list[float]]]:
     return grids
 
 
-@settings(max_examples=25)
-@given(grids=growths(), block=st.integers(1, 7), kills=st.lists(st.integers(0, 130), max_size=4))
+@settings(max_examples=4, phases=[Phase.generate])
+@given(grids=growths(), block=st.integers(1, 7), kills=st.lists(st.integers(0, 130), max_size=2))
 def test_growth_in_any_order_keeps_every_case_though_it_is_killed(grids, block, kills):
+    grow_and_kill(grids, block, kills)
+
+
+@pytest.mark.long
+@settings(max_examples=60, phases=[Phase.generate])
+@given(grids=growths(), block=st.integers(1, 7), kills=st.lists(st.integers(0, 130), max_size=4))
+def test_growth_in_any_order_keeps_every_case_many_times(grids, block, kills):
+    grow_and_kill(grids, block, kills)
+
+
+def grow_and_kill(grids: list[dict[str, list[float]]], block: int, kills: list[int]) -> None:
+    """Grow a store through grids, killed after so many changes of the disk, and compare all of it."""
     with tempfile.TemporaryDirectory() as folder:
         study = make_study(Path(folder), grids[0], block)
         compute(open_store(sweep_for(study)))
@@ -212,8 +224,8 @@ def test_a_kill_at_every_step_of_a_growth_loses_nothing(tmp_path):
         with killed_after(n_call):
             bring_up_to_date(open_store(sweep_for(study)), sweep_for(study))
         assert known(Store(first.output)) == before
-        n_call += 1 if n_call < 40 else 7
-    print(f"\ngrowth killed at {n_call} places")
+        n_call += 5
+    print(f"\na growth killed at {n_call // 5} places lost nothing")
     bring_up_to_date(Store(first.output), sweep_for(study))
     assert compute(Store(first.output), all_of_it=True) == 6
     check_arrays(study)
@@ -278,16 +290,18 @@ def test_another_version_of_the_physics_is_refused_unless_it_is_accepted(tmp_pat
     store = open_store(sweep_for(study))
     compute(store, all_of_it=True)
     before = known(store)
-    monkeypatch.setattr(sweep_module, "PHYSICS", 2)
-    with pytest.raises(StoreError, match=r"physics was 1, is 2; --accept-version keeps its cases"):
+    old = sweep_module.PHYSICS
+    monkeypatch.setattr(sweep_module, "PHYSICS", old + 1)
+    told = f"physics was {old}, is {old + 1}"
+    with pytest.raises(StoreError, match=f"{told}; --accept-version keeps its cases"):
         sweep_for(study)
     changed = make_study(tmp_path, {**grid, "friction": [0.1]})
-    with pytest.raises(StoreError, match=r"physics was 1, is 2; axis friction lacks 0.2, .*choose another"):
+    with pytest.raises(StoreError, match=f"{told}; axis friction lacks 0.2, .*choose another"):
         sweep_for(changed, accept_version=True)
     bring_up_to_date(store, sweep_for(study, accept_version=True), accept_version=True)
     assert known(Store(study.output)) == before
     assert compute(store) == 0
-    assert xr.open_zarr(study.output).attrs["accepted_physics"] == [1]
+    assert xr.open_zarr(study.output).attrs["accepted_physics"] == [old]
     assert sweep_for(study).identity == Store(study.output).manifest.identity
 
 

@@ -1,0 +1,134 @@
+"""A case that kills its rank, or never comes back, fails with its reason; the others finish."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from running import each_launcher, run, stored_bytes, write_study
+
+from rubhpc.schema import DONE, FAILED
+from rubhpc.storage.hand import Hand, find_suspects
+from rubhpc.storage.store import Store
+from rubhpc.storage.verify import verify
+
+POISONED = Path(__file__).with_name("poisoned.py")
+GUILTY = 2  # of six cases, where one speed is computed
+
+
+def runs_until_the_end(mode: str, study: Path, store: Path, most: int, **rest: object) -> int:
+    """Run the study again and again until it ends with failed cases; how often it died on the way."""
+    for n_death in range(most + 1):
+        done = run(mode, study, script=POISONED, **rest)
+        assert "Traceback (most" not in done.stderr
+        if done.returncode == 1 and "cases failed; the first" in done.stderr:
+            return n_death
+        assert done.returncode not in (0, 2, 3)
+        assert not verify(store)
+    raise AssertionError(f"no end after {most} deaths: {done.stderr}")
+
+
+def check_outcome(store: Path, reason: str) -> None:
+    """The guilty have failed with their reason, all others are done."""
+    ledger = Store(store).replay()
+    assert sorted(ledger.status.tolist()) == [DONE] * 4 + [FAILED] * GUILTY
+    assert {flat for flat in range(6) if ledger.status[flat] == FAILED} == {1, 4}
+    assert len(ledger.reasons) == GUILTY
+    assert all(reason in text for text in ledger.reasons.values()), ledger.reasons
+    assert list((store / ".rubhpc" / "hand").iterdir()) == []
+
+
+@each_launcher
+def test_a_case_with_a_segmentation_fault_fails_after_two_of_them(tmp_path, launcher):
+    study, store = write_study(tmp_path, speed_ratio=[0.9]), tmp_path / "tiny.zarr"
+    n_death = runs_until_the_end("segfault", study, store, 2 * GUILTY, ranks=2, launcher=launcher)
+    check_outcome(store, "its rank died in it 2 times: segmentation fault")
+    print(f"\n{launcher.name}: {GUILTY} cases with a segmentation fault failed after {n_death} deaths")
+    healthy = run(study, "--retry-failed")
+    assert healthy.returncode == 0, healthy.stderr
+    whole = write_study(tmp_path, "whole.toml", speed_ratio=[0.9], output=tmp_path / "whole.zarr")
+    assert run(whole).returncode == 0
+    assert stored_bytes(store) == stored_bytes(tmp_path / "whole.zarr")
+
+
+@pytest.mark.long
+@each_launcher
+def test_a_case_whose_rank_is_killed_fails_after_five_times(tmp_path, launcher):
+    """Of SIGKILL nothing tells whose fault it was: neither of the memory, nor of the user."""
+    study, store = write_study(tmp_path, speed_ratio=[0.9]), tmp_path / "tiny.zarr"
+    n_death = runs_until_the_end("killed", study, store, 5 * GUILTY, ranks=2, launcher=launcher)
+    check_outcome(store, "its rank died in it 5 times, of unknown cause")
+    print(f"\n{launcher.name}: {GUILTY} cases that are killed failed after {n_death} deaths")
+
+
+@each_launcher
+def test_a_case_that_never_comes_back_fails_in_the_next_run(tmp_path, launcher):
+    """Its kernel does not return, so nobody can ask it whether its time is over."""
+    study = write_study(tmp_path, speed_ratio=[0.9], run='case_time_limit = "2 s"')
+    store = tmp_path / "tiny.zarr"
+    n_death = runs_until_the_end("stuck", study, store, GUILTY, ranks=2, launcher=launcher)
+    check_outcome(store, "over its time limit of 2 s, in a single step of it")
+    print(f"\n{launcher.name}: {GUILTY} cases that never come back failed after {n_death} deaths")
+
+
+def test_one_that_never_comes_back_says_what_to_do(tmp_path):
+    study = write_study(tmp_path, speed_ratio=[0.9], run='case_time_limit = "2 s"')
+    done = run("stuck", study, script=POISONED)
+    assert done.returncode == 75
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("rubhpc: rank 0: a case is over its time limit of 2 s and cannot be interrupted")
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    study = write_study(tmp_path)
+    assert run(study, "--time-limit", "1 ms").returncode == 75
+    return Store(tmp_path / "tiny.zarr")
+
+
+def die(store: Store, flat: int, run_number: int = 1) -> Hand:
+    """Leave the record of a rank that died in a case."""
+    hand = Hand(store.hand_directory, run_number, "rank00000")
+    hand.take(flat, store.manifest.case_id(flat))
+    return hand
+
+
+def test_innocent_cases_are_tried_again_and_no_record_of_them_stays(store):
+    is_missing = store.replay().status == 0
+    die(store, 3)
+    suspects = find_suspects(store.hand_directory, store.manifest, is_missing)
+    assert (suspects.guilty, suspects.doubtful) == ({}, {})  # one kill of the launcher is no suspicion
+    for _ in range(3):
+        die(store, 3)
+    suspects = find_suspects(store.hand_directory, store.manifest, is_missing)
+    assert (suspects.guilty, suspects.doubtful) == ({}, {3: 4})
+    is_missing[3] = False
+    assert find_suspects(store.hand_directory, store.manifest, is_missing).doubtful == {}
+    assert list(store.hand_directory.iterdir()) == []
+
+
+def test_a_record_of_another_grid_or_of_no_case_says_nothing(store):
+    is_missing = store.replay().status == 0
+    for _ in range(5):
+        with Hand(store.hand_directory, 1, "rank00000"):
+            pass  # ended in order
+        Hand(store.hand_directory, 1, "rank00000")
+        Hand(store.hand_directory, 1, "rank00000").take(3, store.manifest.case_id(4))
+        Hand(store.hand_directory, 1, "rank00000").take(99, store.manifest.case_id(4))
+    suspects = find_suspects(store.hand_directory, store.manifest, is_missing)
+    assert (suspects.guilty, suspects.doubtful) == ({}, {})
+    assert list(store.hand_directory.iterdir()) == []
+
+
+def test_want_of_memory_is_told_from_other_kills(store, monkeypatch):
+    from rubhpc.storage import hand
+
+    is_missing = store.replay().status == 0
+    monkeypatch.setattr(hand, "_oom_kills", lambda: 7)
+    die(store, 3)
+    die(store, 3)
+    die(store, 5)
+    monkeypatch.setattr(hand, "_oom_kills", lambda: 8)
+    suspects = find_suspects(store.hand_directory, store.manifest, is_missing)
+    assert suspects.guilty == {3: "its rank died in it 2 times: killed, as the machine had no memory left"}
+    assert suspects.doubtful == {5: 1}
