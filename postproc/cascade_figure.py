@@ -60,7 +60,8 @@ def waterfall(
         ax.fill_between(at, rows[i], rows[i] + line, color="white", linewidth=0, zorder=order)
         ax.plot(at, rows[i] + line, color="C0", linewidth=0.5, zorder=order)
     ax.set(xlim=(_start(spectra, limit), limit), xlabel=_NAMES[abscissa], ylabel=label)
-    ax.set_ylim(rows.min() - 0.04 * span, rows.max() + (height + 0.02) * span)
+    below_rows = 0.1 if _start(spectra, limit) < 0 else 0.04  # room for the senses of whirl
+    ax.set_ylim(rows.min() - below_rows * span, rows.max() + (height + 0.02) * span)
     ax.set_yticks([t for t in ax.get_yticks() if abs(t - rows.mean()) <= 0.55 * span])
     _scale_bar(spectra, ax, peak, gain)
     _name_senses(ax)
@@ -210,7 +211,7 @@ def _tag(ax: Axes, x: float, y: float, text: str, color: str, ha: str) -> None:
     ax.annotate(
         text,
         (x, y),
-        xytext=(0, 1) if has_room and ha == "center" else (-1, 1 if has_room else -1),
+        xytext=({"left": 2, "right": -1}.get(ha, 0 if has_room else -1), 1 if has_room else -1),
         textcoords="offset points",
         ha=ha if has_room or ha == "left" else "right",
         va="bottom" if has_room else "top",
