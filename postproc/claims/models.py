@@ -46,9 +46,9 @@ def freedom_to_bend_tilts_the_orbit(store: xr.Dataset) -> str:
 
 
 def unevenness(signal: xr.DataArray) -> float:
-    """Return the range of the highest value of each revolution, over their mean."""
-    peaks = signal.values.reshape(-1, samples_per_revolution(signal)).max(axis=1)
-    return float(np.ptp(peaks) / peaks.mean())
+    """Return how far the peak-to-peak values of single revolutions range, over their mean."""
+    sizes = np.ptp(signal.values.reshape(-1, samples_per_revolution(signal)), axis=1)
+    return float(np.ptp(sizes) / sizes.mean())
 
 
 @report(
