@@ -70,7 +70,7 @@ def march(now, before, force, push, kick, place, clearance, turn, n_step, vertic
         )
         gap = clearance + push @ free
         if gap < 0.0:
-            free = free - kick * (gap / compliance)
+            free -= kick * (gap / compliance)
         u, earlier = free, u
 
 
