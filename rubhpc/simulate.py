@@ -152,6 +152,7 @@ def simulate(
             accuracy=accuracy,
         ),
         samples_per_revolution=samples_per_revolution,
+        model=model,
     )
     recording = Recording(
         transient=transient,

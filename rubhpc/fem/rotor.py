@@ -29,7 +29,8 @@ def assemble_rotor(rotor: Rotor) -> Body:
     A disc tilted by (thy, thz) carries its polar momentum along `(1, thz, -thy)`, hence
     `Id thy'' + spin Ip thz' = My` and `Id thz'' - spin Ip thy' = Mz`.
     """
-    shaft = join([rotor_element(section) for section in rotor.shaft for _ in range(section.elements)])
+    sections = [[rotor_element(section)] * section.elements for section in rotor.shaft]
+    shaft = join([element for equal in sections for element in equal])
     M, G, K = shaft.mass, shaft.gyroscopic, shaft.stiffness
     dampers = np.zeros_like(M)
     n_node = len(M) // 6

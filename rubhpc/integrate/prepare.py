@@ -93,11 +93,17 @@ Setup: TypeAlias = CentralDifferenceSetup | ModalSetup
 
 
 def prepare(
-    rig: Rig, speed: float, *, contact: Contact, integrator: Integrator, samples_per_revolution: int
+    rig: Rig,
+    speed: float,
+    *,
+    contact: Contact,
+    integrator: Integrator,
+    samples_per_revolution: int,
+    model: Model | None = None,
 ) -> Setup:
     """Assemble, check the step and factorise: once per rig and speed.
 
-    The step is shortened so that a whole number of steps fills a sample's interval.
+    `model` is that of the rig, where it has been assembled already. The step is shortened so that a whole number of steps fills a sample's interval.
 
     Raises
     ------
@@ -109,7 +115,7 @@ def prepare(
         raise InputError(f"rig {rig.name}: [[stator]]: none; a rub case needs at least one")
     if speed == 0.0 or not math.isfinite(speed):
         raise InputError(f"speed: {speed} rad/s; sampling is locked to the shaft, so it has to turn")
-    model = assemble(rig)
+    model = model or assemble(rig)
     if integrator.method == "modal":
         return ModalSetup(
             model=model,

@@ -1,0 +1,137 @@
+"""What else one could use: the paper's scheme with NumPy, the same compiled, and ROSS's rubbing fault.
+
+The first two follow Eqs. 20 to 24 of the paper, dense over both bodies together, for one upright stator.
+"""
+
+import math
+import time
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from scipy.linalg import block_diag
+
+from rubhpc.fem.assemble import assemble
+from rubhpc.integrate.packing import degrees_of
+
+STEP = 0.5e-6  # s, the paper's
+
+
+@dataclass(frozen=True)
+class Dense:
+    """Matrices of a step: u[n+1] = now u[n] + before u[n-1] + force (cos, sin) - kick gap / compliance."""
+
+    now: np.ndarray  # (n_dof, n_dof)
+    before: np.ndarray  # (n_dof, n_dof)
+    force: np.ndarray  # (n_dof, 2), m
+    push: np.ndarray  # (n_dof,), the gap's rate with displacement
+    kick: np.ndarray  # (n_dof,), displacement for a unit contact force, m/N
+    vertical: int
+
+
+def dense(rig, speed, friction, step):
+    """The scheme's matrices for a rig at a speed, rad/s."""
+    model = assemble(rig)
+    bodies = (model.rotor, model.stators[0].body)
+    mass, stiffness = (block_diag(*(getattr(b, name) for b in bodies)) for name in ("mass", "stiffness"))
+    damping = block_diag(*(b.damping + speed * b.gyroscopic for b in bodies))
+    v, w, torsion, axial, lateral = degrees_of(model)[0]
+    push, pull = np.zeros((2, len(mass)))  # the stator stands upright: n = y
+    push[[v, axial]] = -1.0, 1.0
+    pull[[v, w, torsion, axial, lateral]] = (
+        -1.0,
+        -friction,
+        -friction * model.stators[0].radius,
+        1.0,
+        friction,
+    )
+    inverse = np.linalg.inv(mass / step**2 + damping / (2 * step))
+    force = np.zeros((len(mass), 2))
+    force[: model.rotor.n_dof] = speed**2 * np.column_stack([model.unbalance_cosine, model.unbalance_sine])
+    return Dense(
+        now=inverse @ (2 * mass / step**2 - stiffness),
+        before=inverse @ (damping / (2 * step) - mass / step**2),
+        force=inverse @ force,
+        push=push,
+        kick=inverse @ pull,
+        vertical=v,
+    )
+
+
+def march(now, before, force, push, kick, place, clearance, turn, n_step, vertical):
+    """Step by step from rest; fills `vertical` (n_step,), m."""
+    compliance = push @ kick
+    # From rest: the displacement a step earlier has half the first step's acceleration in it.
+    u, earlier = np.zeros(len(push)), 0.5 * force[:, 0]
+    for i in range(n_step):
+        vertical[i] = u[place]
+        free = (
+            now @ u + before @ earlier + force[:, 0] * math.cos(turn * i) + force[:, 1] * math.sin(turn * i)
+        )
+        gap = clearance + push @ free
+        if gap < 0.0:
+            free -= kick * (gap / compliance)
+        u, earlier = free, u
+
+
+compiled = numba.njit(march)
+
+
+def run(rig, speed, clearance, friction, n_step, *, step, is_compiled):
+    """Wall time a step (s), and the vertical motion at each, m."""
+    scheme = dense(rig, speed, friction, step)
+    given = (scheme.now, scheme.before, scheme.force, scheme.push, scheme.kick)
+    vertical = np.empty(n_step)
+    function = compiled if is_compiled else march
+    if is_compiled:
+        function(*given, scheme.vertical, clearance, speed * step, 10, vertical)
+    began = time.perf_counter()
+    function(*given, scheme.vertical, clearance, speed * step, n_step, vertical)
+    return (time.perf_counter() - began) / n_step, vertical
+
+
+def ross_rubbing(rig, speed, clearance, friction, duration, step):
+    """Wall time (s) of ROSS's rubbing fault over `duration` (s); None where ROSS is not installed.
+
+    Penalty contact all around at one node against a rigid housing; its friction is not Coulomb's. No
+    flexible stator, no sweeps.
+    """
+    try:
+        import ross
+    except ImportError:
+        return None
+    (section,), (disc,), (unbalance,), stator = (
+        rig.rotor.shaft,
+        rig.rotor.disc,
+        rig.rotor.unbalance,
+        rig.stator[0],
+    )
+    steel = ross.Material(
+        name="shaft", rho=section.density, E=section.youngs_modulus, G_s=section.shear_modulus
+    )
+    shaft = [
+        ross.ShaftElement(section.length / section.elements, 0.0, section.outer_diameter, material=steel)
+        for _ in range(section.elements)
+    ]
+    mass = disc.density * math.pi * disc.diameter**2 / 4 * disc.thickness
+    polar = mass * disc.diameter**2 / 8
+    disk = ross.DiskElement(disc.node - 1, mass, 0.5 * polar + mass * disc.thickness**2 / 12, polar)
+    bearings = [
+        ross.BearingElement(b.node - 1, kxx=b.stiffness, kyy=b.stiffness, cxx=0.0) for b in rig.rotor.bearing
+    ]
+    rotor = ross.Rotor(shaft, [disk], bearings)
+    began = time.perf_counter()
+    rotor.run_rubbing(
+        n=disc.node - 1,
+        distance=clearance,
+        contact_stiffness=stator.youngs_modulus * stator.width * stator.height / stator.length,
+        contact_damping=0.0,
+        friction_coeff=friction,
+        torque=True,
+        node=[unbalance.node - 1],
+        unbalance_magnitude=[unbalance.mass * unbalance.radius],
+        unbalance_phase=[0.0],
+        speed=speed,
+        t=np.arange(0.0, duration, step),
+    )
+    return time.perf_counter() - began
