@@ -5,6 +5,7 @@ Nodes count from 1. Angles count from straight up (+y) towards +z, the sense of 
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -279,7 +280,7 @@ def read_rig(
         path = PACKAGED / f"{name}.toml"
         return build(Rig, read_toml(path), f"{name}.toml")
     path = (relative_to or Path()) / name
-    if not name.endswith(".toml") and "/" not in name and not path.exists():
+    if not name.endswith(".toml") and "/" not in name and not os.path.exists(path):
         mend = nearest(name, packaged_rigs())
         raise InputError(f"{where}: neither a packaged rig nor a file {place(str(path))}; {mend}")
     return build(Rig, read_toml(path, where), str(path))

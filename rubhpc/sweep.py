@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rubhpc.rig import Rig
     from rubhpc.study import Study
 
+MOST_CASES = 50_000_000  # beyond, a slip of the pen fills the memory
 PHYSICS = 2  # raised whenever the same study gives other numbers than before
 
 
@@ -87,6 +88,10 @@ class Sweep:
         self.dims = tuple(axis.dimension for axis in study.axes)
         self.shape = tuple(len(axis.values) for axis in study.axes)
         self.n_case = math.prod(self.shape)
+        if self.n_case > MOST_CASES:
+            with _named(study):
+                grid = " x ".join(map(str, self.shape))
+                raise InputError(f"[grid]: {grid} cases are too many; at most {MOST_CASES}, part the study")
         self.n_stator = len(study.rig.stator)
         with _named(study):
             self._settings = Settings(study)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 from rubhpc.errors import StoreError
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 def is_store(path: Path) -> bool:
     """Whether a store of this program stands at `path`."""
-    return any(place.is_file() for place in manifests(path))
+    return any(os.path.isfile(place) for place in manifests(path))  # a name too long is none
 
 
 def sweep_for(study: Study, *, accept_version: bool = False) -> Sweep:

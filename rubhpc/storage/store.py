@@ -59,12 +59,13 @@ class Store:
         """
         with disk_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-            _remove_drafts(path)
-            draft = path.with_name(f".{path.name}.{socket.gethostname()}.{os.getpid()}.draft")
+            place = Path(os.path.realpath(path))  # "." has no name
+            draft = place.with_name(f".{place.name}.{socket.gethostname()}.{os.getpid()}.draft")
+            _remove_drafts(place)
             draft.mkdir()
             try:
                 layout.build(draft, sweep)
-                draft.rename(path)
+                draft.rename(place)
             except (FileExistsError, NotADirectoryError):
                 raise StoreError(
                     f"{path}: is no rubhpc store; move it away or choose another --output"
@@ -277,7 +278,8 @@ def case_checksum(data: dict[str, NDArray[Any]], i_case: int) -> int:
 def _remove_drafts(path: Path) -> None:
     """Remove what creations of this store on this host left behind when they were killed."""
     prefix, host = f".{path.name}.", socket.gethostname()
-    for draft in path.parent.glob(f"{prefix}{host}.*.draft"):
-        pid = draft.name.rsplit(".", 2)[1]
-        if pid.isdigit() and process_state(int(pid)) is None:
-            shutil.rmtree(draft, ignore_errors=True)
+    for name in os.listdir(path.parent):  # no pattern: a store's name may hold anything
+        if name.startswith(f"{prefix}{host}.") and name.endswith(".draft"):
+            pid = name.rsplit(".", 2)[1]
+            if pid.isdigit() and process_state(int(pid)) is None:
+                shutil.rmtree(path.parent / name, ignore_errors=True)
