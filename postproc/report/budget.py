@@ -16,11 +16,12 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from postproc.report.cases import Cases
     from postproc.report.detail import Detail
 
 _NEEDED = ("status", "validity")  # without which a page shows nothing
 _SHARE_OF_MEASURES = 0.5  # of the room for data, at most
-_PILOTS = 64  # cases that are packed to foresee the size of all
+_PILOTS = 24  # cases that are packed to foresee the size of all
 
 
 @dataclass
@@ -101,14 +102,14 @@ def _load_records(page: Page, load: Load, room: float) -> None:
         if room < 0:
             break
         load.records[flat] = packed
-    _tell(level, load, len(done))
+    _tell(level, load, cases)
 
 
-def _tell(level: Detail, load: Load, n_done: int) -> None:
-    n_kept = len(load.records)
+def _tell(level: Detail, load: Load, cases: Cases) -> None:
+    n_kept, n_done = len(load.records), len(cases.done)
     if n_kept:
         which = "all" if n_kept == n_done else f"{n_kept} of {n_done}"
-        load.notes.append(f"On this page, of {which} cases with a result: {level.text()}.")
+        load.notes.append(f"On this page, of {which} cases with a result: {level.text(cases.kept)}.")
     if n_kept < n_done:
         load.notes.append(
             f"Left out to stay within the size: waveforms, spectra and sections of {n_done - n_kept} cases."

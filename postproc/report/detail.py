@@ -15,6 +15,8 @@ from postproc.units import scale_for
 from rubhpc.schema import SECTION_NAMES, SIGNAL_NAMES, VARIABLES
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     Arrays = list[NDArray[np.uint16]]
@@ -44,14 +46,21 @@ class Detail:
     lines: int
     signals: tuple[str, ...]
 
-    def text(self) -> str:
-        """What is kept, in words."""
-        signals = "all signals" if self.signals == SIGNAL_NAMES else ", ".join(self.signals).replace("_", " ")
-        return (
-            f"{signals}; a period (two revolutions at least), or {self.revolutions} revolutions of a "
-            f"motion without a period; at most {self.samples} samples a revolution (of forces, the highest "
-            f"between them) and {self.lines} lines a spectrum"
+    def text(self, kept: Collection[str]) -> str:
+        """What is kept of a store that has these roles, in words."""
+        parts = []
+        if "waveform" in kept:
+            parts.append(
+                f"waveforms of a period (two revolutions at least), or of {self.revolutions} revolutions of a "
+                f"motion without one, at most {self.samples} samples each (of forces, the highest between them)"
+            )
+        if {"waveform", "spectrum"} & set(kept):
+            parts.append(f"spectra up to their last line above {_FLOOR:.1%}, at most {self.lines} lines")
+        parts.append("all section points")
+        signals = (
+            "" if self.signals == SIGNAL_NAMES else f"; only {', '.join(self.signals).replace('_', ' ')}"
         )
+        return "; ".join(parts if {"waveform", "section"} & set(kept) else parts[:-1]) + signals
 
 
 FULL = Detail(samples=1024, revolutions=64, lines=8192, signals=SIGNAL_NAMES)
@@ -146,7 +155,7 @@ def _add_spectra(spectra: xr.DataArray, detail: Detail, header: dict[str, Any], 
         lines = amplitude[1:]  # the mean is no line
         last = np.flatnonzero(lines > _FLOOR * lines.max(initial=0.0))[-1:]
         least = math.ceil(_LEAST_ORDER / header["spacing"])
-        lines = lines[: min(max(*(last + 1), least), detail.lines)]
+        lines = lines[: min(max([*(last + 1), least]), detail.lines)]
         scale = scale_for(VARIABLES[name].unit, float(lines.max(initial=0.0)))
         quantum, codes = quantised_spectrum(lines * scale.factor)
         header["spectra"].append({"name": name, "stator": stator, "unit": scale.unit, **quantum})

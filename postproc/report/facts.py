@@ -157,9 +157,9 @@ def run_rows(store: xr.Dataset, measures: Measures) -> list[tuple[str, str]]:
         wall = wall[np.isfinite(wall)]
         if wall.size:
             total, median, most = (seconds_text(float(f(wall))) for f in (np.sum, np.median, np.max))
-            rows.append(
-                ("Computing time", f"{total} of one core for {wall.size} cases; median {median}, most {most}")
-            )
+            spread = f"; median {median}, most {most}" if wall.size > 1 else ""
+            cases = f"{wall.size} case{'s' if wall.size > 1 else ''}"
+            rows.append(("Computing time", f"{total} of one core for {cases}{spread}"))
     if "identity" in store.attrs:
         rows.append(("Identity", str(store.attrs["identity"])))
     return rows

@@ -116,7 +116,7 @@ class CaseMap {
     figure.xgrid.visible = figure.ygrid.visible = false;
     for (const [axis, bokeh] of [[this.x, figure.xaxis], [this.y, figure.yaxis]]) {
       if (axis && axis.values.length <= 10) bokeh.ticker = new Bokeh.FixedTicker({ ticks: axis.order.map((i) => axis.values[i]) });
-      bokeh.formatter = new Bokeh.CustomJSTickFormatter({ code: "return String(Number(tick.toPrecision(5)))" });
+      bokeh.formatter = new Bokeh.BasicTickFormatter({ use_scientific: false });
     }
     if (this.y) {
       figure.yaxis.axis_label = label(this.y);

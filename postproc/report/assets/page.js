@@ -13,17 +13,21 @@ function element(tag, attributes = {}, ...children) {
   return made;
 }
 
+let nField = 0;
+
 function choice(label, options, chosen, onChange) {
-  const select = element("select", {}, ...options.map(([value, text]) => element("option", { value, textContent: text })));
+  const id = `field-${nField++}`;
+  const select = element("select", { id }, ...options.map(([value, text]) => element("option", { value, textContent: text })));
   select.value = chosen;
   select.addEventListener("change", () => onChange(select.value));
-  return element("label", {}, label, select);
+  return element("div", { className: "field" }, element("label", { htmlFor: id }, label), select);
 }
 
 function check(label, isOn, onChange) {
-  const box = element("input", { type: "checkbox", checked: isOn });
+  const id = `field-${nField++}`;
+  const box = element("input", { type: "checkbox", checked: isOn, id });
   box.addEventListener("change", () => onChange(box.checked));
-  return element("label", { className: "check" }, box, label);
+  return element("div", { className: "check" }, box, element("label", { htmlFor: id }, label));
 }
 
 function setAxes(x, y) {
@@ -57,17 +61,16 @@ function buildControls() {
     check("Logarithmic amplitudes", state.isLogSpectrum, (isLogSpectrum) => update({ isLogSpectrum })),
     check("Orders instead of Hz", state.isOrder, (isOrder) => update({ isOrder })),
   );
-  byId("panel-controls").hidden = !told.kept.length;
 }
 
 function buildSliders() {
   const place = byId("sliders");
   told.axes.forEach((axis, k) => {
     if (axis.values.length < 2) return;
-    const output = element("output", {});
+    const output = element("span", { className: "value" });
     const slider = element("input", { type: "range", min: 0, max: axis.values.length - 1, step: 1, id: `axis-${k}` });
     slider.addEventListener("input", () => move({ [k]: axis.order[Number(slider.value)] }));
-    place.append(element("label", {}, axis.label, output, slider));
+    place.append(element("div", {}, element("label", { htmlFor: slider.id }, axis.label), output, slider));
     axis.slider = slider;
     axis.output = output;
   });
@@ -164,8 +167,7 @@ async function drawCase(flat) {
   const record = status === 1 ? await recordOf(flat) : null;
   if (!record) {
     const why = status !== 1 ? `This case is ${meaning}${reason}`
-      : told.kept.length ? "Left out to keep this page small; rubhpc view shows it"
-      : 'The store keeps neither waveforms nor spectra nor sections: see [record] keep';
+      : `Left out to keep this page small. To see it: rubhpc view ${told.store}`;
     for (const panel of Object.values(panels)) panel.say(why);
     return;
   }
@@ -229,7 +231,9 @@ async function startAt() {
   // The speed runs across, wherever it stands in the grid.
   axes.sort((i, k) => told.axes[k].name.startsWith("speed") - told.axes[i].name.startsWith("speed"));
   [state.x = null, state.y = null] = axes;
-  state.value = ["regime", "peak_contact_force", "status"].find((name) => variable[name]);
+  const first = ["regime", "peak_contact_force", "status"];
+  if (state.y === null) first.unshift("peak_contact_force");
+  state.value = first.find((name) => variable[name]);
   state.signal = Object.keys(told.signals).includes("torsion") ? "torsion" : Object.keys(told.signals)[0] ?? "";
 }
 
@@ -241,6 +245,10 @@ async function begin() {
   buildSliders();
   Object.assign(panels, { orbit: new Orbit("orbit"), section: new Section("section"), spectrum: new Spectrum("spectrum"), waveform: new Waveform("waveform") });
   for (const panel of Object.values(panels)) await panel.begin();
+  if (!told.kept.length) {
+    byId("right").replaceChildren(element("p", { className: "note", textContent: "The store keeps neither waveforms nor spectra nor sections, only measures. To see orbits, run the study with [record] keep = [\"waveform\"]." }));
+    for (const name of Object.keys(panels)) delete panels[name];
+  }
   if (state.x === null) {
     byId("map-card").hidden = true;
     byId("controls").hidden = true;

@@ -153,6 +153,7 @@ class Spectrum extends Panel {
       this.names = source({ x: [], y: [], text: [] });
       this.modes = source({ x: [], low: [], high: [] });
       this.modeNames = source({ x: [], y: [], text: [] });
+      figure.xaxis.ticker = new Bokeh.BasicTicker({ desired_num_ticks: 5 });
       const upright = { x0: { field: "x" }, x1: { field: "x" }, y0: { field: "low" }, y1: { field: "high" } };
       const modes = figure.segment({ ...upright, source: this.modes, line_dash: "dashed" });
       figure.segment({ ...upright, source: this.lines, line_width: 1.8, line_color: { field: "color" } });
