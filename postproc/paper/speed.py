@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -61,7 +62,8 @@ def _markers(
     """Yield the paper's markers with speed ratio, frequency (Hz) and amplitude of the lines they stand at.
 
     a, b, c: 1X, 1/2X and 1/3X crest at the pseudo-critical frequency; d, e, g: 2X, 3X and 1X crest at the
-    torsional one; h, i: multiples of 1/3X beside c; j, k: multiples of 1/2X beside b; f: r = 5.7.
+    torsional one; h, i: multiples of 1/3X beside c; j, k: multiples of 1/2X beside b; f: r = 5.7. What does
+    not crest is not marked.
     """
     crests = {
         letter: (Fraction(*order), crest(spectra, Fraction(*order), frequency))
@@ -81,6 +83,8 @@ def _markers(
         "k": (Fraction(2), crests["b"][1]),
     }
     for letter, (order, speed) in at.items():
+        if math.isnan(speed):
+            continue
         line = spectra.sel(speed_ratio=speed, method="nearest")
         line = line.sel(order=float(order), method="nearest")
         yield letter, speed, float(line["frequency"]), float(line)

@@ -130,7 +130,8 @@ def store(
         )
     rates = np.array([m.rate for m in motions]).reshape(shape)
     data["spin_speed"] = (dims, 2 * np.pi * rates, {"units": "rad s-1", "long_name": "spin speed"})
-    data["contact_free_amplitude"] = ((), 174 * MICRO, {"units": "m"})
+    settings = {"contact_free_amplitude": 174 * MICRO, "clearance": 85 * MICRO}
+    data |= {n: ((), value, {"units": "m"}) for n, value in settings.items() if n not in axes}
     units = {"clearance": "m", "speed": "rad s-1", "stator.youngs_modulus": "Pa"}
     coords = {
         dim: (dim, np.array(values, dtype=float), {"units": units.get(name, "1")})

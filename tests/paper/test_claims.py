@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import synthetic_paper
 from spoiling import SPOILED
 
 from postproc.claims.cases import CaseFailed, cases
@@ -23,11 +22,6 @@ from rubhpc.schema import DIVERGED, MISSING
 BY_ID = {claim.id: claim for claim in CLAIMS}
 GATED = [claim.id for claim in CLAIMS if not claim.is_reported]
 DOCUMENT = Path(__file__).parents[2] / "docs" / "claims.md"
-
-
-@pytest.fixture(scope="module")
-def sound():
-    return synthetic_paper.stores()
 
 
 @pytest.fixture(scope="module")
