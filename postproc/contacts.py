@@ -142,6 +142,42 @@ def event_jumps(
     )
 
 
+def events_in_signal(
+    case: xr.Dataset,
+    signal: str = "torsion_acceleration",
+    stator: int | None = None,
+    threshold: float = 10.0,
+) -> xr.Dataset:
+    """Return where a signal jumps, told from the signal alone: a test rig has no contact force to look at.
+
+    An event is where the departure (see `event_jumps`) peaks above `threshold` times its median over the
+    revolution. Its time is known to within four samples.
+
+    Returns
+    -------
+    Dataset over `event`
+        `time` (s), `departure` (the signal's unit) and `ratio`, which is the departure over that median.
+    """
+    from scipy.signal import find_peaks
+
+    wave = signal_of(case, signal, stator)
+    departure = np.nan_to_num(_departures(wave.values))
+    medians = np.median(departure.reshape(-1, samples_per_revolution(wave)), axis=1)
+    level = np.repeat(medians, samples_per_revolution(wave))
+    places, _ = find_peaks(departure, height=threshold * level, distance=_BEFORE)
+    jump = departure[places]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = jump / level[places]
+    unit = str(wave.attrs.get("units", "1"))
+    return xr.Dataset(
+        {
+            "time": ("event", (places - 0.5) * sample_time(case), {"units": "s", "long_name": "time"}),
+            "departure": ("event", jump, {"units": unit, "long_name": "departure from extrapolation"}),
+            "ratio": ("event", ratio, {"units": "1", "long_name": "departure over its median"}),
+        }
+    )
+
+
 def free_decay(case: xr.Dataset, signal: str = "stator_lateral", stator: int | None = None) -> xr.Dataset:
     """Return frequency and damping of the free vibration in each span out of contact.
 

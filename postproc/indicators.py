@@ -36,6 +36,7 @@ INDICATORS = {
 }
 CHANNELS = ("vertical", "horizontal", "torsion", "stator_lateral")
 LEVELS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+_WHOLE = 6  # revolutions that hold whole periods of half and of third orders
 _SUBHARMONICS = (1 / 3, 1 / 2, 2 / 3)
 _BENIGN = (1, 2, 3)  # multiples of 1X that misalignment, a drive or the floor bring in without rub
 _BANDWIDTH = 1000.0  # Hz in which white noise has the rms that its level says
@@ -101,9 +102,11 @@ def indicator_scores(
     ):
         if not mask.any():
             raise InputError(f"{source(store)}: no case of this selection {kind}; {mend} into the study")
+    n = samples_per_revolution(data[CHANNELS[0]])
+    n_turn = data.sizes["sample"] // n
+    data = data.isel(sample=slice(-n * (n_turn // _WHOLE * _WHOLE or n_turn), None))
     reference = [float(_rms(data[name]).where(rub).median()) for name in CHANNELS]
     frequencies = _natural(data)
-    n = samples_per_revolution(data[CHANNELS[0]])
     highest = (1 + _BAND) * frequencies["stator"] / (data["spin_speed"] / (2 * math.pi))
     if float(highest.max()) >= n / 2:
         least = math.ceil(2 * float(highest.max())) + 1

@@ -9,6 +9,7 @@ import xarray as xr
 from postproc.contacts import (
     contact_spans,
     event_jumps,
+    events_in_signal,
     free_decay,
     free_spans,
     peak_after_contact,
@@ -128,6 +129,16 @@ def test_what_is_smooth_does_not_jump():
     assert (ratio < 2).all()
 
 
+def test_events_are_found_in_the_signal_alone():
+    one = case({"torsion_acceleration": pushed}, [bump(0.25, 0.375, 1.0)])
+    blind = one.assign(contact_force=one["contact_force"] * math.nan)
+    found = events_in_signal(blind)["time"].values
+    assert found == pytest.approx(event_jumps(one)["time"].values, abs=4 * DT)
+    decay = {"torsion_acceleration": lambda t: np.exp(-5 * t) * np.sin(2 * math.pi * 50 * t)}
+    smooth = case(decay, [lambda part: 0 * part])
+    assert events_in_signal(smooth).sizes["event"] == 0
+
+
 def test_a_jump_in_noise_is_told_by_its_ratio():
     rng = np.random.default_rng(1)
     noisy = case(
@@ -205,6 +216,8 @@ def test_free_decays_of_the_packaged_rig_are_its_modes(modulus, clearance):
     jumps = event_jumps(case)
     assert set(jumps["kind"].values) == {"touch", "release"}
     assert (jumps["ratio"] > 5).all()  # Fig. 6g
+    seen = events_in_signal(case)["time"].values
+    assert seen == pytest.approx(jumps["time"].values, abs=4 * sample_time(case))  # each one, and no other
 
 
 def test_signals_come_by_their_name_in_double_precision():

@@ -71,6 +71,15 @@ def test_torsion_counts_at_fractions_of_the_spin_near_its_natural_frequency(orde
     assert found["torsion_harmonics"] == pytest.approx(decibels((2e-4) ** 2 / 2 / SPACING))
 
 
+def test_half_and_third_orders_fall_on_lines_whatever_was_recorded():
+    cases = store(
+        {"vertical": tone(1 / 3, 3e-5), "horizontal": tone(1 / 3, 3e-5, -math.pi / 2)}, [True, False]
+    )
+    scores = indicator_scores(cases.isel(sample=slice(None, 10 * N)), levels=[QUIET])
+    level = float(scores["lateral_subharmonics"].isel(clearance=0).mean())
+    assert level == pytest.approx(decibels((3e-5) ** 2 / (RATE / 6)))
+
+
 @pytest.mark.parametrize("order", [1, 3, 5 + 1 / 12, 7])  # far from 128 Hz (5.1X), or between the multiples
 def test_other_torsion_does_not_count(order):
     waves = {"torsion": np.array([tone(order, 2e-4), tone(5, 2e-4)])}
