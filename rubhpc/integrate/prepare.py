@@ -103,7 +103,8 @@ def prepare(
 ) -> Setup:
     """Assemble, check the step and factorise: once per rig and speed.
 
-    `model` is that of the rig, where it has been assembled already. The step is shortened so that a whole number of steps fills a sample's interval.
+    `model` is that of the rig, where it has been assembled already. The step is shortened so that a whole
+    number of steps fills a sample's interval.
 
     Raises
     ------

@@ -135,7 +135,7 @@ def test_modal_case_against_what_else_there_is(benchmark, capsys, name):
 
 
 def test_whole_study_with_little_around_the_kernel(benchmark, capsys, tmp_path, monkeypatch):
-    """A map over speed, clearance and friction without waveforms: cases a core-second, and what takes them."""
+    """A map over speed, clearance and friction without waveforms: cases a core-second, what takes them."""
     inside = {"kernel": 0.0, "FFT": 0.0}
 
     def watched(function, name):

@@ -64,5 +64,5 @@ def test_keys_of_auto_go_with_it_alone(key):
     with pytest.raises(InputError, match=f"{key}: it goes with transient"):
         Recording(transient=120, **{key: value})
     assert Recording(transient="auto", **{key: value}).is_transient_auto
-    with pytest.raises(InputError, match='whole number.*or "auto"|transient'):
+    with pytest.raises(InputError, match="transient"):
         simulate("mokhtar2017", transient="long", clearance="84 um", **CASE)

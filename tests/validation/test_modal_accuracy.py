@@ -70,3 +70,24 @@ def test_central_difference_tends_to_the_modal_answer():
     ]
     assert np.log2(np.divide(error[:-1], error[1:])) == pytest.approx(2.0, abs=0.2)
     assert error[-1] < 1e-6
+
+
+def test_chaotic_motion_has_the_same_statistics():
+    """Two runs part for good; means over blocks of 20 revolutions agree within their own scatter."""
+    given = {"speed_ratio": 2.25, "clearance_ratio": 0.95, "samples_per_revolution": 64}
+    found = simulate("mokhtar2017", **given, transient=100, revolutions=1600, keep=("waveform",))
+    known = simulate(
+        "mokhtar2017", **given, transient=100, revolutions=400, method="central-difference", step="2 us"
+    )
+    assert found.period == known.period == 0
+    n_sample = known.vertical.size
+    assert np.std(found.vertical[:n_sample] - known.vertical) > 0.1 * np.std(known.vertical)
+    for name in ("contact_force", "torsion", "vertical", "stator_lateral"):
+        for statistic in (np.mean, np.std):
+            blocks = [statistic(getattr(run, name).reshape(-1, 20 * 64), axis=1) for run in (found, known)]
+            scatter = np.hypot(*(np.std(block) / np.sqrt(len(block) - 1) for block in blocks))
+            assert abs(blocks[0].mean() - blocks[1].mean()) < 4 * scatter, (name, statistic)
+            assert scatter < 0.05 * np.std(getattr(known, name)), (name, statistic)
+    # The counts of 400 revolutions scatter by 3 %.
+    assert found.contacts_per_revolution == pytest.approx(known.contacts_per_revolution, rel=0.1)
+    assert found.peak_contact_force == pytest.approx(known.peak_contact_force, rel=0.2)  # of a longer run
