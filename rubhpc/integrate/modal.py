@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
 FIRST_REVOLUTIONS = 32  # of the first kernel call
+MOST_FILLED = 8  # times that one case may fill the book of phases; then short steps cost less
 
 
 class EndlessEvents(Exception):  # noqa: N818 - a state of the motion, never seen by users
@@ -46,6 +47,7 @@ class ModalMarch(March):
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(check, FIRST_REVOLUTIONS * setup.samples_per_revolution)
         self._setup, self._book = setup, setup.book(friction)
+        self._n_filled = 0  # times that the book was full
         self._clearance = np.array([clearance + stator.clearance_offset for stator in setup.model.stators])
         turn = setup.interval * setup.samples_per_revolution
         self._clock = kernel.Clock(
@@ -160,7 +162,10 @@ class ModalMarch(March):
         """See that the tables hold a set of contacts; coordinates are widened where it has more modes."""
         if mask not in self._book.masks:
             if self._book.is_full:
-                raise EndlessEvents
+                self._n_filled += 1
+                if self._n_filled > MOST_FILLED:
+                    raise EndlessEvents
+                self._book.forget()
             self._book.add(mask)
         self._phases = self._book.tables()
         self._z = np.zeros((2, self._phases.switch_re.shape[2]))

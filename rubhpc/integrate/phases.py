@@ -70,6 +70,12 @@ class PhaseBook:
         for known in self.masks:
             self._tabulate(self._made(known))
 
+    def forget(self) -> None:
+        """Make room: keep no phase but that with every pair open."""
+        self.masks.clear()
+        self._tables.clear()
+        self.add(0)
+
     def _made(self, mask: int) -> Phase:
         return make_phase(self.reduced, self.push, self.pull, mask)
 

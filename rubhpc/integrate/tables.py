@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 MOST_PHASES = 256  # sets of closed contacts of one speed and friction
-MOST_BYTES = 2**31  # of their tables
+MOST_BYTES = 2**30  # of their tables
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
 
 
@@ -49,6 +49,10 @@ class Tables:
         for field, new in zip(self._room, rows, strict=True):
             field[self._n_phase] = new[0]
         self._n_phase += 1
+
+    def clear(self) -> None:
+        """Give all room back to phases to come."""
+        self._n_phase = 0
 
     def view(self) -> kernel.Phases:
         """The tables of all phases."""

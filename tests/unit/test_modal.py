@@ -51,6 +51,20 @@ def test_same_case_is_the_same_to_the_last_bit():
         assert np.array_equal(getattr(once, name), getattr(again, name))
 
 
+def test_sets_are_made_anew_where_there_is_no_room_for_all(monkeypatch):
+    """What is forgotten and met again is tabulated to the same numbers."""
+    usual = simulate(trial_rig(3), **CLOSE)
+    monkeypatch.setattr(tables, "MOST_PHASES", 4)
+    monkeypatch.setattr(modal, "MOST_FILLED", 1000)
+    made = []
+    add = PhaseBook.add
+    monkeypatch.setattr(PhaseBook, "add", lambda book, mask: (made.append(mask), add(book, mask)))
+    crowded = simulate(trial_rig(3), **CLOSE)
+    assert made.count(0) > 1
+    check_close(crowded, usual, 1e-9)
+    assert crowded.peak_contact_force == pytest.approx(usual.peak_contact_force, rel=1e-7)
+
+
 def test_sets_of_contacts_are_met_as_they_come():
     """With three stators some touch together, and no set but the singles is tabulated at the start."""
     record = simulate(trial_rig(3), **CLOSE)
@@ -65,6 +79,7 @@ def test_endless_events_are_left_to_short_steps(monkeypatch, too_many):
     exact = simulate(trial_rig(3), **CLOSE)
     if too_many == "sets":
         monkeypatch.setattr(tables, "MOST_PHASES", 4)
+        monkeypatch.setattr(modal, "MOST_FILLED", 0)
     else:
         monkeypatch.setattr(modal, "advance", lambda *_: CONTACT_UNSOLVED)
     stepped = simulate(trial_rig(3), step="0.25 us", **CLOSE)
