@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
 FIRST_REVOLUTIONS = 32  # of the first kernel call
-MOST_FILLED = 8  # times that one case may fill the book of phases; then short steps cost less
+MOST_BOOKS = 8  # of phases that one case may meet; where it meets more, short steps cost less
 
 
 class EndlessEvents(Exception):  # noqa: N818 - a state of the motion, never seen by users
@@ -47,8 +47,8 @@ class ModalMarch(March):
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(check, FIRST_REVOLUTIONS * setup.samples_per_revolution)
         self._setup, self._book = setup, setup.book(friction)
-        self._n_filled = 0  # times that the book was full
         self._clearance = np.array([clearance + stator.clearance_offset for stator in setup.model.stators])
+        self._met = {0, *(1 << i for i in range(self._clearance.size))}  # sets of closed contacts
         turn = setup.interval * setup.samples_per_revolution
         self._clock = kernel.Clock(
             spin=setup.spin,
@@ -159,15 +159,22 @@ class ModalMarch(March):
         return not np.all(reached <= self._setup.displacement_limit)
 
     def _find(self, mask: int) -> None:
-        """See that the tables hold a set of contacts; coordinates are widened where it has more modes."""
+        """See that the tables hold a set of contacts.
+
+        The kernel is shown no set but those that this case has met: what it does must not depend on what
+        other cases have left in the book.
+        """
+        self._met.add(mask)
+        if len(self._met) > MOST_BOOKS * self._book.n_most:
+            raise EndlessEvents
         if mask not in self._book.masks:
             if self._book.is_full:
-                self._n_filled += 1
-                if self._n_filled > MOST_FILLED:
-                    raise EndlessEvents
                 self._book.forget()
-            self._book.add(mask)
-        self._phases = self._book.tables()
+            if not self._book.add(mask):
+                raise EndlessEvents
+        tables = self._book.tables()
+        is_met = np.isin(tables.mask, list(self._met))
+        self._phases = tables._replace(mask=np.where(is_met, tables.mask, -1))
         self._z = np.zeros((2, self._phases.switch_re.shape[2]))
         self._z_next = np.zeros_like(self._z)
 

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 LANES = 8  # modes are padded to whole vectors
+# Coordinates that a set of several contacts may have beyond any single one. The width is settled before the
+# first case: that of the tables decides in which order sums are taken, and so the last bits of every case.
+SPARE = 8
 
 
 class PhaseBook:
@@ -26,6 +29,8 @@ class PhaseBook:
 
     Parameters
     ----------
+    opened : Phase
+        That with every pair open, which friction does not change.
     tick : float, s
     sample_level, n_level : int
         2^sample_level ticks are the interval of samples; exponentials are tabulated over 1, 2, ...,
@@ -38,6 +43,7 @@ class PhaseBook:
         model: Model,
         friction: float,
         *,
+        opened: Phase,
         tick: float,
         sample_level: int,
         n_level: int,
@@ -47,37 +53,42 @@ class PhaseBook:
         self.push, self.pull, self.slip = directions(reduced, model, friction)
         self.friction = friction
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
-        self.masks: list[int] = []
-        self._width = 0  # of the tables
-        self._tables = Tables(1 + len(self.push))
-        for mask in (0, *(1 << i for i in range(self.push.shape[0]))):
-            self.add(mask)
+        self._opened = opened
+        phases = [opened, *(self._made(1 << i) for i in range(len(self.push)))]
+        widest = max(phase.exponent.size for phase in phases) + (SPARE if len(self.push) > 1 else 0)
+        self._width = -(-widest // LANES) * LANES
+        self._tables = Tables(len(phases))
+        self.masks = [phase.mask for phase in phases]
+        for phase in phases:
+            self._tabulate(phase)
+
+    @property
+    def n_most(self) -> int:
+        """Phases that there is room for."""
+        return self._tables.n_most
 
     @property
     def is_full(self) -> bool:
         """Whether there is no room for another phase."""
-        return len(self.masks) >= self._tables.n_most
+        return len(self.masks) >= self.n_most
 
-    def add(self, mask: int) -> None:
-        """Make the phase with these pairs closed."""
-        self.masks.append(mask)
+    def add(self, mask: int) -> bool:
+        """Make the phase with these pairs closed; returns whether the tables are wide enough for it."""
         phase = self._made(mask)
-        if phase.exponent.size <= self._width:
-            self._tabulate(phase)
-            return
-        self._width = -(-phase.exponent.size // LANES) * LANES
-        self._tables = Tables(1 + len(self.push))
-        for known in self.masks:
-            self._tabulate(self._made(known))
+        if phase.exponent.size > self._width:
+            return False
+        self.masks.append(mask)
+        self._tabulate(phase)
+        return True
 
     def forget(self) -> None:
         """Make room: keep no phase but that with every pair open."""
-        self.masks.clear()
         self._tables.clear()
-        self.add(0)
+        self.masks = [0]
+        self._tabulate(self._opened)
 
     def _made(self, mask: int) -> Phase:
-        return make_phase(self.reduced, self.push, self.pull, mask)
+        return make_phase(self.reduced, self.push, self.pull, mask) if mask else self._opened
 
     def _tabulate(self, phase: Phase) -> None:
         self._tables.add(

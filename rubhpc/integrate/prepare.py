@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import step_limit
 from rubhpc.integrate.packing import Packed, law_of, pack
+from rubhpc.integrate.phase import Phase, make_phase
 from rubhpc.integrate.phases import PhaseBook
-from rubhpc.integrate.reduction import ReducedModel, reduce_model
+from rubhpc.integrate.reduction import ReducedModel, directions, reduce_model
 from rubhpc.kernels.contact import MULTIPLIER
 from rubhpc.kernels.phases import SAMPLES_AT_ONCE
 
@@ -74,6 +76,12 @@ class ModalSetup:
         """Resolution of events, s."""
         return self.interval / (1 << self.sample_level)
 
+    @cached_property
+    def _opened(self) -> Phase:
+        """Motion with every pair open, whatever the friction."""
+        push, pull, _ = directions(self.reduced, self.model, 0.0)
+        return make_phase(self.reduced, push, pull, 0)
+
     def book(self, friction: float) -> PhaseBook:
         """Phases of a friction, shared by its cases."""
         if friction not in self._books:
@@ -82,6 +90,7 @@ class ModalSetup:
                 self.reduced,
                 self.model,
                 friction,
+                opened=self._opened,
                 tick=self.tick,
                 sample_level=self.sample_level,
                 n_level=self.sample_level + past_sample.bit_length(),

@@ -10,7 +10,7 @@ from trial_rig import trial_rig
 from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.phase import make_phase
 from rubhpc.integrate.phases import PhaseBook
-from rubhpc.integrate.reduction import reduce_model
+from rubhpc.integrate.reduction import directions, reduce_model
 from rubhpc.kernels.phases import (
     LATERAL_RATE,
     LATERAL_ROW,
@@ -36,7 +36,11 @@ def case(request):
     spin = request.param
     model = assemble(trial_rig(2, cross=1e5))
     reduced = reduce_model(model, spin, 1e-30)
-    book = PhaseBook(reduced, model, FRICTION, tick=TICK, sample_level=SAMPLE_LEVEL, n_level=N_LEVEL)
+    push, pull, _ = directions(reduced, model, FRICTION)
+    opened = make_phase(reduced, push, pull, 0)
+    book = PhaseBook(
+        reduced, model, FRICTION, opened=opened, tick=TICK, sample_level=SAMPLE_LEVEL, n_level=N_LEVEL
+    )
     book.add(3)
     return SimpleNamespace(spin=spin, model=model, reduced=reduced, book=book, tables=book.tables())
 
