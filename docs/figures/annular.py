@@ -1,4 +1,4 @@
-"""Draws annular.png: rings of stators against the closed form, and backward whirl. Takes a minute."""
+"""Draws annular.png: rings of stators against the closed form, and backward whirl. Takes some minutes."""
 
 import math
 from dataclasses import replace
@@ -40,7 +40,7 @@ def draw() -> None:
         for modulus, marker, name in ((12e9, "o", "12 GPa"), (1e9, "s", "1 GPa")):
             error = []
             for count in COUNTS:
-                record = rubhpc.simulate(ring(count, modulus), friction=0.05, transient=100, **RUB)
+                record = rubhpc.simulate(ring(count, modulus), friction=0.05, transient=60, **RUB)
                 model = rubhpc.assemble(ring(count, modulus))
                 known = annular_rub(model, record.spin_speed, record.clearance, 0.05)
                 radius = np.hypot(record.vertical, record.horizontal)
