@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from pathlib import Path
 from typing import NamedTuple
 
 # Rank and number of ranks. Slurm's own count comes last: inside `mpirun` it tells of the launcher's daemons.
@@ -23,7 +24,9 @@ class Launch(NamedTuple):
     is_open_mpi: bool = False  # its own launcher, which no other library can be started by
 
 
+_PARENT = os.getppid()
 _moved: list[Launch] = []
+_watching: list[bool] = []
 _LOOK = 0.5  # s between looks at whether the launcher still lives
 _ORPHANED = 75  # exit code of a rank whose launcher is gone: run the same command again
 
@@ -43,12 +46,29 @@ def move_to(rank: int, size: int) -> None:
     _moved.append(launch()._replace(rank=rank, size=size))
 
 
+def _is_orphan_from_birth() -> bool:
+    """Whether the launcher died before this module was loaded: init is the parent, and is no launcher."""
+    if _PARENT != 1:
+        return False
+    try:
+        name = Path("/proc/1/cmdline").read_text()
+    except OSError:
+        return False
+    return not any(part in name for part in ("mpi", "prte", "orte", "hydra", "slurm"))
+
+
 def end_with_launcher() -> None:
-    """End this process soon after its launcher has died, however deep in a kernel or in MPI it is."""
-    parent = os.getppid()
+    """End this process soon after its launcher has died, however deep in imports, a kernel or MPI it is.
+
+    The launcher is the parent that this process had when this module was loaded: it may have died since.
+    """
+    by_mpirun = any(rank in os.environ for rank, _ in _VARIABLES[:2])  # be it for one rank
+    if _watching or not (by_mpirun or launch().size > 1):
+        return
+    _watching.append(True)
 
     def watch() -> None:
-        while os.getppid() == parent:
+        while os.getppid() == _PARENT and not _is_orphan_from_birth():
             time.sleep(_LOOK)
         os._exit(_ORPHANED)
 

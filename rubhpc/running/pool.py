@@ -242,6 +242,7 @@ def connect() -> Pool:
         The launcher started several processes, but they do not find each other; the text names the mend.
     """
     given = launch()
+    end_with_launcher()
     if given.size == 1:
         return Alone()
     with warnings.catch_warnings():
@@ -252,7 +253,6 @@ def connect() -> Pool:
             f"the launcher started {given.size} processes, but MPI ({library}) connects {n_connected}; "
             "use the mpirun of that MPI, or mpi4py built for this one (pip install --no-binary mpi4py mpi4py)"
         )
-    end_with_launcher()
     return Ranks()
 
 
