@@ -153,7 +153,6 @@ def hilbert_huang(
             amplitude[i, first:end] = np.where(kept, a, math.nan)
             frequency[i, first:end] = np.where(kept, f, math.nan)
     unit = str(wave.attrs.get("units", "1"))
-    squared = f"({unit})2" if " " in unit else f"{unit}2"
     name = str(wave.attrs.get("long_name", signal))
     dims = ("mode", "sample")
     time = {"units": "s", "long_name": "time"}
@@ -164,7 +163,7 @@ def hilbert_huang(
             "imf": (dims, imf, {"units": unit, "long_name": f"intrinsic mode of the {name}"}),
             "amplitude": (dims, amplitude, {"units": unit, "long_name": "instantaneous amplitude"}),
             "frequency": (dims, frequency, {"units": "Hz", "long_name": "instantaneous frequency"}),
-            "energy": (dims, amplitude**2, {"units": squared, "long_name": "energy"}),
+            "energy": (dims, amplitude**2, {"units": f"({unit})2", "long_name": "energy"}),
         },
         coords={
             **scalars,
