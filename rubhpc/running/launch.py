@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import os
+import signal
+import sys
 import threading
 import time
+from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 # Rank and number of ranks. Slurm's own count comes last: inside `mpirun` it tells of the launcher's daemons.
 _VARIABLES = (
@@ -28,6 +34,8 @@ _PARENT = os.getppid()
 _moved: list[Launch] = []
 _watching: list[bool] = []
 _LOOK = 0.5  # s between looks at whether the launcher still lives
+_FEW = 32
+_PR_SET_PDEATHSIG = 1  # from Linux's prctl.h
 _ORPHANED = 75  # exit code of a rank whose launcher is gone: run the same command again
 
 
@@ -44,6 +52,29 @@ def launch() -> Launch:
 def move_to(rank: int, size: int) -> None:
     """Have `launch` tell this place from now on: other ranks were lost, and the first one may be another."""
     _moved.append(launch()._replace(rank=rank, size=size))
+
+
+@contextmanager
+def killed_with_launcher() -> Iterator[None]:
+    """Around the start of Open MPI: it holds the interpreter, for 8 s if its launcher is gone.
+
+    The kernel then kills this process with its parent. That is no way for longer: "parent" is the thread that
+    forked, and Open MPI forks in passing threads where it starts more than `_FEW` ranks on a machine.
+    """
+    count = os.environ.get("OMPI_COMM_WORLD_LOCAL_SIZE", "")
+    if sys.platform != "linux" or not count.isdigit() or int(count) > _FEW:
+        yield
+        return
+    import ctypes  # not for --help
+
+    libc = ctypes.CDLL(None)
+    libc.prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
+    if os.getppid() != _PARENT:
+        os._exit(_ORPHANED)
+    try:
+        yield
+    finally:
+        libc.prctl(_PR_SET_PDEATHSIG, 0, 0, 0, 0)
 
 
 def _is_orphan_from_birth() -> bool:
