@@ -18,7 +18,7 @@ from postproc.load import axes_of, need_results, source
 from postproc.selection import narrow
 from postproc.spectra import samples_per_revolution
 from rubhpc.errors import InputError
-from rubhpc.schema import DONE
+from rubhpc.schema import DONE, REGIME
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,11 +91,12 @@ def indicator_scores(
             f"levels: {list(levels)}, draws: {n_draw}: give levels above 0 and at least one draw"
         )
     axes = axes_of(store)
-    data = narrow(store, [*CHANNELS, "contact_fraction", "spin_speed", "status"], axes)
-    data = data.assign({n: data[n].compute() for n in ("contact_fraction", "spin_speed", "status")})
+    data = narrow(store, [*CHANNELS, "regime", "spin_speed", "status"], axes)
+    data = data.assign({n: data[n].compute() for n in ("regime", "spin_speed", "status")})
     is_done = data["status"] == DONE
     need_results(is_done.where(is_done), store)
-    rub, free = is_done & (data["contact_fraction"] > 0), is_done & (data["contact_fraction"] == 0)
+    is_free = data["regime"] == REGIME.index("no_contact")  # of all stators, whichever is looked at
+    rub, free = is_done & ~is_free, is_done & is_free
     for mask, kind, mend in (
         (rub, "touches", "take smaller clearances"),
         (free, "stays free of contact", "take clearances above the contact-free amplitude"),
@@ -134,22 +135,18 @@ def indicator_scores(
             "output_sizes": {"indicator": len(INDICATORS), "level": noise.levels.size, "draw": n_draw},
         },
     )
-    coords = {
-        "level": ("level", noise.levels, {"units": "1", "long_name": "noise level"}),
-        "channel": ("channel", list(CHANNELS)),
-    }
-    scores = {
-        name: found.isel(indicator=i).assign_attrs(units="dB", long_name=text)
-        for i, (name, text) in enumerate(INDICATORS.items())
-    }
-    return xr.Dataset(
+    scores = xr.Dataset(
         {
-            **scores,
-            "rub": rub.assign_attrs(units="1", long_name="touches"),
-            "reference": ("channel", reference),
+            name: found.isel(indicator=i).assign_attrs(units="dB", long_name=text)
+            for i, (name, text) in enumerate(INDICATORS.items())
         },
         attrs=store.attrs,
-    ).assign_coords(coords)
+    ).assign(rub=rub.assign_attrs(units="1", long_name="touches"), reference=("channel", reference))
+    scores.encoding["source"] = source(store)
+    return scores.assign_coords(
+        level=("level", noise.levels, {"units": "1", "long_name": "noise level"}),
+        channel=("channel", list(CHANNELS)),
+    )
 
 
 def _natural(data: xr.Dataset) -> dict[str, xr.DataArray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import importlib
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,7 @@ LONG_ROLES = ("waveform", "spectrum", "section")
 
 
 def open_store(path: str | Path) -> xr.Dataset:
-    """Return the store as a lazy, dask-backed dataset.
+    """Return the store as a lazy, dask-backed dataset; its `rub` draws it (`postproc.accessor`).
 
     Waveforms, spectra and sections are divided as they lie on disk, so that a selection reads no more than
     its own chunks; scalars are read in pieces of up to some 100 MB, since a map wants all of them at once.
@@ -50,6 +51,7 @@ def open_store(path: str | Path) -> xr.Dataset:
     if "status" not in store:
         raise StoreError(f"{path}: is not a rubhpc store; give the directory that a study was run into")
     store.encoding["source"] = str(path)
+    importlib.import_module("postproc.accessor")  # gives datasets their `rub`
     return store
 
 

@@ -49,6 +49,10 @@ COMMANDS = {
         "rubhpc.commands.signals:indicators",
         "How often the vibration tells rub from no rub, under noise.",
     ),
+    "sensitivity": (
+        "rubhpc.commands.sensitivity:sensitivity",
+        "Which axes a scalar depends on: Sobol indices.",
+    ),
     "report": ("rubhpc.commands.report:report", "One HTML page: maps, and every case behind them."),
     "view": ("rubhpc.commands.report:view", "The same over a big store, served to this machine alone."),
     "claims": ("rubhpc.commands.claims:claims", "The paper's claims against the stores of jobs/paper."),

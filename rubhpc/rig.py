@@ -271,7 +271,7 @@ def read_rig(
     if code := python_function(name):
         if not trust_rig:
             problem = f"{place(name)} is Python code, which is run only when you trust it"
-            raise InputError(f"{where}: {problem}; add --trust-rig (in Python, trust_rig=True)")
+            raise InputError(f"{where}: {problem}; add --trust-rig (in Python, give the Rig itself)")
         rig = call_rig_function((relative_to or Path()) / code[0], code[1], where)
         if not isinstance(rig, Rig):
             raise InputError(f"{where}: {place(name)} returned a {type(rig).__name__}; return a rubhpc.Rig")

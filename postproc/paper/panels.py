@@ -37,8 +37,9 @@ def over_time(
     Contact is shaded where there is one case.
     """
     data = waveform_data(every, [*panels, "contact_force"], revolutions + 1, over)
-    half = samples_per_revolution(data["contact_force"]) // 2  # from here on, no contact is cut at the edge
-    data = data.isel(sample=slice(half, -half)).load()
+    start = between_contacts(data["contact_force"])
+    n_sample = revolutions * samples_per_revolution(data["contact_force"])
+    data = data.isel(sample=slice(start, start + n_sample)).load()
     data = from_zero(data, float(data["time"][0]))
     for signal, ax in panels.items():
         waveform(data[signal], ax)
@@ -48,6 +49,20 @@ def over_time(
         if over is not None:
             for line, style in zip(ax.get_lines(), STYLES, strict=False):
                 line.set_linestyle(style)
+
+
+def between_contacts(force: xr.DataArray) -> int:
+    """Return the sample of the first revolution that is farthest from contact in all cases and revolutions.
+
+    A panel that begins there cuts no contact at its edges.
+    """
+    touches = (force > 0).values.reshape(-1, samples_per_revolution(force)).any(axis=0)
+    if not touches.any():
+        return 0
+    at, n = np.flatnonzero(touches), touches.size
+    gaps = np.diff(np.append(at, at[0] + n))
+    longest = int(np.argmax(gaps))
+    return int(at[longest] + gaps[longest] // 2) % n
 
 
 def closeup(

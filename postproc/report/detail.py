@@ -51,16 +51,16 @@ class Detail:
         parts = []
         if "waveform" in kept:
             parts.append(
-                f"waveforms of a period (two revolutions at least), or of {self.revolutions} revolutions of a "
-                f"motion without one, at most {self.samples} samples each (of forces, the highest between them)"
+                f"waveforms of a period (two revolutions at least), or {self.revolutions} revolutions of a "
+                f"motion without one, at most {self.samples} samples each (of forces, the highest of some)"
             )
         if {"waveform", "spectrum"} & set(kept):
             parts.append(f"spectra up to their last line above {_FLOOR:.1%}, at most {self.lines} lines")
-        parts.append("all section points")
-        signals = (
-            "" if self.signals == SIGNAL_NAMES else f"; only {', '.join(self.signals).replace('_', ' ')}"
-        )
-        return "; ".join(parts if {"waveform", "section"} & set(kept) else parts[:-1]) + signals
+        if {"waveform", "section"} & set(kept):
+            parts.append("all section points")
+        if self.signals != SIGNAL_NAMES:
+            parts.append(f"only {', '.join(self.signals).replace('_', ' ')}")
+        return "; ".join(parts)
 
 
 FULL = Detail(samples=1024, revolutions=64, lines=8192, signals=SIGNAL_NAMES)

@@ -36,6 +36,7 @@ _FIRST = (
     "peak_to_peak_vertical",
     "peak_to_peak_horizontal",
 )
+_FLAGS = ("status", "regime", "period", "validity")
 _NO_PERIOD = "#D55E00"
 _WITHIN, *_BEYOND = ("#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#F0E442", "#0072B2", "#D55E00", "#8C5A2B")
 _MATHTEXT = re.compile(r"\s*\$[^$]*\$")
@@ -91,6 +92,7 @@ class Measures:
                     "factor": scale.factor,
                     "by_stator": self.is_by_stator(name),
                     "is_setting": self._is_setting(name),
+                    "is_flag": name in _FLAGS,
                     "categories": self._categories(name),
                 }
             )
@@ -108,7 +110,7 @@ class Measures:
 
     def _categories(self, name: str) -> list[dict[str, Any]]:
         """Return code, name and colour of the values of a flag that occur; [] of what is no flag."""
-        if name not in ("status", "regime", "period", "validity"):
+        if name not in _FLAGS:
             return []
         values = self.values(name)
         codes = [int(c) for c in np.unique(values[np.isfinite(values)])]

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from rubhpc.errors import RubError, StoreError
-from rubhpc.running.launch import launch
+from rubhpc.running.launch import end_with_launcher, launch
 
 _OUTPUT = click.option(
     "--output", type=click.Path(path_type=Path), metavar="STORE", help="The store, instead of the study's."
@@ -57,6 +57,7 @@ def run(
         return _reproduce(study, output, only, trust_rig=trust_rig)
     from rubhpc.running.stopping import Stopping
 
+    end_with_launcher()
     with Stopping() as stopping:  # signals are answered from here on, whatever the imports below take
         from rubhpc.input.quantity import parse_quantity
         from rubhpc.running.driver import run as run_study

@@ -70,6 +70,7 @@ class Workspace(NamedTuple):
     tangential: Floats  # (2, q, q), m/N, change of a slip for a unit normal force, for a unit friction
     tableau: Floats  # (3 q, 6 q + 2)
     basis: Ints  # (3 q,)
+    members: Ints  # (q,)
 
 
 @jit_inline

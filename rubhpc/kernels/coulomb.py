@@ -22,7 +22,8 @@ from rubhpc.kernels.lemke import solve_lemke
 
 Floats = NDArray[np.float64]
 
-ROUNDING = 1e-12  # share of a force or a slip that counts as zero
+ROUNDING = 1e-12  # share of a force that counts as zero
+UNNOTICED = 1e-6  # share of what friction can change in a step that counts as no slip
 
 
 @jit
@@ -82,60 +83,102 @@ def feeds_energy(pairs: Pairs, work: Workspace, i: int, step: float, spin: float
         before -= step * work.drag[i, a] * work.rate[i, a]
     for j in range(work.force.size):
         after += work.tangential[0, i, j] * work.force[j] + work.tangential[1, i, j] * work.traction[j]
-    size = abs(before) + abs(work.slip[i])
-    return bool(work.traction[i] * (before + after) < -ROUNDING * abs(work.traction[i]) * size)
+    # Against what friction can do to the slip in a step: a pair that sticks slips by the rounding of
+    # positions.
+    least = UNNOTICED * abs(work.tangential[1, i, i]) * work.cone[i] * work.force[i]
+    return bool(work.traction[i] * (before + after) < -abs(work.traction[i]) * least)
 
 
 @jit
 def solve_cones(work: Workspace) -> int:
     """Forces for the given `work.cone`; pivots taken, or UNSOLVED.
 
+    Pairs whose gap stays open of itself are left out; should the forces of the others close it, they are
+    taken in.
+    """
+    q = work.force.size
+    pivots = 0
+    for i in range(q):
+        work.active[i] = work.gap[i] < work.target[i]
+    for _ in range(q + 1):
+        n_member = 0
+        for i in range(q):
+            work.force[i] = work.traction[i] = 0.0
+            if work.active[i]:
+                work.members[n_member] = i
+                n_member += 1
+        taken = solve_members(work, n_member)
+        if taken == UNSOLVED:
+            return UNSOLVED
+        pivots += taken
+        is_complete = True
+        for i in range(q):
+            if not work.active[i]:
+                gap = work.gap[i] - work.target[i]
+                for k in range(n_member):
+                    j = work.members[k]
+                    gap += work.matrix[i, j] * work.force[j] + work.coupling[i, j] * work.traction[j]
+                if gap < 0.0:
+                    work.active[i] = True
+                    is_complete = False
+        if is_complete:
+            return pivots
+    return UNSOLVED
+
+
+@jit
+def solve_members(work: Workspace, q: int) -> int:
+    """Forces of the first q `work.members`; pivots taken, or UNSOLVED.
+
     Each pair's friction and slip are counted in the sense of its slip without forces, so that steady sliding,
     the ordinary case, is where the method starts. Rows: gap, d+, T+; unknowns of their columns: N, T-, d-.
     Forces are counted in the displacement that they cause: all entries of the tableau are then of order one.
     """
-    tableau, basis, q = work.tableau, work.basis, work.force.size
+    tableau, basis, members = work.tableau, work.basis, work.members
     n = 3 * q
     value = 2 * n + 1  # last column
     scale = 0.0
-    for i in range(q):
+    for a in range(q):
+        i = members[a]
         scale = max(scale, abs(work.matrix[i, i]), abs(work.tangential[1, i, i]))
-    if not scale > 0.0:
+    if q > 0 and not scale > 0.0:
         return UNSOLVED
-    tableau[:] = 0.0
-    for i in range(n):
-        tableau[i, i], tableau[i, 2 * n] = 1.0, -1.0
-    for i in range(q):
-        ahead, room = q + i, 2 * q + i
+    for row in range(n):
+        for column in range(2 * n + 2):
+            tableau[row, column] = 0.0
+        tableau[row, row], tableau[row, 2 * n] = 1.0, -1.0
+    for a in range(q):
+        i, ahead, room = members[a], q + a, 2 * q + a
         forward = 1.0 if work.slip[i] >= 0.0 else -1.0
-        tableau[i, value] = work.gap[i] - work.target[i]
+        tableau[a, value] = work.gap[i] - work.target[i]
         tableau[ahead, value] = forward * work.slip[i]
         tableau[ahead, n + room] = -1.0
-        tableau[room, n + i], tableau[room, n + ahead] = -2.0 * work.cone[i], 1.0
-        for j in range(q):
+        tableau[room, n + a], tableau[room, n + ahead] = -2.0 * work.cone[i], 1.0
+        for b in range(q):
+            j = members[b]
             sense = 1.0 if work.slip[j] >= 0.0 else -1.0
             answer, turn = work.coupling[i, j] * sense / scale, work.tangential[1, i, j] * sense / scale
-            tableau[i, n + j] = -work.matrix[i, j] / scale - work.cone[j] * answer
-            tableau[ahead, n + j] = -forward * (work.tangential[0, i, j] / scale + work.cone[j] * turn)
+            tableau[a, n + b] = -work.matrix[i, j] / scale - work.cone[j] * answer
+            tableau[ahead, n + b] = -forward * (work.tangential[0, i, j] / scale + work.cone[j] * turn)
             if work.cone[j] > 0.0:
-                tableau[i, n + q + j], tableau[ahead, n + q + j] = answer, forward * turn
+                tableau[a, n + q + b], tableau[ahead, n + q + b] = answer, forward * turn
         if not work.cone[i] > 0.0:  # no friction, whatever the slip: rows that are met as they stand
-            tableau[ahead, n:] = 0.0
-            tableau[room, n:] = 0.0
-    pivots = solve_lemke(tableau, basis)
+            for column in range(n, 2 * n + 2):
+                tableau[ahead, column] = tableau[room, column] = 0.0
+    pivots = solve_lemke(tableau, basis, n)
     if pivots == UNSOLVED:
         return UNSOLVED
-    for i in range(q):
-        work.force[i] = work.traction[i] = 0.0
     for row in range(n):
         k = basis[row] - n
         found = max(tableau[row, value] / scale, 0.0)
         if 0 <= k < q:
-            work.force[k] += found
-            work.traction[k] += work.cone[k] * found
+            i = members[k]
+            work.force[i] += found
+            work.traction[i] += work.cone[i] * found
         elif q <= k < 2 * q:
-            work.traction[k - q] -= found
-    for i in range(q):
+            work.traction[members[k - q]] -= found
+    for a in range(q):
+        i = members[a]
         bound = work.cone[i] * work.force[i]  # which rounding passes by a little, most of all at zero
         work.traction[i] = min(max(work.traction[i], -bound), bound)
         work.traction[i] *= 1.0 if work.slip[i] >= 0.0 else -1.0

@@ -22,9 +22,9 @@ PIVOTS_A_ROW = 20
 
 
 @jit
-def exchange(tableau: Floats, basis: Ints, row: int, column: int) -> int:
-    """Take the variable of `column` into the basis at `row`; returns the one that leaves."""
-    n, width = tableau.shape
+def exchange(tableau: Floats, basis: Ints, n: int, row: int, column: int) -> int:
+    """Take the variable of `column` into the basis at `row`, of n rows; returns the one that leaves."""
+    width = 2 * n + 2
     pivot = tableau[row, column]
     for k in range(width):
         tableau[row, k] /= pivot
@@ -39,18 +39,19 @@ def exchange(tableau: Floats, basis: Ints, row: int, column: int) -> int:
 
 
 @jit
-def solve_lemke(tableau: Floats, basis: Ints) -> int:
-    """Pivots taken until the problem of a tableau is solved, or UNSOLVED.
+def solve_lemke(tableau: Floats, basis: Ints, n: int) -> int:
+    """Pivots taken until the problem of n rows is solved, or UNSOLVED.
 
     Parameters
     ----------
-    tableau : (n, 2 n + 2)
+    tableau : (n or more, 2 n + 2 or more)
         Columns of w (the identity), of z (-A), of z0 (-1), and b. On return the last column holds the values
         of the basic variables.
-    basis : (n,)
+    basis : (n or more,)
         Filled with the basic variable of each row: k for w_k, n + k for z_k. All others are zero.
     """
-    n = basis.size
+    if n == 0:
+        return 0
     z0, last = 2 * n, 2 * n + 1
     row = 0
     for i in range(n):
@@ -59,7 +60,7 @@ def solve_lemke(tableau: Floats, basis: Ints) -> int:
             row = i
     if not tableau[row, last] < 0.0:
         return 0
-    leaving = exchange(tableau, basis, row, z0)
+    leaving = exchange(tableau, basis, n, row, z0)
     for n_pivot in range(1, PIVOTS_A_ROW * n):
         entering = leaving + n if leaving < n else leaving - n
         row, finish = -1, -1
@@ -76,7 +77,7 @@ def solve_lemke(tableau: Floats, basis: Ints) -> int:
         # Of rows that are equal but for rounding that of z0 leaves: then all is done.
         if finish >= 0 and tableau[finish, last] <= least * (1.0 + TIE) * tableau[finish, entering]:
             row = finish
-        leaving = exchange(tableau, basis, row, entering)
+        leaving = exchange(tableau, basis, n, row, entering)
         if leaving == z0:
             return n_pivot
     return UNSOLVED

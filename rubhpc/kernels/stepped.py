@@ -88,6 +88,27 @@ def book_step(
 
 
 @jit_sum
+def take_back(
+    kicks: Kicks, work: Workspace, step: float, z_re: Floats, z_im: Floats, before: Floats, now: Floats
+) -> None:
+    """Take back what a step's forces have moved before their impacts were due; velocities stay.
+
+    `z` are the coordinates at the end of the step (s); the ends `before` and `now` (5 q,) are moved alike.
+    """
+    for i in range(work.force.size):
+        for d in range(N_DEGREE):
+            late = work.delay[i] * step * work.force[i] * work.pull[i, d]
+            if late != 0.0:
+                for k in range(z_re.size):
+                    z_re[k] -= kicks.shifted_re[i * N_DEGREE + d, k] * late
+                    z_im[k] -= kicks.shifted_im[i * N_DEGREE + d, k] * late
+    for a in range(now.size):
+        moved = dot(kicks.degree_re[a], kicks.degree_im[a], z_re, z_im) - now[a]
+        before[a] += moved
+        now[a] += moved
+
+
+@jit_sum
 def advance_stepped(
     phases: Phases,
     reduced: Reduced,
@@ -127,6 +148,7 @@ def advance_stepped(
     highest_level = phases.power_re.shape[1] - 1
     per_revolution = clock.samples_per_revolution << clock.sample_level
     is_direct, is_springy = is_plain(pairs.law), pairs.law.stiffness > 0.0
+    is_bouncing = pairs.law.restitution > 0.0
     is_followed = is_recorded or not is_direct  # the steps before and after a force are looked at
     t = first_tick
     was_touching = bool(np.any(work.force > 0.0))
@@ -185,14 +207,13 @@ def advance_stepped(
                     b = i * N_DEGREE + d
                     impulse = step * work.force[i] * work.pull[i, d]
                     if impulse != 0.0:
-                        late = impulse * work.delay[i]  # what it has moved before its impact was due
                         if is_sample:
                             samples.rotor[TWIST_ACCELERATION, t >> clock.sample_level] += (
                                 kicks.twist_answer[b] * impulse / step
                             )
                         for k in range(z_re.size):
-                            next_re[k] += kicks.drifted_re[b, k] * impulse - kicks.shifted_re[b, k] * late
-                            next_im[k] += kicks.drifted_im[b, k] * impulse - kicks.shifted_im[b, k] * late
+                            next_re[k] += kicks.drifted_re[b, k] * impulse
+                            next_im[k] += kicks.drifted_im[b, k] * impulse
             if is_followed:
                 for a in range(n_degree):
                     after[a] = dot(degree_re[a], degree_im[a], next_re, next_im)
@@ -219,6 +240,8 @@ def advance_stepped(
         was_touching = is_touching
         for a in range(n_degree):
             before[a], now[a] = now[a], after[a]
+        if is_touching and is_bouncing:
+            take_back(kicks, work, step, next_re, next_im, before, now)
         if not (is_near and is_followed):
             before[0] = np.nan
         for k in range(z_re.size):

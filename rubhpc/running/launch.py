@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import os
+import signal
+import sys
 import threading
 import time
-from typing import NamedTuple
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 # Rank and number of ranks. Slurm's own count comes last: inside `mpirun` it tells of the launcher's daemons.
 _VARIABLES = (
@@ -23,8 +30,12 @@ class Launch(NamedTuple):
     is_open_mpi: bool = False  # its own launcher, which no other library can be started by
 
 
+_PARENT = os.getppid()
 _moved: list[Launch] = []
+_watching: list[bool] = []
 _LOOK = 0.5  # s between looks at whether the launcher still lives
+_FEW = 32
+_PR_SET_PDEATHSIG = 1  # from Linux's prctl.h
 _ORPHANED = 75  # exit code of a rank whose launcher is gone: run the same command again
 
 
@@ -43,12 +54,52 @@ def move_to(rank: int, size: int) -> None:
     _moved.append(launch()._replace(rank=rank, size=size))
 
 
+@contextmanager
+def killed_with_launcher() -> Iterator[None]:
+    """Around the start of Open MPI: it holds the interpreter, for 8 s if its launcher is gone.
+
+    The kernel then kills this process with its parent. That is no way for longer: "parent" is the thread that
+    forked, and Open MPI forks in passing threads where it starts more than `_FEW` ranks on a machine.
+    """
+    count = os.environ.get("OMPI_COMM_WORLD_LOCAL_SIZE", "")
+    if sys.platform != "linux" or not count.isdigit() or int(count) > _FEW:
+        yield
+        return
+    import ctypes  # not for --help
+
+    libc = ctypes.CDLL(None)
+    libc.prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
+    if os.getppid() != _PARENT:
+        os._exit(_ORPHANED)
+    try:
+        yield
+    finally:
+        libc.prctl(_PR_SET_PDEATHSIG, 0, 0, 0, 0)
+
+
+def _is_orphan_from_birth() -> bool:
+    """Whether the launcher died before this module was loaded: init is the parent, and is no launcher."""
+    if _PARENT != 1:
+        return False
+    try:
+        name = Path("/proc/1/cmdline").read_text()
+    except OSError:
+        return False
+    return not any(part in name for part in ("mpi", "prte", "orte", "hydra", "slurm"))
+
+
 def end_with_launcher() -> None:
-    """End this process soon after its launcher has died, however deep in a kernel or in MPI it is."""
-    parent = os.getppid()
+    """End this process soon after its launcher has died, however deep in imports, a kernel or MPI it is.
+
+    The launcher is the parent that this process had when this module was loaded: it may have died since.
+    """
+    by_mpirun = any(rank in os.environ for rank, _ in _VARIABLES[:2])  # be it for one rank
+    if _watching or not (by_mpirun or launch().size > 1):
+        return
+    _watching.append(True)
 
     def watch() -> None:
-        while os.getppid() == parent:
+        while os.getppid() == _PARENT and not _is_orphan_from_birth():
             time.sleep(_LOOK)
         os._exit(_ORPHANED)
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar
 import numpy as np
 
 from rubhpc.errors import InputError, RubError
-from rubhpc.running.launch import Launch, end_with_launcher, launch
+from rubhpc.running.launch import Launch, end_with_launcher, killed_with_launcher, launch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -242,6 +242,7 @@ def connect() -> Pool:
         The launcher started several processes, but they do not find each other; the text names the mend.
     """
     given = launch()
+    end_with_launcher()
     if given.size == 1:
         return Alone()
     with warnings.catch_warnings():
@@ -252,7 +253,6 @@ def connect() -> Pool:
             f"the launcher started {given.size} processes, but MPI ({library}) connects {n_connected}; "
             "use the mpirun of that MPI, or mpi4py built for this one (pip install --no-binary mpi4py mpi4py)"
         )
-    end_with_launcher()
     return Ranks()
 
 
@@ -273,5 +273,6 @@ def _connected(given: Launch) -> tuple[str, int]:
     if given.is_open_mpi and any(name in library for name in ("MPICH", "Intel", "MVAPICH")):
         return library, 1
     if not MPI.Is_initialized():
-        MPI.Init_thread(MPI.THREAD_FUNNELED)  # other threads keep the lock alive and watch the launcher
+        with killed_with_launcher():
+            MPI.Init_thread(MPI.THREAD_FUNNELED)  # other threads keep the lock alive and watch the launcher
     return library, MPI.COMM_WORLD.size

@@ -12,6 +12,7 @@ from postproc.load import open_store
 from postproc.report.budget import write_report
 from postproc.report.page import Page as ReportPage
 from postproc.report.page import least_size
+from rubhpc.schema import MISSING
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -60,7 +61,7 @@ def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
 
 @pytest.fixture(scope="session")
 def stores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Stores of four axes and two stators, of one axis, of one case, and one without long arrays."""
+    """Stores of four axes and two stators, of one axis, of one case, of measures alone, and without results."""
     folder = tmp_path_factory.mktemp("stores")
     whole = synthetic_store.make(n_stator=2)
     rest = {"clearance": [1], "friction": [1], "stator_youngs_modulus": [0]}
@@ -69,7 +70,9 @@ def stores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "line": whole.isel(rest),
         "single": whole.isel(speed_ratio=[1], **rest),
         "scalars": synthetic_store.make(keep=()),
+        "empty": synthetic_store.make(keep=()),
     }
+    made["empty"]["status"][...] = MISSING
     for name, dataset in made.items():
         synthetic_store.write(folder / f"{name}.zarr", dataset)
     return {name: folder / f"{name}.zarr" for name in made}

@@ -219,3 +219,10 @@ def test_a_served_store_is_read_case_by_case(visit: Visit, stores: dict[str, Pat
         expect(page.locator("#orbit .plot")).to_have_attribute("aria-label", re.compile("2 revolutions"))
         server.shutdown()
     assert [url for url in asked if "/record/" in url]
+
+
+def test_a_store_without_any_result_has_its_maps(visit: Visit, pages: dict[str, str]) -> None:
+    page = visit(pages["empty"])
+    expect(page.locator("#case-text")).to_contain_text("not computed yet")
+    expect(page.locator("#legend")).to_have_text("missing")
+    assert not page.evaluate("Boolean(map.bar)")

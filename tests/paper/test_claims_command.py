@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -53,6 +55,25 @@ def test_the_studies_store_where_the_command_looks():
         assert study.output == Path("paper") / f"{name}.zarr"
         assert study.recording.transient >= 120
         assert study.recording.revolutions % 12 == 0
+
+
+def test_the_gallery_tells_of_every_study_its_cases_and_every_figure():
+    gallery = (ROOT / "docs" / "gallery.md").read_text()
+    told = dict(re.findall(r"^\| \[`jobs/paper/(\w+).toml`\].*?\| [^|]* \| (\d+) \|", gallery, re.MULTILINE))
+    cases = {
+        name: math.prod(len(axis.values) for axis in read_study(path).axes) for name, path in STUDIES.items()
+    }
+    assert {name: int(n) for name, n in told.items()} == cases
+    assert f"{sum(cases.values())} cases" in (ROOT / "README.md").read_text()
+    shown = re.findall(r"^## Fig\. (\d+): .*\n\n!\[.*\]\(gallery/fig(\d\d)\.png\)$", gallery, re.MULTILINE)
+    assert [int(a) for a, _ in shown] == [int(b) for _, b in shown] == list(FIGURES)
+    assert f"holds {len(CLAIMS)} statements" in gallery
+    told_discrepancies = re.findall(r"^\| (D\d+) \|", gallery, re.MULTILINE)
+    assert told_discrepancies == [c.id for c in CLAIMS if c.id.startswith("D")]
+
+
+def test_the_gallery_is_small():
+    assert sum(path.stat().st_size for path in (ROOT / "docs" / "gallery").iterdir()) < 4e6
 
 
 def test_the_wall_meets_the_rotor_of_the_packaged_rig():

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from synthetic_paper import SAMPLES
 
 from postproc.paper.index import FIGURES, draw_figures
+from postproc.paper.panels import between_contacts
 from postproc.style import house_style
 from rubhpc.errors import InputError
 
@@ -40,6 +42,16 @@ def test_cases_over_one_another_are_told_apart(sound):
     assert len({line.get_color() for line in torsion.lines[:3]}) == 3
     peaks = [line.get_ydata().max() for line in torsion.lines[:3]]
     assert peaks == pytest.approx([peaks[0], 3 * peaks[0], 5 * peaks[0]], rel=1e-3)
+
+
+@pytest.mark.parametrize("study", ["subcritical", "clearance", "friction"])
+def test_panels_over_time_cut_no_contact(study, sound):
+    force = sound[study]["contact_force"].isel(stator=0)
+    start = between_contacts(force)
+    edge = force.values.reshape(-1, SAMPLES)[:, start]
+    assert (edge == 0).all()
+    turned = force.roll(sample=SAMPLES // 3)  # wherever contact lies
+    assert (turned.values.reshape(-1, SAMPLES)[:, between_contacts(turned)] == 0).all()
 
 
 def test_the_cascade_marks_what_it_found(sound):

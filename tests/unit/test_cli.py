@@ -230,3 +230,24 @@ def test_plan_foresees_the_time_of_the_cases(tmp_path):
     run(study, quiet=True)
     taken = float(xr.open_zarr(study.output).wall_time.sum())
     assert taken / 5 < foreseen < 5 * taken
+
+
+def test_plan_tells_why_its_pilots_failed(tmp_path, monkeypatch, capsys):
+    from rubhpc.running import plan
+
+    def burst(*_: object) -> None:
+        raise ZeroDivisionError("by\nzero")
+
+    monkeypatch.setattr(plan, "set_up", burst)
+    code, out, err = call(capsys, "plan", write_study(tmp_path))
+    assert (code, err) == (0, "")
+    assert "core-hours unknown: the pilot cases failed" in out
+    assert "failed      a pilot case: speed_ratio=0.9, clearance_ratio=0.7, friction=0.1: " in out
+    assert "ZeroDivisionError: by zero" in out
+
+
+@pytest.mark.parametrize("arguments", [("nosuch",), ("nosuch", "--help"), ("verfy", "x.zarr")])
+def test_a_word_that_is_no_command_is_told(capsys, arguments):
+    code, out, err = call(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert f"{arguments[0]}: no such command or study; " in err

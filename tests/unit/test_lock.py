@@ -130,3 +130,12 @@ def test_an_orphan_is_waited_for(path):
     with Lock(path):
         assert time.monotonic() - began > 0.3
     process.wait()
+
+
+def test_an_heir_takes_the_lock_of_a_lost_rank_at_once(path):
+    """On another machine nothing but its heart could tell that the holder is dead."""
+    leave(path, host="elsewhere", token="of the first rank")
+    with pytest.raises(StoreError, match="on elsewhere"):
+        Lock(path, heir_of="of another run").__enter__()
+    with Lock(path, heir_of="of the first rank") as lock:
+        assert read_holder(path).token == lock.token

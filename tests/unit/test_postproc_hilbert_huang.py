@@ -240,17 +240,23 @@ def test_a_figure_without_oscillation_is_refused():
 ONE = ["speed_ratio=1.5", "clearance=84 um", "friction=0.3", "stator.youngs_modulus=3 GPa"]
 
 
-@pytest.fixture
-def run(tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
     made = synthetic_store.make()
     twist = np.sin(8 * math.pi * made["revolution"])  # 4X: three cycles between contacts
     made["torsion"] = made["torsion"].copy(data=np.broadcast_to(twist, made["torsion"].shape))
-    synthetic_store.write(tmp_path / "study.zarr", made)
+    path = tmp_path_factory.mktemp("stores") / "study.zarr"
+    synthetic_store.write(path, made)
+    return str(path)
+
+
+@pytest.fixture
+def run(store, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def invoke(*args):
         words = [word for choice in ONE for word in ("--select", choice)]
-        return CliRunner().invoke(command, ["study.zarr", *words, *args], catch_exceptions=False).output
+        return CliRunner().invoke(command, [store, *words, *args], catch_exceptions=False).output
 
     return invoke
 

@@ -30,7 +30,7 @@ def store(waves, rub):
     rows = {n: np.broadcast_to(waves.get(n, np.zeros(N * TURNS)), (n_case, N * TURNS)) for n in CHANNELS}
     data = {n: (("clearance", "sample"), w, {"units": "m"}) for n, w in rows.items() if n != "stator_lateral"}
     data["stator_lateral"] = (("clearance", "stator", "sample"), rows["stator_lateral"][:, None])
-    data["contact_fraction"] = (("clearance", "stator"), np.where(rub, 0.1, 0.0)[:, None])
+    data["regime"] = ("clearance", np.where(rub, 1, 0).astype(np.int8))
     data["status"] = ("clearance", np.full(n_case, DONE, dtype=np.int8))
     data["spin_speed"] = ((), 2 * math.pi * RATE)
     coords = {

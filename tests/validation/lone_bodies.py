@@ -40,18 +40,18 @@ def tip(stator_body, angle, *, radius=1.0, axial=0, lateral=-1):
 
 
 def _model(rotor, stators, spin, force):
-    none = np.zeros(rotor.n_dof)
+    force = np.zeros(rotor.n_dof) if force is None else np.asarray(force)
     return Model(
         rotor=rotor,
-        unbalance_cosine=none if force is None else np.asarray(force) / spin**2,
-        unbalance_sine=none,
+        unbalance_cosine=force.real / spin**2,
+        unbalance_sine=-force.imag / spin**2,
         stators=tuple(stators),
         output_node=1,
     )
 
 
 def set_up(rotor, stators, spin, per_revolution, contact, *, force=None, steps_per_sample=1):
-    """Central difference of a body and its stators; `force` (n_dof,), N, goes with the cosine of spin t."""
+    """Central difference of a body and its stators; `force` (n_dof,), N, is the phasor of exp(i spin t)."""
     model = _model(rotor, stators, spin, force)
     step = 2 * math.pi / (abs(spin) * per_revolution * steps_per_sample)
     return CentralDifferenceSetup(
@@ -67,7 +67,7 @@ def set_up(rotor, stators, spin, per_revolution, contact, *, force=None, steps_p
     )
 
 
-def set_up_modal(rotor, stators, spin, per_revolution, contact, *, force=None, step=1e-4):
+def set_up_modal(rotor, stators, spin, per_revolution, contact, *, force=None, step=2e-6):
     """Modal scheme of a body and its stators; `step` (s) is that in contact."""
     model = _model(rotor, stators, spin, force)
     return ModalSetup(

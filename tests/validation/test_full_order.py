@@ -77,6 +77,16 @@ CASES = {
         0.2,
     ),
     "at two nodes": (ROTOR, [stator(6, 10, radius=0.05), stator(3, 130)], -280.0, 90e-6, 0.25),
+    "a ring, and one at another node": (
+        ROTOR,
+        [
+            *(stator(3, 120 * i, clearance_offset=(i - 1) * 1e-5) for i in range(3)),
+            stator(6, 10, radius=0.05),
+        ],
+        310.0,
+        70e-6,
+        0.15,
+    ),
     "no lateral freedom": (SPRUNG, [stator(3, -30, **STIFF)], 400.0, 120e-6, 0.5),
 }
 # Accurate enough for the greatest distance at any instant, over the greatest value, to be in tolerance.

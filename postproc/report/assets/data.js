@@ -102,7 +102,7 @@ function axisValue(axis, i) {
 
 // A value as people read it: the name of a category, or a number with its unit.
 function valueText(v, x) {
-  if (v.categories.length) {
+  if (v.is_flag) {
     const found = v.categories.find((c) => c.code === x);
     return found ? found.name : "–";
   }

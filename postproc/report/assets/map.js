@@ -74,14 +74,14 @@ class CaseMap {
   }
 
   height(v, value, kind) {
-    return v.categories.length || !["known", "beyond"].includes(kind) ? NaN : value * v.factor;
+    return v.is_flag || !["known", "beyond"].includes(kind) ? NaN : value * v.factor;
   }
 
   // Colours run over the whole study, so that they mean the same wherever the other axes stand.
   colours(v, values, cells, isLog) {
     const painted = (i) => cells.kind[i] === "known" || cells.kind[i] === "beyond";
     const color = cells.kind.map((kind, i) => (painted(i) ? null : HATCHES[kind][0]));
-    if (v.categories.length) {
+    if (v.is_flag) {
       const of = new Map(v.categories.map((c) => [c.code, c.color]));
       cells.color = color.map((c, i) => c ?? of.get(cells.value[i]) ?? "#ffffff");
       return null;
@@ -146,7 +146,7 @@ class CaseMap {
     this.cellSource.data = { left, right, bottom, top, color, tip };
     const hatched = cells.kind.map((kind, i) => i).filter((i) => cells.kind[i] !== "known" && cells.kind[i] !== "empty");
     const pick = (column) => hatched.map((i) => column[i]);
-    const warning = v.categories.length ? "#111111" : "#d1490b";
+    const warning = v.is_flag ? "#111111" : "#d1490b";
     this.hatchSource.data = {
       left: pick(left), right: pick(right), bottom: pick(bottom), top: pick(top),
       pattern: hatched.map((i) => (cells.kind[i] === "beyond" ? "left_diagonal_line" : HATCHES[cells.kind[i]][1])),
@@ -164,8 +164,8 @@ class CaseMap {
     setRange(this.figure.y_range, start, end);
     cells.bottom = cells.top.map((t) => (Number.isFinite(t) ? Math.min(t, 0) : start));
     cells.top = cells.top.map((t) => (Number.isFinite(t) ? Math.max(t, 0) : end));
-    this.figure.yaxis.axis_label = v.categories.length ? "" : v.label + (v.unit ? ` (${v.unit})` : "");
-    this.figure.yaxis.visible = !v.categories.length;
+    this.figure.yaxis.axis_label = v.is_flag ? "" : v.label + (v.unit ? ` (${v.unit})` : "");
+    this.figure.yaxis.visible = !v.is_flag;
   }
 
   colourBar(v, scale) {

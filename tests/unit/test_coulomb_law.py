@@ -104,7 +104,7 @@ def test_complementarity_with_a_zero_diagonal_is_solved():
     matrix, constant = np.array([[0.0, 1.0], [-1.0, 0.0]]), np.array([-1.0, 2.0])
     tableau[:, :2], tableau[:, 2:4], tableau[:, 4], tableau[:, 5] = np.eye(2), -matrix, -1.0, constant
     basis = np.zeros(2, dtype=np.int64)
-    assert solve_lemke(tableau, basis) > 0
+    assert solve_lemke(tableau, basis, 2) > 0
     z = np.zeros(4)
     z[basis] = tableau[:, 5]
     assert z[2:] == pytest.approx([0.0, 1.0]) or z[2:] == pytest.approx([2.0, 1.0])
@@ -113,7 +113,7 @@ def test_complementarity_with_a_zero_diagonal_is_solved():
 
 def test_problem_without_solution_is_reported():
     tableau = np.array([[1.0, 1.0, -1.0, -1.0]])  # w = -z - 1
-    assert solve_lemke(tableau, np.zeros(1, dtype=np.int64)) == UNSOLVED
+    assert solve_lemke(tableau, np.zeros(1, dtype=np.int64), 1) == UNSOLVED
     assert linprog([0.0], A_ub=[[1.0]], b_ub=[-1.0], bounds=[(0, None)]).status == 2  # infeasible indeed
 
 

@@ -1,0 +1,68 @@
+"""`rubhpc sensitivity`: which axes of a study a measure depends on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from rubhpc.commands.drawing import finish, of_store, open_cases
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@click.command()
+@of_store
+@click.option(
+    "--scalar", default="peak_contact_force", show_default=True, help="A measure or setting of a case."
+)
+@click.option(
+    "--confidence",
+    type=click.FloatRange(0, 1, min_open=True, max_open=True),
+    default=0.95,
+    show_default=True,
+    help="Of the intervals.",
+)
+@click.option("--draws", type=click.IntRange(min=2), default=500, show_default=True, help="Of axis levels.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the draws.")
+def sensitivity(
+    store: str,
+    selection: tuple[str, ...],
+    figure: str | None,
+    data: str | None,
+    scalar: str,
+    confidence: float,
+    draws: int,
+    seed: int,
+) -> None:
+    """First-order and total Sobol indices of a measure over the axes of the study, with intervals.
+
+    They are exact on the levels of the grid, each of which weighs the same; an interval tells what as many
+    other levels of the same range could have given. Cases without a value are counted, and told.
+    """
+    from postproc.sensitivity import sensitivity as indices_of
+    from postproc.sensitivity_figure import bars, height
+
+    found = indices_of(open_cases(store, selection), scalar, n_draw=draws, confidence=confidence, seed=seed)
+    _print_table(found)
+    finish("sensitivity", store, figure, data, found, lambda axes: bars(found, axes[0]), height=height(found))
+
+
+def _print_table(found: xr.Dataset) -> None:
+    about = found.attrs
+    unit = "" if about["units"] == "1" else f" {about['units']}"
+    click.echo(
+        f"{about['scalar']}: mean {about['mean']:.6g}{unit}, standard deviation "
+        f"{about['standard_deviation']:.6g}{unit}, {about['cases']} cases"
+    )
+    for note in about["notes"].splitlines():
+        click.echo(note)
+    click.echo(f"{'axis':<28} {'levels':>6}  {'first order':<22}  total")
+    for i, axis in enumerate(found["axis"].values):
+        cells = []
+        for name in ("first_order", "total"):
+            share, low, high = (float(found[n][i]) for n in (name, f"{name}_low", f"{name}_high"))
+            cells.append(f"{share:.3f} [{low:.3f}, {high:.3f}]")
+        click.echo(f"{axis:<28} {int(found['levels'][i]):>6}  {cells[0]:<22}  {cells[1]}")
+    click.echo(f"interactions: {about['interactions']:.3f}")
