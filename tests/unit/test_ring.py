@@ -2,16 +2,22 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rubhpc import InputError, Rig, read_rig
+import rubhpc
+from rubhpc import InputError, Rig, assemble, read_rig
 from rubhpc.input.stators import MOST_STATORS
+from rubhpc.integrate.contact_work import workspace
+from rubhpc.integrate.packing import pack, pairs_of
+from rubhpc.kernels.complementarity import UNSOLVED, solve_complementarity
 from rubhpc.rig import rig_from_dict, with_key
 from rubhpc.study import make_axis
 
 PACKAGED = read_rig("mokhtar2017")
+PACKAGED_FILE = Path(rubhpc.__file__).parent / "rigs" / "mokhtar2017.toml"
 ONE = PACKAGED.stator[0]
 
 
@@ -82,3 +88,49 @@ def test_stators_of_a_ring_do_not_stand_in_each_other():
     with pytest.raises(InputError, match="stator: 80 of them; there may be 62"):
         replace(PACKAGED, stator=(replace(ONE, count=40), replace(ONE, count=40, angle=0.01)))
     assert isinstance(ring(3), Rig)
+
+
+@pytest.mark.parametrize("count", [3, 12, 32])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_forces_of_a_ring_are_one_problem_solved_in_few_pivots(count, friction):
+    """The disc anywhere, tips disturbed, in steps of 0.5 us: no gap is left, no force pulls."""
+    model = assemble(ring(count))
+    step, spin = 0.5e-6, 300.0
+    packed = pack(model, spin, step)
+    pairs = pairs_of(model, packed, clearance=1e-4, friction=friction, spin=spin, is_updated=False)
+    matrix = workspace(pairs, step).matrix
+    random = np.random.default_rng(count)
+    angle = np.array([stator.angle for stator in model.stators])
+    most_pivots, worst, together = 0, 0.0, 0
+    for _ in range(300):
+        toward = random.uniform(0, 2 * math.pi)
+        gap = 1e-4 - random.uniform(0, 2e-4) * np.cos(angle - toward) + random.normal(0, 2e-5, count)
+        force, active = np.zeros(count), gap < 0
+        pivots = solve_complementarity(matrix, gap, 1e-14, force, active, np.zeros((count, count + 1)))
+        assert pivots != UNSOLVED
+        left = gap + matrix @ force
+        scale = np.abs(gap).max()
+        pulled = -force.min() * matrix[0, 0]
+        worst = max(worst, pulled / scale, -left.min() / scale, abs(left[active]).max(initial=0.0) / scale)
+        most_pivots, together = max(most_pivots, pivots), max(together, np.count_nonzero(force))
+    assert together > 1
+    assert most_pivots <= 6
+    assert worst < 1e-12
+
+
+def test_a_store_tells_where_the_stators_stand_and_which_cases_diverged(tmp_path):
+    """Dry friction drives the whirl of a ring without bound: a result of its own, which stops nothing."""
+    (tmp_path / "study.toml").write_text(
+        'rig = "ring.toml"\n[grid]\nspeed_ratio = 1.5\nclearance_ratio = 0.8\nfriction = [0.3, 0.02]\n'
+        "[record]\ntransient = 8\nrevolutions = 2\nsamples_per_revolution = 64\n"
+    )
+    packaged = PACKAGED_FILE.read_text().replace("[[stator]]", "[[stator]]\ncount = 3")
+    (tmp_path / "ring.toml").write_text(packaged)
+    summary = rubhpc.run(tmp_path / "study.toml", output=tmp_path / "ring.zarr", quiet=True)
+    assert summary.exit_code == 0
+    cases = rubhpc.open(tmp_path / "ring.zarr")
+    assert cases["status"].values.ravel().tolist() == [3, 1]
+    assert cases["stator_angle"].values == pytest.approx(2 * math.pi / 3 * np.arange(3))
+    assert cases["stator_angle"].attrs["units"] == "rad"
+    assert cases["stator_node"].values.tolist() == [8, 8, 8]
+    assert {"stator_angle", "stator_node"} <= set(cases.coords)
