@@ -51,6 +51,9 @@ class State:
         )
 
 
+MOST_RESIDUAL = 0.01  # of the energy balance: more is told of
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Record:
     """One simulated case; every stored variable is an attribute (`record.vertical`, `record.period`).
@@ -91,9 +94,17 @@ class Record:
                     return group[name]
         raise AttributeError(f"this record holds no {name}")
 
+    @property
+    def remark(self) -> str:
+        """Why the case diverged, or what is wrong with its result; "" where nothing is."""
+        residual = self.scalars.get("energy_residual", 0.0)
+        if self.reason or not residual > MOST_RESIDUAL:
+            return self.reason
+        return f"its energy balance is off by {100 * residual:.2g} %; take a shorter step"
+
     def __repr__(self) -> str:
         """One line: status and what it holds."""
-        reason = f" ({self.reason})" if self.reason else ""
+        reason = f" ({self.remark})" if self.remark else ""
         held = ", ".join((*self.signals, *self.spectra, *self.sections))
         return f"<Record: {STATUS[self.status]}{reason}; {held or 'scalars only'}>"
 

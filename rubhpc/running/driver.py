@@ -20,7 +20,7 @@ from rubhpc.running.progress import Progress
 from rubhpc.running.stopping import Stopping
 from rubhpc.running.watch import Watch
 from rubhpc.running.worker import Worker
-from rubhpc.schema import FAILED, MISSING
+from rubhpc.schema import DONE, FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.hand import Hand, forget
 from rubhpc.storage.journal import count
@@ -285,4 +285,5 @@ def _finish(job: Job, computed: int, seconds: float) -> Summary:
         computed=computed,
         seconds=seconds,
         reasons=tuple((store.manifest.name_case(i), ledger.reasons.get(i, "")) for i in failed),
+        flawed=sum(1 for i in ledger.reasons if ledger.status[i] == DONE),
     )

@@ -86,7 +86,7 @@ def reproduce(study: Study, name: str) -> Reproduction:
         text = " ".join(str(error).split())
         raise RubError(f"case {case.id}, {told}: {type(error).__name__}: {text}") from error
     row = metrics_of(record, metrics_type(sweep.n_stator))
-    status = STATUS[record.status] + (f": {record.reason}" if record.reason else "")
+    status = STATUS[record.status] + (f": {record.remark}" if record.remark else "")
     metrics = {n: row[n].tolist() for n in row.dtype.names or ()}
     return Reproduction(
         id=case.id,

@@ -197,7 +197,7 @@ class Worker:
             return Entry(flat, case.id, FAILED, reason=_told(error))
         finally:
             self.watch.end()
-        return Entry(flat, case.id, record.status, case_checksum(data, i_case), metrics, record.reason)
+        return Entry(flat, case.id, record.status, case_checksum(data, i_case), metrics, record.remark)
 
     def _compute(self, case: Case) -> Record:
         study = self.sweep.study

@@ -36,7 +36,7 @@ class StoreStatus:
     n_recent : int
         Cases journalled by the latest run.
     failures : tuple of (str, str)
-        Id, coordinates and reason of each failed or diverged case.
+        Id, coordinates and reason of each failed or diverged case, or of one whose result has a flaw.
     """
 
     title: str
@@ -92,7 +92,7 @@ def read_status(path: Path) -> StoreStatus:
         if holder is not None and not is_alive(holder, lock):
             holder = None
         ledger = replay(path / PRIVATE / "journal", manifest.header, with_metrics=False)
-    troubled = np.flatnonzero((ledger.status == FAILED) | (ledger.status == DIVERGED)).tolist()
+    troubled = {*np.flatnonzero((ledger.status == FAILED) | (ledger.status == DIVERGED)).tolist()}
     return StoreStatus(
         title=manifest.title,
         counts=count(ledger.status),
@@ -104,6 +104,6 @@ def read_status(path: Path) -> StoreStatus:
                 f"{manifest.case_id(i)[:12]} {manifest.name_case(i)}: {STATUS[ledger.status[i]]}",
                 ledger.reasons.get(i, ""),
             )
-            for i in troubled
+            for i in sorted(troubled | ledger.reasons.keys())
         ),
     )

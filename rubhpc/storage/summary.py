@@ -29,6 +29,8 @@ class Summary:
         What the run took.
     reasons : tuple of (str, str)
         Coordinates and reason of each failed case, the first hundred.
+    flawed : int
+        Cases that are done, but whose energy balance is off.
     lost : int
         Ranks that died on the way; the others have done their work.
     """
@@ -39,6 +41,7 @@ class Summary:
     seconds: float
     reasons: tuple[tuple[str, str], ...] = ()
     lost: int = 0
+    flawed: int = 0
 
     @property
     def exit_code(self) -> int:
@@ -49,7 +52,10 @@ class Summary:
         """The summary in a line."""
         states = [i for i in (DONE, FAILED, DIVERGED, MISSING) if self.counts[i]]
         told = ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in states)
-        return f"{self.store}: {told}; {self.computed} computed in {duration(self.seconds)}"
+        flaw = (
+            f"; the energy balance of {self.flawed} is off, rubhpc status names them" if self.flawed else ""
+        )
+        return f"{self.store}: {told}; {self.computed} computed in {duration(self.seconds)}{flaw}"
 
     def complaint(self) -> str:
         """What failed, in a line with the mend."""

@@ -20,6 +20,7 @@ from rubhpc.running import driver, job, stopping, worker
 from rubhpc.running.driver import run
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
 from rubhpc.storage.journal import METRICS
+from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
 from rubhpc.study import Integrator, read_study
@@ -50,7 +51,8 @@ def record(recording: Recording, friction: float, status: int = DONE, reason: st
         signals=waveforms,
         spectra={f"spectrum_{name}": values[..., :n_order] for name, values in waveforms.items()},
         sections={f"section_{name}": np.full(recording.revolutions, friction) for name in SECTION_NAMES},
-        scalars={v.name: np.array([friction]) if "stator" in v.dims else 7 for v in METRICS},
+        scalars={v.name: np.array([friction]) if "stator" in v.dims else 7 for v in METRICS}
+        | {"energy_residual": 1e-6},
         final=None,  # type: ignore[arg-type]
     )
 
@@ -190,6 +192,27 @@ def test_a_diverged_case_is_a_result(physics, study):
     ledger = Store(study.output).replay()
     assert set(ledger.reasons.values()) == {"grew past 1 m"}
     assert not verify(study.output)
+
+
+def test_a_balance_that_is_off_is_named(physics, study):
+    """The result stands, and both the run's end and `rubhpc status` tell what is wrong with it."""
+
+    def lose_energy(*, recording: Recording, **_: Any) -> Record:
+        case = record(recording, 0.3)
+        case.scalars["energy_residual"] = 0.25
+        return case
+
+    assert "balance" not in run(study, quiet=True).text()
+    physics.poison = lose_energy
+    other = replace(study, output=study.output.with_name("other.zarr"))
+    summary = run(other, quiet=True)
+    assert summary.counts == (0, 12, 0, 0)
+    assert summary.exit_code == 0
+    assert "the energy balance of 4 is off" in summary.text()
+    failures = read_status(other.output).failures
+    assert len(failures) == 4
+    assert {told for _, told in failures} == {"its energy balance is off by 25 %; take a shorter step"}
+    assert "friction=0.3: done" in failures[0][0]
 
 
 def test_a_run_with_too_many_failures_stops(physics, study):
