@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import operator
 from dataclasses import MISSING, field
 from typing import TYPE_CHECKING, Any
 
@@ -172,10 +173,16 @@ def _parse_degrees(value: object, where: str) -> tuple[tuple[int, str], ...]:
         pairs = [(node, name) for node, name in value]  # type: ignore[attr-defined]
     except (TypeError, ValueError):
         raise InputError(f"{where}: {brief(value)} is no list of degrees; {mend}") from None
+    degrees = []
     for node, name in pairs:
-        if isinstance(node, bool) or not isinstance(node, int) or node < 1 or not isinstance(name, str):
+        try:
+            number = 0 if isinstance(node, bool) else operator.index(node)  # numpy's whole numbers too
+        except TypeError:
+            number = 0
+        if number < 1 or not isinstance(name, str):
             raise InputError(f"{where}: {brief((node, name))} is no degree; {mend}")
-    return tuple(pairs)
+        degrees.append((number, str(name)))
+    return tuple(degrees)
 
 
 def _check_quantity(value: object, bounds: Any) -> str:

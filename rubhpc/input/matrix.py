@@ -22,7 +22,7 @@ _ENTRY = np.dtype([("row", "<i4"), ("column", "<i4"), ("value", "<f8")])
 
 
 def parse_matrix(value: object, where: str) -> Matrix:
-    """Return a matrix given as an array, as a list of rows, or as `encode_matrix` wrote it.
+    """Return a matrix given as an array, sparse or not, as a list of rows, or as `encode_matrix` wrote it.
 
     Raises
     ------
@@ -33,7 +33,7 @@ def parse_matrix(value: object, where: str) -> Matrix:
         return _decoded(value, where)
     mend = "give the rows, [[1.0, 0.0], [0.0, 1.0]]"
     try:
-        given = np.asarray(value)
+        given = np.asarray(value.toarray() if hasattr(value, "toarray") else value)  # or a sparse one
         is_number = given.dtype.kind in "iuf"
     except ValueError:  # rows of unequal length
         is_number = False

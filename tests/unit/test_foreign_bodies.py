@@ -184,6 +184,15 @@ def test_rig_of_python_finds_the_modules_beside_it(tmp_path):
     assert first_lateral_frequency(assemble(rig)) == pytest.approx(2.0)
 
 
+def test_sparse_matrices_and_numpy_nodes_are_as_good():
+    from scipy.sparse import csr_array
+
+    degrees = [(node, name) for node in np.arange(1, 3) for name in np.array(["v", "w"])]
+    sparse = rotor(csr_array(np.eye(4)), None, csr_array(3 * np.eye(4)), degrees=degrees)
+    plain = rotor(np.eye(4), None, 3 * np.eye(4), degrees=[(1, "v"), (1, "w"), (2, "v"), (2, "w")])
+    assert json.dumps(sparse.as_dict()) == json.dumps(plain.as_dict())
+
+
 def test_keys_of_a_matrix_rig_are_those_that_it_has():
     spring = LumpedStator(node=1, mass=1e-3, stiffness=1e6, radius=0.1, count=3)
     rig = rotor(stators=[spring], unbalance=[Unbalance(node=1, mass=1e-3, radius=0.1)])
