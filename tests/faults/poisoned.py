@@ -18,11 +18,14 @@ import sys
 import time
 from typing import Any
 
-import numpy as np
+from rubhpc.running.launch import end_with_launcher, launch
 
-from rubhpc.cli import main
-from rubhpc.running import watch, worker
-from rubhpc.running.launch import launch
+end_with_launcher()  # before what takes long, as the command does
+
+import numpy as np  # noqa: E402
+
+from rubhpc.cli import main  # noqa: E402
+from rubhpc.running import watch, worker  # noqa: E402
 
 run_case = worker.run_case
 mode = sys.argv.pop(1)

@@ -83,7 +83,8 @@ def test_any_damage_is_told_and_mended(finished, strikes):
 
 
 @pytest.mark.long
-@settings(max_examples=300, phases=[Phase.generate])
+@pytest.mark.timeout(3600)
+@settings(max_examples=100, phases=[Phase.generate])
 @given(strikes=st.lists(blows, min_size=1, max_size=6))
 def test_any_damage_is_told_and_mended_many_times(finished, strikes):
     check(finished, strikes)

@@ -52,6 +52,7 @@ def test_a_case_with_a_segmentation_fault_fails_after_two_of_them(tmp_path, laun
 
 
 @pytest.mark.long
+@pytest.mark.timeout(3600)
 @each_launcher
 def test_a_case_whose_rank_is_killed_fails_after_five_times(tmp_path, launcher):
     """Of SIGKILL nothing tells whose fault it was: neither of the memory, nor of the user."""

@@ -177,6 +177,7 @@ def test_no_file_breaks_the_program(pair):
 
 
 @pytest.mark.long
+@pytest.mark.timeout(3600)
 @settings(max_examples=3000, phases=[Phase.generate])
 @given(pair=PAIRS)
 def test_no_file_of_thousands_breaks_the_program(pair):

@@ -88,6 +88,7 @@ def test_a_kill_storm_loses_nothing(tmp_path, launcher):
 
 
 @pytest.mark.long
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("launcher", LAUNCHERS, ids=lambda launcher: launcher.name)
 def test_a_storm_of_twenty_kills_loses_nothing(tmp_path, launcher, seed):

@@ -46,6 +46,7 @@ def test_a_million_cases_fit_in_a_gigabyte(times):
 
 
 @pytest.mark.long
+@pytest.mark.timeout(3600)
 def test_a_million_cases_in_earnest(tmp_path):
     """Nothing is extrapolated."""
     told = took(MILLION, tmp_path)

@@ -20,11 +20,11 @@ LONG = 10  # transient revolutions: a case takes a fifth of a second
 
 
 def ended_early(job: subprocess.Popen[str]) -> str:
-    """The one line of a run that stopped early, within a second or so."""
+    """The one line of a run that stopped early, soon: in a second or two, where nothing else runs."""
     began = time.monotonic()
     _, err = job.communicate(timeout=10)
     took = time.monotonic() - began
-    assert took < 3
+    assert took < 8  # and with ten processes on two cores
     assert job.returncode == 75
     line = complaint(err)
     assert "cases missing; run the same command again" in line

@@ -18,6 +18,8 @@ import pytest
 import rubhpc
 from rubhpc.cli import commands
 from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
+from rubhpc.running.crash import Crashed
+from rubhpc.running.pool import RankLost
 from rubhpc.schema import VARIABLES, Variable
 from rubhpc.study import Recording, read_study
 
@@ -107,7 +109,7 @@ def test_commands_shown_can_be_given(path: Path) -> None:
 
 def test_readme_lists_the_exit_codes() -> None:
     codes = [int(number) for number, _ in rows(README, "Exit codes")]
-    errors = (RubError, InputError, StoreError, StoppedEarly)
+    errors = (RubError, InputError, StoreError, StoppedEarly, Crashed, RankLost)
     assert codes == [0, *sorted(error.exit_code for error in errors)]
 
 

@@ -178,6 +178,7 @@ def test_growth_in_any_order_keeps_every_case_though_it_is_killed(grids, block, 
 
 
 @pytest.mark.long
+@pytest.mark.timeout(3600)
 @settings(max_examples=60, phases=[Phase.generate])
 @given(grids=growths(), block=st.integers(1, 7), kills=st.lists(st.integers(0, 130), max_size=4))
 def test_growth_in_any_order_keeps_every_case_many_times(grids, block, kills):
