@@ -27,7 +27,7 @@ from rubhpc.input.parts import (
 from rubhpc.input.python_rig import call_rig_function, python_function
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build, plain, read_toml
-from rubhpc.input.stators import AnyStator, LumpedStator, MatrixStator, Stator, one_by_one
+from rubhpc.input.stators import AnyStator, LumpedStator, MatrixStator, Seat, Stator, one_by_one
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -140,7 +140,7 @@ class Rig:
             Which degree each row is: "u", "v", "w" (m), "thx", "thy", "thz" (rad) of a node counted from 1;
             x along the shaft, "v" up, positive spin from v to w. A stator presses on v and w of its node, and
             friction on thx where there is one. Coordinates of another kind have names that begin with "q".
-        stators : sequence of Stator, LumpedStator or MatrixStator
+        stators : sequence of Stator, LumpedStator or MatrixStator, or one
             Each with its node and, as matrices know no disc, its radius of contact, m.
         unbalance : sequence of Unbalance
         output_node : int, optional
@@ -167,11 +167,11 @@ class Rig:
         rotor = MatrixRotor(
             **given,
             degrees=parse_field(declared["degrees"], degrees, "degrees"),
-            unbalance=tuple(unbalance),
+            unbalance=_several(unbalance),
             output_node=output_node,
             displacement_limit=displacement_limit,
         )
-        return cls(name=name, rotor=rotor, stator=tuple(stators))
+        return cls(name=name, rotor=rotor, stator=_several(stators))
 
     @classmethod
     def from_ross(
@@ -195,7 +195,7 @@ class Rig:
         ----------
         rotor : ross.Rotor
             With six degrees of freedom a node. The matrices are taken as they are at this moment.
-        stators : sequence of Stator, LumpedStator or MatrixStator
+        stators : sequence of Stator, LumpedStator or MatrixStator, or one
             Each with its node (from 1) and its radius of contact.
         unbalance : sequence of Unbalance
             At nodes from 1; ROSS keeps none in its rotor.
@@ -215,10 +215,10 @@ class Rig:
         from rubhpc.input.ross import rotor_from_ross
 
         at = None if speed is None else parse_quantity(speed, "rad/s", "from_ross: speed")
-        found = rotor_from_ross(rotor, speed=at, torsion=torsion, unbalance=unbalance)
+        found = rotor_from_ross(rotor, speed=at, torsion=torsion, unbalance=_several(unbalance))
         if output_node is not None:
             found = replace(found, output_node=output_node)
-        return cls(name=name, rotor=found, stator=tuple(stators))
+        return cls(name=name, rotor=found, stator=_several(stators))
 
     def contact_radius(self, stator: AnyStator) -> float | None:
         """Radius at which a stator touches, m: its own, or that of the largest disc at its node."""
@@ -230,6 +230,11 @@ class Rig:
         """Return the rig as plain dicts, lists, numbers and text, for JSON."""
         result: dict[str, Any] = plain(self)
         return result
+
+
+def _several(parts: Any) -> tuple[Any, ...]:
+    """Parts in a row; one by itself is a row of one."""
+    return (parts,) if isinstance(parts, Seat | Unbalance) else tuple(parts)
 
 
 def rig_from_dict(table: Mapping[str, Any], where: str = "rig") -> Rig:

@@ -184,6 +184,13 @@ def test_rig_of_python_finds_the_modules_beside_it(tmp_path):
     assert first_lateral_frequency(assemble(rig)) == pytest.approx(2.0)
 
 
+def test_one_stator_and_one_unbalance_need_no_list():
+    heavy = Unbalance(node=1, mass=1.0, radius=1.0)
+    assert (
+        rotor(stators=WALL, unbalance=heavy).as_dict() == rotor(stators=[WALL], unbalance=[heavy]).as_dict()
+    )
+
+
 def test_sparse_matrices_and_numpy_nodes_are_as_good():
     from scipy.sparse import csr_array
 
