@@ -202,7 +202,7 @@ def test_a_balance_that_is_off_is_named(physics, study):
         case.scalars["energy_residual"] = 0.25
         return case
 
-    assert "balance" not in run(study, quiet=True).text()
+    assert "energy balance" not in run(study, quiet=True).text()
     physics.poison = lose_energy
     other = replace(study, output=study.output.with_name("other.zarr"))
     summary = run(other, quiet=True)
