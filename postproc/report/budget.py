@@ -65,7 +65,7 @@ def _load_measures(page: Page, load: Load, room: float, limit: float) -> None:
     for name in page.measures.names:
         packed = pack_floats(page.measures.values(name))
         size = text_size(packed)
-        share = room if name in _NEEDED else room * _SHARE_OF_MEASURES
+        share = room if name in _NEEDED or not page.cases.kept else room * _SHARE_OF_MEASURES
         if used + size <= share:
             load.values[name] = packed
             used += size

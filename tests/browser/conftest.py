@@ -61,7 +61,7 @@ def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
 
 @pytest.fixture(scope="session")
 def stores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Stores of four axes and two stators, of one axis, of one case, of measures alone, and without results."""
+    """Stores of four axes and two stators, of one axis, of one case, of measures alone, without results."""
     folder = tmp_path_factory.mktemp("stores")
     whole = synthetic_store.make(n_stator=2)
     rest = {"clearance": [1], "friction": [1], "stator_youngs_modulus": [0]}

@@ -55,6 +55,18 @@ def test_a_click_shows_the_case_of_that_cell(visit: Visit, pages: dict[str, str]
     assert "out of the model's range: slip, Euler load" in said(page)
 
 
+def test_the_pointer_is_told_what_it_is_over(visit: Visit, pages: dict[str, str]) -> None:
+    page = visit(pages["whole"])
+    click_map(page, 0.97, 0.5)
+    box = page.locator("#map").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 60)
+    told = re.compile(r"Speed ratio 1\.25, Clearance 100.µm\s+Regime: quasi-periodic")
+    expect(page.locator("#tip")).to_contain_text(told)
+    page.mouse.move(2, 2)
+    expect(page.locator("#tip")).to_be_hidden()
+
+
 def test_keys_move_on_the_map(visit: Visit, pages: dict[str, str]) -> None:
     page = visit(pages["whole"])
     page.focus("#map")

@@ -1,11 +1,31 @@
 // The map: a measure over two axes of the grid, as cells, or over one, as columns.
 const PALETTE = () => Bokeh.Palettes.cividis(256).map((c) => (typeof c === "number" ? "#" + (c >>> 8).toString(16).padStart(6, "0") : c));
+// Ground and hatch of what is no value: colour, ink, and a tile of 8 by 8 as lines and dots.
 const HATCHES = {
-  missing: ["#ededed", "dot", "#555555"],
-  failed: ["#cccccc", "diagonal_cross", "#444444"],
-  diverged: ["#999999", "right_diagonal_line", "#222222"],
-  empty: ["#ffffff", " ", "#ffffff"],
+  missing: ["#ededed", "#666666", (c) => { c.beginPath(); c.arc(4, 4, 1.1, 0, 7); c.fill(); }],
+  failed: ["#cccccc", "#444444", (c) => { slope(c, 1); slope(c, -1); }],
+  diverged: ["#999999", "#222222", (c) => slope(c, 1)],
+  beyond: [null, "#d1490b", (c) => slope(c, -1)],
+  empty: ["#ffffff", "#ffffff", () => {}],
 };
+
+function slope(context, sign) {
+  context.beginPath();
+  for (const shift of [-8, 0, 8]) {
+    context.moveTo(shift - 1, sign > 0 ? 9 : -1);
+    context.lineTo(shift + 9, sign > 0 ? -1 : 9);
+  }
+  context.stroke();
+}
+
+function hatch(context, kind, color, fine) {
+  const tile = new OffscreenCanvas(8 * fine, 8 * fine), pen = tile.getContext("2d");
+  pen.scale(fine, fine);
+  pen.fillStyle = pen.strokeStyle = color;
+  pen.lineWidth = 1.1;
+  HATCHES[kind][2](pen);
+  return context.createPattern(tile, "repeat");
+}
 
 class CaseMap {
   constructor(place, onPick) {
@@ -27,54 +47,58 @@ class CaseMap {
     this.iY = y;
     const v = variable[value];
     const [values, status, validity] = await Promise.all([valuesOf(value), valuesOf("status"), valuesOf("validity")]);
-    const cells = this.cells(v, values, status, validity, stator, at);
-    const scale = this.colours(v, values, cells, isLog);
-    const key = [x, y, y === null ? value : "", isLog && y === null].join();
-    if (key !== this.key) {
+    const axes = [x, y].join();
+    if (axes !== this.axes) {
       if (this.chart) drop(this.chart);
-      await this.build(v, cells);
-      this.key = key;
+      this.cells = null;
+      await this.build();
+      this.axes = axes;
+      this.shown = null;
     }
-    this.fill(v, cells, scale);
+    // Moving on the map changes nothing in it but the mark.
+    const rest = at.filter((_, k) => k !== x && k !== y);
+    const shown = [value, stator, isLog, ...rest].join();
+    if (shown !== this.shown) {
+      this.validity = validity;
+      const cells = this.describe(v, values, status, validity, stator, at);
+      this.fill(v, cells, this.colours(v, values, cells, isLog));
+      this.shown = shown;
+    }
     this.mark(at);
-    return cells;
+    return this.cells;
   }
 
-  // Edges of every cell, its case, and what is to be seen of it.
-  cells(v, values, status, validity, stator, at) {
+  // Every cell by rows from below: its case, its value, and what is to be seen of it.
+  describe(v, values, status, validity, stator, at) {
     const nX = this.x.values.length, nY = this.y ? this.y.values.length : 1;
-    const stride = v.by_stator ? told.nStator : 1;
-    const cells = { flat: [], value: [], kind: [], left: [], right: [], bottom: [], top: [], tip: [] };
-    const place = at.slice();
+    const stride = v.by_stator ? told.nStator : 1, shift = v.by_stator ? stator : 0;
+    const step = (k) => shape.slice(k + 1).reduce((product, n) => product * n, 1);
+    const base = at.slice();
+    base[this.iX] = 0;
+    if (this.y) base[this.iY] = 0;
+    const start = flatOf(base), across = step(this.iX), up = this.y ? step(this.iY) : 0;
+    const cells = { nX, nY, flat: [], value: [], kind: [], color: [] };
+    const isKnown = v.name === "status" || v.is_setting;
     for (let j = 0; j < nY; j++) {
       for (let i = 0; i < nX; i++) {
-        place[this.iX] = this.x.order[i];
-        if (this.y) place[this.iY] = this.y.order[j];
-        const flat = flatOf(place);
-        const value = values[flat * stride + (v.by_stator ? stator : 0)];
-        const state = status[flat];
-        const isKnown = v.name === "status" || v.is_setting;
-        const kind = isKnown ? "known"
-          : state === MISSING ? "missing" : state === FAILED ? "failed" : state === DIVERGED ? "diverged"
-          : !Number.isFinite(value) ? "empty" : validity[flat] > 0 && v.name !== "validity" ? "beyond" : "known";
+        const flat = start + this.x.order[i] * across + (this.y ? this.y.order[j] * up : 0);
+        const value = values[flat * stride + shift], state = status[flat];
         cells.flat.push(flat);
         cells.value.push(value);
-        cells.kind.push(kind);
-        cells.left.push(this.x.edges[i]);
-        cells.right.push(this.x.edges[i + 1]);
-        cells.bottom.push(this.y ? this.y.edges[j] : 0);
-        cells.top.push(this.y ? this.y.edges[j + 1] : this.height(v, value, kind));
-        const where = [`${this.x.label} ${axisValue(this.x, this.x.order[i])}`];
-        if (this.y) where.push(`${this.y.label} ${axisValue(this.y, this.y.order[j])}`);
-        const what = kind === "known" || kind === "beyond" ? `${v.label}: ${valueText(v, value)}` : kind === "empty" ? "no value" : kind;
-        cells.tip.push(`${where.join(", ")}; ${what}${kind === "beyond" ? " (out of range: " + told.validity[validity[flat]] + ")" : ""}`);
+        cells.kind.push(isKnown ? "known"
+          : state === MISSING ? "missing" : state === FAILED ? "failed" : state === DIVERGED ? "diverged"
+          : !Number.isFinite(value) ? "empty" : validity[flat] > 0 && v.name !== "validity" ? "beyond" : "known");
       }
     }
     return cells;
   }
 
-  height(v, value, kind) {
-    return v.is_flag || !["known", "beyond"].includes(kind) ? NaN : value * v.factor;
+  tip(i, j) {
+    const { v, validity, cells } = this, n = j * cells.nX + i, kind = cells.kind[n];
+    const where = [`${this.x.label} ${axisValue(this.x, this.x.order[i])}`];
+    if (this.y) where.push(`${this.y.label} ${axisValue(this.y, this.y.order[j])}`);
+    const what = kind === "known" || kind === "beyond" ? `${v.label}: ${valueText(v, cells.value[n])}` : kind === "empty" ? "no value" : kind;
+    return `${where.join(", ")}\n${what}${kind === "beyond" ? `\nout of range: ${told.validity[validity[cells.flat[n]]]}` : ""}`;
   }
 
   // Colours run over the whole study, so that they mean the same wherever the other axes stand.
@@ -104,7 +128,7 @@ class CaseMap {
     return { low: low * v.factor, high: high * v.factor, palette, isLog };
   }
 
-  async build(v, cells) {
+  async build() {
     const label = (axis) => axis.label + (axis.unit ? ` (${axis.unit})` : "");
     const figure = makeFigure({
       x_range: new Bokeh.Range1d({ start: this.x.edges[0], end: this.x.edges.at(-1) }),
@@ -122,50 +146,73 @@ class CaseMap {
       figure.yaxis.axis_label = label(this.y);
       setRange(figure.y_range, this.y.edges[0], this.y.edges.at(-1));
     }
-    this.cellSource = source({ left: [], right: [], bottom: [], top: [], color: [], tip: [] });
-    this.hatchSource = source({ left: [], right: [], bottom: [], top: [], pattern: [], color: [] });
+    this.picture = source({ url: [], x: [], y: [], w: [], h: [] });
     this.markSource = source({ left: [], right: [], bottom: [], top: [] });
-    const box = { left: { field: "left" }, right: { field: "right" }, bottom: { field: "bottom" }, top: { field: "top" } };
-    const drawn = figure.quad({ ...box, fill_color: { field: "color" }, line_color: { field: "color" }, line_width: 0.6, source: this.cellSource });
-    figure.quad({
-      ...box, fill_color: null, line_color: null, hatch_pattern: { field: "pattern" }, hatch_color: { field: "color" },
-      hatch_scale: 9, hatch_weight: 1.2, source: this.hatchSource,
-    });
-    figure.quad({ ...box, fill_color: null, line_color: "#ffffff", line_width: 5, source: this.markSource });
-    figure.quad({ ...box, fill_color: null, line_color: "#111111", line_width: 2.4, source: this.markSource });
-    figure.add_tools(new Bokeh.HoverTool({ renderers: [drawn], tooltips: [["", "@tip"]], point_policy: "follow_mouse" }));
+    const field = (name) => ({ field: name });
+    figure.image_url({ url: field("url"), x: field("x"), y: field("y"), w: field("w"), h: field("h"), anchor: "bottom_left", source: this.picture });
+    const box = { left: field("left"), right: field("right"), bottom: field("bottom"), top: field("top"), fill_color: null };
+    figure.quad({ ...box, line_color: "#ffffff", line_width: 5, source: this.markSource });
+    figure.quad({ ...box, line_color: "#111111", line_width: 2.4, source: this.markSource });
     figure.on_event("tap", (event) => this.pick(event.x, event.y));
+    figure.on_event("mousemove", (event) => this.hover(event));
+    figure.on_event("mouseleave", () => (byId("tip").hidden = true));
+    for (const side of ["inner_width", "inner_height"]) figure.properties[side].change.connect(() => this.paint());
     this.figure = figure;
     this.chart = await show(figure, this.place, () => this.bar && this.paintBar());
   }
 
   fill(v, cells, scale) {
-    this.shown = cells;
-    if (!this.y) this.fitColumns(v, cells);
-    const { left, right, bottom, top, color, tip } = cells;
-    this.cellSource.data = { left, right, bottom, top, color, tip };
-    const hatched = cells.kind.map((kind, i) => i).filter((i) => cells.kind[i] !== "known" && cells.kind[i] !== "empty");
-    const pick = (column) => hatched.map((i) => column[i]);
-    const warning = v.is_flag ? "#111111" : "#d1490b";
-    this.hatchSource.data = {
-      left: pick(left), right: pick(right), bottom: pick(bottom), top: pick(top),
-      pattern: hatched.map((i) => (cells.kind[i] === "beyond" ? "left_diagonal_line" : HATCHES[cells.kind[i]][1])),
-      color: hatched.map((i) => (cells.kind[i] === "beyond" ? warning : HATCHES[cells.kind[i]][2])),
-    };
+    Object.assign(this, { v, cells });
+    this.heights = this.y ? null : this.columns(v, cells);
+    this.paint();
     this.colourBar(v, scale);
   }
 
   // Columns stand on zero; what has no height fills the figure.
-  fitColumns(v, cells) {
-    const heights = cells.top.filter(Number.isFinite);
-    const high = Math.max(0, ...heights), low = Math.min(0, ...heights);
-    const span = high - low || 1;
-    const [start, end] = [low < 0 ? low - 0.05 * span : 0, high + 0.05 * span];
-    setRange(this.figure.y_range, start, end);
-    cells.bottom = cells.top.map((t) => (Number.isFinite(t) ? Math.min(t, 0) : start));
-    cells.top = cells.top.map((t) => (Number.isFinite(t) ? Math.max(t, 0) : end));
+  columns(v, cells) {
+    const heights = cells.value.map((x, i) => (v.is_flag || !["known", "beyond"].includes(cells.kind[i]) ? NaN : x * v.factor));
+    const finite = heights.filter(Number.isFinite);
+    const high = Math.max(0, ...finite), low = Math.min(0, ...finite), span = high - low || 1;
+    setRange(this.figure.y_range, low < 0 ? low - 0.05 * span : 0, high + 0.05 * span);
     this.figure.yaxis.axis_label = v.is_flag ? "" : v.label + (v.unit ? ` (${v.unit})` : "");
     this.figure.yaxis.visible = !v.is_flag;
+    return heights;
+  }
+
+  // The cells as a picture, as fine as the screen: a study may have a hundred thousand of them.
+  paint() {
+    const { cells, figure } = this;
+    const { inner_width: width, inner_height: height } = figure;
+    if (!cells || !width || !height) return;
+    const fine = Math.min(devicePixelRatio || 1, 3);
+    const canvas = document.createElement("canvas");
+    canvas.width = Math.round(width * fine);
+    canvas.height = Math.round(height * fine);
+    const context = canvas.getContext("2d");
+    const along = (edges, isLog, size) => {
+      const on = isLog ? Math.log : (x) => x, first = on(edges[0]), last = on(edges.at(-1));
+      return edges.map((edge) => Math.round((size * (on(edge) - first)) / (last - first)));
+    };
+    const x = along(this.x.edges, this.x.is_log, canvas.width);
+    const range = figure.y_range, y = this.y ? along(this.y.edges, this.y.is_log, canvas.height) : [0, canvas.height];
+    const level = (value) => (canvas.height * (value - range.start)) / (range.end - range.start);
+    const patterns = Object.fromEntries(Object.keys(HATCHES).map((kind) =>
+      [kind, hatch(context, kind, kind === "beyond" && this.v.is_flag ? "#111111" : HATCHES[kind][1], fine)]));
+    for (let j = 0; j < cells.nY; j++) {
+      for (let i = 0; i < cells.nX; i++) {
+        const n = j * cells.nX + i, h = this.heights?.[n];
+        const [low, high] = Number.isFinite(h) ? [level(Math.min(h, 0)), level(Math.max(h, 0))] : [y[j], y[j + 1]];
+        const box = [x[i], canvas.height - high, Math.max(x[i + 1] - x[i], 1), Math.max(high - low, 1)];
+        context.fillStyle = cells.color[n];
+        context.fillRect(...box);
+        if (cells.kind[n] !== "known") {
+          context.fillStyle = patterns[cells.kind[n]];
+          context.fillRect(...box);
+        }
+      }
+    }
+    const left = this.x.edges[0], bottom = range.start;
+    this.picture.data = { url: [canvas.toDataURL()], x: [left], y: [bottom], w: [this.x.edges.at(-1) - left], h: [range.end - bottom] };
   }
 
   colourBar(v, scale) {
@@ -207,10 +254,28 @@ class CaseMap {
     };
   }
 
+  // Which cell holds a point, by its place along each axis.
+  cellAt(x, y) {
+    const along = (edges, value) => Math.min(Math.max(edges.findIndex((edge) => edge > value), 1), edges.length - 1) - 1;
+    const last = (edges, value) => (value >= edges.at(-1) ? edges.length - 2 : along(edges, value));
+    return [last(this.x.edges, x), this.y ? last(this.y.edges, y) : 0];
+  }
+
   pick(x, y) {
-    const cell = (edges, value) => Math.min(Math.max(edges.findIndex((edge) => edge > value) - 1, 0), edges.length - 2);
-    const found = { [this.iX]: this.x.order[x >= this.x.edges.at(-1) ? this.x.edges.length - 2 : cell(this.x.edges, x)] };
-    if (this.y) found[this.iY] = this.y.order[y >= this.y.edges.at(-1) ? this.y.edges.length - 2 : cell(this.y.edges, y)];
-    this.onPick(found);
+    const [i, j] = this.cellAt(x, y);
+    this.onPick({ [this.iX]: this.x.order[i], ...(this.y ? { [this.iY]: this.y.order[j] } : {}) });
+  }
+
+  hover({ x, y, sx, sy }) {
+    const tip = byId("tip"), frame = this.chart.view?.frame.bbox;
+    if (!frame || !this.cells || sx < frame.left || sx > frame.right || sy < frame.top || sy > frame.bottom) {
+      tip.hidden = true;
+      return;
+    }
+    tip.textContent = this.tip(...this.cellAt(x, y));
+    tip.hidden = false;
+    const room = this.place.clientWidth - tip.offsetWidth;
+    tip.style.left = `${Math.max(0, Math.min(sx + 14, room))}px`;
+    tip.style.top = `${sy + 18}px`;
   }
 }

@@ -150,7 +150,7 @@ function drawLegend(v, cells) {
     return element("span", {}, swatch, c.name);
   });
   for (const [kind, text] of Object.entries(words)) {
-    if (kinds.has(kind)) swatches.push(element("span", {}, element("i", { className: kind }), text));
+    if (kinds.has(kind)) swatches.push(element("span", {}, element("i", { className: kind === "beyond" && v.is_flag ? "beyond dark" : kind }), text));
   }
   byId("legend").replaceChildren(...swatches);
   byId("map-title").textContent = v.label + (v.by_stator && told.nStator > 1 ? `, stator ${state.stator + 1}` : "");
