@@ -82,6 +82,8 @@ _FLAGS = (
 )
 _SCALARS = (
     _scalar("period", "1", "period in revolutions (0: none up to 16)", dtype="int16"),
+    _scalar("lyapunov_exponent", "1", "largest Lyapunov exponent per revolution (NaN: not measured)"),
+    _scalar("whirl_ratio", "1", "whirl at the spin frequency (1: forward circle, -1: backward circle)"),
     _scalar("contact_fraction", "1", "fraction of the time in contact", "stator"),
     _scalar("contacts_per_revolution", "1", "contacts per revolution", "stator"),
     _scalar("contact_duration", "s", "mean duration of a contact", "stator"),

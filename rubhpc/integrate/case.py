@@ -15,6 +15,7 @@ from rubhpc.integrate.gather import (
     empty_tally,
     scalars_of,
 )
+from rubhpc.integrate.lyapunov import growth
 from rubhpc.integrate.measures import amplitude_spectrum
 from rubhpc.integrate.modal import EndlessEvents, ModalMarch
 from rubhpc.integrate.prepare import CentralDifferenceSetup, ModalSetup
@@ -62,15 +63,19 @@ def run_case(
     """
     began = time.perf_counter()
     initial = initial or State.at_rest(setup.model)
+
+    def start(state: State) -> March:
+        return _march(setup, clearance, friction, state, check)
+
+    def start_stepped(state: State) -> March:
+        assert isinstance(setup, ModalSetup)
+        return SteppedMarch(setup, clearance, friction, state, check)
+
     try:
-        march = _march(setup, clearance, friction, initial, check)
-        record = _integrate(march, setup, clearance, recording)
+        record = _integrate(start, initial, setup, clearance, recording)
     except EndlessEvents:
         # Contacts that chatter, or too many sets of them: short steps need no events.
-        assert isinstance(setup, ModalSetup)
-        march = SteppedMarch(setup, clearance, friction, initial, check)
-        record = _integrate(march, setup, clearance, recording)
-    record.scalars["steps"] = march.n_step
+        record = _integrate(start_stepped, initial, setup, clearance, recording)
     record.scalars["wall_time"] = time.perf_counter() - began
     return record
 
@@ -87,12 +92,18 @@ def compile_kernels(
     short = replace(recording, transient=1, revolutions=1)
     run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)
     if isinstance(setup, ModalSetup):
-        march = SteppedMarch(setup, clearance, friction, State.at_rest(setup.model), check)
-        _integrate(march, setup, clearance, short)
+
+        def start(state: State) -> March:
+            return SteppedMarch(setup, clearance, friction, state, check)
+
+        _integrate(start, State.at_rest(setup.model), setup, clearance, short)
 
 
-def _integrate(march: March, setup: Setup, clearance: float, recording: Recording) -> Record:
+def _integrate(
+    start: Callable[[State], March], initial: State, setup: Setup, clearance: float, recording: Recording
+) -> Record:
     """March through transient and record, then measure."""
+    march = start(initial)
     per_revolution = setup.samples_per_revolution
     n_stator = len(setup.model.stators)
     n_sample = recording.revolutions * per_revolution
@@ -111,7 +122,7 @@ def _integrate(march: March, setup: Setup, clearance: float, recording: Recordin
             f"{reason} in revolution {revolution}", n_stator, recording, settings, march.final()
         )
     else:
-        signals = by_name(samples.whole)
+        signals, final = by_name(samples.whole), march.final()
         record = Record(
             status=DONE,
             samples_per_revolution=per_revolution,
@@ -127,13 +138,14 @@ def _integrate(march: March, setup: Setup, clearance: float, recording: Recordin
                 stators=setup.model.stators,
                 spin=setup.spin,
                 samples_per_revolution=per_revolution,
+                growth=growth(start, final, setup.model, setup.spin, recording),
             ),
             settings=settings,
-            final=march.final(),
+            final=final,
         )
         if "waveform" not in recording.keep:
             record.signals.clear()
-    record.scalars["transient_revolutions"] = n_transient
+    record.scalars.update(transient_revolutions=n_transient, steps=march.n_step)
     return record
 
 

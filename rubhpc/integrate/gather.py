@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.measures import period, regime
+from rubhpc.integrate.measures import period, whirl_ratio
 from rubhpc.integrate.record import Record, State
+from rubhpc.integrate.regimes import regime
 from rubhpc.kernels.observe import (
     DAMPING_LOSS,
     DRIVE_WORK,
@@ -24,6 +25,8 @@ from rubhpc.kernels.observe import (
 from rubhpc.schema import DIVERGED, VARIABLES
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import StatorModel
@@ -83,6 +86,7 @@ def scalars_of(
     stators: tuple[StatorModel, ...],
     spin: float,
     samples_per_revolution: int,
+    growth: Iterable[float],
 ) -> dict[str, Any]:
     """Scalars of a finished case; those of a contact that never happened are zero, or NaN where undefined.
 
@@ -91,13 +95,17 @@ def scalars_of(
     energy : (float, float), J
         Mechanical energy at the beginning and at the end of the record.
     spin : float, rad/s
+    growth : iterable of float
+        How a small displacement grows after the record (`lyapunov.growth`); read where that tells the regime.
     """
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution
     duration = 2.0 * np.pi * n_revolution / abs(spin)
     has_touched = tally.impulse > 0
     n_contact = np.maximum(tally.n_contact, 1)  # one that lasts throughout never begins in the record
-    orbit_period = period(signals["vertical"], signals["horizontal"], samples_per_revolution)
+    orbit = signals["vertical"], signals["horizontal"], samples_per_revolution
+    orbit_period = period(*orbit)
+    flag, exponent = regime(*orbit, period=orbit_period, is_contact=bool(has_touched.any()), growth=growth)
     # Drive and friction exchange a hundred times what the vibration feels of them: only their difference
     # counts.
     flows = [
@@ -109,7 +117,9 @@ def scalars_of(
     exchanged = max(0.5 * np.abs(flows).sum(), LEAST_EXCHANGE * max(energy), np.finfo(float).tiny)
     return {
         "period": orbit_period,
-        "regime": regime(orbit_period, bool(has_touched.any())),
+        "regime": flag,
+        "lyapunov_exponent": exponent,
+        "whirl_ratio": whirl_ratio(*orbit, spin),
         "contact_fraction": tally.contact_time / duration,
         "contacts_per_revolution": tally.n_contact / n_revolution,
         "contact_duration": np.where(has_touched, tally.contact_time / n_contact, 0.0),

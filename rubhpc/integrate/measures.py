@@ -1,13 +1,12 @@
-"""Measures of recorded signals: spectra, sections, period and regime."""
+"""Measures of recorded signals: spectra, period and sense of the whirl."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.fft
-
-from rubhpc.schema import REGIME
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -56,14 +55,26 @@ def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) ->
         distance = 0.0
         for signal in (vertical, horizontal):
             change = signal[shift:] - signal[:-shift]
-            distance += float(change @ change) / change.size
+            distance += float(np.mean(np.square(change)))
         if distance <= PERIOD_TOLERANCE**2 * size:
             return n
     return 0
 
 
-def regime(period: int, is_contact: bool) -> int:
-    """Flag of `schema.REGIME`; a motion without period up to 16 is left undecided."""
-    if not is_contact:
-        return REGIME.index("no_contact")
-    return REGIME.index("periodic" if period > 0 else "undecided")
+def whirl_ratio(vertical: Floats, horizontal: Floats, samples_per_revolution: int, spin: float) -> float:
+    """Sense of the whirl at the spin frequency: 1 on a forward circle, 0 on a line, -1 on a backward circle.
+
+    The amplitudes of the two-sided first order, (forward - backward) / (forward + backward); NaN without
+    motion at that frequency.
+
+    Parameters
+    ----------
+    vertical, horizontal : (n_revolution * samples_per_revolution,), m
+    spin : float, rad/s
+    """
+    whirl = (vertical + 1j * horizontal).reshape(-1, samples_per_revolution).mean(axis=0)
+    turn = np.exp(2j * np.pi * np.arange(samples_per_revolution) / samples_per_revolution)
+    forward, backward = float(abs(np.vdot(turn, whirl))), float(abs(turn @ whirl))
+    if forward + backward == 0.0:
+        return math.nan
+    return math.copysign(1.0, spin) * (forward - backward) / (forward + backward)

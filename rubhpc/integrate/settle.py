@@ -38,15 +38,15 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
         Revolutions marched.
     """
     if not recording.is_transient_auto:
-        return _pass(march, recording, recording.longest_transient), recording.longest_transient
+        return pass_revolutions(march, recording, recording.longest_transient), recording.longest_transient
 
     n_stator, done, limit = march.touching().size, 0, recording.longest_transient
     samples, tally = empty_samples(n_stator, recording.samples_per_revolution), empty_tally(n_stator)
     reference: Floats | None = None
     for i, pause in enumerate(chain([0], cycle(PAUSES))):
         if done + pause + 1 > limit:
-            return _pass(march, recording, limit - done), limit
-        reason = _pass(march, recording, pause)
+            return pass_revolutions(march, recording, limit - done), limit
+        reason = pass_revolutions(march, recording, pause)
         done += pause
         if reason is None:
             reason = march.advance(0, recording.samples_per_revolution, samples, tally, is_recorded=True)
@@ -67,7 +67,7 @@ def has_settled(cycle: Floats, earlier: Floats, tolerance: float) -> bool:
     return bool(np.all(change <= tolerance * size))
 
 
-def _pass(march: March, recording: Recording, n_revolution: int) -> str | None:
+def pass_revolutions(march: March, recording: Recording, n_revolution: int) -> str | None:
     """March some revolutions without a record; returns why the case cannot go on."""
     samples, tally = empty_samples(march.touching().size, 0), empty_tally(march.touching().size)
     first = -n_revolution * recording.samples_per_revolution

@@ -1,12 +1,11 @@
-"""Spectra, periods and regimes of signals whose answers are known."""
+"""Spectra, periods and whirl of signals whose answers are known."""
 
 import math
 
 import numpy as np
 import pytest
 
-from rubhpc.integrate.measures import amplitude_spectrum, period, regime
-from rubhpc.schema import REGIME
+from rubhpc.integrate.measures import amplitude_spectrum, period, whirl_ratio
 
 SAMPLES = 64  # a revolution
 
@@ -104,9 +103,18 @@ def test_short_record_shows_only_short_periods():
     assert period(*orbit(1, revolutions=1), SAMPLES) == 0  # nothing to compare with
 
 
+@pytest.mark.parametrize("spin", [120.0, -120.0])
 @pytest.mark.parametrize(
-    ("found", "is_contact", "expected"),
-    [(1, False, "no_contact"), (0, False, "no_contact"), (3, True, "periodic"), (0, True, "undecided")],
+    ("forward", "backward"), [(1.0, 0.0), (0.0, 1.0), (3.0, 1.0), (1.0, 3.0), (1.0, 1.0)]
 )
-def test_regime_names_the_motion(found, is_contact, expected):
-    assert REGIME[regime(found, is_contact)] == expected
+def test_whirl_has_the_sense_of_the_larger_circle(forward, backward, spin):
+    """Other orders do not count, and forward is the sense of the spin, whichever that is."""
+    turn = math.copysign(1.0, spin) * angles(6)
+    whirl = forward * np.exp(1j * (turn + 0.7)) + backward * np.exp(-1j * (turn - 0.2))
+    whirl += 4 * np.exp(-2j * turn) + 5 * np.exp(-0.5j * turn) + 6
+    expected = (forward - backward) / (forward + backward)
+    assert whirl_ratio(whirl.real, whirl.imag, SAMPLES, spin) == pytest.approx(expected, abs=1e-12)
+
+
+def test_no_motion_has_no_whirl():
+    assert math.isnan(whirl_ratio(np.zeros(2 * SAMPLES), np.zeros(2 * SAMPLES), SAMPLES, 1.0))

@@ -1,0 +1,133 @@
+"""Regimes of orbits whose kind is known, from their cycles and from how neighbours part."""
+
+import math
+from itertools import repeat
+
+import numpy as np
+import pytest
+
+from rubhpc.integrate.regimes import cycle_distances, is_torus, regime
+from rubhpc.schema import REGIME
+
+SAMPLES, REVOLUTIONS = 64, 64
+TURN = 2 * math.pi * np.arange(REVOLUTIONS * SAMPLES) / SAMPLES
+GOLDEN = (math.sqrt(5) - 1) / 2
+
+
+def torus(order, amount=0.2):
+    """Forward whirl with a part of some other order."""
+    return np.exp(1j * TURN) + amount * np.exp(1j * order * TURN + 0.4j)
+
+
+def swollen(sizes):
+    """Forward whirl on a circle of another size each revolution."""
+    return np.exp(1j * TURN) * (1 + 0.2 * np.repeat(sizes, SAMPLES))
+
+
+def logistic(rate):
+    """The logistic map, 100 iterations after its beginning."""
+    sizes = [0.3]
+    for _ in range(100 + REVOLUTIONS - 1):
+        sizes.append(rate * sizes[-1] * (1 - sizes[-1]))
+    return sizes[-REVOLUTIONS:]
+
+
+def settling(share):
+    """A spiral into a periodic orbit, with an order of its own."""
+    return np.exp(1j * TURN) + 0.5 * np.exp((1j * GOLDEN + math.log(share) / (2 * math.pi)) * TURN)
+
+
+def unread():
+    """Growth that nobody may ask for."""
+    raise AssertionError
+    yield
+
+
+def of(whirl, growth, *, period=0, is_contact=True):
+    flag, exponent = regime(
+        whirl.real, whirl.imag, SAMPLES, period=period, is_contact=is_contact, growth=growth
+    )
+    return REGIME[flag], exponent
+
+
+@pytest.mark.parametrize("period", [0, 1, 16])
+def test_without_contact_nothing_else_counts(period):
+    found = of(swollen(logistic(4.0)), unread(), period=period, is_contact=False)
+    assert found == ("no_contact", pytest.approx(math.nan, nan_ok=True))
+
+
+def test_period_makes_a_motion_periodic_at_no_cost():
+    name, exponent = of(torus(1 / 3), unread(), period=3)
+    assert name == "periodic"
+    assert math.isnan(exponent)
+
+
+def test_period_beyond_sixteen_is_one_too():
+    name, exponent = of(torus(8 / 21), unread())
+    assert name == "periodic"
+    assert math.isnan(exponent)
+
+
+def test_orders_without_common_period_are_a_torus_at_the_first_look():
+    growth = iter([0.03, -0.03] * 8)  # as many spans as are read at first
+    name, exponent = of(torus(GOLDEN), growth)
+    assert name == "quasi_periodic"
+    assert exponent == pytest.approx(0.0, abs=1e-15)
+    assert next(growth, None) is None
+
+
+@pytest.mark.parametrize("order", [GOLDEN, math.sqrt(2), math.sqrt(3), math.e, 1 / math.pi, 2**0.25])
+@pytest.mark.parametrize("amount", [0.05, 0.5, 2.0])
+def test_cycles_of_two_orders_lie_on_a_torus(order, amount):
+    whirl = torus(order, amount)
+    assert is_torus(cycle_distances(whirl.real, whirl.imag, SAMPLES))
+
+
+@pytest.mark.parametrize("rate", [3.6, 3.65, 3.7, 3.8, 3.9, 4.0])
+def test_cycles_of_chaos_lie_on_none(rate):
+    """At 3.6 in two narrow bands, to which each second revolution returns."""
+    whirl = swollen(logistic(rate))
+    assert not is_torus(cycle_distances(whirl.real, whirl.imag, SAMPLES))
+
+
+@pytest.mark.parametrize("share", [0.9, 0.95, 0.98])
+def test_cycles_that_settle_lie_on_none(share):
+    whirl = settling(share)
+    assert not is_torus(cycle_distances(whirl.real, whirl.imag, SAMPLES))
+
+
+@pytest.mark.parametrize("rate", [3.7, 4.0])
+def test_motion_whose_neighbours_part_is_chaotic(rate):
+    """The exponent of the logistic map is the mean logarithm of its slope; ln 2 at 4."""
+    sizes = np.array(logistic(rate))
+    slopes = np.log(np.abs(rate * (1 - 2 * sizes)))
+    name, exponent = of(swollen(sizes), slopes)
+    assert name == "chaotic"
+    assert exponent == pytest.approx(slopes[:16].mean())
+    assert exponent == pytest.approx(math.log(2) if rate == 4.0 else 0.35, abs=0.2)
+
+
+def test_motion_whose_neighbours_close_up_is_periodic():
+    assert of(settling(0.95), repeat(math.log(0.95))) == ("periodic", pytest.approx(math.log(0.95)))
+
+
+@pytest.mark.parametrize(
+    ("rate", "expected"), [(0.02, "chaotic"), (-0.02, "periodic"), (0.005, "quasi_periodic")]
+)
+def test_slow_growth_is_looked_at_four_times_as_long(rate, expected):
+    growth = iter([rate] * 65)
+    assert of(swollen(logistic(3.8)), growth) == (expected, pytest.approx(rate))
+    assert len(list(growth)) == 1
+
+
+def test_short_record_stays_undecided():
+    whirl = torus(GOLDEN)[: 31 * SAMPLES]
+    name, exponent = of(whirl, unread())
+    assert name == "undecided"
+    assert math.isnan(exponent)
+
+
+def test_motion_next_to_one_that_runs_away_stays_undecided():
+    name, exponent = of(swollen(logistic(4.0)), iter([0.3] * 5))
+    assert name == "undecided"
+    assert math.isnan(exponent)
