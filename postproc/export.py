@@ -1,9 +1,10 @@
-"""The data behind a figure as a file, in SI units: csv, json, zarr or netCDF by its extension."""
+"""Cases, or the data behind a figure, as a file in SI units: csv, json, zarr or HDF5 by its extension."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,8 @@ from rubhpc.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-FORMATS = (".csv", ".json", ".zarr", ".nc")
+HDF5 = (".nc", ".h5", ".hdf5")
+FORMATS = (".csv", ".json", ".zarr", *HDF5)
 
 
 def check_data_path(path: str | Path) -> Path:
@@ -22,7 +24,7 @@ def check_data_path(path: str | Path) -> Path:
         raise InputError(f"{path}: data is written as {', '.join(FORMATS)}; name it {path.stem}.csv")
     if not path.parent.is_dir():
         raise InputError(f"{path}: no directory {path.parent}; make it first")
-    if path.suffix == ".zarr" and path.exists():
+    if path.suffix.lower() == ".zarr" and path.exists():
         raise InputError(f"{path}: is there already; choose another --data, or remove it")
     return path
 
@@ -36,17 +38,18 @@ def write_data(data: xr.Dataset, path: str | Path) -> Path:
         The extension is none of the known ones, or the file cannot be written.
     """
     path = check_data_path(path)
-    data = data.load().copy()
+    kind = path.suffix.lower()
+    data = data.copy()
     data.attrs = {k: v for k, v in data.attrs.items() if isinstance(v, str | int | float)}
     try:
-        if path.suffix == ".csv":
+        if kind == ".csv":
             _write_csv(data, path)
-        elif path.suffix == ".json":
+        elif kind == ".json":
             path.write_text(json.dumps(_plain(data.to_dict()), allow_nan=False))
-        elif path.suffix == ".zarr":
+        elif kind == ".zarr":
             _bare(data).to_zarr(path, zarr_format=3, consolidated=False)
         else:
-            _write_netcdf(data, path)
+            write_hdf5(data, path)
     except OSError as error:
         raise InputError(
             f"{path}: cannot be written: {error.strerror or error}; choose another --data"
@@ -64,14 +67,21 @@ def _write_csv(data: xr.Dataset, path: Path) -> None:
     table[[c for c in columns if c in table]].rename(columns=headings).to_csv(path, index=False)
 
 
-def _write_netcdf(data: xr.Dataset, path: Path) -> None:
-    """NetCDF 4 where h5netcdf or netCDF4 is there, else netCDF 3 through scipy."""
-    from importlib.util import find_spec
+def write_hdf5(data: xr.Dataset, path: Path) -> None:
+    """Write an HDF5 file that is netCDF 4 too, chunk by chunk; it appears under its name when it is whole.
 
-    if find_spec("h5netcdf") or find_spec("netCDF4"):
-        _bare(data).to_netcdf(path)
-    else:
-        _bare(data).to_netcdf(path, engine="scipy", format="NETCDF3_64BIT")
+    Tables of attributes (study, rig, versions) become text in JSON.
+    """
+    data = _bare(data).copy()
+    data.attrs = {
+        k: v if isinstance(v, str | int | float) else json.dumps(_plain(v)) for k, v in data.attrs.items()
+    }
+    partial = path.with_name(f".{path.name}.part")
+    try:
+        data.to_netcdf(partial, engine="h5netcdf")
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def _bare(data: xr.Dataset) -> xr.Dataset:

@@ -55,6 +55,7 @@ COMMANDS = {
     ),
     "report": ("rubhpc.commands.report:report", "One HTML page: maps, and every case behind them."),
     "view": ("rubhpc.commands.report:view", "The same over a big store, served to this machine alone."),
+    "export": ("rubhpc.commands.export:export", "Cases as one HDF5 file."),
     "claims": ("rubhpc.commands.claims:claims", "The paper's claims against the stores of jobs/paper."),
 }
 
