@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
-FIRST_REVOLUTIONS = 32  # of the first kernel call
+FIRST_REVOLUTIONS = 8  # of the first kernel call
 MOST_BOOKS = 8  # of phases that one case may meet; where it meets more, short steps cost less
 
 
@@ -114,6 +114,7 @@ class ModalMarch(March):
             outcome = self._kernel(first, stop * per_sample, samples, tally, is_recorded=is_recorded)
             self.n_step = int(self._progress[kernel.N_STEP])
             first = int(self._progress[kernel.TIME])
+            self.sample = first >> self._clock.sample_level
             if outcome == kernel.PHASE_WANTED:
                 self._find(int(self._progress[kernel.WANTED]))
             elif outcome == kernel.CONTACT_UNSOLVED:

@@ -127,6 +127,7 @@ class SteppedMarch(ModalMarch):
             )
             self.n_step = int(self._progress[N_STEP])
             first = int(self._progress[TIME])
+            self.sample = first >> self._clock.sample_level
             if outcome == CONTACT_UNSOLVED:
                 return "the contact forces of a step have no solution"
             if self._has_diverged(tally):
