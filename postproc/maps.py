@@ -63,10 +63,18 @@ def map_data(store: xr.Dataset, value: str, x: str, y: str) -> xr.Dataset:
     return loaded
 
 
+def monitors(store: xr.Dataset) -> dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]]:
+    """Return the monitors that hold for a store: under Coulomb's law a slip that reverses is no fault."""
+    study = store.attrs.get("study")
+    contact = study.get("contact", {}) if isinstance(study, dict) else {}
+    has_stick = contact.get("friction_law") == "coulomb"
+    return {n: told for n, told in VALIDITY.items() if not (has_stick and n == "minimum_slip_speed")}
+
+
 def validity(store: xr.Dataset) -> xr.DataArray:
     """Return how each case leaves the model's range, over the axes: 0, or a sum of bits of `VALIDITY`."""
     found = xr.zeros_like(store["status"], dtype=np.int8)
-    for name, (bit, _, is_bad) in VALIDITY.items():
+    for name, (bit, _, is_bad) in monitors(store).items():
         if name in store:
             bad = is_bad(store[name])
             # One stator out of range spoils the case, whichever is drawn.

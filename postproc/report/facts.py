@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.load import axes_of
-from postproc.maps import VALIDITY
+from postproc.maps import monitors
 from postproc.report.grid import plain
 from postproc.units import Scale, scale_for, short_name
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, SIGNAL_NAMES, STATUS
@@ -71,10 +71,12 @@ def failures(store: xr.Dataset, axes: list[dict[str, Any]]) -> list[dict[str, An
     return told
 
 
-def validity_rows(measures: Measures, axes: list[dict[str, Any]], n_done: int) -> list[dict[str, Any]]:
+def validity_rows(
+    store: xr.Dataset, measures: Measures, axes: list[dict[str, Any]], n_done: int
+) -> list[dict[str, Any]]:
     """Return a row for each monitor: its limit, how many cases are beyond it, and the worst of them."""
     rows = []
-    for name, (_, text, is_bad) in VALIDITY.items():
+    for name, (_, text, is_bad) in monitors(store).items():
         if name not in measures.names:
             continue
         values = measures.values(name)

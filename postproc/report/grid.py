@@ -123,7 +123,11 @@ class Measures:
             return [{"code": c, "name": f"{c}" if c else "none", "color": _period_color(c)} for c in codes]
         meanings, colors = (STATUS, STATUS_COLORS) if name == "status" else (REGIME, REGIME_COLORS)
         return [
-            {"code": c, "name": meanings[c].replace("_", "-" if c == 2 else " "), "color": colors[c]}
+            {
+                "code": c,
+                "name": meanings[c].replace("_", "-" if c == 2 else " "),
+                "color": colors[c % len(colors)],
+            }
             for c in codes
         ]
 

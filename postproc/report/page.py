@@ -98,7 +98,7 @@ class Page:
             "axis_rows": axis_rows(axes),
             "study_rows": study_rows(store),
             "run_rows": run_rows(store, self.measures),
-            "validity_rows": validity_rows(self.measures, axes, len(self.cases.done)),
+            "validity_rows": validity_rows(store, self.measures, axes, len(self.cases.done)),
             "failures": failures(store, axes),
             "n_done": len(self.cases.done),
         }

@@ -72,6 +72,7 @@ def test_a_case_that_never_comes_back_fails_in_the_next_run(tmp_path, launcher):
     print(f"\n{launcher.name}: {GUILTY} cases that never come back failed after {n_death} deaths")
 
 
+@pytest.mark.long
 def test_one_that_never_comes_back_says_what_to_do(tmp_path):
     study = write_study(tmp_path, speed_ratio=[0.9], run='case_time_limit = "2 s"')
     done = run("stuck", study, script=POISONED)

@@ -43,7 +43,10 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 FRICTION = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
 
 
-@pytest.mark.parametrize("size", ["300k", "900k", "1200k"])
+@pytest.mark.parametrize(
+    "size",
+    [pytest.param("300k", marks=pytest.mark.long), "900k", pytest.param("1200k", marks=pytest.mark.long)],
+)
 def test_a_disk_that_fills_up_keeps_what_is_there_and_is_gone_on_with(tmp_path, whole, size):
     """At the smallest not even the store fits; then a few blocks do; then most of them."""
     (tmp_path / "disk").mkdir()

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from postproc.load import open_store
+from postproc.maps import validity
 from postproc.report.budget import write_report
 from postproc.report.cases import Cases, spread
 from postproc.report.detail import FULL, LEVELS
@@ -229,6 +230,16 @@ def test_validity_counts_what_is_out_of_range(store: Path) -> None:
     assert told["Lowest slip speed"] == 24
     assert told["Contact force over Euler load"] == 12
     assert told["Tip deflection over length"] == 0
+
+
+def test_slip_may_reverse_under_coulombs_law(store: Path) -> None:
+    dataset = open_store(store)
+    study = {**dataset.attrs["study"], "contact": {"friction_law": "coulomb"}}
+    text = Page(dataset.assign_attrs(study=study)).html(values={})
+    assert "Contact force over Euler load" in text
+    assert "steady sliding is wrong" not in text
+    assert int((validity(dataset.assign_attrs(study=study)) & 1).sum()) == 0
+    assert int((validity(dataset) & 1).sum()) == 24
 
 
 @pytest.mark.parametrize(("room", "is_cut"), [(20_000, True), (30_000, True), (300_000, False)])
