@@ -67,6 +67,7 @@ FULL = Detail(samples=1024, revolutions=64, lines=8192, signals=SIGNAL_NAMES)
 _MAIN = ("vertical", "horizontal", "torsion", "contact_force")
 LEVELS = (  # of a page with a limited size, from the best
     Detail(samples=128, revolutions=32, lines=1024, signals=SIGNAL_NAMES),
+    Detail(samples=64, revolutions=24, lines=512, signals=SIGNAL_NAMES),
     Detail(samples=128, revolutions=16, lines=512, signals=_MAIN),
     Detail(samples=64, revolutions=12, lines=256, signals=_MAIN),
     Detail(samples=64, revolutions=6, lines=160, signals=_MAIN[:3]),

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 _BINARY, _HTML = "application/octet-stream", "text/html; charset=utf-8"
-# Nothing but the page's own scripts and what this server gives.
+# Nothing but the page's own scripts and what this server gives; who drives a browser evaluates his own.
 _POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:; connect-src 'self'"
 )
 
