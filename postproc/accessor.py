@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
+from postproc.load import find_axis
 from postproc.selection import first_of_rest, select
 from postproc.style import COLUMN_WIDTH, house_style
 from postproc.units import caption
@@ -156,11 +157,13 @@ class Rub:
         **choice: Any,
     ) -> Axes:
         """Draw the Poincaré section in the plane of two signals, or signal `y` along the axis `over`."""
-        from postproc.sections import bifurcation, plane, section_data
+        from postproc.bifurcation import bifurcation, bifurcation_data
+        from postproc.sections import plane, section_data
 
-        shown = section_data(self.select(**choice), [y] if over else [x, y], over)
+        cases = self.select(**choice)
+        shown = bifurcation_data(cases, y, find_axis(cases, over)) if over else section_data(cases, [x, y])
         with _drawing(ax, shown) as (ax,):
-            return bifurcation(shown[f"section_{y}"], ax) if over else plane(shown, x, y, ax)
+            return bifurcation(shown, y, ax, color=None) if over else plane(shown, x, y, ax)
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -27,6 +27,7 @@ _NOT_DONE = {
     DIVERGED: ("diverged", "0.6", "////"),
 }
 REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
+PERIOD_COLORS = ("#D55E00", "#56B4E9", "#0072B2", "#009E73", "#CC79A7")  # none, P1 to P4
 _WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
 _LEGEND_WIDTH = 64  # characters that fit a column of a page, 6 of them taken by each handle
 _CATEGORIES = ("status", "regime", "period")
@@ -116,24 +117,32 @@ def _draw_categories(
     edges: Edges,
 ) -> list[Artist]:
     """Draw codes in colours of their own and return handles of those that occur."""
-    import matplotlib
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
     codes = np.where(done, np.nan_to_num(np.asarray(data.values, dtype=float), nan=-1), -1).astype(int)
-    present = [int(c) for c in np.unique(codes) if c >= 0]
-    if data.name == "period":
-        # Period 0 is no period at all, which is a colour apart; the others darken with their length.
-        ramp = matplotlib.colormaps["viridis_r"](np.linspace(0.0, 0.7, max(len(present), 2)))
-        names = {c: "none" if c == 0 else f"P{c}" for c in present}
-        colors = {c: "#D55E00" if c == 0 else ramp[i] for i, c in enumerate(present)}
-    else:
-        meanings, palette = (STATUS, STATUS_COLORS) if data.name == "status" else (REGIME, REGIME_COLORS)
-        names = {c: meanings[c].replace("_", "-" if c == 2 else " ") for c in present}
-        colors = {c: palette[c] for c in present}
-    if present:
+    known = categories(str(data.name), codes)
+    if known:
+        present = list(known)
         index = np.searchsorted(present, codes).clip(max=len(present) - 1)
         cells = np.ma.masked_where(codes < 0, index)
-        cmap = ListedColormap([colors[c] for c in present])
+        cmap = ListedColormap([color for _, color in known.values()])
         ax.pcolormesh(*edges, cells, cmap=cmap, vmin=-0.5, vmax=len(present) - 0.5, rasterized=True)
-    return [Patch(facecolor=colors[c], edgecolor="0.4", linewidth=0.3, label=names[c]) for c in present]
+    return [
+        Patch(facecolor=color, edgecolor="0.4", linewidth=0.3, label=name) for name, color in known.values()
+    ]
+
+
+def categories(variable: str, codes: NDArray[np.integer]) -> dict[int, tuple[str, Any]]:
+    """Return name and colour of each code of a flag, or of each period, that occurs; those below 0 do not."""
+    import matplotlib
+
+    present = [int(c) for c in np.unique(codes) if c >= 0]
+    if variable == "period":
+        # The short ones have colours of their own, the longer ones darken, and 0, none, stands apart.
+        longer = [c for c in present if c >= len(PERIOD_COLORS)]
+        ramp = matplotlib.colormaps["Greys"](np.linspace(0.45, 1.0, max(len(longer), 2)))
+        colors = {**dict(enumerate(PERIOD_COLORS)), **dict(zip(longer, ramp, strict=False))}
+        return {c: ("none" if c == 0 else f"P{c}", colors[c]) for c in present}
+    meanings, palette = (STATUS, STATUS_COLORS) if variable == "status" else (REGIME, REGIME_COLORS)
+    return {c: (meanings[c].replace("_", "-" if c == 2 else " "), palette[c]) for c in present}

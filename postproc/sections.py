@@ -1,4 +1,4 @@
-"""Poincaré sections: one point a revolution, in a plane of two signals or along an axis of the study."""
+"""Poincaré sections: one point a revolution, in a plane of two signals."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.load import find_axis, need, need_results
+from postproc.load import need, need_results
 from postproc.selection import narrow
 from postproc.spectra import check_signal, samples_per_revolution
-from postproc.units import displayed, scale_of, short_name
+from postproc.units import displayed
 from rubhpc.schema import SECTION_NAMES
 
 if TYPE_CHECKING:
@@ -40,10 +40,10 @@ def section_of(store: xr.Dataset, signal: str) -> xr.DataArray:
     return points
 
 
-def section_data(store: xr.Dataset, signals: Sequence[str], over: str | None = None) -> xr.Dataset:
-    """Return the sections of some signals of one case, or of cases along the axis `over`; lazy."""
+def section_data(store: xr.Dataset, signals: Sequence[str]) -> xr.Dataset:
+    """Return the sections of some signals of one case; lazy."""
     found = {f"section_{s}": section_of(store, s) for s in signals}
-    return narrow(store.assign(found), list(found), [find_axis(store, over)] if over else [])
+    return narrow(store.assign(found), list(found))
 
 
 def plane(data: xr.Dataset, x: str, y: str, ax: Axes) -> Axes:
@@ -56,20 +56,6 @@ def plane(data: xr.Dataset, x: str, y: str, ax: Axes) -> Axes:
     ax.figure.colorbar(dots, ax=ax, pad=0.02, aspect=25).set_label("Revolution")
     _widen(ax, xs, ys)
     ax.set(xlabel=x_label, ylabel=y_label)
-    return ax
-
-
-def bifurcation(section: xr.DataArray, ax: Axes) -> Axes:
-    """Draw the section of one signal against the axis of the study it spreads over: a bifurcation diagram."""
-    section = section.load()
-    over = next(d for d in section.dims if d != "section")
-    section = section.transpose(over, "section")
-    need_results(section, section.to_dataset())
-    x, x_label = displayed(section[over])
-    scale = scale_of(section)
-    y = section.values * scale.factor
-    ax.plot(np.repeat(x, y.shape[1]), y.ravel(), ".", color="C0", markersize=2.4, markeredgewidth=0)
-    ax.set(xlabel=x_label, ylabel=scale.label(f"{short_name(section)},\nonce a revolution"))
     return ax
 
 

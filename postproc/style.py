@@ -28,20 +28,23 @@ def house_style() -> Iterator[None]:
         yield
 
 
-def new_figure(n_panel: int = 1, height: float | None = None) -> tuple[Figure, list[Axes]]:
-    """Return a figure of column width with `n_panel` axes above one another, sharing their abscissa.
+def new_figure(
+    n_panel: int = 1, height: float | None = None, width: float | None = None, n_column: int = 1
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with `n_panel` rows of axes that share their abscissa and, in columns, their ordinate.
 
-    `height` is in mm; by default each panel takes its share. Call it within `house_style`.
+    Width and height are in mm; by default it is one journal column wide and each row takes its share of the
+    height. The axes come row by row. Call it within `house_style`.
     """
     # Made without pyplot: no display is looked for, and nothing is left open behind the caller's back.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     inches = (height if height is not None else (63 if n_panel == 1 else 10 + 27 * n_panel)) / 25.4
-    figure = Figure(figsize=(COLUMN_WIDTH, inches))
+    figure = Figure(figsize=(COLUMN_WIDTH if width is None else width / 25.4, inches))
     FigureCanvasAgg(figure)
-    axes = figure.subplots(n_panel, 1, sharex=True, squeeze=False)
-    return figure, list(axes[:, 0])
+    axes = figure.subplots(n_panel, n_column, sharex=True, sharey=n_column > 1, squeeze=False)
+    return figure, list(axes.ravel())
 
 
 def check_figure_path(path: str | Path) -> Path:

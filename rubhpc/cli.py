@@ -43,7 +43,11 @@ COMMANDS = {
     "orbit": ("rubhpc.commands.figures:orbit", "Orbit of the disc."),
     "spectrum": ("rubhpc.commands.figures:spectrum", "Amplitude spectrum of a signal."),
     "waveform": ("rubhpc.commands.figures:waveform", "Signals over the revolutions."),
-    "section": ("rubhpc.commands.figures:section", "Poincaré section, or bifurcation diagram along an axis."),
+    "section": ("rubhpc.commands.figures:section", "Poincaré section of a signal."),
+    "bifurcation": (
+        "rubhpc.commands.figures:bifurcation_diagram",
+        "Section points along an axis, by regime or period.",
+    ),
     "hht": ("rubhpc.commands.signals:hht", "Hilbert-Huang analysis of a signal."),
     "indicators": (
         "rubhpc.commands.signals:indicators",

@@ -55,6 +55,8 @@ def finish(
     draw: Draw,
     n_panel: int = 1,
     height: float | None = None,
+    width: float | None = None,
+    n_column: int = 1,
 ) -> None:
     """Draw and save the figure, write the data where asked, and tell where they are."""
     from postproc.export import check_data_path, write_data
@@ -64,7 +66,7 @@ def finish(
     path = check_figure_path(figure or f"{Path(store).resolve().stem}_{command}.png")
     data_path = check_data_path(data) if data else None
     with house_style():
-        page, axes = new_figure(n_panel, height)
+        page, axes = new_figure(n_panel, height, width, n_column)
         draw(axes)
         page.suptitle(caption(shown), fontsize=7, x=0.02, ha="left")
         save(page, path)

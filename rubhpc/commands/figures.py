@@ -217,17 +217,53 @@ def section(
     over: str | None,
 ) -> None:
     """Poincaré section: a point a revolution, in the plane of two signals or along an axis."""
-    from postproc.sections import bifurcation, plane, section_data
+    from postproc.bifurcation import bifurcation, bifurcation_data
+    from postproc.load import find_axis
+    from postproc.sections import plane, section_data
 
-    shown = section_data(open_cases(store, selection), [y] if over else [x, y], over)
+    cases = open_cases(store, selection)
+    shown = bifurcation_data(cases, y, find_axis(cases, over)) if over else section_data(cases, [x, y])
 
     def draw(axes: list[Axes]) -> None:
         if over:
-            bifurcation(shown[f"section_{y}"], axes[0])
+            bifurcation(shown, y, axes[0], color=None)
         else:
             plane(shown, x, y, axes[0])
 
     finish("section", store, figure, data, shown, draw)
 
 
-COMMANDS = (cascade, map, orbit, spectrum, waveform, section)
+@click.command("bifurcation")
+@of_store
+@click.option("--signal", default="vertical", show_default=True, help="vertical, horizontal or torsion.")
+@click.option("--along", metavar="AXIS", help="The axis of the diagram [default: the longest].")
+@click.option("--color", type=click.Choice(["regime", "period"]), default="regime", show_default=True)
+def bifurcation_diagram(
+    store: str,
+    selection: tuple[str, ...],
+    figure: str | None,
+    data: str | None,
+    signal: str,
+    along: str | None,
+    color: str,
+) -> None:
+    """Section points of a signal, one a revolution, over an axis, coloured by regime or period."""
+    from postproc.bifurcation import WIDTH, bifurcation, bifurcation_data, default_axis
+    from postproc.sections import section_of
+    from postproc.selection import first_of_rest
+
+    cases = open_cases(store, selection)
+    axis = default_axis(cases, along)
+    name = f"section_{signal}"
+    cases, notes = first_of_rest(cases.assign({name: section_of(cases, signal)}), [axis], name)
+    shown = bifurcation_data(cases, signal, axis)
+    for note in notes:
+        click.echo(note)
+
+    def draw(axes: list[Axes]) -> None:
+        bifurcation(shown, signal, axes[0], color)
+
+    finish("bifurcation", store, figure, data, shown, draw, height=90, width=WIDTH)
+
+
+COMMANDS = (cascade, map, orbit, spectrum, waveform, section, bifurcation_diagram)

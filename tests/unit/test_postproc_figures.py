@@ -11,7 +11,7 @@ from postproc.map_figure import value_map
 from postproc.maps import default_axes, map_data
 from postproc.orbits import orbit, orbit_data
 from postproc.overlay import overlaid
-from postproc.sections import bifurcation, plane, section_data
+from postproc.sections import plane, section_data
 from postproc.selection import select
 from postproc.spectra import spectrum_data
 from postproc.spectrum_figure import default_limit, spectrum
@@ -259,14 +259,6 @@ def test_the_section_plane_has_a_point_a_revolution(case, ax):
     assert plane(section_data(case, ["horizontal", "vertical"]), "horizontal", "vertical", ax) is ax
     assert len(ax.collections[0].get_offsets()) == synthetic_store.REVOLUTIONS
     assert ax.get_ylabel() == "Vertical displacement (µm)"
-
-
-def test_the_bifurcation_diagram_has_points_at_each_value(store, ax):
-    data = section_data(select(store, rest("speed_ratio")), ["vertical"], over="speed_ratio")
-    assert bifurcation(data["section_vertical"], ax) is ax
-    x, _ = ax.lines[0].get_data()
-    assert len(x) == 5 * synthetic_store.REVOLUTIONS
-    assert "once a revolution (µm)" in ax.get_ylabel()
 
 
 # spectra
