@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from postproc.cells import cell_edges, hatch_cells, is_geometric
 from postproc.maps import VALIDITY
-from postproc.units import displayed, scale_of, short_name
+from postproc.units import displayed, scale_of, short_name, written_value
 from rubhpc.errors import InputError
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, REGIME, STATUS, VARIABLES
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.colors import Normalize
     from numpy.typing import NDArray
 
     Edges = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -34,44 +37,184 @@ _CATEGORIES = ("status", "regime", "period")
 STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
 
 
-def value_map(data: xr.Dataset, value: str, ax: Axes, log: bool = False) -> Axes:
-    """Draw a map from `map_data`: flags and periods as distinct colours, other scalars with a colour bar.
+def value_map(data: xr.Dataset, value: str, ax: Axes, log: bool = False, n_contour: int = 0) -> Axes:
+    """Draw a map from `map_data` over two axes; see `value_maps`."""
+    return value_maps(data, value, [ax], log, n_contour)[0]
 
+
+def value_maps(
+    data: xr.Dataset, value: str, axes: Sequence[Axes], log: bool = False, n_contour: int = 0
+) -> Sequence[Axes]:
+    """Draw maps from `map_data`, one for each value of its facets, in one scale of colours.
+
+    Flags and periods have distinct colours, other scalars a continuous bar and, where asked for, contours.
     Cells without a result are grey and hatched by their status; out of the model's range, by lines.
+
+    Parameters
+    ----------
+    data : Dataset over (row, column, y, x), (column, y, x) or (y, x)
+    axes : sequence of Axes
+        As many as there are facets, row by row.
+    n_contour : int
+        Contour lines at about so many levels.
     """
-    y_name, x_name = data[value].dims
-    data = data.sortby([str(y_name), str(x_name)])
+    *facets, y_name, x_name = map(str, data[value].dims)
+    data = data.sortby([*facets, y_name, x_name])
     x, x_label = displayed(data[x_name])
     y, y_label = displayed(data[y_name])
     edges = cell_edges(x), cell_edges(y)
-    status = data["status"].values
-    is_known = value == "status" or VARIABLES[value].role == "setting"  # before any case is done
-    done = np.ones_like(status, dtype=bool) if is_known else status == DONE
-    handles = []
-    if value in _CATEGORIES:
-        handles += _draw_categories(ax, data[value], done, edges)
-    else:
-        _draw_scalar(ax, data[value], done, edges, log)
-    if not is_known:
-        for code, (name, color, hatch) in _NOT_DONE.items():
-            handles += hatch_cells(ax, edges, ~done & (status == code), name, hatch, facecolor=color)
-        empty = done & np.isnan(
-            np.asarray(data[value].values, dtype=float)
-        )  # such as durations without contact
-        handles += hatch_cells(ax, edges, empty, "no value", "", facecolor="white")
-        validity = np.where(done, data["validity"].values, 0)
-        reasons = [text for bit, text, _ in VALIDITY.values() if (validity & bit).any()]
-        color = "k" if value in _CATEGORIES else _WARNING
-        invalid = f"out of range: {', '.join(reasons)}"
-        handles += hatch_cells(ax, edges, validity > 0, invalid, "\\\\\\\\", color=color)
-    for values, name in ((x, "x"), (y, "y")):
-        if is_geometric(values):
-            getattr(ax, f"set_{name}scale")("log")
-    ax.set(xlabel=x_label, ylabel=y_label, xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+    # Settings and the status are known before any case is done.
+    is_known = value == "status" or VARIABLES[value].role == "setting"
+    shown = data[value] if is_known else data[value].where(data["status"] == DONE)
+    paint = _category_paint(shown) if value in _CATEGORIES else _scalar_paint(shown, log)
+    if n_contour and value in _CATEGORIES:
+        raise InputError(f"map: {value} has no contours; draw it without --contours")
+    levels = _levels(paint, n_contour) if n_contour and min(x.size, y.size) > 1 else np.array([])
+    handles: dict[str, Artist] = {}
+    for ax, place in zip(axes, np.ndindex(*(data.sizes[f] for f in facets)), strict=True):
+        here = dict(zip(facets, place, strict=True))
+        cells = paint.cells(shown.isel(here).values)
+        mesh = ax.pcolormesh(*edges, cells, norm=paint.norm, cmap=paint.cmap, rasterized=True)
+        inside = levels[(levels > cells.min()) & (levels < cells.max())] if cells.count() else []
+        if len(inside):
+            ax.contour(x, y, cells, levels=inside, colors="white", linewidths=0.5)
+        if not is_known:
+            for patch in _hatch(ax, edges, data.isel(here), value, _reasons(data)):
+                handles[str(patch.get_label())] = patch
+        for values, name in ((x, "x"), (y, "y")):
+            if is_geometric(values):
+                getattr(ax, f"set_{name}scale")("log")
+        ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+    figure = axes[0].figure
+    bar = figure.colorbar(mesh, ax=list(axes), pad=0.02, aspect=25, ticks=paint.ticks)
+    bar.set_label(paint.label)
+    bar.ax.hlines(levels, *bar.ax.get_xlim(), color="white", linewidth=0.5)
+    if paint.names:
+        bar.ax.set_yticklabels(paint.names)
+        bar.ax.tick_params(which="both", length=0)
+    _name_facets(axes, data, facets, x_label, y_label)
     if handles:
-        n_column = _columns([len(str(h.get_label())) for h in handles])
-        ax.figure.legend(handles=handles, loc="outside lower center", ncols=n_column, fontsize=6.5)
-    return ax
+        n_column = _columns([len(label) for label in handles])
+        figure.legend(
+            handles=list(handles.values()), loc="outside lower center", ncols=n_column, fontsize=6.5
+        )
+    return axes
+
+
+class _Paint(NamedTuple):
+    """How values become colours, the same on every panel."""
+
+    cells: Callable[[NDArray[Any]], np.ma.MaskedArray[Any, Any]]  # values to what is drawn
+    norm: Normalize | None
+    cmap: Any
+    label: str
+    ticks: list[int] | None = None
+    names: list[str] | None = None
+
+
+def _scalar_paint(shown: xr.DataArray, log: bool) -> _Paint:
+    from matplotlib.colors import LogNorm, Normalize
+
+    scale = scale_of(shown)
+
+    def cells(values: NDArray[Any]) -> np.ma.MaskedArray[Any, Any]:
+        drawn = np.ma.masked_invalid(np.asarray(values, dtype=float) * scale.factor)
+        return np.ma.masked_less_equal(drawn, 0.0) if log else drawn
+
+    everything = cells(shown.values)
+    if np.ma.masked_invalid(np.asarray(shown.values, dtype=float)).count() == 0:
+        raise InputError(
+            f"map: no case of this selection has a {shown.name}; run the study first, or select others"
+        )
+    if everything.count() == 0:
+        raise InputError(f"map: {shown.name} is nowhere positive; draw it without --log")
+    limits = float(everything.min()), float(everything.max())
+    norm = LogNorm(*limits) if log else Normalize(*limits)
+    return _Paint(cells, norm, "cividis", scale.label(short_name(shown)))
+
+
+def _category_paint(shown: xr.DataArray) -> _Paint:
+    from matplotlib.colors import ListedColormap, Normalize
+
+    def coded(values: NDArray[Any]) -> NDArray[np.int64]:
+        codes: NDArray[np.int64] = np.nan_to_num(np.asarray(values, dtype=float), nan=-1).astype(np.int64)
+        return codes
+
+    known = categories(str(shown.name), coded(shown.values))
+    if not known:
+        return _Paint(
+            lambda values: np.ma.masked_where(coded(values) < 0, values),
+            None,
+            "Greys",
+            short_name(shown),
+            [],
+            [],
+        )
+    present = list(known)
+
+    def cells(values: NDArray[Any]) -> np.ma.MaskedArray[Any, Any]:
+        codes = coded(values)
+        return np.ma.masked_where(codes < 0, np.searchsorted(present, codes).clip(max=len(present) - 1))
+
+    return _Paint(
+        cells,
+        Normalize(-0.5, len(present) - 0.5),
+        ListedColormap([color for _, color in known.values()]),
+        short_name(shown),
+        list(range(len(present))),
+        [name for name, _ in known.values()],
+    )
+
+
+def _reasons(data: xr.Dataset) -> str:
+    """Name what leaves the model's range in any case that is done."""
+    validity = np.where(data["status"].values == DONE, data["validity"].values, 0)
+    return ", ".join(text for bit, text, _ in VALIDITY.values() if (validity & bit).any())
+
+
+def _hatch(ax: Axes, edges: Edges, data: xr.Dataset, value: str, reasons: str) -> list[Artist]:
+    """Hatch what has no result, no value, or is out of the model's range, and return what names them."""
+    status = data["status"].values
+    handles: list[Artist] = []
+    for code, (name, color, hatch) in _NOT_DONE.items():
+        handles += hatch_cells(ax, edges, status == code, name, hatch, facecolor=color)
+    # Such as durations without contact.
+    empty = (status == DONE) & np.isnan(np.asarray(data[value].values, dtype=float))
+    handles += hatch_cells(ax, edges, empty, "no value", "", facecolor="white")
+    invalid = (status == DONE) & (data["validity"].values > 0)
+    color = "k" if value in _CATEGORIES else _WARNING
+    return handles + hatch_cells(ax, edges, invalid, f"out of range: {reasons}", "\\\\\\\\", color=color)
+
+
+def _levels(paint: _Paint, n_contour: int) -> NDArray[np.float64]:
+    """Return about so many levels for contours, round ones on a linear scale."""
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import MaxNLocator
+
+    assert paint.norm is not None
+    low, high = float(paint.norm.vmin or 0.0), float(paint.norm.vmax or 0.0)
+    if isinstance(paint.norm, LogNorm):
+        levels = np.geomspace(low, high, n_contour + 2)
+    else:
+        levels = np.asarray(MaxNLocator(n_contour + 1).tick_values(low, high))
+    return levels[(levels > low) & (levels < high)]
+
+
+def _name_facets(
+    axes: Sequence[Axes], data: xr.Dataset, facets: Sequence[str], x_label: str, y_label: str
+) -> None:
+    """Label the outer axes, and each panel with its values of the facets."""
+    n_column = data.sizes[facets[-1]] if facets else 1
+    n_row = len(axes) // n_column
+    for i, ax in enumerate(axes):
+        row, column = divmod(i, n_column)
+        if row == n_row - 1:
+            ax.set_xlabel(x_label)
+        if column == 0:
+            ax.set_ylabel(y_label)
+        places = (row, column)[-len(facets) :] if facets else ()
+        names = [written_value(data[f][place]) for f, place in zip(facets, places, strict=True)]
+        ax.set_title(", ".join(names), fontsize=7)
 
 
 def _columns(lengths: list[int]) -> int:
@@ -81,56 +224,6 @@ def _columns(lengths: list[int]) -> int:
         if sum(6 + int(column.max()) for column in columns) <= _LEGEND_WIDTH:
             return n_column
     return 1
-
-
-def _draw_scalar(
-    ax: Axes,
-    data: xr.DataArray,
-    done: NDArray[np.bool_],
-    edges: Edges,
-    log: bool,
-) -> None:
-    from matplotlib.colors import LogNorm
-
-    shown = data.where(xr.DataArray(done, dims=data.dims))
-    scale = scale_of(shown)
-    values = np.ma.masked_invalid(np.asarray(shown.values, dtype=float) * scale.factor)
-    if values.count() == 0:
-        raise InputError(
-            f"map: no case of this selection has a {data.name}; run the study first, or select others"
-        )
-    norm = None
-    if log:
-        values = np.ma.masked_less_equal(values, 0.0)
-        if values.count() == 0:
-            raise InputError(f"map: {data.name} is nowhere positive; draw it without --log")
-        norm = LogNorm(float(values.min()), float(values.max()))
-    mesh = ax.pcolormesh(*edges, values, norm=norm, cmap="cividis", rasterized=True)
-    bar = ax.figure.colorbar(mesh, ax=ax, pad=0.02, aspect=25)
-    bar.set_label(scale.label(short_name(data)))
-
-
-def _draw_categories(
-    ax: Axes,
-    data: xr.DataArray,
-    done: NDArray[np.bool_],
-    edges: Edges,
-) -> list[Artist]:
-    """Draw codes in colours of their own and return handles of those that occur."""
-    from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
-
-    codes = np.where(done, np.nan_to_num(np.asarray(data.values, dtype=float), nan=-1), -1).astype(int)
-    known = categories(str(data.name), codes)
-    if known:
-        present = list(known)
-        index = np.searchsorted(present, codes).clip(max=len(present) - 1)
-        cells = np.ma.masked_where(codes < 0, index)
-        cmap = ListedColormap([color for _, color in known.values()])
-        ax.pcolormesh(*edges, cells, cmap=cmap, vmin=-0.5, vmax=len(present) - 0.5, rasterized=True)
-    return [
-        Patch(facecolor=color, edgecolor="0.4", linewidth=0.3, label=name) for name, color in known.values()
-    ]
 
 
 def categories(variable: str, codes: NDArray[np.integer]) -> dict[int, tuple[str, Any]]:

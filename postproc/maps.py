@@ -13,9 +13,10 @@ from rubhpc.errors import InputError
 from rubhpc.schema import VARIABLES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
 MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in ("scalar", "flag", "setting"))
+MOST_FACETS, MOST_PANELS = 2, 6
 # Where the model leaves its range, by variable: the flag, what is out of range, and the test.
 VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
     "minimum_slip_speed": (1, "slip", lambda slip: slip < 0),
@@ -37,7 +38,27 @@ def default_axes(store: xr.Dataset, x: str | None = None, y: str | None = None) 
     return across, named.pop(0) if y else free.pop(0)
 
 
-def map_data(store: xr.Dataset, value: str, x: str, y: str) -> xr.Dataset:
+def facet_axes(store: xr.Dataset, names: Sequence[str], taken: Sequence[str]) -> list[str]:
+    """Return the axes of small multiples, down and across: at most two, of at most six values each.
+
+    Raises
+    ------
+    InputError
+        No such axis, too many of them or of their values, or one that the maps spread over already.
+    """
+    facets = [find_axis(store, name) for name in names]
+    if len(facets) > MOST_FACETS or len({*facets, *taken}) < len(facets) + len(taken):
+        raise InputError(f"{source(store)}: --facet: take one or two axes, and not {' or '.join(taken)}")
+    for axis in facets:
+        if store.sizes[axis] > MOST_PANELS:
+            raise InputError(
+                f"{source(store)}: --facet {axis}: {store.sizes[axis]} values are more than {MOST_PANELS}; "
+                f"keep some with --select {axis}=..."
+            )
+    return facets[::-1]
+
+
+def map_data(store: xr.Dataset, value: str, x: str, y: str, facets: Sequence[str] = ()) -> xr.Dataset:
     """Return what a map shows, loaded: no more than this scalar, the status and the validity monitors.
 
     Parameters
@@ -49,7 +70,7 @@ def map_data(store: xr.Dataset, value: str, x: str, y: str) -> xr.Dataset:
 
     Returns
     -------
-    Dataset over (y, x)
+    Dataset over (*facets, y, x)
         The value, `status`, and `validity`: 0 within the model's range, else the sum of 1 (slip reverses, so
         that steady sliding is wrong), 2 (force over the stator's Euler load) and 4 (tip over a tenth of its
         length).
@@ -58,8 +79,8 @@ def map_data(store: xr.Dataset, value: str, x: str, y: str) -> xr.Dataset:
         need(store, [value])
         raise InputError(f"{source(store)}: {value}: no scalar of a case; choose {', '.join(MAPPABLE)}")
     store = store.assign(validity=validity(store))
-    data = narrow(store, dict.fromkeys([value, "status", "validity"]), spread=[x, y])
-    loaded: xr.Dataset = data.broadcast_like(store[[x, y]]).transpose(y, x).load()
+    data = narrow(store, dict.fromkeys([value, "status", "validity"]), spread=[x, y, *facets])
+    loaded: xr.Dataset = data.broadcast_like(store[[x, y, *facets]]).transpose(*facets, y, x).load()
     return loaded
 
 

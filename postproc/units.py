@@ -69,7 +69,10 @@ _SHORT = {
     "minimum_slip_speed": "Lowest slip speed",
     "period": "Period (revolutions)",
     "regime": "Regime",
+    "lyapunov_exponent": "Lyapunov exponent",
+    "whirl_ratio": "Whirl ratio",
     "status": "Status",
+    "validity": "Validity",
     "energy_residual": "Energy balance residual",
 }
 _SYMBOLS = {

@@ -86,6 +86,8 @@ def cascade(
 )
 @click.option("--x", metavar="AXIS", help="Axis across [default: the longest].")
 @click.option("--y", metavar="AXIS", help="Axis up [default: the next longest].")
+@click.option("--facet", "facets", metavar="AXIS", multiple=True, help="A map for each value; twice: a grid.")
+@click.option("--contours", type=click.IntRange(min=1), default=None, metavar="N", help="Lines at N levels.")
 @click.option("--log", is_flag=True, help="Colours on a logarithmic scale.")
 def map(  # noqa: A001 - the name of the command
     store: str,
@@ -95,20 +97,30 @@ def map(  # noqa: A001 - the name of the command
     value: str,
     x: str | None,
     y: str | None,
+    facets: tuple[str, ...],
+    contours: int | None,
     log: bool,
 ) -> None:
     """A scalar, the regime or the status over two axes; what is missing or out of range is hatched."""
-    from postproc.map_figure import value_map
-    from postproc.maps import default_axes, map_data
+    from postproc.map_figure import value_maps
+    from postproc.maps import default_axes, facet_axes, map_data
     from postproc.selection import first_of_rest
 
     cases = open_cases(store, selection)
     across, up = default_axes(cases, x, y)
-    cases, notes = first_of_rest(cases, [across, up], value)
-    shown = map_data(cases, value, across, up)
+    multiples = facet_axes(cases, facets, [across, up])
+    cases, notes = first_of_rest(cases, [across, up, *multiples], value)
+    shown = map_data(cases, value, across, up, multiples)
     for note in notes:
         click.echo(note)
-    finish("map", store, figure, data, shown, lambda axes: value_map(shown, value, axes[0], log), height=75)
+    n_column = shown.sizes[multiples[-1]] if multiples else 1
+    n_row = shown.sizes[multiples[0]] if len(multiples) == 2 else 1
+
+    def draw(axes: list[Axes]) -> None:
+        value_maps(shown, value, axes, log, contours or 0)
+
+    height, width = (75, None) if not multiples else (30 + 45 * n_row, 180)
+    finish("map", store, figure, data, shown, draw, n_row, height, width, n_column)
 
 
 @click.command()
