@@ -238,3 +238,10 @@ def test_a_store_without_any_result_has_its_maps(visit: Visit, pages: dict[str, 
     expect(page.locator("#case-text")).to_contain_text("not computed yet")
     expect(page.locator("#legend")).to_have_text("missing")
     assert not page.evaluate("Boolean(map.bar)")
+
+
+def test_what_is_offered_has_short_names(visit: Visit, pages: dict[str, str]) -> None:
+    page = visit(pages["whole"])
+    names = page.get_by_label("Show", exact=True).locator("option").all_inner_texts()
+    assert {"Validity", "Regime", "Peak contact force"} <= set(names)
+    assert len(names) == len(set(names))

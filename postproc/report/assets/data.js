@@ -88,7 +88,7 @@ function placeOf(flat) {
 
 function written(x, digits = 4) {
   if (!Number.isFinite(x)) return "–";
-  if (x !== 0 && (Math.abs(x) >= 1e6 || Math.abs(x) < 1e-4)) return x.toExponential(digits - 2).replace("e", " e");
+  if (x !== 0 && (Math.abs(x) >= 1e6 || Math.abs(x) < 1e-4)) return x.toExponential(digits - 2);
   return String(Number(x.toPrecision(digits)));
 }
 

@@ -219,7 +219,9 @@ class Spectrum extends Panel {
     const inside = Object.entries(told.frequencies).filter(([, f]) => f * rate < 0.97 * end);
     const x = inside.map(([, f]) => f * rate);
     this.modes.data = { x, low: x.map(() => floor), high: x.map(() => top) };
-    this.modeNames.data = { x, y: x.map(() => top), text: inside.map(([name]) => name) };
+    // Names that would lie over one another are left out.
+    const isClear = x.every((f, i) => x.every((g, k) => i === k || Math.abs(f - g) > 0.16 * end));
+    this.modeNames.data = { x: isClear ? x : [], y: isClear ? x.map(() => top) : [], text: isClear ? inside.map(([name]) => name) : [] };
   }
 }
 
