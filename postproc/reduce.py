@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 SCALARS = tuple(n for n, v in VARIABLES.items() if v.role in ("scalar", "setting"))
-# Chunks decoded in Rust, where zarrs is installed: six times as fast as in zarr itself, checksums included.
+# Chunks decoded in Rust, where zarrs is installed, checksums included: a mean takes 0.65 of the time.
 _FAST = {"codec_pipeline.path": "zarrs.ZarrsCodecPipeline"}
 _MEMORY = 1e9  # bytes that pieces may take together, each some four times: as stored, as read, and on the way
 _SMALLEST, _LARGEST = 4e6, 64e6  # bytes of a piece: below, the scheduler's 1 ms a piece counts

@@ -97,6 +97,7 @@ def main() -> int:
     if shown.ndim == 1:
         with house_style():
             page, (ax,) = new_figure()
+            ax.set_title(f"{given.what} of {int(found['cases'].max())} cases".capitalize(), fontsize=7)
             spectrum(shown, ax, abscissa="order", limit=min(10.0, float(shown["order"][-1])))
             save(page, figure)
         print(figure)

@@ -26,10 +26,11 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 SPECTRUM = "spectrum_torsion"
-# What a Slurm user has on PATH, made of scripts: a job runs here and now, in the background.
+# What a Slurm user has on PATH, made of scripts: a job runs here and now, in the background, from a
+# copy, since its script is removed once it is submitted.
 SBATCH = """#!/bin/sh
 cp "$1" "$0.job"
-bash "$1" > "$0.log" 2>&1 &
+bash "$0.job" > "$0.log" 2>&1 &
 echo $! >> "$0.pids"
 echo "Submitted batch job $!"
 """
