@@ -29,8 +29,12 @@ FIRST_REVOLUTIONS = 8  # of the first kernel call
 MOST_BOOKS = 8  # of phases that one case may meet; where it meets more, short steps cost less
 
 
-class EndlessEvents(Exception):  # noqa: N818 - a state of the motion, never seen by users
-    """Contacts open and close without end, or in too many combinations to tabulate."""
+class NoClosedForm(Exception):  # noqa: N818 - a state of the motion, never seen by users
+    """What only short steps can follow.
+
+    Contacts open and close without end, or in too many combinations to tabulate; or set-valued friction
+    meets a slip that turns.
+    """
 
 
 class ModalMarch(March):
@@ -55,11 +59,11 @@ class ModalMarch(March):
             tick=setup.tick,
             sample_level=setup.sample_level,
             samples_per_revolution=setup.samples_per_revolution,
-            blind_level=max(0, min(setup.sample_level, math.floor(math.log2(setup.step / setup.tick)))),
+            blind_level=setup.level_within(setup.step),
             contact_level=math.floor(math.log2(min(setup.interval, turn / CONTACT_STEPS) / setup.tick)),
             n_sample=0,
         )
-        self._bodies = self._book.kernel_reduced(self._clearance, setup.law.restitution)
+        self._bodies = self._book.kernel_reduced(self._clearance, setup.law)
         self._motion = self._reduce(initial)
         self._recorder = recorder(self._clearance.size)
         self._progress = np.zeros(kernel.N_PROGRESS, dtype=np.int64)
@@ -117,8 +121,8 @@ class ModalMarch(March):
             self.sample = first >> self._clock.sample_level
             if outcome == kernel.PHASE_WANTED:
                 self._find(int(self._progress[kernel.WANTED]))
-            elif outcome == kernel.CONTACT_UNSOLVED:
-                raise EndlessEvents
+            elif outcome in (kernel.CONTACT_UNSOLVED, kernel.SLIP_TURNED):
+                raise NoClosedForm
             elif outcome == kernel.DIVERGED or self._has_diverged(tally):
                 return f"a displacement passed {self._setup.displacement_limit:.3g} m"
             elif outcome == kernel.FINISHED:
@@ -167,12 +171,12 @@ class ModalMarch(March):
         """
         self._met.add(mask)
         if len(self._met) > MOST_BOOKS * self._book.n_most:
-            raise EndlessEvents
+            raise NoClosedForm
         if mask not in self._book.masks:
             if self._book.is_full:
                 self._book.forget()
             if not self._book.add(mask):
-                raise EndlessEvents
+                raise NoClosedForm
         tables = self._book.tables()
         is_met = np.isin(tables.mask, list(self._met))
         self._phases = tables._replace(mask=np.where(is_met, tables.mask, -1))

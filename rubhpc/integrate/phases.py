@@ -10,11 +10,13 @@ from rubhpc.integrate.phase import Phase, make_phase
 from rubhpc.integrate.reduction import ReducedModel, directions
 from rubhpc.integrate.tables import Tables, tabulate
 from rubhpc.kernels import phases as kernel
+from rubhpc.kernels.contact import MULTIPLIER
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
+    from rubhpc.kernels.contact import Law
 
     Floats = NDArray[np.float64]
 
@@ -103,8 +105,8 @@ class PhaseBook:
             )
         )
 
-    def kernel_reduced(self, clearance: Floats, restitution: float = 0.0) -> kernel.Reduced:
-        """The reduced bodies as the kernel takes them, with a case's clearances (q,), m, and restitution."""
+    def kernel_reduced(self, clearance: Floats, law: Law = MULTIPLIER) -> kernel.Reduced:
+        """The reduced bodies as the kernel takes them, with a case's clearances (q,), m, and law."""
         return kernel.Reduced(
             stiffness=self.reduced.stiffness,
             damping=self.reduced.damping,
@@ -115,8 +117,10 @@ class PhaseBook:
             answer=self.push @ self.pull.T,
             friction=np.full(self.push.shape[0], self.friction),
             radius=np.array([stator.radius for stator in self.model.stators]),
-            restitution=restitution,
+            slip=self.slip,
+            restitution=law.restitution,
             clearance=clearance,
+            is_set_valued=law.is_set_valued,
         )
 
     def tables(self) -> kernel.Phases:

@@ -16,6 +16,7 @@ from rubhpc.integrate.phases import PhaseBook
 from rubhpc.integrate.reduction import ReducedModel, directions, reduce_model
 from rubhpc.kernels.contact import MULTIPLIER
 from rubhpc.kernels.phases import SAMPLES_AT_ONCE
+from rubhpc.options import BLIND_STEP
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
@@ -49,7 +50,8 @@ class ModalSetup:
     model: Model
     reduced: ReducedModel
     spin: float  # rad/s
-    step: float  # s, up to which steps are taken without a bound; where stepped, step in contact
+    step: float  # s, up to which steps are taken without a bound
+    kick_step: float  # s, of contact where it has no closed form
     samples_per_revolution: int
     is_updated: bool  # normal
     displacement_limit: float  # m
@@ -58,8 +60,11 @@ class ModalSetup:
 
     @property
     def is_stepped(self) -> bool:
-        """Whether closed contacts have no closed form, so that contact is taken in short steps."""
-        return self.is_updated or self.law.stiffness > 0.0 or self.law.is_set_valued
+        """Whether closed contacts have no closed form, so that contact is taken in short steps.
+
+        Set-valued friction has one until the slip turns.
+        """
+        return self.is_updated or self.law.stiffness > 0.0
 
     @property
     def interval(self) -> float:
@@ -75,6 +80,10 @@ class ModalSetup:
     def tick(self) -> float:
         """Resolution of events, s."""
         return self.interval / (1 << self.sample_level)
+
+    def level_within(self, step: float) -> int:
+        """Largest level at which 2^level ticks are no longer than a step, s, and than a sample's interval."""
+        return max(0, min(self.sample_level, math.floor(math.log2(step / self.tick))))
 
     @cached_property
     def _opened(self) -> Phase:
@@ -131,7 +140,8 @@ def prepare(
             model=model,
             reduced=reduce_model(model, speed, integrator.accuracy),
             spin=speed,
-            step=integrator.contact_step(contact),
+            step=BLIND_STEP if integrator.step is None else integrator.step,
+            kick_step=integrator.contact_step(contact),
             samples_per_revolution=samples_per_revolution,
             is_updated=contact.normal == "updated",
             law=law_of(contact),

@@ -86,7 +86,7 @@ class SteppedMarch(ModalMarch):
         degree = setup.reduced.degree.reshape(-1, n)
         motion = phases.motion_re[0] + 1j * phases.motion_im[0]
         enter = phases.enter_re[0] + 1j * phases.enter_im[0]
-        level = max(0, min(self._clock.blind_level, self._clock.sample_level))
+        level = setup.level_within(setup.kick_step)
         power = phases.power_re[0, level] + 1j * phases.power_im[0, level]
         drifted, shifted = degree @ enter[n:] * power, degree @ enter[:n]
         positions, rates = degree @ motion[:n], degree @ motion[n:]

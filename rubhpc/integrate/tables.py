@@ -110,6 +110,7 @@ def tabulate(
         slip_im=sliding.imag,
         slip_rate_re=(sliding * exponent).real,
         slip_rate_im=(sliding * exponent).imag,
+        slip_bound=np.abs(sliding) * np.abs(exponent) ** 2 * growth,
         motion_re=motion.real,
         motion_im=motion.imag,
         enter_re=enter.real,

@@ -29,6 +29,7 @@ from rubhpc.kernels.phases import (
     PHASE,
     PHASE_WANTED,
     SAMPLES_AT_ONCE,
+    SLIP_TURNED,
     SPAN,
     TIME,
     WANTED,
@@ -39,7 +40,9 @@ from rubhpc.kernels.phases import (
     enter,
     find_phase,
     floor_log2,
+    has_turned,
     propagate,
+    proved_slip,
     proved_time,
 )
 from rubhpc.kernels.sampling import (
@@ -99,7 +102,8 @@ def advance(
     Returns
     -------
     int
-        FINISHED, DIVERGED (not finite), CONTACT_UNSOLVED or PHASE_WANTED.
+        FINISHED, DIVERGED (not finite), CONTACT_UNSOLVED, PHASE_WANTED, or SLIP_TURNED: set-valued friction
+        has no closed form from there on.
     """
     q, n = reduced.push.shape
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
@@ -165,6 +169,25 @@ def advance(
             level = min(level, ceiling)
         else:
             proved = proved_time(switch_re, switch_im, rate_re, rate_im, bound, p, z_re, z_im)
+            if reduced.is_set_valued and not is_free:
+                for i in range(q):
+                    if (mask[p] >> i) & 1:
+                        proved = min(
+                            proved,
+                            proved_slip(
+                                abs(clock.spin) * reduced.radius[i],
+                                phases.slip_re[p, i],
+                                phases.slip_im[p, i],
+                                phases.slip_rate_re[p, i],
+                                phases.slip_rate_im[p, i],
+                                phases.slip_bound[p, i],
+                                z_re,
+                                z_im,
+                            ),
+                        )
+                if proved < 0.0:
+                    progress[TIME] = t
+                    return SLIP_TURNED
             while level > clock.blind_level and (1 << level) * tick > proved:
                 level -= 1
             is_proved = (1 << level) * tick <= proved
@@ -222,6 +245,11 @@ def advance(
             end_span(phases, p, clock, t, z, progress, recorder, tally)
             impulse[:] = tally.impulse
         angle = sense * 2.0 * np.pi * (t % ticks_per_revolution) / ticks_per_revolution
+        if reduced.is_set_valued:
+            for i in range(q):
+                if ((mask[p] | crossing) >> i) & 1 and has_turned(reduced, i, clock.spin, motion[n:]):
+                    progress[TIME] = t
+                    return SLIP_TURNED
         wanted = change_contacts(
             reduced,
             mask[p],
@@ -238,6 +266,11 @@ def advance(
             elimination,
             tally,
         )
+        if reduced.is_set_valued:
+            for i in range(q):
+                if ((mask[p] | crossing) >> i) & 1 and has_turned(reduced, i, clock.spin, motion[n:]):
+                    progress[TIME] = t
+                    return SLIP_TURNED
         if wanted < 0 or n_event > MOST_EVENTS:
             progress[TIME] = t
             return CONTACT_UNSOLVED

@@ -19,7 +19,7 @@ TWIST_ACCELERATION_ROW = 6
 LATERAL_ROW, LATERAL_RATE = 1, 2
 
 
-FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED = range(4)  # outcomes
+FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED, SLIP_TURNED = range(5)  # outcomes
 
 # What a call leaves in `progress` (7,) for the next one: tick reached, phase, set of pairs wanted next (-1:
 # none), steps taken, next sample to take, tick at which the phase began, and that from which energies are
@@ -51,6 +51,7 @@ class Phases(NamedTuple):
     slip_im: Floats
     slip_rate_re: Floats  # (p, q, m), its time derivative
     slip_rate_im: Floats
+    slip_bound: Floats  # (p, q, m), bound on its second time derivative for a unit coordinate
     motion_re: Floats  # (p, 2 n, m), reduced displacements, then velocities
     motion_im: Floats
     enter_re: Floats  # (p, 2 n, m), modal coordinates of a unit displacement or velocity
@@ -73,11 +74,13 @@ class Reduced(NamedTuple):
     force_sine: Floats  # (n,)
     push: Floats  # (q, n), rate of a gap with the motion
     pull: Floats  # (q, n), force on the motion of a unit contact force, friction included
+    slip: Floats  # (q, n), slip speed with the motion, but for that of the steady spin
     answer: Floats  # (q, q), push @ pull.T, 1/kg
     friction: Floats  # (q,), coefficient, not negative
     radius: Floats  # (q,), m
     restitution: float  # normal velocity after an impact over that before it
     clearance: Floats  # (q,), m
+    is_set_valued: bool  # friction, so that it is known only while the rim outruns the stator
 
 
 class Clock(NamedTuple):
@@ -185,3 +188,37 @@ def proved_time(
         elif rate < 0.0:
             proved = min(proved, -s / rate)
     return proved
+
+
+@jit_inline_sum
+def proved_slip(
+    steady: float,
+    slip_re: Floats,
+    slip_im: Floats,
+    rate_re: Floats,
+    rate_im: Floats,
+    bound: Floats,
+    z_re: Floats,
+    z_im: Floats,
+) -> float:
+    """Time, s, in which the slip of a pair cannot turn; negative where it has. `steady`: the spin's, m/s."""
+    s = steady + dot(slip_re, slip_im, z_re, z_im)
+    rate = dot(rate_re, rate_im, z_re, z_im)
+    b = bounded(bound, z_re, z_im)
+    if not s > 0.0:
+        return -1.0
+    proved = np.inf
+    if b > 0.0:
+        proved = (rate + np.sqrt(rate * rate + 2.0 * b * s)) / b
+    elif rate < 0.0:
+        proved = -s / rate
+    return float(proved)
+
+
+@jit_inline_sum
+def has_turned(reduced: Reduced, i: int, spin: float, velocity: Floats) -> bool:
+    """Whether the stator outruns the rim at pair i, with the motion's velocity (n,)."""
+    s = abs(spin) * reduced.radius[i]
+    for k in range(velocity.size):
+        s += reduced.slip[i, k] * velocity[k]
+    return not s > 0.0

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 scalars = {v.name: np.ones(1) if "stator" in v.dims else 1 for v in METRICS}
-record = SimpleNamespace(status=DONE, reason="", signals={}, spectra={}, sections={}, scalars=scalars)
+record = SimpleNamespace(
+    status=DONE, reason="", remark="", signals={}, spectra={}, sections={}, scalars=scalars
+)
 stub = {
     "compile_kernels": lambda *_, **__: None,
     "run_case": lambda *_, **__: record,

@@ -31,6 +31,8 @@ def bodies(rng, q, friction=0.0, restitution=0.0):
         radius=np.full(q, 0.06),
         restitution=restitution,
         clearance=np.full(q, 1e-4),
+        slip=np.zeros((q, N)),
+        is_set_valued=False,
     )
 
 

@@ -136,13 +136,22 @@ def test_dry_whip_diverges_in_steady_sliding_and_settles_under_coulombs_law(ring
 @pytest.mark.parametrize("normal", ["fixed", "updated"])
 def test_ordinary_rub_is_that_of_steady_sliding(normal):
     given = {"speed_ratio": 0.75, "clearance": "100 um", "transient": 2, "revolutions": 2, "normal": normal}
-    for method in ({"method": "central-difference", "step": "2 us"}, {"step": "1 us"}):
+    for method in ({"method": "central-difference", "step": "2 us"}, {}):
         sliding, coulomb = (
             simulate("mokhtar2017", **given, **method, friction_law=law) for law in ("sliding", "coulomb")
         )
         assert sliding.minimum_slip_speed.min() > 0.0
-        # The modal scheme goes from event to event in one case, in steps in the other.
-        same = 1e-9 if "method" in method or normal == "updated" else 3e-3
         for name in ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral"):
             one, other = getattr(sliding, name), getattr(coulomb, name)
-            assert other == pytest.approx(one, rel=0, abs=same * abs(one).max()), (name, method)
+            assert other == pytest.approx(one, rel=0, abs=1e-9 * abs(one).max()), (name, method)
+
+
+def test_modal_scheme_takes_short_steps_only_where_the_slip_turns():
+    """At r 1.5 the stator's tip is thrown back faster than the rim goes: there, and there alone, both part."""
+    given = {"transient": 30, "revolutions": 2, "friction_law": "coulomb", "step": "2 us", "keep": ()}
+    outrun = simulate("mokhtar2017", speed_ratio=0.75, clearance="84 um", **given)
+    turned = simulate("mokhtar2017", speed_ratio=1.5, clearance="150 um", **given)
+    assert outrun.minimum_slip_speed > 0.0
+    assert outrun.steps < 5000
+    assert turned.minimum_slip_speed <= 0.0
+    assert turned.steps > 10_000
