@@ -41,8 +41,8 @@ LEAST_EXCHANGE = 1e-6  # of the mechanical energy: a motion that exchanges less 
 def empty_samples(n_stator: int, n_sample: int) -> Samples:
     """Room for the samples of a record: one array, so that their spectra are taken together."""
     whole = np.zeros((4 + 3 * n_stator, n_sample))
-    rotor, axial, lateral, force = np.split(whole, [4, 4 + n_stator, 4 + 2 * n_stator])
-    return Samples(rotor=rotor, axial=axial, lateral=lateral, force=force, whole=whole)
+    axial, lateral, force = whole[4:].reshape(3, n_stator, n_sample)
+    return Samples(rotor=whole[:4], axial=axial, lateral=lateral, force=force, whole=whole)
 
 
 def empty_tally(n_stator: int) -> Tally:

@@ -177,9 +177,12 @@ class ModalMarch(March):
                 self._book.forget()
             if not self._book.add(mask):
                 raise NoClosedForm
-        tables = self._book.tables()
-        is_met = np.isin(tables.mask, list(self._met))
-        self._phases = tables._replace(mask=np.where(is_met, tables.mask, -1))
+        self._phases = self._book.tables()
+        unmet = [p for p, known in enumerate(self._book.masks) if known not in self._met]
+        if unmet:
+            shown = self._phases.mask.copy()
+            shown[unmet] = -1
+            self._phases = self._phases._replace(mask=shown)
         self._z = np.zeros((2, self._phases.switch_re.shape[2]))
         self._z_next = np.zeros_like(self._z)
 

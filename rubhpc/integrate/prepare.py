@@ -66,17 +66,17 @@ class ModalSetup:
         """
         return self.is_updated or self.law.stiffness > 0.0
 
-    @property
+    @cached_property
     def interval(self) -> float:
         """Time between samples, s."""
         return 2.0 * math.pi / (abs(self.spin) * self.samples_per_revolution)
 
-    @property
+    @cached_property
     def sample_level(self) -> int:
         """2^sample_level ticks are the interval of samples."""
         return max(2, math.ceil(math.log2(self.interval / FINEST_TICK)))
 
-    @property
+    @cached_property
     def tick(self) -> float:
         """Resolution of events, s."""
         return self.interval / (1 << self.sample_level)

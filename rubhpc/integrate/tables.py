@@ -37,6 +37,7 @@ class Tables:
         self.n_most = max(n_least, MOST_PHASES)
         self._n_least, self._n_phase = n_least, 0
         self._room: list[Any] = []
+        self._view: kernel.Phases | None = None
 
     def add(self, row: kernel.Phases) -> None:
         """Take in the tables of a phase, (1, ...) each."""
@@ -49,14 +50,17 @@ class Tables:
         for field, new in zip(self._room, rows, strict=True):
             field[self._n_phase] = new[0]
         self._n_phase += 1
+        self._view = None
 
     def clear(self) -> None:
         """Give all room back to phases to come."""
-        self._n_phase = 0
+        self._n_phase, self._view = 0, None
 
     def view(self) -> kernel.Phases:
         """The tables of all phases."""
-        return kernel.Phases(*(field[: self._n_phase] for field in self._room))
+        if self._view is None:
+            self._view = kernel.Phases(*(field[: self._n_phase] for field in self._room))
+        return self._view
 
 
 def tabulate(

@@ -147,7 +147,7 @@ def test_ordinary_rub_is_that_of_steady_sliding(normal):
 
 
 def test_modal_scheme_takes_short_steps_only_where_the_slip_turns():
-    """At r 1.5 the stator's tip is thrown back faster than the rim goes: there, and there alone, both part."""
+    """At r 1.5 the tip is thrown back faster than the rim goes: there alone, steps are short."""
     given = {"transient": 30, "revolutions": 2, "friction_law": "coulomb", "step": "2 us", "keep": ()}
     outrun = simulate("mokhtar2017", speed_ratio=0.75, clearance="84 um", **given)
     turned = simulate("mokhtar2017", speed_ratio=1.5, clearance="150 um", **given)
