@@ -62,7 +62,7 @@ class Contact:
 
     @property
     def is_stepped(self) -> bool:
-        """Whether closed contacts have no closed form, so that the modal scheme takes short steps."""
+        """Whether closed contacts may have no closed form, so that the modal scheme takes short steps."""
         return self.normal == "updated" or self.law == "penalty" or self.friction_law == "coulomb"
 
 

@@ -48,10 +48,6 @@ class Hand:
         """Note the case that is computed from now on; it outlives this process, at 1 us."""
         os.pwrite(self._handle, f"{flat} {name}".ljust(_RECORD - 1).encode(), 0)
 
-    def drop(self) -> None:
-        """Note that no case is in hand."""
-        os.pwrite(self._handle, b" " * (_RECORD - 1), 0)
-
     def accuse(self, seconds: float) -> None:
         """Leave it as evidence that the case in hand does not end; from any thread."""
         os.write(self._handle, f"{_OVERRUN} of {seconds:g} s, in a single step of it\n".encode())
@@ -93,7 +89,7 @@ def find_suspects(directory: Path, manifest: Manifest, is_missing: NDArray[np.bo
     for record in sorted(directory.glob("run*")) if directory.is_dir() else ():
         found = _read(record)
         if found is None or not _is_open(*found[:2], manifest, is_missing):
-            record.unlink(missing_ok=True)  # it died between cases, or has been computed since
+            record.unlink(missing_ok=True)  # it died before its first case, or that has been computed since
             continue
         flat, _, evidence = found
         deaths[flat] += 1
