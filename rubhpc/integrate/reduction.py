@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -94,24 +94,15 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     """
     mass, damping, stiffness, force = whole_system(model, spin)
     degree, output = degrees_of(model), output_degrees(model)
-    seen = np.unique(np.concatenate([degree[degree >= 0], output[output >= 0]]))
-
-    fastest = max(_contact_frequency(mass, stiffness, degree, model), abs(spin))
-    cutoff = CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * fastest
-    symmetric = 0.5 * (stiffness + stiffness.T)
-    coupled = (mass != 0) | (stiffness != 0)
-    n_part, part = connected_components(csr_array(coupled), directed=False)
-    _, whole = connected_components(csr_array(coupled | (damping != 0)), directed=False)
+    seen = _seen(model)
+    standstill = _at_standstill(model)
+    cutoff = CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * max(standstill.contact_frequency, abs(spin))
     columns = []
-    for i_part in range(n_part):
-        rows = np.flatnonzero(part == i_part)
-        looked_at = np.flatnonzero(np.isin(rows, seen))
-        if np.isin(whole[rows[0]], whole[seen]):
-            pick = np.ix_(rows, rows)
-            column = np.zeros((mass.shape[0], rows.size))
-            shapes = _basis(mass[pick], symmetric[pick], looked_at, cutoff)
-            column[rows, : shapes.shape[1]] = shapes
-            columns.append(column[:, : shapes.shape[1]])
+    for part in standstill.parts:
+        shapes = _basis(part, mass[np.ix_(part.rows, part.rows)], cutoff)
+        column = np.zeros((mass.shape[0], shapes.shape[1]))
+        column[part.rows] = shapes
+        columns.append(column)
     basis = np.hstack(columns)
     stiffness, damping = basis.T @ stiffness @ basis, basis.T @ damping @ basis
     keep = np.flatnonzero(_visible(basis[seen], stiffness, damping))
@@ -126,6 +117,56 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
         degree=np.where((degree >= 0)[:, :, None], basis[np.maximum(degree, 0)], 0.0),
         output=np.where((output >= 0)[:, None], basis[np.maximum(output, 0)], 0.0),
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Part:
+    """Degrees that mass and stiffness couple, and their n undamped modes."""
+
+    rows: Ints  # (n,), among all degrees
+    looked_at: Ints  # among `rows`, those that contact or outputs see
+    square: Floats  # (n,), of the frequency, rad2/s2
+    mode: Floats  # (n, n), orthonormal in the mass
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Standstill:
+    """What a model is at every speed."""
+
+    parts: tuple[_Part, ...]  # those that matter to what is seen
+    contact_frequency: float  # rad/s
+
+
+@lru_cache(maxsize=4)
+def _at_standstill(model: Model) -> _Standstill:
+    """Modes of the parts of a model, found once for all speeds."""
+    mass, damping, stiffness, _ = whole_system(model, 1.0)  # at a speed, for what gyroscopic terms couple
+    symmetric = 0.5 * (stiffness + stiffness.T)
+    seen = _seen(model)
+    coupled = (mass != 0) | (stiffness != 0)
+    n_part, part = connected_components(csr_array(coupled), directed=False)
+    _, whole = connected_components(csr_array(coupled | (damping != 0)), directed=False)
+    parts = []
+    for i_part in range(n_part):
+        rows = np.flatnonzero(part == i_part)
+        if not np.isin(whole[rows[0]], whole[seen]):
+            continue
+        square, mode = eigh(symmetric[np.ix_(rows, rows)], mass[np.ix_(rows, rows)])
+        if square[0] <= FREE * square[-1]:
+            raise InputError(
+                "[integrator] method: modal needs bodies that are held, and here one is free to move or to "
+                'turn; take method = "central-difference"'
+            )
+        looked_at = np.flatnonzero(np.isin(rows, seen))
+        parts.append(_Part(rows=rows, looked_at=looked_at, square=square, mode=mode))
+    frequency = _contact_frequency(mass, stiffness, degrees_of(model), model)
+    return _Standstill(parts=tuple(parts), contact_frequency=frequency)
+
+
+def _seen(model: Model) -> Ints:
+    """Degrees that contact or outputs see."""
+    degree, output = degrees_of(model), output_degrees(model)
+    return np.unique(np.concatenate([degree[degree >= 0], output[output >= 0]]))
 
 
 def _contact_frequency(mass: Floats, stiffness: Floats, degree: Ints, model: Model) -> float:
@@ -148,20 +189,15 @@ def _contact_frequency(mass: Floats, stiffness: Floats, degree: Ints, model: Mod
     return float(highest)
 
 
-def _basis(mass: Floats, stiffness: Floats, looked_at: Ints, cutoff: float) -> Floats:
-    """Modes of a part below the cutoff, rad/s, and static shapes, orthonormal in the mass."""
-    n = mass.shape[0]
-    square, mode = eigh(stiffness, mass)
-    if square[0] <= FREE * square[-1]:
-        raise InputError(
-            "[integrator] method: modal needs bodies that are held, and here one is free to move or to turn; "
-            'take method = "central-difference"'
-        )
+def _basis(part: _Part, mass: Floats, cutoff: float) -> Floats:
+    """Modes of a part below the cutoff, rad/s, and static shapes, orthonormal in its mass matrix."""
+    square, mode, looked_at = part.square, part.mode, part.looked_at
+    n = square.size
     frequency = np.sqrt(np.maximum(square, 0.0))
     n_keep = max(int(np.count_nonzero(frequency <= cutoff)), min(FEWEST_MODES, n))
     kept: Floats = mode[:, :n_keep]
     if n_keep + looked_at.size >= n:
-        return np.asarray(mode)
+        return mode
     # Static answer of the modes above the cutoff alone: no rigid-body motion is left in it.
     rest = mode[:, n_keep:]
     shape = (rest / square[n_keep:]) @ rest[looked_at].T
