@@ -109,8 +109,7 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     parts = [np.flatnonzero(part == i_part) for i_part in range(n_part)]
     parts = [rows for rows in parts if np.isin(whole[rows[0]], whole[seen])]
     modes = [
-        _modes(mass, symmetric, rows, n_seen=np.count_nonzero(np.isin(rows, seen)), cutoff=cutoff)
-        for rows in parts
+        _modes(mass, symmetric, rows, n_seen=int(np.isin(rows, seen).sum()), cutoff=cutoff) for rows in parts
     ]
     kept = np.hstack([those.low for those in modes])
     frequency = np.concatenate([those.low_frequency for those in modes])
@@ -194,7 +193,8 @@ def _shapes(modes: _Modes, seen: Ints, drawn: Floats, least: float) -> Floats:
     shape = shape[:, length > 0.0] / length[length > 0.0]
     size, mix = np.linalg.eigh(shape.T @ shape)
     independent = size > 1e-8 * size[-1]
-    return modes.high @ (shape @ mix[:, independent] / np.sqrt(size[independent]))
+    mixed: Floats = modes.high @ (shape @ mix[:, independent] / np.sqrt(size[independent]))
+    return mixed
 
 
 def _visible(seen: Floats, stiffness: Floats, damping: Floats) -> NDArray[np.bool_]:
