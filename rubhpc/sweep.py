@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rubhpc.study import Study
 
 MOST_CASES = 50_000_000  # beyond, a slip of the pen fills the memory
-PHYSICS = 3  # raised whenever the same study gives other numbers than before
+PHYSICS = 4  # raised whenever the same study gives other numbers than before
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -185,7 +185,8 @@ def _named(study: Study) -> Iterator[None]:
 def identity_parts(study: Study) -> dict[str, Any]:
     """Return all that changes the results of a study but the values on its axes, for JSON.
 
-    What the rig says of a key that is an axis is no part of it: every case sets that key.
+    What the rig says of a key that is an axis is no part of it: every case sets that key. Of a sample, all is
+    that has values drawn but how many.
     """
     keys = [axis.name for axis in study.axes if axis.is_rig_key]
     rig = with_keys(
@@ -194,7 +195,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
     for key in keys:
         _blank(rig, key.split("."))
     del rig["name"]
-    return {
+    parts = {
         "physics": PHYSICS,
         "axes": [axis.name for axis in study.axes],
         "rig": rig,
@@ -202,6 +203,10 @@ def identity_parts(study: Study) -> dict[str, Any]:
         "integrator": asdict(study.integrator),
         "record": asdict(study.recording) | {"keep": sorted(study.recording.keep)},
     }
+    if study.sample is not None:
+        ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
+        parts["sample"] = {"method": study.sample.method, "seed": study.sample.seed, "ranges": ranges}
+    return parts
 
 
 def _blank(table: Any, key: list[str]) -> None:
