@@ -24,6 +24,7 @@ from rubhpc.kernels.phases import (
     DIVERGED,
     ENTERED,
     FINISHED,
+    FORCED_LEVEL,
     N_STEP,
     NEXT_SAMPLE,
     PHASE,
@@ -51,6 +52,7 @@ from rubhpc.kernels.sampling import (
     begin_span,
     end_span,
     observe_step,
+    resolved_contact,
     take_samples,
 )
 
@@ -60,7 +62,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-FORCED_LEVEL = 6  # steps of up to 2^level ticks follow an event unquestioned, so that time goes on
 MOST_EVENTS = 200_000  # in one call; more is chatter without end
 GAP_TOLERANCE = 1e-13  # m
 
@@ -120,6 +121,7 @@ def advance(
     active, elimination = np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
     crossing_at = np.zeros(q, dtype=np.bool_)
     t, p = first_tick, progress[PHASE]
+    age, fine = -1, 0  # of the contact, as a level, and the level up to which it was then resolved
     ceiling = -1  # while halving: the longest level worth a try
     is_halving = False
     is_forced = False
@@ -128,7 +130,7 @@ def advance(
     if is_recorded and wanted < 0:
         if progress[SPAN] < 0:
             begin_span(phases, p, t, z, progress, recorder)
-        begin_contact(phases, reduced, p, clock.spin, z_re, z_im, recorder)
+        begin_contact(phases, reduced, p, clock.spin, z, z_next, recorder)
     while True:
         if wanted >= 0:  # go over to another set of contacts
             angle = sense * 2.0 * np.pi * (t % ticks_per_revolution) / ticks_per_revolution
@@ -139,11 +141,11 @@ def advance(
             p = found
             enter(phases, p, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
             progress[PHASE], progress[WANTED], progress[ENTERED] = p, -1, t
-            wanted = -1
+            wanted, age = -1, -1
             is_forced, is_halving = True, False
             if is_recorded:
                 begin_span(phases, p, t, z, progress, recorder)
-                begin_contact(phases, reduced, p, clock.spin, z_re, z_im, recorder)
+                begin_contact(phases, reduced, p, clock.spin, z, z_next, recorder)
         is_sample = is_recorded and t == progress[NEXT_SAMPLE] << sample_level
         if t >= last_tick:
             if is_recorded and t == end_tick:
@@ -160,8 +162,12 @@ def advance(
         level = min(highest_level, floor_log2(limit - t))
         if is_recorded and not is_free:
             # What an impact sets off is fast at first: no step is longer than the contact has lasted.
-            age = floor_log2(max(1, t - progress[ENTERED]))
-            level = min(level, clock.contact_level, max(age, clock.blind_level))
+            lasted = floor_log2(max(1, t - progress[ENTERED]))
+            if lasted != age:
+                age = lasted
+                time = resolved_contact(phases, p, z_re, z_im)
+                fine = floor_log2(int(max(1.0, min(time / tick, 1.0 * (1 << highest_level)))))
+            level = min(level, clock.contact_level, max(age, clock.blind_level), fine)
         is_proved = False
         if is_forced:
             level, is_forced, is_proved = min(level, FORCED_LEVEL), False, True
