@@ -20,9 +20,11 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_sum
 from rubhpc.kernels.events import change_contacts
 from rubhpc.kernels.phases import (
+    AGE,
     CONTACT_UNSOLVED,
     DIVERGED,
     ENTERED,
+    FINE,
     FINISHED,
     FORCED_LEVEL,
     N_STEP,
@@ -94,7 +96,7 @@ def advance(
     ----------
     is_recorded : bool
         Whether to fill `samples` and `tally`.
-    progress : (7,)
+    progress : (N_PROGRESS,)
         See `kernels.phases`. Where a set of contacts is met that is not tabulated, PHASE_WANTED is returned
         with the motion in `motion` (2 n,); the caller adds the phase and calls again.
     z, z_next : (2, m)
@@ -121,7 +123,6 @@ def advance(
     active, elimination = np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
     crossing_at = np.zeros(q, dtype=np.bool_)
     t, p = first_tick, progress[PHASE]
-    age, fine = -1, 0  # of the contact, as a level, and the level up to which it was then resolved
     ceiling = -1  # while halving: the longest level worth a try
     is_halving = False
     is_forced = False
@@ -141,7 +142,7 @@ def advance(
             p = found
             enter(phases, p, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
             progress[PHASE], progress[WANTED], progress[ENTERED] = p, -1, t
-            wanted, age = -1, -1
+            wanted, progress[AGE] = -1, -1
             is_forced, is_halving = True, False
             if is_recorded:
                 begin_span(phases, p, t, z, progress, recorder)
@@ -162,12 +163,11 @@ def advance(
         level = min(highest_level, floor_log2(limit - t))
         if is_recorded and not is_free:
             # What an impact sets off is fast at first: no step is longer than the contact has lasted.
-            lasted = floor_log2(max(1, t - progress[ENTERED]))
-            if lasted != age:
-                age = lasted
-                time = resolved_contact(phases, p, z_re, z_im)
-                fine = floor_log2(int(max(1.0, min(time / tick, 1.0 * (1 << highest_level)))))
-            level = min(level, clock.contact_level, max(age, clock.blind_level), fine)
+            age = floor_log2(max(1, t - progress[ENTERED]))
+            if age != progress[AGE]:
+                resolved = min(resolved_contact(phases, p, z_re, z_im) / tick, 1.0 * (1 << highest_level))
+                progress[AGE], progress[FINE] = age, floor_log2(int(max(1.0, resolved)))
+            level = min(level, clock.contact_level, max(age, clock.blind_level), progress[FINE])
         is_proved = False
         if is_forced:
             level, is_forced, is_proved = min(level, FORCED_LEVEL), False, True

@@ -21,11 +21,12 @@ LATERAL_ROW, LATERAL_RATE = 1, 2
 
 FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED, SLIP_TURNED = range(5)  # outcomes
 
-# What a call leaves in `progress` (7,) for the next one: tick reached, phase, set of pairs wanted next (-1:
-# none), steps taken, next sample to take, tick at which the phase began, and that from which energies are
-# still to be added (-1: none).
-N_PROGRESS = 7
-TIME, PHASE, WANTED, N_STEP, NEXT_SAMPLE, ENTERED, SPAN = range(N_PROGRESS)
+# What a call leaves in `progress` for the next one: tick reached, phase, set of pairs wanted next (-1: none),
+# steps taken, next sample to take, tick at which the phase began, that from which energies are still to be
+# added (-1: none), how long the contact had lasted, as a level, when its pace was last seen (-1: never),
+# and level of the longest step that resolved it then.
+N_PROGRESS = 9
+TIME, PHASE, WANTED, N_STEP, NEXT_SAMPLE, ENTERED, SPAN, AGE, FINE = range(N_PROGRESS)
 
 SAMPLES_AT_ONCE = 8  # read from one set of modal coordinates
 FORCED_LEVEL = 6  # steps of up to 2^level ticks follow an event unquestioned, so that time goes on
