@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import math
 import re
-import struct
 from dataclasses import Field, dataclass, fields
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
@@ -17,7 +15,7 @@ from rubhpc.input.fields import check_value, nearest, parse_field, place, quanti
 from rubhpc.input.quantity import brief, parse_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from rubhpc.rig import Rig
 
@@ -46,6 +44,11 @@ _LONG_NAMES = {
 SPEED_AXES = ("speed_ratio", "speed")
 CLEARANCE_AXES = ("clearance_ratio", "clearance")
 _RANGE_KEYS = ("start", "stop", "step", "num", "scale")
+_TABLE_KEYS = ("values", *_RANGE_KEYS, "sweep")
+SWEEPS = ("from_rest", "up", "down", "both")
+FROM_REST, UP, DOWN, BOTH = SWEEPS
+DIRECTION = "direction"  # the axis that a sweep both ways adds
+DIRECTIONS = (UP, DOWN)  # meanings of 0 and 1 on it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,9 +64,11 @@ class Axis:
     unit : str
         SI unit of the values, in the notation of the store ("rad s-1"; "1" without dimension).
     values : tuple of float
-        In SI units, each once, in any order.
+        In SI units, each once; in any order, but rising where the axis is swept.
     long_name : str
         What labels and attributes say.
+    sweep : {"from_rest", "up", "down", "both"}
+        Whether each case starts at rest, or where its neighbour on this axis has ended.
     """
 
     name: str
@@ -71,15 +76,20 @@ class Axis:
     unit: str
     values: tuple[float, ...]
     long_name: str
+    sweep: str = FROM_REST
 
     def __post_init__(self) -> None:
+        if self.sweep not in SWEEPS:
+            raise InputError(f"{place('', 'grid', self.name)}: sweep: {_unknown_sweep(self.sweep)}")
+        if self.sweep != FROM_REST:
+            object.__setattr__(self, "values", tuple(sorted(self.values)))
         if problem := _problem(self.name, self.values):
             raise InputError(f"{place('', 'grid', self.name)}: {problem}")
 
     @property
     def is_rig_key(self) -> bool:
         """Whether the axis sets a key of the rig."""
-        return self.name not in _OWN
+        return self.name not in _OWN and self.name != DIRECTION
 
 
 def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
@@ -91,7 +101,7 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
         A dotted key of the rig, or one of speed_ratio, speed, clearance_ratio, clearance, friction.
     values : list, dict or single value
         A dict is a range, stop included: `{start, stop, step}`, or `{start, stop, num}` with the `scale`
-        "lin" or "log".
+        "lin" or "log"; or it holds `values`. Either may say how the axis is swept: `{values, sweep}`.
     rig : Rig
         Whose keys the axis may name.
     file : str
@@ -104,6 +114,9 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     """
     where = place(file, "grid", name)
     declared = _declared(name, rig, where)
+    sweep = FROM_REST
+    if isinstance(values, dict):
+        values, sweep = _read_table(values, where)
     numbers = _read(declared, values, where)
     if problem := _problem(name, numbers):
         raise InputError(f"{where}: {problem}")
@@ -113,24 +126,22 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
         unit=_store_unit(declared.metadata.get("unit", "")),
         values=numbers,
         long_name=_LONG_NAMES.get(name, name.replace("_", " ").replace(".", " ")),
+        sweep=sweep,
     )
 
 
-def case_id(identity: str, point: Sequence[float]) -> str:
-    """Return the id of a case: a hash of its study's identity and of its values on the axes.
-
-    It outlives the growth of any axis, and the order of the values on it.
-    """
-    digest = hashlib.sha256(identity.encode())
-    digest.update(struct.pack(f"<{len(point)}d", *point))
-    return digest.hexdigest()[:32]
+def direction_axis() -> Axis:
+    """Return the axis that tells the two runs of a sweep both ways apart."""
+    return Axis(
+        name=DIRECTION, dimension=DIRECTION, unit="1", values=(0.0, 1.0), long_name="direction of the sweep"
+    )
 
 
 def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
     """Return dotted keys and values of a table in which `stator.angle = 0` may stand without quotes."""
     pairs: list[tuple[str, Any]] = []
     for key, value in table.items():
-        is_table = isinstance(value, dict) and value and not set(value) & set(_RANGE_KEYS)
+        is_table = isinstance(value, dict) and value and not set(value) & set(_TABLE_KEYS)
         is_table = is_table and prefix + key not in _OWN and prefix.count(".") < 8
         pairs += flatten(value, f"{prefix}{key}.") if is_table else [(prefix + key, value)]
     return pairs
@@ -152,6 +163,29 @@ def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
         raise InputError(f"{where}: {str(error).replace('unknown key', 'unknown axis')}") from None
 
 
+def _read_table(table: Mapping[str, object], where: str) -> tuple[object, str]:
+    """What stands for the values in `{values, sweep}` or a range with a sweep, and how they are swept."""
+    for key in table:
+        if key not in _TABLE_KEYS:
+            raise InputError(f"{where}: unknown key {brief(key)} in a range; {nearest(key, _TABLE_KEYS)}")
+    sweep = table.get("sweep", FROM_REST)
+    if sweep not in SWEEPS:
+        raise InputError(f"{where}: sweep: {_unknown_sweep(sweep)}")
+    rest = {key: value for key, value in table.items() if key != "sweep"}
+    if "values" not in rest:
+        return rest, str(sweep)
+    if len(rest) > 1:
+        other = next(key for key in rest if key != "values")
+        raise InputError(f"{where}: {other} stands beside values; give a range or values, one of the two")
+    if isinstance(rest["values"], dict):
+        raise InputError(f"{where}: values: {brief(rest['values'])} is no list; write values = [...]")
+    return rest["values"], str(sweep)
+
+
+def _unknown_sweep(sweep: object) -> str:
+    return f"{brief(sweep)} is unknown; {nearest(sweep if isinstance(sweep, str) else '', SWEEPS)}"
+
+
 def _read(declared: Field[Any], values: object, where: str) -> tuple[float, ...]:
     if isinstance(values, dict):
         if declared.metadata["kind"] == "flag":
@@ -166,9 +200,6 @@ def _read(declared: Field[Any], values: object, where: str) -> tuple[float, ...]
 
 def _read_range(table: Mapping[str, object], unit: str, where: str) -> list[float]:
     """Values of `{start, stop, step}` or `{start, stop, num, scale}`."""
-    for key in table:
-        if key not in _RANGE_KEYS:
-            raise InputError(f"{where}: unknown key {brief(key)} in a range; {nearest(key, _RANGE_KEYS)}")
     for key in ("start", "stop"):
         if key not in table:
             raise InputError(

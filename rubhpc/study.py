@@ -8,7 +8,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.axes import CLEARANCE_AXES, SPEED_AXES, Axis, flatten, make_axis
+from rubhpc.axes import (
+    BOTH,
+    CLEARANCE_AXES,
+    DIRECTION,
+    FROM_REST,
+    SPEED_AXES,
+    Axis,
+    direction_axis,
+    flatten,
+    make_axis,
+)
 from rubhpc.errors import InputError
 from rubhpc.input.fields import place
 from rubhpc.input.quantity import brief
@@ -25,7 +35,7 @@ __all__ = ["Axis", "Contact", "Integrator", "Recording", "Run", "Study", "make_a
 
 _TABLES = ("title", "rig", "output", "grid", "override", "contact", "integrator", "record", "run")
 # Names that a store takes for itself; an axis `clearance` is the very setting of that name.
-_RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution"}) - {"clearance"}
+_RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution", "degree"}) - {"clearance"}
 _MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
 
 
@@ -48,7 +58,8 @@ class Study:
     rig : Rig
         With the study's overrides applied.
     axes : tuple of Axis
-        The cases are their Cartesian product, the last axis running fastest.
+        The cases are their Cartesian product, the last axis running fastest. An axis that is swept both ways
+        brings a last one, `direction`.
     output : Path
         The store.
     source : Path or None
@@ -71,6 +82,8 @@ class Study:
     source: Path | None = None
 
     def __post_init__(self) -> None:
+        if any(axis.sweep == BOTH for axis in self.axes) and self.axes[-1].name != DIRECTION:
+            object.__setattr__(self, "axes", (*self.axes, direction_axis()))
         _check_axes(self.axes)
         _check_rigs(self.rig, [axis for axis in self.axes if axis.is_rig_key], self.axes)
 
@@ -86,7 +99,12 @@ class Study:
         return {
             "title": self.title,
             "rig": self.rig.name,
-            "grid": {axis.name: {"unit": axis.unit, "values": list(axis.values)} for axis in self.axes},
+            "grid": {
+                axis.name: {"unit": axis.unit, "values": list(axis.values)}
+                | ({"sweep": axis.sweep} if axis.sweep != FROM_REST else {})
+                for axis in self.axes
+                if axis.name != DIRECTION
+            },
             "contact": {key: value for key, value in asdict(self.contact).items() if value is not None},
             "integrator": asdict(self.integrator),
             "record": asdict(self.recording) | {"keep": list(self.recording.keep)},
@@ -189,6 +207,9 @@ def _check_axes(axes: tuple[Axis, ...]) -> None:
             raise InputError(f"[grid] {ways[0]}: missing; add {' or '.join(ways)}, such as {example}")
         if len(given) > 1:
             raise InputError(f"[grid] {given[1]}: stands beside {given[0]}; give one of them")
+    swept = [axis.name for axis in axes if axis.sweep != FROM_REST]
+    if len(swept) > 1:
+        raise InputError(f"[grid] {swept[1]}: sweep: {swept[0]} is swept already; leave one of the two out")
     taken: dict[str, str] = {}
     for axis in axes:
         if axis.dimension in _RESERVED:

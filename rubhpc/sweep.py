@@ -15,8 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.axes import case_id
+from rubhpc.axes import FROM_REST
+from rubhpc.chain import CaseIds, chain_of
 from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.model import state_size
 from rubhpc.input.fields import place
 from rubhpc.rig import with_keys
 from rubhpc.settings import Settings
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
     from rubhpc.study import Study
 
 MOST_CASES = 50_000_000  # beyond, a slip of the pen fills the memory
+_MOST_RIGS = 64  # along an axis, assembled before the run, 1 ms each; of more, the ends
 PHYSICS = 3  # raised whenever the same study gives other numbers than before
 
 
@@ -64,7 +68,8 @@ class Sweep:
     study : Study
     chunk : tuple of int, optional
         Cases of a block along each axis, where a store has them already. Default: at most `[run] block`
-        cases, taken first from the axes that leave speed and rig alone: a block then shares its setup.
+        cases, taken first from the axes that leave speed and rig alone: a block then shares its setup. Where
+        an axis is swept, from that one before all.
 
     Attributes
     ----------
@@ -74,13 +79,18 @@ class Sweep:
         Number of cases, and of stators.
     chunk : tuple of int
         Cases of a block along each axis.
+    chain : Chain or None
+        How the motion is carried from case to case.
+    n_degree : int
+        Numbers of the final state that a case of a chain keeps; 0 where there are no chains.
     identity, identity_parts : str, dict
         SHA-256 of all that changes results but the values on the axes, and what went into it.
 
     Raises
     ------
     InputError
-        When the step asked for is above the stability limit of a rig.
+        When the step asked for is above the stability limit of a rig, or a sweep meets rigs of different
+        degrees of freedom.
     """
 
     def __init__(self, study: Study, chunk: tuple[int, ...] | None = None) -> None:
@@ -95,10 +105,41 @@ class Sweep:
         self.n_stator = len(study.rig.stator)
         with _named(study):
             self._settings = Settings(study)
+            self.chain = chain_of(study.axes)
+            self.n_degree = count_state(study) if self.chain else 0
         self.chunk = chunk if chunk is not None else self._default_chunk()
         self.identity_parts = identity_parts(study)
         text = json.dumps(self.identity_parts, sort_keys=True, separators=(",", ":"), allow_nan=False)
         self.identity = hashlib.sha256(text.encode()).hexdigest()
+        self._ids = CaseIds(self.identity, [axis.values for axis in study.axes], self.chain)
+
+    def chains(self) -> list[list[Block]]:
+        """Return the blocks that one rank has to compute in turn, the longest such chain first.
+
+        Without a sweep every block is a chain of its own.
+        """
+        blocks = self.blocks()
+        chain = self.chain
+        if chain is None:
+            return [[block] for block in blocks]
+        together: dict[tuple[int, ...], list[Block]] = {}
+        for block in sorted(blocks, key=lambda block: block.start):
+            at = block.start
+            together.setdefault((*at[: chain.axis], *at[chain.axis + 1 :]), []).append(block)
+        chains = [part[::-1] if chain.goes_down(part[0].start) else part for part in together.values()]
+        return sorted(chains, key=lambda part: -sum(block.cost for block in part))
+
+    def in_turn(self, cases: Sequence[Case]) -> list[int]:
+        """Positions of the cases of a block in the order in which they are to be computed."""
+        chain = self.chain
+        if chain is None:
+            return list(range(len(cases)))
+        sense = -1 if chain.goes_down(cases[0].index) else 1
+        return sorted(range(len(cases)), key=lambda i: sense * cases[i].index[chain.axis])
+
+    def before(self, index: Sequence[int]) -> tuple[int, ...] | None:
+        """Index of the case that this one goes on from; None where it starts at rest."""
+        return self.chain.before(index, self.shape[self.chain.axis]) if self.chain else None
 
     def blocks(self) -> list[Block]:
         """Return all blocks, the longest first."""
@@ -126,13 +167,13 @@ class Sweep:
     def case(self, index: Sequence[int]) -> Case:
         """Return the case at an index of the grid."""
         point = [axis.values[i] for axis, i in zip(self.study.axes, index, strict=True)]
-        return self._case(tuple(index), case_id(self.identity, point))
+        return self._case(tuple(index), self._ids(point))
 
     def case_ids(self, block: Block) -> list[str]:
         """Return the ids of the cases of a block, in the order of `cases`."""
         box = zip(self.study.axes, block.start, block.shape, strict=True)
         points = itertools.product(*(axis.values[s : s + n] for axis, s, n in box))
-        return [case_id(self.identity, point) for point in points]
+        return [self._ids(point) for point in points]
 
     def settings(self) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
         """Return what the axes amount to: name -> (dimensions of the axes that set it, values in SI units).
@@ -165,7 +206,10 @@ class Sweep:
         costly = [self._settings.speed_axis, *self._settings.rig_axes]
         others = [i for i in range(len(self.shape)) if i not in costly]
         chunk = [1] * len(self.shape)
-        for i in [*reversed(others), *costly]:
+        order = [*reversed(others), *costly]
+        if self.chain is not None:  # a block has one direction
+            order = [self.chain.axis, *(i for i in order if i not in (self.chain.axis, self.chain.direction))]
+        for i in order:
             n_block = -(-self.shape[i] // min(self.shape[i], wanted))
             chunk[i] = -(-self.shape[i] // n_block)  # blocks of one size, rather than full ones and a rest
             wanted = max(wanted // chunk[i], 1)
@@ -195,14 +239,36 @@ def identity_parts(study: Study) -> dict[str, Any]:
     for key in keys:
         _blank(rig, key.split("."))
     del rig["name"]
+    swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
     return {
         "physics": PHYSICS,
         "axes": [axis.name for axis in study.axes],
+        **({"sweep": swept} if swept else {}),  # older stores know none
         "rig": rig,
         "contact": asdict(study.contact),
         "integrator": asdict(study.integrator),
         "record": asdict(study.recording) | {"keep": sorted(study.recording.keep)},
     }
+
+
+def count_state(study: Study) -> int:
+    """Numbers in the final state of a case: displacement and velocity of each degree, two for each stator.
+
+    Raises
+    ------
+    InputError
+        When it is not the same for all cases: a motion cannot be carried from one to another.
+    """
+    first = {axis.name: axis.values[0] for axis in study.axes if axis.is_rig_key}
+    n_state = state_size(assemble(with_keys(study.rig, first)))
+    for axis in study.axes:
+        values = axis.values if len(axis.values) <= _MOST_RIGS else axis.values[:: len(axis.values) - 1]
+        for value in values if axis.is_rig_key else ():
+            if state_size(assemble(with_keys(study.rig, {**first, axis.name: value}))) != n_state:
+                swept = next(a.name for a in study.axes if a.sweep != FROM_REST)
+                problem = "changes the degrees of freedom, so that no motion can be carried"
+                raise InputError(f"[grid] {axis.name}: {problem}; leave out this axis, or the sweep of {swept}")
+    return n_state
 
 
 def _blank(table: Any, key: list[str]) -> None:

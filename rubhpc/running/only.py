@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.axes import case_id
 from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.integrate.case import run_case
 from rubhpc.running.worker import metrics_of, put, set_up
@@ -102,9 +101,7 @@ def _find(sweep: Sweep, name: str) -> int:
     if len(name) < SHORTEST:
         raise InputError(f"--only {name}: too short; give {SHORTEST} characters of an id at least")
     manifest = Manifest.of(sweep)
-    found = [
-        flat for flat in range(sweep.n_case) if case_id(sweep.identity, manifest.point(flat)).startswith(name)
-    ]
+    found = [flat for flat in range(sweep.n_case) if manifest.case_id(flat).startswith(name)]
     if len(found) != 1:
         what = f"{len(found)} cases have such an id; give more of it" if found else "no case has such an id"
         raise InputError(f"--only {name}: {what}; rubhpc status names those that failed")

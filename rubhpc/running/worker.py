@@ -83,12 +83,15 @@ class Worker:
     def __post_init__(self) -> None:
         self._record_type = metrics_type(self.sweep.n_stator)
         self._setups: OrderedDict[tuple[int, float], tuple[Rig, Setup]] = OrderedDict()
+        self._ends: dict[int, State] = {}  # of the last cases of chains, by flat index
         self._unsynced: list[Path] = []
         self._next_sync = time.monotonic() + _SYNC_GAP
         self._seconds, self._cost = 0.0, 0.0
 
     def work(self, block: Block) -> None:
         """Compute, store and journal what is missing of a block; what is finished when a stop comes is kept.
+
+        In a chain that ends with the first case that cannot be computed: those behind it go on from it.
 
         Raises
         ------
@@ -110,14 +113,16 @@ class Worker:
             ids = self.sweep.case_ids(block)
             entries = [Entry(int(flat[i]), ids[i], FAILED, reason=reason) for i in np.flatnonzero(wanted)]
             self.report(Tally(failed=len(entries), cost=round(cost * len(entries))))
-        for i_case, case in enumerate(cases):
+        for i_case in self.sweep.in_turn(cases):
+            case = cases[i_case]
             if not wanted[i_case]:
                 continue
             if self.stopping.look() or not self.stopping.fits(cost * self._pace):
                 break
             began = time.perf_counter()
             try:
-                entry = self._enter(case, int(flat[i_case]), data, i_case)
+                start = self._start_of(case, block, data)
+                entry = self._enter(case, int(flat[i_case]), data, i_case, *start)
             except Stopped:
                 break
             self._seconds += time.perf_counter() - began

@@ -35,13 +35,20 @@ _HELD = 64  # blocks of the old grid kept in memory: neighbours in the new one c
 
 
 def origins(before: Manifest, after: Manifest) -> NDArray[np.int64]:
-    """Flat index in the grid of `before` of every case of `after`, (n_case,); -1 for a new one."""
+    """Flat index in the grid of `before` of every case of `after`, (n_case,); -1 for a new one.
+
+    A case of a chain is new wherever one of those before it is.
+    """
     origin, is_new = np.zeros((), np.int64), np.zeros((), bool)
     for mine, yours in zip(before.axes, after.axes, strict=True):
         at = {value: i for i, value in enumerate(mine.values)}
         place = np.array([at.get(value, -1) for value in yours.values])
         origin = np.add.outer(origin * len(mine.values), place)
         is_new = np.logical_or.outer(is_new, place < 0)
+    if (chain := after.chain) is not None:
+        kept = chain.kept(before.axes[chain.axis].values, after.axes[chain.axis].values)
+        shape = [len(axis.values) if i in (chain.axis, chain.direction) else 1 for i, axis in enumerate(after.axes)]
+        is_new |= ~kept.reshape(shape)
     return np.where(is_new, -1, origin).ravel()
 
 

@@ -15,12 +15,13 @@ import math
 import os
 import re
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
 import numpy as np
 
-from rubhpc.axes import case_id
+from rubhpc.chain import CaseIds
 from rubhpc.schema import STATUS, VARIABLES
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from numpy.typing import NDArray
+
+    from rubhpc.chain import Chain
 
 _FORMAT = 1
 _NAME = re.compile(r"run(\d{6})-(\w+)\.journal")
@@ -73,11 +76,12 @@ class Entry:
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What a journal's lines refer to: the study's identity, the values on its axes, the type of metrics."""
+    """What a journal's lines refer to: identity and axes of the study, its chain, the type of metrics."""
 
     identity: str
     axes: tuple[tuple[float, ...], ...]
     n_stator: int
+    chain: Chain | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -100,7 +104,11 @@ class Header:
         if flat >= math.prod(self.shape):
             return ""
         index = np.unravel_index(flat, self.shape)
-        return case_id(self.identity, [values[i] for values, i in zip(self.axes, index, strict=True)])
+        return self._ids([values[i] for values, i in zip(self.axes, index, strict=True)])
+
+    @cached_property
+    def _ids(self) -> CaseIds:
+        return CaseIds(self.identity, self.axes, self.chain)
 
     def line(self) -> bytes:
         """The header as the first line of a journal."""

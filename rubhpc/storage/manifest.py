@@ -6,18 +6,21 @@ import json
 import math
 import re
 from dataclasses import asdict, dataclass, fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
-from rubhpc.axes import case_id
+from rubhpc.axes import DIRECTION, DIRECTIONS, FROM_REST
+from rubhpc.chain import CaseIds, chain_of
 from rubhpc.errors import StoreError
-from rubhpc.schema import KEEPABLE, VARIABLES
+from rubhpc.schema import STATE, VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import Header
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from rubhpc.chain import Chain
     from rubhpc.schema import Variable
     from rubhpc.sweep import Sweep
 
@@ -36,6 +39,13 @@ class AxisRecord:
     unit: str
     long_name: str
     values: tuple[float, ...]
+    sweep: str = FROM_REST
+
+    def written(self, value: float) -> str:
+        """One of the values for people, as in `friction=0.3`."""
+        if self.name == DIRECTION:
+            return f"{self.name}={DIRECTIONS[int(value)]}"
+        return f"{self.name}={value:.6g}" + (f" {self.unit}" if self.unit not in ("", "1") else "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,12 +102,22 @@ class Manifest:
             identity=self.identity,
             axes=tuple(axis.values for axis in self.axes),
             n_stator=self.sizes["stator"],
+            chain=self.chain,
         )
+
+    @cached_property
+    def chain(self) -> Chain | None:
+        """How the motion is carried from case to case; None where each starts at rest."""
+        return chain_of(self.axes)
+
+    @cached_property
+    def _ids(self) -> CaseIds:
+        return CaseIds(self.identity, [axis.values for axis in self.axes], self.chain)
 
     @property
     def variables(self) -> tuple[Variable, ...]:
         """The arrays stored for every case and written block by block, in the order of their checksum."""
-        return tuple(v for v in VARIABLES.values() if v.role in KEEPABLE and v.role in self.keep)
+        return tuple(v for v in VARIABLES.values() if v.role in self.keep)
 
     def extent(self, variable: Variable) -> tuple[int, ...]:
         """Shape of a variable after the axes."""
@@ -113,13 +133,12 @@ class Manifest:
 
     def case_id(self, flat: int) -> str:
         """Id of a case."""
-        return case_id(self.identity, self.point(flat))
+        return self._ids(self.point(flat))
 
     def name_case(self, flat: int) -> str:
         """Coordinates of a case, as in `friction=0.3, clearance_ratio=0.7`."""
         return ", ".join(
-            f"{axis.name}={value:.6g}" + (f" {axis.unit}" if axis.unit not in ("", "1") else "")
-            for axis, value in zip(self.axes, self.point(flat), strict=True)
+            axis.written(value) for axis, value in zip(self.axes, self.point(flat), strict=True)
         )
 
     @classmethod
@@ -142,8 +161,9 @@ class Manifest:
                 "sample": n_sample,
                 "order": n_sample // 2 + 1,
                 "section": recording.revolutions,
+                **({"degree": sweep.n_degree} if sweep.chain else {}),
             },
-            keep=tuple(sorted(recording.keep)),
+            keep=tuple(sorted([*recording.keep, *([STATE] if sweep.chain else [])])),
             files=files or {},
             accepted=accepted,
         )
