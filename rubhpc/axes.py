@@ -60,7 +60,7 @@ class Axis:
     name : str
         Key in `[grid]`: "friction", "stator.youngs_modulus".
     dimension : str
-        Name of its dimension in a store: "stator_youngs_modulus".
+        Name of the dimension of a store that it runs along: its own, as a rule.
     unit : str
         SI unit of the values, in the notation of the store ("rad s-1"; "1" without dimension).
     values : tuple of float
@@ -85,6 +85,11 @@ class Axis:
             object.__setattr__(self, "values", tuple(sorted(self.values)))
         if problem := _problem(self.name, self.values):
             raise InputError(f"{place('', 'grid', self.name)}: {problem}")
+
+    @property
+    def coordinate(self) -> str:
+        """Name of its values in a store: "stator_youngs_modulus"."""
+        return coordinate_of(self.name)
 
     @property
     def is_rig_key(self) -> bool:
@@ -122,7 +127,7 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
         raise InputError(f"{where}: {problem}")
     return Axis(
         name=name,
-        dimension=name.replace(".", "_"),
+        dimension=coordinate_of(name),
         unit=_store_unit(declared.metadata.get("unit", "")),
         values=numbers,
         long_name=_LONG_NAMES.get(name, name.replace("_", " ").replace(".", " ")),
@@ -135,6 +140,11 @@ def direction_axis() -> Axis:
     return Axis(
         name=DIRECTION, dimension=DIRECTION, unit="1", values=(0.0, 1.0), long_name="direction of the sweep"
     )
+
+
+def coordinate_of(name: str) -> str:
+    """Return what an axis is called in a store."""
+    return name.replace(".", "_")
 
 
 def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:

@@ -212,14 +212,14 @@ def _check_axes(axes: tuple[Axis, ...]) -> None:
         raise InputError(f"[grid] {swept[1]}: sweep: {swept[0]} is swept already; leave one of the two out")
     taken: dict[str, str] = {}
     for axis in axes:
-        if axis.dimension in _RESERVED:
+        if axis.coordinate in _RESERVED:
             mend = "name one stator, such as stator.1.lateral" if axis.is_rig_key else "leave it out"
-            raise InputError(f"[grid] {axis.name}: a store has another {axis.dimension}; {mend}")
-        if axis.dimension in taken:
+            raise InputError(f"[grid] {axis.name}: a store has another {axis.coordinate}; {mend}")
+        if axis.coordinate in taken:
             raise InputError(
-                f"[grid] {axis.name}: is the same dimension as {taken[axis.dimension]}; leave one out"
+                f"[grid] {axis.name}: is the same dimension as {taken[axis.coordinate]}; leave one out"
             )
-        taken[axis.dimension] = axis.name
+        taken[axis.coordinate] = axis.name
         for other in axes:
             without_numbers = ".".join(part for part in axis.name.split(".") if not part.isdigit())
             if other.name == without_numbers != axis.name:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-import math
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -21,6 +20,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.model import state_size
 from rubhpc.input.fields import place
+from rubhpc.points import Points, boxed
 from rubhpc.rig import with_keys
 from rubhpc.settings import Settings
 
@@ -67,18 +67,20 @@ class Sweep:
     ----------
     study : Study
     chunk : tuple of int, optional
-        Cases of a block along each axis, where a store has them already. Default: at most `[run] block`
-        cases, taken first from the axes that leave speed and rig alone: a block then shares its setup. Where
-        an axis is swept, from that one before all.
+        Cases of a block along each dimension, where a store has them already. Default: at most `[run] block`
+        cases, taken first from the dimensions that leave speed and rig alone: a block then shares its setup.
+        Where an axis is swept, from that one before all.
 
     Attributes
     ----------
+    points : Points
+        Where the cases lie.
     dims, shape : tuple
-        Dimension names of the axes, and cases along each.
+        Names of the dimensions, and cases along each.
     n_case, n_stator : int
         Number of cases, and of stators.
     chunk : tuple of int
-        Cases of a block along each axis.
+        Cases of a block along each dimension.
     chain : Chain or None
         How the motion is carried from case to case.
     n_degree : int
@@ -95,9 +97,8 @@ class Sweep:
 
     def __init__(self, study: Study, chunk: tuple[int, ...] | None = None) -> None:
         self.study = study
-        self.dims = tuple(axis.dimension for axis in study.axes)
-        self.shape = tuple(len(axis.values) for axis in study.axes)
-        self.n_case = math.prod(self.shape)
+        self.points = Points(study.axes)
+        self.dims, self.shape, self.n_case = self.points.dims, self.points.shape, self.points.n_case
         if self.n_case > MOST_CASES:
             with _named(study):
                 grid = " x ".join(map(str, self.shape))
@@ -111,7 +112,7 @@ class Sweep:
         self.identity_parts = identity_parts(study)
         text = json.dumps(self.identity_parts, sort_keys=True, separators=(",", ":"), allow_nan=False)
         self.identity = hashlib.sha256(text.encode()).hexdigest()
-        self._ids = CaseIds(self.identity, [axis.values for axis in study.axes], self.chain)
+        self._ids = CaseIds(self.identity, self.points.values, self.chain)
 
     def chains(self) -> list[list[Block]]:
         """Return the blocks that one rank has to compute in turn, the longest such chain first.
@@ -149,7 +150,7 @@ class Sweep:
         for i, at in enumerate(starts):
             if cost.shape[i] == self.shape[i]:
                 cost = np.add.reduceat(cost, np.array(at), axis=i)
-            else:  # the same for every case along this axis
+            else:  # the same for every case along this dimension
                 cost = cost * np.array(sizes[i]).reshape([-1 if j == i else 1 for j in range(cost.ndim)])
         steps = np.rint(cost.ravel()).astype(np.int64)
         order = np.argsort(-steps, kind="stable")
@@ -161,22 +162,20 @@ class Sweep:
 
     def cases(self, block: Block) -> list[Case]:
         """Return the cases of a block, the last axis running fastest."""
-        box = itertools.product(*(range(s, s + n) for s, n in zip(block.start, block.shape, strict=True)))
+        box = boxed(block.start, block.shape)
         return [self._case(index, name) for index, name in zip(box, self.case_ids(block), strict=True)]
 
     def case(self, index: Sequence[int]) -> Case:
         """Return the case at an index of the grid."""
-        point = [axis.values[i] for axis, i in zip(self.study.axes, index, strict=True)]
-        return self._case(tuple(index), self._ids(point))
+        return self._case(tuple(index), self._ids(self.points.at(index)))
 
     def case_ids(self, block: Block) -> list[str]:
         """Return the ids of the cases of a block, in the order of `cases`."""
-        box = zip(self.study.axes, block.start, block.shape, strict=True)
-        points = itertools.product(*(axis.values[s : s + n] for axis, s, n in box))
+        points = self.points.within(block.start, block.shape)
         return [self._ids(point) for point in points]
 
     def settings(self) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
-        """Return what the axes amount to: name -> (dimensions of the axes that set it, values in SI units).
+        """Return what the axes amount to: name -> (dimensions that set it, values in SI units).
 
         `spin_speed` in rad/s, `clearance` and `contact_free_amplitude` in m.
 
@@ -187,7 +186,7 @@ class Sweep:
         """
         with _named(self.study):
             found = self._settings.arrays()
-        return {name: (tuple(self.dims[i] for i in axes), values) for name, (axes, values) in found.items()}
+        return {name: (tuple(self.dims[i] for i in dims), values) for name, (dims, values) in found.items()}
 
     def _case(self, index: tuple[int, ...], name: str) -> Case:
         speed, amplitude = self._settings.response(index)
@@ -203,7 +202,7 @@ class Sweep:
 
     def _default_chunk(self) -> tuple[int, ...]:
         wanted = self.study.run.block or min(max(self.n_case // 64, 1), 16)
-        costly = [self._settings.speed_axis, *self._settings.rig_axes]
+        costly = self._settings.costly_dims
         others = [i for i in range(len(self.shape)) if i not in costly]
         chunk = [1] * len(self.shape)
         order = [*reversed(others), *costly]

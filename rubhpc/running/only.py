@@ -9,6 +9,7 @@ import numpy as np
 
 from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.integrate.case import run_case
+from rubhpc.points import Points
 from rubhpc.running.worker import metrics_of, put, set_up
 from rubhpc.schema import MISSING, STATUS
 from rubhpc.storage.journal import metrics_type
@@ -115,10 +116,10 @@ def _compare(
     if not is_store(study.output):
         return f"{study.output} is not there yet"
     store = Store(study.output)
-    grid = {axis.name: axis.values for axis in store.manifest.axes}
+    mine, theirs = Points(study.axes), store.manifest.points
     try:
         index = [
-            grid[axis.name].index(axis.values[i]) for axis, i in zip(study.axes, case.index, strict=True)
+            theirs.along(dim).index(mine.along(dim)[i]) for dim, i in zip(mine.dims, case.index, strict=True)
         ]
     except ValueError:
         return f"{study.output} does not hold it yet"

@@ -40,10 +40,10 @@ def origins(before: Manifest, after: Manifest) -> NDArray[np.int64]:
     A case of a chain is new wherever one of those before it is.
     """
     origin, is_new = np.zeros((), np.int64), np.zeros((), bool)
-    for mine, yours in zip(before.axes, after.axes, strict=True):
-        at = {value: i for i, value in enumerate(mine.values)}
-        place = np.array([at.get(value, -1) for value in yours.values])
-        origin = np.add.outer(origin * len(mine.values), place)
+    for dim, n in zip(before.dims, before.shape, strict=True):
+        at = {values: i for i, values in enumerate(before.points.along(dim))}
+        place = np.array([at.get(values, -1) for values in after.points.along(dim)])
+        origin = np.add.outer(origin * n, place)
         is_new = np.logical_or.outer(is_new, place < 0)
     if (chain := after.chain) is not None:
         kept = chain.kept(before.axes[chain.axis].values, after.axes[chain.axis].values)

@@ -166,7 +166,7 @@ def _static(sweep: Sweep) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict
         "section": (np.arange(sizes["section"]), "revolution of the section"),
     }
     static: dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]] = {
-        axis.dimension: (
+        axis.coordinate: (
             (axis.dimension,),
             np.array(axis.values, dtype=np.float64),
             {"units": axis.unit or "1", "long_name": axis.long_name},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
@@ -13,6 +12,7 @@ from zlib import crc32
 from rubhpc.axes import DIRECTION, DIRECTIONS, FROM_REST
 from rubhpc.chain import CaseIds, chain_of
 from rubhpc.errors import StoreError
+from rubhpc.points import Points
 from rubhpc.schema import STATE, VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import Header
@@ -59,7 +59,7 @@ class Manifest:
     axes : tuple of AxisRecord
         The grid; the only part that may grow.
     chunk : tuple of int
-        Cases of one block along each axis, fixed for the life of the store.
+        Cases of one block along each dimension, fixed for the life of the store.
     sizes : dict
         Lengths of the dimensions after the axes: stator, sample, order, section.
     keep : tuple of str
@@ -80,27 +80,32 @@ class Manifest:
     files: dict[str, int]
     accepted: tuple[int, ...] = ()
 
+    @cached_property
+    def points(self) -> Points:
+        """Where the cases lie."""
+        return Points(self.axes)
+
     @property
     def dims(self) -> tuple[str, ...]:
         """Dimensions of the grid."""
-        return tuple(axis.dimension for axis in self.axes)
+        return self.points.dims
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Cases along each axis."""
-        return tuple(len(axis.values) for axis in self.axes)
+        """Cases along each dimension."""
+        return self.points.shape
 
     @property
     def n_case(self) -> int:
         """Cases of the grid."""
-        return math.prod(self.shape)
+        return self.points.n_case
 
     @property
     def header(self) -> Header:
         """Header of the journals of this store."""
         return Header(
             identity=self.identity,
-            axes=tuple(axis.values for axis in self.axes),
+            points=self.points,
             n_stator=self.sizes["stator"],
             chain=self.chain,
         )
@@ -112,7 +117,7 @@ class Manifest:
 
     @cached_property
     def _ids(self) -> CaseIds:
-        return CaseIds(self.identity, [axis.values for axis in self.axes], self.chain)
+        return CaseIds(self.identity, self.points.values, self.chain)
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -123,22 +128,14 @@ class Manifest:
         """Shape of a variable after the axes."""
         return tuple(self.sizes[dim] for dim in variable.dims)
 
-    def point(self, flat: int) -> list[float]:
-        """Values of a case on the axes."""
-        values = []
-        for axis in reversed(self.axes):
-            flat, i = divmod(flat, len(axis.values))
-            values.append(axis.values[i])
-        return values[::-1]
-
     def case_id(self, flat: int) -> str:
         """Id of a case."""
-        return self._ids(self.point(flat))
+        return self._ids(self.points.at_flat(flat))
 
     def name_case(self, flat: int) -> str:
         """Coordinates of a case, as in `friction=0.3, clearance_ratio=0.7`."""
         return ", ".join(
-            axis.written(value) for axis, value in zip(self.axes, self.point(flat), strict=True)
+            axis.written(value) for axis, value in zip(self.axes, self.points.at_flat(flat), strict=True)
         )
 
     @classmethod
@@ -234,12 +231,12 @@ class Manifest:
         if self.dims != other.dims:
             found.append(f"axes were {', '.join(self.dims)}, are {', '.join(other.dims)}")
             return found
-        for mine, yours in zip(self.axes, other.axes, strict=True):
-            lost = sorted(set(mine.values) - set(yours.values))
-            if lost:
+        for dim in self.dims:
+            if lost := sorted(set(self.points.along(dim)) - set(other.points.along(dim))):
+                names = ", ".join(axis.name for axis in self.axes if axis.dimension == dim)
                 rest = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
-                told = ", ".join(f"{value:.12g}" for value in lost[:3])
-                found.append(f"axis {mine.name} lacks {told}{rest}, which is stored")
+                told = ", ".join(" ".join(f"{value:.12g}" for value in values) for values in lost[:3])
+                found.append(f"axis {names} lacks {told}{rest}, which is stored")
         if not found and (
             self.identity != other.identity or self.keep != other.keep or self.sizes != other.sizes
         ):
