@@ -142,6 +142,13 @@ def direction_axis() -> Axis:
     )
 
 
+def written(name: str, value: float, unit: str) -> str:
+    """Return a value on an axis for people, as in `friction=0.3`."""
+    if name == DIRECTION:
+        return f"{name}={DIRECTIONS[int(value)]}"
+    return f"{name}={value:.6g}" + (f" {unit}" if unit not in ("", "1") else "")
+
+
 def coordinate_of(name: str) -> str:
     """Return what an axis is called in a store."""
     return name.replace(".", "_")

@@ -1,7 +1,7 @@
 """Who a case is, and from which other it goes on: ids, and the chains of a sweep along one axis.
 
-A case of a chain depends on all that come before it, so its id tells of them too: a value put in between makes
-new cases of those behind it and leaves those before it as they are.
+A case of a chain depends on all that come before it, so its id tells of them too: a value put in between
+makes new cases of those behind it and leaves those before it as they are.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import struct
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -27,10 +27,12 @@ class Named(Protocol):
     @property
     def name(self) -> str:
         """Key in the study."""
+        ...
 
     @property
     def sweep(self) -> str:
         """One of `axes.SWEEPS`."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,15 +57,19 @@ class Chain:
         """Whether the chain of this case runs from high to low values."""
         return self.is_down if self.direction is None else index[self.direction] == 1
 
+    def turn(self, index: Sequence[int]) -> int:
+        """What orders the cases of a chain: the lowest comes first."""
+        return -index[self.axis] if self.goes_down(index) else index[self.axis]
+
     def before(self, index: Sequence[int], n: int) -> tuple[int, ...] | None:
         """Index of the case that this one goes on from, with `n` values on the axis; None for the first."""
         place = index[self.axis] + (1 if self.goes_down(index) else -1)
         return (*index[: self.axis], place, *index[self.axis + 1 :]) if 0 <= place < n else None
 
-    def behind(self, marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which cases of the grid have a marked one before them in their chain."""
-        up = _behind(marked, self.axis)
-        down = np.flip(_behind(np.flip(marked, self.axis), self.axis), self.axis)
+    def highest(self, values: NDArray[Any]) -> NDArray[Any]:
+        """The highest of the values of each case of the grid and of those before it in its chain."""
+        up = np.maximum.accumulate(values, self.axis)
+        down = np.flip(np.maximum.accumulate(np.flip(values, self.axis), self.axis), self.axis)
         if self.direction is None:
             return down if self.is_down else up
         ways = [np.take(way, [i], self.direction) for i, way in enumerate((up, down))]
@@ -113,13 +119,6 @@ class CaseIds:
             is_down = chain.is_down if chain.direction is None else point[chain.direction] == 1.0
             digest.update(self._lineage[point[chain.axis], is_down])
         return digest.hexdigest()[:32]
-
-
-def _behind(marked: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
-    seen = np.logical_or.accumulate(marked, axis=axis)
-    behind = np.roll(seen, 1, axis=axis)
-    behind[(*[slice(None)] * axis, 0)] = False
-    return behind
 
 
 def _same_before(before: Sequence[float], after: Sequence[float]) -> NDArray[np.bool_]:

@@ -63,8 +63,9 @@ _SECTIONS = tuple(
     if n in SECTION_NAMES
 )
 
+FINAL_STATE = "final_state"
 _STATE = Variable(
-    name="final_state",
+    name=FINAL_STATE,
     role="state",
     dims=("degree",),
     long_name="where the case ended: displacements of rotor and stators, their velocities, "

@@ -35,7 +35,9 @@ __all__ = ["Axis", "Contact", "Integrator", "Recording", "Run", "Study", "make_a
 
 _TABLES = ("title", "rig", "output", "grid", "override", "contact", "integrator", "record", "run")
 # Names that a store takes for itself; an axis `clearance` is the very setting of that name.
-_RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution", "degree"}) - {"clearance"}
+_RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution", "degree"}) - {
+    "clearance"
+}
 _MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
 
 
@@ -210,6 +212,9 @@ def _check_axes(axes: tuple[Axis, ...]) -> None:
     swept = [axis.name for axis in axes if axis.sweep != FROM_REST]
     if len(swept) > 1:
         raise InputError(f"[grid] {swept[1]}: sweep: {swept[0]} is swept already; leave one of the two out")
+    if swept and any(axis.dimension != axis.coordinate for axis in axes):
+        problem = "the cases of a sample have no neighbours to carry a motion to"
+        raise InputError(f"[grid] {swept[0]}: sweep: {problem}; leave the sweep or the sample out")
     taken: dict[str, str] = {}
     for axis in axes:
         if axis.coordinate in _RESERVED:

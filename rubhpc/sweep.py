@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from rubhpc.study import Study
 
 MOST_CASES = 50_000_000  # beyond, a slip of the pen fills the memory
+_BLOCK = 16  # cases of a block, unless told
 _MOST_RIGS = 64  # along an axis, assembled before the run, 1 ms each; of more, the ends
 PHYSICS = 3  # raised whenever the same study gives other numbers than before
 
@@ -132,11 +133,8 @@ class Sweep:
 
     def in_turn(self, cases: Sequence[Case]) -> list[int]:
         """Positions of the cases of a block in the order in which they are to be computed."""
-        chain = self.chain
-        if chain is None:
-            return list(range(len(cases)))
-        sense = -1 if chain.goes_down(cases[0].index) else 1
-        return sorted(range(len(cases)), key=lambda i: sense * cases[i].index[chain.axis])
+        chain, order = self.chain, range(len(cases))
+        return sorted(order, key=lambda i: chain.turn(cases[i].index)) if chain is not None else list(order)
 
     def before(self, index: Sequence[int]) -> tuple[int, ...] | None:
         """Index of the case that this one goes on from; None where it starts at rest."""
@@ -201,18 +199,27 @@ class Sweep:
         )
 
     def _default_chunk(self) -> tuple[int, ...]:
-        wanted = self.study.run.block or min(max(self.n_case // 64, 1), 16)
+        wanted = self.study.run.block or min(max(self.n_case // 64, 1), _BLOCK)
         costly = self._settings.costly_dims
-        others = [i for i in range(len(self.shape)) if i not in costly]
+        order = [*(i for i in reversed(range(len(self.shape))) if i not in costly), *costly]
         chunk = [1] * len(self.shape)
-        order = [*reversed(others), *costly]
-        if self.chain is not None:  # a block has one direction
-            order = [self.chain.axis, *(i for i in order if i not in (self.chain.axis, self.chain.direction))]
+        if (chain := self.chain) is not None:
+            # One rank computes a chain anyway: an eighth of it is stored at once, and several only of many.
+            n = self.shape[chain.axis]
+            chunk[chain.axis] = _evenly(n, self.study.run.block or min(max(n // 8, 1), _BLOCK))
+            n_chain = self.n_case // n
+            wanted = (self.study.run.block or min(max(n_chain // 64, 1), _BLOCK)) // chunk[chain.axis]
+            order = [i for i in order if i not in (chain.axis, chain.direction)]  # a block has one direction
         for i in order:
-            n_block = -(-self.shape[i] // min(self.shape[i], wanted))
-            chunk[i] = -(-self.shape[i] // n_block)  # blocks of one size, rather than full ones and a rest
+            chunk[i] = _evenly(self.shape[i], wanted)
             wanted = max(wanted // chunk[i], 1)
         return tuple(chunk)
+
+
+def _evenly(n: int, most: int) -> int:
+    """Size of blocks of at most so many, all of one size rather than full ones and a rest."""
+    n_block = -(-n // max(min(n, most), 1))
+    return -(-n // n_block)
 
 
 @contextmanager
@@ -266,7 +273,9 @@ def count_state(study: Study) -> int:
             if state_size(assemble(with_keys(study.rig, {**first, axis.name: value}))) != n_state:
                 swept = next(a.name for a in study.axes if a.sweep != FROM_REST)
                 problem = "changes the degrees of freedom, so that no motion can be carried"
-                raise InputError(f"[grid] {axis.name}: {problem}; leave out this axis, or the sweep of {swept}")
+                raise InputError(
+                    f"[grid] {axis.name}: {problem}; leave out this axis, or the sweep of {swept}"
+                )
     return n_state
 
 

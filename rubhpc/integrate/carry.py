@@ -1,8 +1,8 @@
 """A motion carried to another case: its contacts as that case's clearances and stators have them.
 
-What a wall that has moved in overlaps is pushed apart as by moving the wall slowly: by the static shapes of rotor
-and stators under the contact forces that it takes, the least strain energy that does it. To let the first step
-close the gap instead would throw the bodies apart at micrometres a microsecond.
+What a wall that has moved in overlaps is pushed apart as by moving the wall slowly: by the static shapes of
+rotor and stators under the contact forces that it takes, with the least strain energy that does it. To let
+the first step close the gap instead would throw the bodies apart at micrometres a microsecond.
 """
 
 from __future__ import annotations

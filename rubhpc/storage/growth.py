@@ -47,7 +47,9 @@ def origins(before: Manifest, after: Manifest) -> NDArray[np.int64]:
         is_new = np.logical_or.outer(is_new, place < 0)
     if (chain := after.chain) is not None:
         kept = chain.kept(before.axes[chain.axis].values, after.axes[chain.axis].values)
-        shape = [len(axis.values) if i in (chain.axis, chain.direction) else 1 for i, axis in enumerate(after.axes)]
+        shape = [
+            len(axis.values) if i in (chain.axis, chain.direction) else 1 for i, axis in enumerate(after.axes)
+        ]
         is_new |= ~kept.reshape(shape)
     return np.where(is_new, -1, origin).ravel()
 

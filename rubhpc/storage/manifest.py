@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
-from rubhpc.axes import DIRECTION, DIRECTIONS, FROM_REST
+from rubhpc.axes import FROM_REST, written
 from rubhpc.chain import CaseIds, chain_of
 from rubhpc.errors import StoreError
 from rubhpc.points import Points
@@ -40,12 +40,6 @@ class AxisRecord:
     long_name: str
     values: tuple[float, ...]
     sweep: str = FROM_REST
-
-    def written(self, value: float) -> str:
-        """One of the values for people, as in `friction=0.3`."""
-        if self.name == DIRECTION:
-            return f"{self.name}={DIRECTIONS[int(value)]}"
-        return f"{self.name}={value:.6g}" + (f" {self.unit}" if self.unit not in ("", "1") else "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,7 +129,8 @@ class Manifest:
     def name_case(self, flat: int) -> str:
         """Coordinates of a case, as in `friction=0.3, clearance_ratio=0.7`."""
         return ", ".join(
-            axis.written(value) for axis, value in zip(self.axes, self.points.at_flat(flat), strict=True)
+            written(axis.name, value, axis.unit)
+            for axis, value in zip(self.axes, self.points.at_flat(flat), strict=True)
         )
 
     @classmethod
