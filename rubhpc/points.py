@@ -63,13 +63,17 @@ class Points:
         """Return the values of the case at an index, one an axis."""
         return tuple([values[index[place]] for values, place in self._columns])
 
-    def at_flat(self, flat: int) -> Values:
-        """Return the values of the case at a flat index, one an axis."""
+    def index(self, flat: int) -> Index:
+        """Return the index of the case at a flat index."""
         index = []
         for n in reversed(self.shape):
             flat, i = divmod(flat, n)
             index.append(i)
-        return self.at(index[::-1])
+        return tuple(index[::-1])
+
+    def at_flat(self, flat: int) -> Values:
+        """Return the values of the case at a flat index, one an axis."""
+        return self.at(self.index(flat))
 
     def within(self, start: Iterable[int], shape: Iterable[int]) -> Iterator[Values]:
         """Yield the values of the cases in a box of the grid, the last dimension running fastest."""

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 MOST_CASES = 50_000_000  # beyond, a slip of the pen fills the memory
 _BLOCK = 16  # cases of a block, unless told
 _MOST_RIGS = 64  # along an axis, assembled before the run, 1 ms each; of more, the ends
-PHYSICS = 3  # raised whenever the same study gives other numbers than before
+PHYSICS = 4  # raised whenever the same study gives other numbers than before
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -236,7 +236,8 @@ def _named(study: Study) -> Iterator[None]:
 def identity_parts(study: Study) -> dict[str, Any]:
     """Return all that changes the results of a study but the values on its axes, for JSON.
 
-    What the rig says of a key that is an axis is no part of it: every case sets that key.
+    What the rig says of a key that is an axis is no part of it: every case sets that key. Of a sample, all is
+    that has values drawn but how many.
     """
     keys = [axis.name for axis in study.axes if axis.is_rig_key]
     rig = with_keys(
@@ -246,7 +247,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
         _blank(rig, key.split("."))
     del rig["name"]
     swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
-    return {
+    parts = {
         "physics": PHYSICS,
         "axes": [axis.name for axis in study.axes],
         **({"sweep": swept} if swept else {}),  # older stores know none
@@ -255,6 +256,10 @@ def identity_parts(study: Study) -> dict[str, Any]:
         "integrator": asdict(study.integrator),
         "record": asdict(study.recording) | {"keep": sorted(study.recording.keep)},
     }
+    if study.sample is not None:
+        ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
+        parts["sample"] = {"method": study.sample.method, "seed": study.sample.seed, "ranges": ranges}
+    return parts
 
 
 def count_state(study: Study) -> int:

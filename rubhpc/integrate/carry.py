@@ -60,11 +60,11 @@ def carried(state: State, setup: Setup, clearance: float) -> State:
     if np.any(gap + allowed < -TOLERANCE):
         for _ in range(MOST_PASSES):
             shape = _static_shapes(push.T, setup)
-            more = _least_forces(push @ shape, gap + allowed)
-            displacement = displacement + shape @ more
-            force += more
+            wanted = _least_forces(push @ shape, gap + allowed - push @ shape @ force)
+            displacement, force = displacement + shape @ (wanted - force), wanted
             gap, push = gaps(displacement, setup, clearance)
-            if np.all(gap + allowed >= -TOLERANCE):
+            excess = gap + allowed
+            if np.all(excess >= -TOLERANCE) and np.all(excess[force > 0.0] <= TOLERANCE):
                 break
         sizes = [setup.model.rotor.n_dof, *(stator.body.n_dof for stator in setup.model.stators)]
         rotor, *stators = np.split(displacement, np.cumsum(sizes)[:-1])

@@ -94,7 +94,9 @@ def prepare_job(order: Order, n_rank: int) -> Job:
         missing = ledger.status == MISSING
         if order.retry_failed:
             failed = np.flatnonzero(ledger.status == FAILED).tolist()
-            store.take_back(ledger, _with_those_behind(sweep, failed), run, "retry")
+            store.take_back(
+                ledger, _with_those_behind(sweep, failed), run, "anew"
+            )  # a name that comes before those of ranks
             missing = (ledger.status == MISSING) | (ledger.status == FAILED)
         doubtful = _with_followers(sweep, _judge(store, ledger, missing, run), missing)
     missing[list(doubtful)] = False

@@ -17,6 +17,7 @@ from numcodecs.blosc import Blosc
 from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.storage import MemoryStore
 
+from rubhpc.axes import DIRECTION, DIRECTIONS
 from rubhpc.schema import VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import METRICS
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from zarr.core.buffer import Buffer
 
     from rubhpc.schema import Variable
+    from rubhpc.study import Study
     from rubhpc.sweep import Sweep
 
 PACKED = (
@@ -128,10 +130,7 @@ def _create(group: zarr.Group, variable: Variable, manifest: Manifest, *, chunk:
     if "sample" in variable.dims:
         attributes["coordinates"] = "revolution"  # CF: a coordinate that is no dimension
     if variable.flags:
-        attributes |= {
-            "flag_values": list(range(len(variable.flags))),
-            "flag_meanings": " ".join(variable.flags),
-        }
+        attributes |= _flags(variable.flags)
     group.create_array(
         variable.name,
         shape=(*manifest.shape, *extent),
@@ -142,6 +141,11 @@ def _create(group: zarr.Group, variable: Variable, manifest: Manifest, *, chunk:
         dimension_names=(*manifest.dims, *variable.dims),
         attributes=attributes,
     )
+
+
+def _flags(meanings: tuple[str, ...]) -> dict[str, Any]:
+    """CF attributes that name the values 0, 1, ..."""
+    return {"flag_values": list(range(len(meanings))), "flag_meanings": " ".join(meanings)}
 
 
 def _packed_chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -169,10 +173,14 @@ def _static(sweep: Sweep) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict
         axis.coordinate: (
             (axis.dimension,),
             np.array(axis.values, dtype=np.float64),
-            {"units": axis.unit or "1", "long_name": axis.long_name},
+            {"units": axis.unit or "1", "long_name": axis.long_name}
+            | (_flags(DIRECTIONS) if axis.name == DIRECTION else {}),
         )
         for axis in sweep.study.axes
     }
+    for dim, n_case in zip(sweep.dims, sweep.shape, strict=True):
+        if dim not in static:
+            own[dim] = (np.arange(n_case), "number of the case in its sample")
     for name, (values, text) in own.items():
         dim = "sample" if name == "revolution" else name
         static[name] = ((dim,), values, {"units": "1", "long_name": text})
@@ -205,9 +213,14 @@ def _attributes(sweep: Sweep, *, accepted: tuple[int, ...]) -> dict[str, Any]:
             **{name: _version(name) for name in _PACKAGES},
         },
         # also where no array over the samples is kept
-        "coordinates": " ".join(("revolution", *(name for name, *_ in _PLACES))),
+        "coordinates": " ".join(("revolution", *(name for name, *_ in _PLACES), *_drawn(study))),
         **({"accepted_physics": list(accepted)} if accepted else {}),
     }
+
+
+def _drawn(study: Study) -> list[str]:
+    """Coordinates that share a dimension."""
+    return [axis.coordinate for axis in study.axes if axis.coordinate != axis.dimension]
 
 
 def _version(package: str) -> str:

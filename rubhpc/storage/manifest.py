@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
-from rubhpc.axes import FROM_REST, written
+from rubhpc.axes import FROM_REST, coordinate_of, written
 from rubhpc.chain import CaseIds, chain_of
 from rubhpc.errors import StoreError
 from rubhpc.points import Points
@@ -40,6 +40,11 @@ class AxisRecord:
     long_name: str
     values: tuple[float, ...]
     sweep: str = FROM_REST
+
+    @property
+    def coordinate(self) -> str:
+        """Name of its values in the store."""
+        return coordinate_of(self.name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,11 +132,15 @@ class Manifest:
         return self._ids(self.points.at_flat(flat))
 
     def name_case(self, flat: int) -> str:
-        """Coordinates of a case, as in `friction=0.3, clearance_ratio=0.7`."""
-        return ", ".join(
+        """Coordinates of a case, as in `friction=0.3, clearance_ratio=0.7`; in a sample its number first."""
+        own = {axis.coordinate for axis in self.axes}
+        index = zip(self.dims, self.points.index(flat), strict=True)
+        numbers = [f"{dim}={i}" for dim, i in index if dim not in own]
+        values = (
             written(axis.name, value, axis.unit)
             for axis, value in zip(self.axes, self.points.at_flat(flat), strict=True)
         )
+        return ", ".join([*numbers, *values])
 
     @classmethod
     def of(cls, sweep: Sweep, *, files: dict[str, int] | None = None, accepted: tuple[int, ...] = ()) -> Self:
@@ -227,11 +236,16 @@ class Manifest:
             found.append(f"axes were {', '.join(self.dims)}, are {', '.join(other.dims)}")
             return found
         for dim in self.dims:
-            if lost := sorted(set(self.points.along(dim)) - set(other.points.along(dim))):
-                names = ", ".join(axis.name for axis in self.axes if axis.dimension == dim)
+            lost = sorted(set(self.points.along(dim)) - set(other.points.along(dim)))
+            names = [axis.name for axis in self.axes if axis.dimension == dim]
+            if lost and len(names) == 1:
                 rest = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
-                told = ", ".join(" ".join(f"{value:.12g}" for value in values) for values in lost[:3])
-                found.append(f"axis {names} lacks {told}{rest}, which is stored")
+                told = ", ".join(f"{value:.12g}" for (value,) in lost[:3])
+                found.append(f"axis {names[0]} lacks {told}{rest}, which is stored")
+            elif lost:
+                n_mine, n_yours = (dict(zip(m.dims, m.shape, strict=True))[dim] for m in (self, other))
+                why = "n can only grow" if n_yours < n_mine else "this SALib or SciPy draws other points"
+                found.append(f"the sample lacks {len(lost)} of its {n_mine} cases ({why})")
         if not found and (
             self.identity != other.identity or self.keep != other.keep or self.sizes != other.sizes
         ):
