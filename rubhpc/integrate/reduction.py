@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -98,19 +98,11 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     """
     mass, damping, stiffness, force = whole_system(model, spin)
     degree, output = degrees_of(model), output_degrees(model)
-    seen = np.unique(np.concatenate([degree[degree >= 0], output[output >= 0]]))
-
-    fastest = max(_contact_frequency(mass, stiffness, degree, model), abs(spin))
+    standstill = _at_standstill(model)
+    fastest = max(standstill.contact_frequency, abs(spin))
     cutoff = CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * fastest
-    symmetric = 0.5 * (stiffness + stiffness.T)
-    coupled = (mass != 0) | (stiffness != 0)
-    n_part, part = connected_components(csr_array(coupled), directed=False)
-    _, whole = connected_components(csr_array(coupled | (damping != 0)), directed=False)
-    parts = [np.flatnonzero(part == i_part) for i_part in range(n_part)]
-    parts = [rows for rows in parts if np.isin(whole[rows[0]], whole[seen])]
-    modes = [
-        _modes(mass, symmetric, rows, n_seen=int(np.isin(rows, seen).sum()), cutoff=cutoff) for rows in parts
-    ]
+    modes = [_parted(part, cutoff) for part in standstill.parts]
+    symmetric, seen = standstill.stiffness, _seen(model)
     kept = np.hstack([those.low for those in modes])
     frequency = np.concatenate([those.low_frequency for those in modes])
     drawn = np.hstack([0.5 * (damping + damping.T) @ kept, (stiffness - symmetric) @ (kept / frequency)])
@@ -129,6 +121,54 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
         degree=np.where((degree >= 0)[:, :, None], basis[np.maximum(degree, 0)], 0.0),
         output=np.where((output >= 0)[:, None], basis[np.maximum(output, 0)], 0.0),
     )
+
+
+class _Part(NamedTuple):
+    """Undamped modes of what mass and stiffness couple, orthonormal in the mass."""
+
+    n_seen: int  # of its degrees are seen by contact or outputs
+    mode: Floats  # (n_all, n)
+    frequency: Floats  # (n,), rad/s
+
+
+class _Standstill(NamedTuple):
+    """What a model is at every speed."""
+
+    stiffness: Floats  # (n_all, n_all), its symmetric part
+    parts: list[_Part]  # those that contact or outputs feel
+    contact_frequency: float  # rad/s
+
+
+@lru_cache(maxsize=4)
+def _at_standstill(model: Model) -> _Standstill:
+    """Find the modes of a model, once for all speeds."""
+    mass, damping, stiffness, _ = whole_system(model, 1.0)  # at a speed, for what gyroscopic terms couple
+    symmetric, seen = 0.5 * (stiffness + stiffness.T), _seen(model)
+    coupled = (mass != 0) | (stiffness != 0)
+    n_part, number = connected_components(csr_array(coupled), directed=False)
+    _, whole = connected_components(csr_array(coupled | (damping != 0)), directed=False)
+    parts = []
+    for i_part in range(n_part):
+        rows = np.flatnonzero(number == i_part)
+        if not np.isin(whole[rows[0]], whole[seen]):
+            continue
+        square, shape = eigh(symmetric[np.ix_(rows, rows)], mass[np.ix_(rows, rows)])
+        if square[0] <= FREE * square[-1]:
+            raise InputError(
+                "[integrator] method: modal needs bodies that are held, and here one is free to move or to "
+                'turn; take method = "central-difference"'
+            )
+        mode = np.zeros((mass.shape[0], rows.size))
+        mode[rows] = shape
+        parts.append(_Part(int(np.isin(rows, seen).sum()), mode, np.sqrt(square)))
+    frequency = _contact_frequency(mass, stiffness, degrees_of(model), model)
+    return _Standstill(symmetric, parts, frequency)
+
+
+def _seen(model: Model) -> Ints:
+    """Degrees that contact or outputs see."""
+    degree, output = degrees_of(model), output_degrees(model)
+    return np.unique(np.concatenate([degree[degree >= 0], output[output >= 0]]))
 
 
 def _contact_frequency(mass: Floats, stiffness: Floats, degree: Ints, model: Model) -> float:
@@ -160,20 +200,12 @@ class _Modes(NamedTuple):
     high_frequency: Floats  # (n_high,), rad/s
 
 
-def _modes(mass: Floats, stiffness: Floats, rows: Ints, *, n_seen: int, cutoff: float) -> _Modes:
-    """Modes of the part with these rows; all are kept where modes and shapes would be as many."""
-    square, shape = eigh(stiffness[np.ix_(rows, rows)], mass[np.ix_(rows, rows)])
-    if square[0] <= FREE * square[-1]:
-        raise InputError(
-            "[integrator] method: modal needs bodies that are held, and here one is free to move or to turn; "
-            'take method = "central-difference"'
-        )
-    frequency = np.sqrt(square)
-    n_low = max(int(np.count_nonzero(frequency <= cutoff)), min(FEWEST_MODES, rows.size))
-    if n_low + n_seen >= rows.size:
-        n_low = rows.size
-    mode = np.zeros((mass.shape[0], rows.size))
-    mode[rows] = shape
+def _parted(part: _Part, cutoff: float) -> _Modes:
+    """Modes up to a cutoff, rad/s, and beyond; all are kept where modes and shapes would be as many."""
+    n_seen, mode, frequency = part
+    n_low = max(int(np.count_nonzero(frequency <= cutoff)), min(FEWEST_MODES, frequency.size))
+    if n_low + n_seen >= frequency.size:
+        n_low = frequency.size
     return _Modes(mode[:, :n_low], frequency[:n_low], mode[:, n_low:], frequency[n_low:])
 
 
