@@ -26,7 +26,7 @@ SIZE, RATIO = 0, 1  # of `Pair.apart`
 class Pair(NamedTuple):
     """A motion and its neighbour, m modal coordinates and n reduced degrees."""
 
-    progress: Ints  # (2, 7), as `kernels.phases` has it
+    progress: Ints  # (2, N_PROGRESS), as `kernels.phases` has it
     z: Floats  # (2, 2, m)
     z_next: Floats  # (2, m), work space
     motion: Floats  # (2, 2 n), reduced displacements and velocities where a phase is to be entered
