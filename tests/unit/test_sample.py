@@ -72,14 +72,15 @@ def test_each_case_has_the_speed_and_the_rig_of_its_row(tmp_path):
 
 
 def test_a_larger_sample_keeps_every_case(tmp_path):
-    run_here(read_study(write_sample(tmp_path, n=8)), quiet=True)
+    few = {"keep": '["section"]', "block": 8}
+    run_here(read_study(write_sample(tmp_path, n=8, **few)), quiet=True)
     before = xr.open_zarr(tmp_path / "tiny.zarr").load()
-    summary = run_here(read_study(write_sample(tmp_path, n=16)), quiet=True)
+    summary = run_here(read_study(write_sample(tmp_path, n=16, **few)), quiet=True)
     assert (summary.computed, sum(summary.counts)) == (64, 128)
     after = xr.open_zarr(tmp_path / "tiny.zarr").load()
     xr.testing.assert_equal(after.isel(case=slice(32)), before)
     assert not verify(tmp_path / "tiny.zarr")
-    whole = read_study(write_sample(tmp_path, n=16), tmp_path / "whole.zarr")
+    whole = read_study(write_sample(tmp_path, n=16, **few), tmp_path / "whole.zarr")
     run_here(whole, quiet=True)
     xr.testing.assert_equal(
         after.drop_vars("wall_time"), xr.open_zarr(whole.output).load().drop_vars("wall_time")
