@@ -7,6 +7,7 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from rubhpc.integrate.carry import carried, with_overlap
 from rubhpc.integrate.central import CentralDifferenceMarch
 from rubhpc.integrate.gather import (
     by_name,
@@ -59,12 +60,13 @@ def run_case(
     friction : float
         Coefficient of friction.
     initial : State, optional
-        Where to start, with the unbalance at its phase; default at rest.
+        Where to start, with the unbalance at its phase 0; default at rest. Where another case has ended is
+        fitted to the gaps of this one (`carry.carried`).
     check : callable, optional
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
     """
     began = time.perf_counter()
-    initial = initial or State.at_rest(setup.model)
+    initial = State.at_rest(setup.model) if initial is None else carried(initial, setup, clearance)
 
     def start(state: State) -> March:
         return _march(setup, clearance, friction, state, check)
@@ -78,6 +80,7 @@ def run_case(
     except NoClosedForm:
         # Contacts that chatter, or too many sets of them, or slip that turns: short steps need no events.
         record = _integrate(start_stepped, initial, setup, clearance, recording)
+    record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.scalars["wall_time"] = time.perf_counter() - began
     return record
 

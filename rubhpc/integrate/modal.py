@@ -204,6 +204,4 @@ class ModalMarch(March):
     def _reduce(self, state: State) -> Floats:
         """Reduced coordinates and velocities of a state."""
         project = self._setup.reduced.project
-        displacement = np.concatenate([state.rotor_displacement, *state.stator_displacement])
-        velocity = np.concatenate([state.rotor_velocity, *state.stator_velocity])
-        return np.concatenate([project @ displacement, project @ velocity])
+        return np.concatenate([project @ state.displacement, project @ state.velocity])
