@@ -146,7 +146,7 @@ def test_a_store_tells_its_sample(tmp_path):
         ("start = 1.2, ", "", "[grid] speed_ratio: a range without start"),
         ("stop = 2.4", "stop = 1.2", "start and stop are both 1.2; write that value alone"),
         ("stop = 2.4", "stop = 2.4, step = 0.1", "step: a sample is drawn from start to stop; leave step or"),
-        ("stop = 2.4", 'stop = 2.4, sweep = "up"', "sweep: a sample has no order to follow; leave sweep or"),
+        ("stop = 2.4", 'stop = 2.4, sweep = "up"', "sweep: the cases of a sample have no neighbours"),
         ("stop = 2.4", "stpo = 2.4", 'unknown key "stpo" in a range; did you mean stop?'),
         ("start = 1.2", "start = -1.2", "holds 0, which is no speed"),
         ("start = 0.05", "start = 0", "a logarithmic range from 0 to 0.5"),
