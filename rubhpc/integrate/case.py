@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rubhpc.integrate.central import CentralDifferenceMarch
 from rubhpc.integrate.gather import (
+    add_sag,
     by_name,
     diverged_record,
     empty_samples,
@@ -20,6 +21,7 @@ from rubhpc.integrate.measures import amplitude_spectrum
 from rubhpc.integrate.modal import ModalMarch, NoClosedForm
 from rubhpc.integrate.prepare import CentralDifferenceSetup, ModalSetup
 from rubhpc.integrate.record import Record, State
+from rubhpc.integrate.rest import state_at_rest
 from rubhpc.integrate.settle import pass_transient
 from rubhpc.integrate.stepped import SteppedMarch
 from rubhpc.kernels.observe import IMPACT_STEPS
@@ -57,12 +59,12 @@ def run_case(
     friction : float
         Coefficient of friction.
     initial : State, optional
-        Where to start, with the unbalance at its phase; default at rest.
+        Where to start, with the unbalance at its phase; default at rest (`state_at_rest`).
     check : callable, optional
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
     """
     began = time.perf_counter()
-    initial = initial or State.at_rest(setup.model)
+    initial = initial or state_at_rest(setup.model, clearance)
 
     def start(state: State) -> March:
         return _march(setup, clearance, friction, state, check)
@@ -122,6 +124,7 @@ def _integrate(
             f"{reason} in revolution {revolution}", n_stator, recording, settings, march.final()
         )
     else:
+        add_sag(samples, tally, setup.model)
         signals, final = by_name(samples.whole), march.final()
         record = Record(
             status=DONE,

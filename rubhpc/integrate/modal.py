@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.march import March
 from rubhpc.integrate.record import State
 from rubhpc.kernels import phases as kernel
@@ -51,7 +52,8 @@ class ModalMarch(March):
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(check, FIRST_REVOLUTIONS * setup.samples_per_revolution)
         self._setup, self._book = setup, setup.book(friction)
-        self._clearance = np.array([clearance + stator.clearance_offset for stator in setup.model.stators])
+        offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
+        self._clearance = clearance + offsets - sag_at_stators(setup.model)[0]
         self._met = {0, *(1 << i for i in range(self._clearance.size))}  # sets of closed contacts
         turn = setup.interval * setup.samples_per_revolution
         self._clock = kernel.Clock(
@@ -98,7 +100,7 @@ class ModalMarch(March):
         displacement = np.split(setup.reduced.basis @ motion[:n], ends)
         velocity = np.split(setup.reduced.basis @ motion[n:], ends)
         return State(
-            rotor_displacement=displacement[0],
+            rotor_displacement=displacement[0] + setup.model.sag,
             rotor_velocity=velocity[0],
             stator_displacement=tuple(displacement[1:]),
             stator_velocity=tuple(velocity[1:]),
@@ -195,6 +197,7 @@ class ModalMarch(March):
     def _reduce(self, state: State) -> Floats:
         """Reduced coordinates and velocities of a state."""
         project = self._setup.reduced.project
-        displacement = np.concatenate([state.rotor_displacement, *state.stator_displacement])
+        moved = state.rotor_displacement - self._setup.model.sag
+        displacement = np.concatenate([moved, *state.stator_displacement])
         velocity = np.concatenate([state.rotor_velocity, *state.stator_velocity])
         return np.concatenate([project @ displacement, project @ velocity])
