@@ -1,28 +1,31 @@
 """`store.rub`: the figures of a store, one call each, for notebooks; `rubhpc.open` brings it along.
 
-Every method takes the values that choose cases as keywords, as `postproc.selection.select` does (a dotted rig
-key with underscores), draws on `ax` or on a new figure of pyplot, and returns the Axes.
+A method draws what the command of its name draws, and takes its options as keywords of the same names and
+defaults (`postproc.figures`). Further keywords choose cases, as `postproc.selection.select` does (a dotted
+rig key with underscores). It draws on `ax`, a list of them where the figure has several, or on a new figure
+of pyplot, and returns what it drew on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from postproc.load import find_axis
-from postproc.selection import first_of_rest, select
-from postproc.style import COLUMN_WIDTH, house_style
+from postproc import figures
+from postproc.selection import select
+from postproc.style import figure_size, house_style
 from postproc.units import caption
+from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping, Sequence
 
     from matplotlib.axes import Axes
 
-_HEIGHT = 75.0  # mm
+    from postproc.figures import Drawing
 
 
 @xr.register_dataset_accessor("rub")  # type: ignore[no-untyped-call]  # xarray leaves it untyped
@@ -52,27 +55,31 @@ class Rub:
         self,
         signal: str = "torsion",
         *,
+        full: bool = False,
         along: str | None = None,
         form: str = "waterfall",
+        max_frequency: float | str | None = None,
+        max_order: float = 5.0,
+        orders: bool = False,
+        order_lines: str = "1/3,1/2,2/3,1,3/2,2,3",
+        mark: Mapping[str, float | str] | None = None,
         ax: Axes | None = None,
         **choice: Any,
     ) -> Axes:
-        """Draw the spectra of a signal, or of the "whirl", along an axis; `form` may be "intensity"."""
-        from postproc.bench import natural_frequencies
-        from postproc.cascade import cascade
-        from postproc.cascade_figure import default_limit, draw_frequencies, draw_orders, intensity, waterfall
-
-        cases = self.select(**choice)
-        spectra = cascade(cases, signal, along)
-        frequencies = dict(natural_frequencies(cases, str(spectra.dims[0])))
-        if signal == "whirl":  # lateral motion alone
-            frequencies.pop("torsional", None)
-        limit = default_limit(spectra, frequencies)
-        is_waterfall = form == "waterfall"
-        with _drawing(ax, spectra) as (ax,):
-            (waterfall if is_waterfall else intensity)(spectra, ax, limit)
-            draw_orders(ax, spectra, color="0.35" if is_waterfall else "0.8")
-            return draw_frequencies(ax, spectra, frequencies, color="C1" if is_waterfall else "#56B4E9")
+        """Draw the spectra of a signal along an axis; `form` may be "intensity", `mark` names more Hz."""
+        drawing = figures.cascade(
+            self.select(**choice),
+            signal,
+            full=full,
+            along=along,
+            form=form,
+            max_frequency=max_frequency,
+            max_order=max_order,
+            orders=orders,
+            order_lines=order_lines,
+            mark=mark,
+        )
+        return _draw(drawing, ax)[0]
 
     def map(
         self,
@@ -80,20 +87,21 @@ class Rub:
         *,
         x: str | None = None,
         y: str | None = None,
+        facet: str | Sequence[str] = (),
+        contours: int | None = None,
         log: bool = False,
-        ax: Axes | None = None,
+        ax: Axes | Sequence[Axes] | None = None,
         **choice: Any,
-    ) -> Axes:
-        """Draw a measure, the regime or the status over two axes, the others at their first value."""
-        from postproc.map_figure import value_map
-        from postproc.maps import default_axes, map_data
+    ) -> Axes | list[Axes]:
+        """Draw a measure, the regime or the status over two axes; with `facet`, a map for each of its values.
 
+        `facet` is one axis or two, and makes a list of what is returned. Axes that are neither spread over
+        nor chosen are taken at their first value.
+        """
         cases = self.select(**choice)
-        across, up = default_axes(cases, x, y)
-        cases, _ = first_of_rest(cases, [across, up], value)
-        shown = map_data(cases, value, across, up)
-        with _drawing(ax, shown) as (ax,):
-            return value_map(shown, value, ax, log)
+        drawing = figures.map_of(cases, value, x=x, y=y, facet=facet, contours=contours, log=log)
+        drawn = _draw(drawing, ax)
+        return drawn if facet else drawn[0]
 
     def orbit(
         self,
@@ -104,48 +112,46 @@ class Rub:
         **choice: Any,
     ) -> Axes:
         """Draw the orbit of the disc with the clearance and the stators, or those along the axis `over`."""
-        from postproc.orbits import orbit, orbit_data
-
-        shown = orbit_data(self.select(**choice), revolutions, over)
-        with _drawing(ax, shown) as (ax,):
-            return orbit(shown, ax)
+        return _draw(figures.orbit(self.select(**choice), revolutions=revolutions, over=over), ax)[0]
 
     def spectrum(
         self,
         signal: str = "torsion",
         *,
-        over: str | None = None,
-        abscissa: str = "frequency",
+        full: bool = False,
+        orders: bool = False,
+        max: float | None = None,  # noqa: A002 - the word of the command
+        lines: int = 6,
         log: bool = False,
+        over: str | None = None,
         ax: Axes | None = None,
         **choice: Any,
     ) -> Axes:
-        """Draw the spectrum of a signal, or of the "whirl", its strongest lines named."""
-        from postproc.lines import strongest_lines
-        from postproc.spectra import spectrum_data
-        from postproc.spectrum_figure import default_limit, spectrum
-
-        shown = spectrum_data(self.select(**choice), signal, over).compute()
-        lines = strongest_lines(shown) if over is None else None
-        with _drawing(ax, shown) as (ax,):
-            return spectrum(shown, ax, lines, abscissa, default_limit(shown, abscissa), log)
+        """Draw the spectrum of a signal, or of the whirl (`full`), its strongest lines named."""
+        drawing = figures.spectrum(
+            self.select(**choice),
+            signal,
+            full=full,
+            orders=orders,
+            max=max,
+            lines=lines,
+            log=log,
+            over=over,
+        )
+        return _draw(drawing, ax)[0]
 
     def waveform(
         self,
-        signals: str | Sequence[str] = ("vertical", "horizontal", "torsion", "contact_force"),
+        signal: str | Sequence[str] = (),
         *,
         revolutions: int = 4,
         over: str | None = None,
-        axes: Sequence[Axes] | None = None,
+        ax: Axes | Sequence[Axes] | None = None,
         **choice: Any,
     ) -> list[Axes]:
         """Draw the last revolutions of some signals in panels above one another; contact is shaded."""
-        from postproc.waveforms import panels, waveform_data
-
-        names = [signals] if isinstance(signals, str) else list(signals)
-        shown = waveform_data(self.select(**choice), names, revolutions, over)
-        with _drawing(axes, shown, len(names)) as found:
-            return panels(shown, found)
+        cases = self.select(**choice)
+        return _draw(figures.waveform(cases, signal, revolutions=revolutions, over=over), ax)
 
     def section(
         self,
@@ -157,30 +163,96 @@ class Rub:
         **choice: Any,
     ) -> Axes:
         """Draw the Poincaré section in the plane of two signals, or signal `y` along the axis `over`."""
-        from postproc.bifurcation import bifurcation, bifurcation_data
-        from postproc.sections import plane, section_data
+        return _draw(figures.section(self.select(**choice), x, y, over=over), ax)[0]
 
+    def bifurcation(
+        self,
+        signal: str = "vertical",
+        *,
+        along: str | None = None,
+        color: str = "regime",
+        ax: Axes | None = None,
+        **choice: Any,
+    ) -> Axes:
+        """Draw the section points of a signal over an axis, coloured by "regime" or "period"."""
+        return _draw(figures.bifurcation(self.select(**choice), signal, along=along, color=color), ax)[0]
+
+    def hht(
+        self,
+        signal: str = "torsion",
+        *,
+        contact: str | None = None,
+        revolutions: int = 4,
+        mode: int = 1,
+        max_frequency: float | str | None = None,
+        ax: Sequence[Axes] | None = None,
+        **choice: Any,
+    ) -> list[Axes]:
+        """Draw a signal with its intrinsic mode, and its energy over time and frequency."""
+        drawing = figures.hht(
+            self.select(**choice),
+            signal,
+            contact=contact,
+            revolutions=revolutions,
+            mode=mode,
+            max_frequency=max_frequency,
+        )
+        return _draw(drawing, ax)
+
+    def indicators(
+        self,
+        *,
+        noise: Sequence[float] = (),
+        draws: int = 3,
+        false_alarms: float = 0.05,
+        seed: int = 1,
+        ax: Sequence[Axes] | None = None,
+        **choice: Any,
+    ) -> list[Axes]:
+        """Draw how often the vibration tells rub from no rub, over the level of measurement noise."""
         cases = self.select(**choice)
-        shown = bifurcation_data(cases, y, find_axis(cases, over)) if over else section_data(cases, [x, y])
-        with _drawing(ax, shown) as (ax,):
-            return bifurcation(shown, y, ax, color=None) if over else plane(shown, x, y, ax)
+        drawing = figures.indicators(cases, noise=noise, draws=draws, false_alarms=false_alarms, seed=seed)
+        return _draw(drawing, ax)
+
+    def sensitivity(
+        self,
+        scalar: str = "peak_contact_force",
+        *,
+        confidence: float = 0.95,
+        draws: int = 500,
+        seed: int = 1,
+        ax: Axes | None = None,
+        **choice: Any,
+    ) -> Axes:
+        """Draw the Sobol indices of a measure over the axes of the study, with their intervals."""
+        cases = self.select(**choice)
+        drawing = figures.sensitivity(cases, scalar, confidence=confidence, draws=draws, seed=seed)
+        return _draw(drawing, ax)[0]
+
+
+def _draw(drawing: Drawing, ax: Axes | Sequence[Axes] | None) -> list[Axes]:
+    with _drawing_on(drawing, ax) as axes:
+        drawing.draw(axes)
+    return axes
 
 
 @contextmanager
-def _drawing(
-    axes: Axes | Sequence[Axes] | None, shown: xr.DataArray | xr.Dataset, n_panel: int = 1
-) -> Iterator[list[Axes]]:
+def _drawing_on(drawing: Drawing, given: Axes | Sequence[Axes] | None) -> Iterator[list[Axes]]:
     """Yield, in the house style, the axes to draw on: those given, or new ones under what holds for all."""
-    if axes is None:
+    n_row, n_column = drawing.n_row, drawing.n_column
+    if given is None:
         from matplotlib import pyplot
 
         # Before the style: what pyplot sets up in a notebook with its first figure would end with the style.
-        height = _HEIGHT if n_panel == 1 else 10 + 27 * n_panel
-        figure = pyplot.figure(figsize=(COLUMN_WIDTH, height / 25.4), dpi=150, layout="constrained")
+        size = figure_size(n_row, drawing.height, drawing.width)
+        figure = pyplot.figure(figsize=size, dpi=150, layout="constrained")
         with house_style():
-            made = figure.subplots(n_panel, 1, sharex=True, squeeze=False)
-            figure.suptitle(caption(shown), fontsize=7, x=0.02, ha="left")
-            yield list(made[:, 0])
-    else:
-        with house_style():
-            yield list(axes) if isinstance(axes, Sequence) else [axes]
+            made = figure.subplots(n_row, n_column, sharex=True, sharey=n_column > 1, squeeze=False)
+            figure.suptitle(caption(drawing.shown), fontsize=7, x=0.02, ha="left")
+            yield list(made.ravel())
+        return
+    axes = list(given) if isinstance(given, Iterable) else [given]
+    if len(axes) != n_row * n_column:
+        raise InputError(f"ax: {len(axes)} of them for a figure that has {n_row * n_column}; give as many")
+    with house_style():
+        yield axes

@@ -37,7 +37,9 @@ def bars(indices: xr.Dataset, ax: Axes) -> Axes:
     scalar = xr.DataArray(name=about["scalar"], attrs={"long_name": about["scalar_name"]})
     told = f"{about['interactions']:.0%} interactions, {about['confidence']:.0%} intervals"
     ax.set_title(f"{short_name(scalar)} ({told})", fontsize=7)
-    ax.set(xlim=(0, 1), xlabel="Share of the variance")
+    low, high = (indices[[f"first_order_{e}", f"total_{e}"]].to_dataarray() for e in ("low", "high"))
+    ends_at = min(0.0, float(low.min())), max(1.0, float(high.max()))  # estimates may lie beyond
+    ax.set(xlim=ends_at, xlabel="Share of the variance")
     ax.xaxis.grid(visible=True, zorder=0)
     handles, labels = ax.get_legend_handles_labels()
     ax.figure.legend(handles[::-1], labels[::-1], loc="outside lower center", ncols=2)

@@ -40,11 +40,17 @@ def new_figure(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    inches = (height if height is not None else (63 if n_panel == 1 else 10 + 27 * n_panel)) / 25.4
-    figure = Figure(figsize=(COLUMN_WIDTH if width is None else width / 25.4, inches))
+    figure = Figure(figsize=figure_size(n_panel, height, width))
     FigureCanvasAgg(figure)
     axes = figure.subplots(n_panel, n_column, sharex=True, sharey=n_column > 1, squeeze=False)
     return figure, list(axes.ravel())
+
+
+def figure_size(n_panel: int, height: float | None, width: float | None) -> tuple[float, float]:
+    """Return width and height of a figure, inches; given ones are in mm, the others as `new_figure` says."""
+    default = 63 if n_panel == 1 else 10 + 27 * n_panel
+    inches = (default if height is None else height) / 25.4
+    return COLUMN_WIDTH if width is None else width / 25.4, inches
 
 
 def check_figure_path(path: str | Path) -> Path:

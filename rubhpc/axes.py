@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-import math
 import re
 import struct
-from dataclasses import Field, dataclass, fields
-from decimal import Decimal
+from dataclasses import Field, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
 from rubhpc.input.dotted import find_key
 from rubhpc.input.fields import check_value, nearest, parse_field, place, quantity
-from rubhpc.input.quantity import brief, parse_quantity
+from rubhpc.input.ranges import MOST_VALUES, RANGE_KEYS, Range, read_ends, read_range
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from rubhpc.rig import Rig
-
-MOST_VALUES = 10_000_000  # of one axis: beyond, a slip of the pen fills the memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +41,6 @@ _LONG_NAMES = {
 }
 SPEED_AXES = ("speed_ratio", "speed")
 CLEARANCE_AXES = ("clearance_ratio", "clearance")
-_RANGE_KEYS = ("start", "stop", "step", "num", "scale")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,13 +52,15 @@ class Axis:
     name : str
         Key in `[grid]`: "friction", "stator.youngs_modulus".
     dimension : str
-        Name of its dimension in a store: "stator_youngs_modulus".
+        Name of the dimension of a store that it runs along: its own, as a rule.
     unit : str
         SI unit of the values, in the notation of the store ("rad s-1"; "1" without dimension).
     values : tuple of float
-        In SI units, each once, in any order.
+        In SI units, each once, in any order; of drawn ones, one a case of the sample.
     long_name : str
         What labels and attributes say.
+    drawn_from : Range or None
+        Where the values are a sample's. Such axes share a dimension.
     """
 
     name: str
@@ -71,15 +68,26 @@ class Axis:
     unit: str
     values: tuple[float, ...]
     long_name: str
+    drawn_from: Range | None = None
 
     def __post_init__(self) -> None:
-        if problem := _problem(self.name, self.values):
+        if problem := _problem(self.name, self.values, is_drawn=self.drawn_from is not None):
             raise InputError(f"{place('', 'grid', self.name)}: {problem}")
+
+    @property
+    def coordinate(self) -> str:
+        """Name of its values in a store: "stator_youngs_modulus"."""
+        return coordinate_of(self.name)
 
     @property
     def is_rig_key(self) -> bool:
         """Whether the axis sets a key of the rig."""
         return self.name not in _OWN
+
+    @property
+    def tried(self) -> tuple[float, ...]:
+        """What to try out before a run: all values, or the ends of what they are drawn from."""
+        return self.values if self.drawn_from is None else (self.drawn_from.start, self.drawn_from.stop)
 
 
 def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
@@ -104,16 +112,33 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     """
     where = place(file, "grid", name)
     declared = _declared(name, rig, where)
-    numbers = _read(declared, values, where)
-    if problem := _problem(name, numbers):
-        raise InputError(f"{where}: {problem}")
-    return Axis(
-        name=name,
-        dimension=name.replace(".", "_"),
-        unit=_store_unit(declared.metadata.get("unit", "")),
-        values=numbers,
-        long_name=_LONG_NAMES.get(name, name.replace("_", " ").replace(".", " ")),
-    )
+    return _axis(name, declared, _read(declared, values, where), where)
+
+
+def make_range(name: str, table: Mapping[str, object], rig: Rig, file: str = "") -> Axis:
+    """Return an axis whose values are yet to be drawn, from `{start, stop}` and the `scale` "lin" or "log".
+
+    Until then they are the two ends (`rubhpc.sample.draw`).
+
+    Raises
+    ------
+    InputError
+        When the name is unknown, or nothing can be drawn from such a range.
+    """
+    where = place(file, "grid", name)
+    declared = _declared(name, rig, where)
+    if declared.metadata["kind"] != "quantity":
+        raise InputError(f"{where}: none but a quantity is drawn from a range; write a list of values")
+    ends = read_ends(table, declared.metadata["unit"], where)
+    if name in SPEED_AXES and ends.start * ends.stop < 0:
+        told = f"from {ends.start:g} to {ends.stop:g}"
+        raise InputError(f"{where}: the range {told} holds 0, which is no speed; take one side of it")
+    return replace(_axis(name, declared, (ends.start, ends.stop), where), drawn_from=ends)
+
+
+def coordinate_of(name: str) -> str:
+    """Return what an axis is called in a store."""
+    return name.replace(".", "_")
 
 
 def case_id(identity: str, point: Sequence[float]) -> str:
@@ -126,11 +151,23 @@ def case_id(identity: str, point: Sequence[float]) -> str:
     return digest.hexdigest()[:32]
 
 
+def _axis(name: str, declared: Field[Any], values: tuple[float, ...], where: str) -> Axis:
+    if problem := _problem(name, values):
+        raise InputError(f"{where}: {problem}")
+    return Axis(
+        name=name,
+        dimension=coordinate_of(name),
+        unit=_store_unit(declared.metadata.get("unit", "")),
+        values=values,
+        long_name=_LONG_NAMES.get(name, name.replace("_", " ").replace(".", " ")),
+    )
+
+
 def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
     """Return dotted keys and values of a table in which `stator.angle = 0` may stand without quotes."""
     pairs: list[tuple[str, Any]] = []
     for key, value in table.items():
-        is_table = isinstance(value, dict) and value and not set(value) & set(_RANGE_KEYS)
+        is_table = isinstance(value, dict) and value and not set(value) & set(RANGE_KEYS)
         is_table = is_table and prefix + key not in _OWN and prefix.count(".") < 8
         pairs += flatten(value, f"{prefix}{key}.") if is_table else [(prefix + key, value)]
     return pairs
@@ -156,7 +193,7 @@ def _read(declared: Field[Any], values: object, where: str) -> tuple[float, ...]
     if isinstance(values, dict):
         if declared.metadata["kind"] == "flag":
             raise InputError(f"{where}: a range between true and false; write [true, false]")
-        return tuple(_read_range(values, declared.metadata.get("unit", ""), where))
+        return tuple(read_range(values, declared.metadata.get("unit", ""), where))
     if not isinstance(values, list | tuple):
         values = [values]
     if len(values) > MOST_VALUES:
@@ -164,61 +201,7 @@ def _read(declared: Field[Any], values: object, where: str) -> tuple[float, ...]
     return tuple(float(parse_field(declared, value, where)) for value in values)
 
 
-def _read_range(table: Mapping[str, object], unit: str, where: str) -> list[float]:
-    """Values of `{start, stop, step}` or `{start, stop, num, scale}`."""
-    for key in table:
-        if key not in _RANGE_KEYS:
-            raise InputError(f"{where}: unknown key {brief(key)} in a range; {nearest(key, _RANGE_KEYS)}")
-    for key in ("start", "stop"):
-        if key not in table:
-            raise InputError(
-                f"{where}: a range without {key}; write {{ start, stop, step }} or {{ start, stop, num }}"
-            )
-    if ("step" in table) == ("num" in table):
-        raise InputError(f"{where}: a range has either step or num; write one of them")
-    start, stop = (parse_quantity(table[key], unit, f"{where}: {key}") for key in ("start", "stop"))
-    if "step" in table:
-        if "scale" in table:
-            raise InputError(f"{where}: scale goes with num; write num instead of step, or leave scale out")
-        return _stepped(start, stop, parse_quantity(table["step"], unit, f"{where}: step"), where)
-    num, scale = table["num"], table.get("scale", "lin")
-    if isinstance(num, bool) or not isinstance(num, int) or not 2 <= num <= MOST_VALUES:
-        raise InputError(
-            f"{where}: num {brief(num)} is no count; write a whole number from 2 to {MOST_VALUES}"
-        )
-    if scale == "lin":
-        return [_exact(start, stop, i, num - 1) for i in range(num)]
-    if scale != "log":
-        raise InputError(f'{where}: scale {brief(scale)} is unknown; there is "lin", "log"')
-    if start * stop <= 0:
-        raise InputError(f"{where}: a logarithmic range from {start:g} to {stop:g}; both must be above 0")
-    inner = [start * (stop / start) ** (i / (num - 1)) for i in range(1, num - 1)]
-    return [start, *inner, stop]
-
-
-def _stepped(start: float, stop: float, step: float, where: str) -> list[float]:
-    if step == 0 or (stop - start) / step < 0:
-        raise InputError(
-            f"{where}: step {step:g} does not lead from {start:g} to {stop:g}; turn its sign or size"
-        )
-    n_step = (stop - start) / step
-    if n_step >= MOST_VALUES:
-        raise InputError(
-            f"{where}: {n_step:.3g} values are too many; at most {MOST_VALUES}, take a longer step"
-        )
-    n_step = math.floor(n_step + 1e-6)  # 6.1 is reached from 0.9 by 26 steps of 0.2, whatever their last bits
-    # In decimals, so that the fourth value is the 1.5 that a user writes and a longer range meets it.
-    first, stride = Decimal(repr(start)), Decimal(repr(step))
-    return [float(first + i * stride) + 0.0 for i in range(n_step + 1)]
-
-
-def _exact(start: float, stop: float, i: int, n: int) -> float:
-    """Value i of n + 1 evenly spaced ones, rounded once."""
-    first, last = Decimal(repr(start)), Decimal(repr(stop))
-    return float((first * (n - i) + last * i) / n) + 0.0
-
-
-def _problem(name: str, values: tuple[float, ...]) -> str:
+def _problem(name: str, values: tuple[float, ...], *, is_drawn: bool = False) -> str:
     """What is wrong with the values of an axis; "" when nothing is."""
     if not values:
         return "empty; give at least one value"
@@ -228,7 +211,7 @@ def _problem(name: str, values: tuple[float, ...]) -> str:
                 return problem
     if name in SPEED_AXES and 0.0 in values:
         return "0 is no speed; leave it out, the rotor has to spin"
-    if len(set(values)) < len(values):
+    if not is_drawn and len(set(values)) < len(values):
         ordered = sorted(values)
         twice = next(v for v, following in itertools.pairwise(ordered) if v == following)
         return f"{twice:.12g} stands twice; leave one out"

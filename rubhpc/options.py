@@ -132,6 +132,32 @@ class Recording:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Sample:
+    """How the cases of a sampled study are drawn from the ranges of its grid.
+
+    Attributes
+    ----------
+    method : {"sobol"}
+        Saltelli's design of Sobol' points, for Sobol indices of the first and total order.
+    n : int
+        Base points, a power of two; with d ranges they make n (d + 2) cases.
+    seed : int
+        Of the scrambling; with the same seed a larger n goes on where a smaller one ended.
+    """
+
+    method: str = choice(of=("sobol",), default="sobol")
+    n: int = count(at_least=8, at_most=2**20)
+    seed: int = count(default=1, at_least=0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.n & (self.n - 1):
+            near = 2 ** self.n.bit_length()
+            problem = f"{self.n} is no power of two, without which Sobol' points lose their balance"
+            raise FieldError("n", f"{problem}; write {near // 2} or {near}")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Run:
     """How the study is run; nothing here changes results."""
 

@@ -8,22 +8,35 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.axes import CLEARANCE_AXES, SPEED_AXES, Axis, flatten, make_axis
+from rubhpc.axes import CLEARANCE_AXES, SPEED_AXES, Axis, flatten, make_axis, make_range
 from rubhpc.errors import InputError
 from rubhpc.input.fields import place
 from rubhpc.input.quantity import brief
 from rubhpc.input.reading import build, read_toml, refuse_unknown
-from rubhpc.options import Contact, Integrator, Recording, Run
+from rubhpc.options import Contact, Integrator, Recording, Run, Sample
 from rubhpc.rig import Rig, read_rig, with_keys
+from rubhpc.sample import draw
 from rubhpc.schema import VARIABLES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from os import PathLike
 
-__all__ = ["Axis", "Contact", "Integrator", "Recording", "Run", "Study", "make_axis", "read_study"]
+__all__ = [
+    "Axis",
+    "Contact",
+    "Integrator",
+    "Recording",
+    "Run",
+    "Sample",
+    "Study",
+    "draw",
+    "make_axis",
+    "make_range",
+    "read_study",
+]
 
-_TABLES = ("title", "rig", "output", "grid", "override", "contact", "integrator", "record", "run")
+_TABLES = ("title", "rig", "output", "grid", "sample", "override", "contact", "integrator", "record", "run")
 # Names that a store takes for itself; an axis `clearance` is the very setting of that name.
 _RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution"}) - {"clearance"}
 _MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
@@ -48,7 +61,9 @@ class Study:
     rig : Rig
         With the study's overrides applied.
     axes : tuple of Axis
-        The cases are their Cartesian product, the last axis running fastest.
+        The cases are the Cartesian product of their dimensions, the last one running fastest.
+    sample : Sample or None
+        How some of the axes have been drawn (`rubhpc.sample.draw`).
     output : Path
         The store.
     source : Path or None
@@ -63,6 +78,7 @@ class Study:
     title: str
     rig: Rig
     axes: tuple[Axis, ...]
+    sample: Sample | None = None
     contact: Contact = DEFAULT_CONTACT
     integrator: Integrator = DEFAULT_INTEGRATOR
     recording: Recording = DEFAULT_RECORDING
@@ -86,7 +102,12 @@ class Study:
         return {
             "title": self.title,
             "rig": self.rig.name,
-            "grid": {axis.name: {"unit": axis.unit, "values": list(axis.values)} for axis in self.axes},
+            "grid": {
+                axis.name: {"unit": axis.unit}
+                | (asdict(axis.drawn_from) if axis.drawn_from else {"values": list(axis.values)})
+                for axis in self.axes
+            },
+            **({"sample": asdict(self.sample)} if self.sample else {}),
             "contact": {key: value for key, value in asdict(self.contact).items() if value is not None},
             "integrator": asdict(self.integrator),
             "record": asdict(self.recording) | {"keep": list(self.recording.keep)},
@@ -124,7 +145,8 @@ def read_study(
         )
     rig = read_rig(_text(table, "rig", "", file), source.parent, place(file, "", "rig"), trust_rig=trust_rig)
     rig = _overridden(rig, _table(table, "override", file), file)
-    axes = _read_axes(_table(table, "grid", file), rig, file)
+    sample = build(Sample, table["sample"], file, "sample") if "sample" in table else None
+    axes = _read_axes(_table(table, "grid", file), rig, sample, file)
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
         raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
     contact = build(Contact, table.get("contact", {}), file, "contact")
@@ -136,6 +158,7 @@ def read_study(
             title=title,
             rig=rig,
             axes=axes,
+            sample=sample,
             contact=contact,
             integrator=integrator,
             recording=recording,
@@ -168,13 +191,19 @@ def _overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
         raise InputError(f"{place(file, 'override')} {error}") from None
 
 
-def _read_axes(table: dict[str, Any], rig: Rig, file: str) -> tuple[Axis, ...]:
+def _read_axes(table: dict[str, Any], rig: Rig, sample: Sample | None, file: str) -> tuple[Axis, ...]:
     pairs = flatten(table)
     names = [name for name, _ in pairs]
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"{place(file, 'grid', name)}: stands twice; leave one out")
-    return tuple(make_axis(name, values, rig, file) for name, values in pairs)
+    if sample is None:
+        return tuple(make_axis(name, values, rig, file) for name, values in pairs)
+    axes = [(make_range if isinstance(v, dict) else make_axis)(name, v, rig, file) for name, v in pairs]
+    try:
+        return draw(axes, sample)
+    except InputError as error:
+        raise InputError(f"{place(file)}: {error}") from None
 
 
 def _check_axes(axes: tuple[Axis, ...]) -> None:
@@ -191,14 +220,14 @@ def _check_axes(axes: tuple[Axis, ...]) -> None:
             raise InputError(f"[grid] {given[1]}: stands beside {given[0]}; give one of them")
     taken: dict[str, str] = {}
     for axis in axes:
-        if axis.dimension in _RESERVED:
+        if axis.coordinate in _RESERVED:
             mend = "name one stator, such as stator.1.lateral" if axis.is_rig_key else "leave it out"
-            raise InputError(f"[grid] {axis.name}: a store has another {axis.dimension}; {mend}")
-        if axis.dimension in taken:
+            raise InputError(f"[grid] {axis.name}: a store has another {axis.coordinate}; {mend}")
+        if axis.coordinate in taken:
             raise InputError(
-                f"[grid] {axis.name}: is the same dimension as {taken[axis.dimension]}; leave one out"
+                f"[grid] {axis.name}: is the same dimension as {taken[axis.coordinate]}; leave one out"
             )
-        taken[axis.dimension] = axis.name
+        taken[axis.coordinate] = axis.name
         for other in axes:
             without_numbers = ".".join(part for part in axis.name.split(".") if not part.isdigit())
             if other.name == without_numbers != axis.name:
@@ -209,12 +238,12 @@ def _check_rigs(rig: Rig, rig_axes: list[Axis], axes: tuple[Axis, ...]) -> None:
     """Refuse a grid some of whose rigs cannot be, or cannot be studied."""
     names = [axis.name for axis in rig_axes]
     grid: Iterable[tuple[float, ...]]
-    if math.prod(len(axis.values) for axis in rig_axes) <= _MOST_RIGS:
-        grid = itertools.product(*(axis.values for axis in rig_axes))
+    if math.prod(len(axis.tried) for axis in rig_axes) <= _MOST_RIGS:
+        grid = itertools.product(*(axis.tried for axis in rig_axes))
     else:
-        first = [axis.values[0] for axis in rig_axes]
+        first = [axis.tried[0] for axis in rig_axes]
         grid = itertools.chain.from_iterable(
-            ((*first[:i], value, *first[i + 1 :]) for value in axis.values) for i, axis in enumerate(rig_axes)
+            ((*first[:i], value, *first[i + 1 :]) for value in axis.tried) for i, axis in enumerate(rig_axes)
         )
     for values in grid:
         case = dict(zip(names, values, strict=True))
@@ -235,7 +264,7 @@ def _check_rig(rig: Rig, axes: tuple[Axis, ...]) -> None:
         problem = f"{rig.name} has no unbalance, so no contact-free amplitude"
         raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead, or an unbalance")
     if "clearance" in by_name:
-        least = min(by_name["clearance"].values)
+        least = min(by_name["clearance"].tried)
         offset = min(stator.clearance_offset for stator in rig.stator)
         if least + offset <= 0:
             problem = f"{least:g} m and a stator's clearance_offset of {offset:g} m leave no gap"

@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-import math
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -18,6 +17,7 @@ import numpy as np
 from rubhpc.axes import case_id
 from rubhpc.errors import InputError
 from rubhpc.input.fields import place
+from rubhpc.points import Points, boxed
 from rubhpc.rig import with_keys
 from rubhpc.settings import Settings
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rubhpc.study import Study
 
 MOST_CASES = 50_000_000  # beyond, a slip of the pen fills the memory
-PHYSICS = 3  # raised whenever the same study gives other numbers than before
+PHYSICS = 4  # raised whenever the same study gives other numbers than before
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -63,17 +63,19 @@ class Sweep:
     ----------
     study : Study
     chunk : tuple of int, optional
-        Cases of a block along each axis, where a store has them already. Default: at most `[run] block`
-        cases, taken first from the axes that leave speed and rig alone: a block then shares its setup.
+        Cases of a block along each dimension, where a store has them already. Default: at most `[run] block`
+        cases, taken first from the dimensions that leave speed and rig alone: a block then shares its setup.
 
     Attributes
     ----------
+    points : Points
+        Where the cases lie.
     dims, shape : tuple
-        Dimension names of the axes, and cases along each.
+        Names of the dimensions, and cases along each.
     n_case, n_stator : int
         Number of cases, and of stators.
     chunk : tuple of int
-        Cases of a block along each axis.
+        Cases of a block along each dimension.
     identity, identity_parts : str, dict
         SHA-256 of all that changes results but the values on the axes, and what went into it.
 
@@ -85,9 +87,8 @@ class Sweep:
 
     def __init__(self, study: Study, chunk: tuple[int, ...] | None = None) -> None:
         self.study = study
-        self.dims = tuple(axis.dimension for axis in study.axes)
-        self.shape = tuple(len(axis.values) for axis in study.axes)
-        self.n_case = math.prod(self.shape)
+        self.points = Points(study.axes)
+        self.dims, self.shape, self.n_case = self.points.dims, self.points.shape, self.points.n_case
         if self.n_case > MOST_CASES:
             with _named(study):
                 grid = " x ".join(map(str, self.shape))
@@ -108,7 +109,7 @@ class Sweep:
         for i, at in enumerate(starts):
             if cost.shape[i] == self.shape[i]:
                 cost = np.add.reduceat(cost, np.array(at), axis=i)
-            else:  # the same for every case along this axis
+            else:  # the same for every case along this dimension
                 cost = cost * np.array(sizes[i]).reshape([-1 if j == i else 1 for j in range(cost.ndim)])
         steps = np.rint(cost.ravel()).astype(np.int64)
         order = np.argsort(-steps, kind="stable")
@@ -120,22 +121,20 @@ class Sweep:
 
     def cases(self, block: Block) -> list[Case]:
         """Return the cases of a block, the last axis running fastest."""
-        box = itertools.product(*(range(s, s + n) for s, n in zip(block.start, block.shape, strict=True)))
+        box = boxed(block.start, block.shape)
         return [self._case(index, name) for index, name in zip(box, self.case_ids(block), strict=True)]
 
     def case(self, index: Sequence[int]) -> Case:
         """Return the case at an index of the grid."""
-        point = [axis.values[i] for axis, i in zip(self.study.axes, index, strict=True)]
-        return self._case(tuple(index), case_id(self.identity, point))
+        return self._case(tuple(index), case_id(self.identity, self.points.at(index)))
 
     def case_ids(self, block: Block) -> list[str]:
         """Return the ids of the cases of a block, in the order of `cases`."""
-        box = zip(self.study.axes, block.start, block.shape, strict=True)
-        points = itertools.product(*(axis.values[s : s + n] for axis, s, n in box))
+        points = self.points.within(block.start, block.shape)
         return [case_id(self.identity, point) for point in points]
 
     def settings(self) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
-        """Return what the axes amount to: name -> (dimensions of the axes that set it, values in SI units).
+        """Return what the axes amount to: name -> (dimensions that set it, values in SI units).
 
         `spin_speed` in rad/s, `clearance` and `contact_free_amplitude` in m.
 
@@ -146,7 +145,7 @@ class Sweep:
         """
         with _named(self.study):
             found = self._settings.arrays()
-        return {name: (tuple(self.dims[i] for i in axes), values) for name, (axes, values) in found.items()}
+        return {name: (tuple(self.dims[i] for i in dims), values) for name, (dims, values) in found.items()}
 
     def _case(self, index: tuple[int, ...], name: str) -> Case:
         speed, amplitude = self._settings.response(index)
@@ -162,7 +161,7 @@ class Sweep:
 
     def _default_chunk(self) -> tuple[int, ...]:
         wanted = self.study.run.block or min(max(self.n_case // 64, 1), 16)
-        costly = [self._settings.speed_axis, *self._settings.rig_axes]
+        costly = self._settings.costly_dims
         others = [i for i in range(len(self.shape)) if i not in costly]
         chunk = [1] * len(self.shape)
         for i in [*reversed(others), *costly]:
@@ -186,7 +185,8 @@ def _named(study: Study) -> Iterator[None]:
 def identity_parts(study: Study) -> dict[str, Any]:
     """Return all that changes the results of a study but the values on its axes, for JSON.
 
-    What the rig says of a key that is an axis is no part of it: every case sets that key.
+    What the rig says of a key that is an axis is no part of it: every case sets that key. Of a sample, all is
+    that has values drawn but how many.
     """
     keys = [axis.name for axis in study.axes if axis.is_rig_key]
     rig = with_keys(
@@ -195,7 +195,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
     for key in keys:
         _blank(rig, key.split("."))
     del rig["name"]
-    return {
+    parts = {
         "physics": PHYSICS,
         "axes": [axis.name for axis in study.axes],
         "rig": rig,
@@ -203,6 +203,10 @@ def identity_parts(study: Study) -> dict[str, Any]:
         "integrator": asdict(study.integrator),
         "record": asdict(study.recording) | {"keep": sorted(study.recording.keep)},
     }
+    if study.sample is not None:
+        ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
+        parts["sample"] = {"method": study.sample.method, "seed": study.sample.seed, "ranges": ranges}
+    return parts
 
 
 def _blank(table: Any, key: list[str]) -> None:

@@ -58,6 +58,18 @@ def write_slow_study(folder: Path, name: str = "tiny.toml", **changes: object) -
     return write_study(folder, name, **({"integrator": integrator, "transient": 8} | changes))
 
 
+def write_sample(
+    folder: Path, name: str = "tiny.toml", *, n: int = 8, seed: int = 1, **changes: object
+) -> Path:
+    """Write a sampled study of two ranges and a list of two values: 8 n cases."""
+    ranges = {
+        "speed_ratio": "{ start = 1.2, stop = 2.4 }",
+        "friction": '{ start = 0.05, stop = 0.5, scale = "log" }',
+        "run": f"[sample]\nn = {n}\nseed = {seed}",
+    }
+    return write_study(folder, name, **(ranges | changes))
+
+
 @dataclass(frozen=True)
 class Launcher:
     """An mpirun, and the Python whose mpi4py it can start."""

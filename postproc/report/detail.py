@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from postproc.report.packing import pack_record, quantised, quantised_spectrum
+from postproc.report.packing import STEPS, WAVE_STEPS, bends, pack_record, quantised, quantised_spectrum
 from postproc.spectra import amplitude_spectrum, last_revolutions, samples_per_revolution, whole_periods
-from postproc.units import scale_for
-from rubhpc.schema import SECTION_NAMES, SIGNAL_NAMES, VARIABLES
+from rubhpc.schema import SECTION_NAMES, SIGNAL_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -21,9 +20,10 @@ if TYPE_CHECKING:
 
     Arrays = list[NDArray[np.uint16]]
 
-_DISC = ("vertical", "horizontal")  # share their scale, so that an orbit is round where it is
-_FLOOR = 1e-3  # of the highest line: those beyond the last one above it are left out
-_LEAST_ORDER = 6.0
+_DISC = ("vertical", "horizontal")  # of the orbit
+# A spectrum is shown to the last line above that share of the highest, and a little further.
+_FLOOR, _FURTHER = 0.02, 1.15
+_LEAST_ORDER = 4.2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,9 @@ class Detail:
     samples : int
         A revolution, at most.
     revolutions : int
-        Of a motion without a period, at most; a periodic one needs no more than one period.
+        Of the orbit of a motion without a period, at most; a periodic one needs no more than one period.
+    shown : int
+        Of the waveforms of such a motion, at most: more of them could not be told apart.
     lines : int
         Of a spectrum, at most.
     signals : tuple of str
@@ -43,6 +45,7 @@ class Detail:
 
     samples: int
     revolutions: int
+    shown: int
     lines: int
     signals: tuple[str, ...]
 
@@ -51,11 +54,12 @@ class Detail:
         parts = []
         if "waveform" in kept:
             parts.append(
-                f"waveforms of a period (two revolutions at least), or {self.revolutions} revolutions of a "
-                f"motion without one, at most {self.samples} samples each (of forces, the highest of some)"
+                f"waveforms of a period (two revolutions at least), at most {self.samples} samples a "
+                f"revolution (of forces, the highest of some); of a motion without a period the orbit of "
+                f"{self.revolutions} revolutions and waveforms of {self.shown}"
             )
         if {"waveform", "spectrum"} & set(kept):
-            parts.append(f"spectra up to their last line above {_FLOOR:.1%}, at most {self.lines} lines")
+            parts.append(f"spectra to beyond their last line above {_FLOOR:.0%}, at most {self.lines} lines")
         if {"waveform", "section"} & set(kept):
             parts.append("all section points")
         if self.signals != SIGNAL_NAMES:
@@ -63,22 +67,23 @@ class Detail:
         return "; ".join(parts)
 
 
-FULL = Detail(samples=1024, revolutions=64, lines=8192, signals=SIGNAL_NAMES)
+FULL = Detail(samples=1024, revolutions=64, shown=32, lines=8192, signals=SIGNAL_NAMES)
 _MAIN = ("vertical", "horizontal", "torsion", "contact_force")
 LEVELS = (  # of a page with a limited size, from the best
-    Detail(samples=128, revolutions=32, lines=1024, signals=SIGNAL_NAMES),
-    Detail(samples=64, revolutions=24, lines=512, signals=SIGNAL_NAMES),
-    Detail(samples=128, revolutions=16, lines=512, signals=_MAIN),
-    Detail(samples=64, revolutions=12, lines=256, signals=_MAIN),
-    Detail(samples=64, revolutions=6, lines=160, signals=_MAIN[:3]),
+    Detail(samples=128, revolutions=24, shown=12, lines=1024, signals=SIGNAL_NAMES),
+    Detail(samples=64, revolutions=16, shown=8, lines=512, signals=SIGNAL_NAMES),
+    Detail(samples=64, revolutions=16, shown=8, lines=512, signals=_MAIN),
+    Detail(samples=64, revolutions=8, shown=6, lines=256, signals=_MAIN),
+    Detail(samples=64, revolutions=6, shown=4, lines=160, signals=_MAIN[:3]),
 )
 
 
 def pack_case(case: xr.Dataset, detail: Detail, places: list[tuple[float, float]] | None = None) -> bytes:
     """Return one case, loaded, as a record for the page.
 
-    What the store does not keep is left out; spectra are taken over whole periods where waveforms are kept.
-    `places` are the stators around the disc, as of `stator_places`, where they are the case's own.
+    Values are SI. What the store does not keep is left out; spectra are taken over whole periods where
+    waveforms are kept. `places` are the stators around the disc, as of `stator_places`, where they are the
+    case's own.
     """
     header: dict[str, Any] = {"waves": [], "spectra": [], "section": []}
     if places is not None:
@@ -134,55 +139,38 @@ def _add_waves(
 ) -> None:
     recorded = samples_per_revolution(waves)
     period = int(case["period"].values) if "period" in case else 0
-    revolutions = period * math.ceil(2 / period) if period > 0 else detail.revolutions
-    kept = last_revolutions(waves, revolutions).values
+    whole = period * math.ceil(2 / period) if period > 0 else 0
+    kept = last_revolutions(waves, whole or detail.revolutions).values
     # Samples fall on whole revolutions only where their number divides those recorded.
     samples = max(n for n in range(1, min(detail.samples, recorded) + 1) if recorded % n == 0)
     held = kept.reshape(len(kept), -1, recorded // samples)
-    header |= {"period": period, "samples": samples}
-    disc = [
-        np.abs(row).max() for row, name in zip(kept, waves["signal"].values, strict=True) if name in _DISC
-    ]
+    shown = samples * (whole or detail.shown)
+    header |= {"period": period, "samples": samples, "shown": whole or detail.shown}
     for groups, name, stator in _rows(held, waves):
         values = groups.max(axis=-1) if name == "contact_force" else groups[:, 0]
-        size = float(max(disc)) if name in _DISC else float(np.abs(values).max())
-        _add(header["waves"], arrays, values, name, stator, size)
+        quantum, codes = quantised(values if name in _DISC else values[-shown:], WAVE_STEPS)
+        header["waves"].append({"name": name, "stator": stator, **quantum})
+        arrays.append(bends(codes))
 
 
 def _add_spectra(spectra: xr.DataArray, detail: Detail, header: dict[str, Any], arrays: Arrays) -> None:
     orders = spectra["order"].values
     header["spacing"] = float(orders[1] - orders[0]) if orders.size > 1 else 1.0
+    least = math.ceil(_LEAST_ORDER / header["spacing"])
     for amplitude, name, stator in _rows(np.nan_to_num(spectra.values), spectra):
         lines = amplitude[1:]  # the mean is no line
-        last = np.flatnonzero(lines > _FLOOR * lines.max(initial=0.0))[-1:]
-        least = math.ceil(_LEAST_ORDER / header["spacing"])
-        lines = lines[: min(max([*(last + 1), least]), detail.lines)]
-        scale = scale_for(VARIABLES[name].unit, float(lines.max(initial=0.0)))
-        quantum, codes = quantised_spectrum(lines * scale.factor)
-        header["spectra"].append({"name": name, "stator": stator, "unit": scale.unit, **quantum})
+        strong = np.flatnonzero(lines > _FLOOR * lines.max(initial=0.0)) + 1
+        last = math.ceil(_FURTHER * strong.max(initial=0))
+        quantum, codes = quantised_spectrum(lines[: min(max(last, least), detail.lines)])
+        header["spectra"].append({"name": name, "stator": stator, **quantum})
         arrays.append(codes)
 
 
 def _add_sections(sections: xr.DataArray, header: dict[str, Any], arrays: Arrays) -> None:
-    disc = [np.abs(row).max() for row, name, _ in _rows(sections.values, sections) if name in _DISC]
     for values, name, stator in _rows(sections.values, sections):
-        size = float(max(disc)) if name in _DISC else float(np.abs(values).max())
-        _add(header["section"], arrays, values, name, stator, size)
-
-
-def _add(
-    entries: list[dict[str, Any]],
-    arrays: Arrays,
-    values: NDArray[np.floating[Any]],
-    name: str,
-    stator: int,
-    size: float,
-) -> None:
-    """Add an array in the display unit that suits `size`, SI."""
-    scale = scale_for(VARIABLES[name].unit, size)
-    quantum, codes = quantised(values * scale.factor)
-    entries.append({"name": name, "stator": stator, "unit": scale.unit, "factor": scale.factor, **quantum})
-    arrays.append(codes)
+        quantum, codes = quantised(values, STEPS)
+        header["section"].append({"name": name, "stator": stator, **quantum})
+        arrays.append(codes)
 
 
 def _rows(values: NDArray[Any], stacked: xr.DataArray) -> list[tuple[NDArray[Any], str, int]]:

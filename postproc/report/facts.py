@@ -10,9 +10,8 @@ import xarray as xr
 
 from postproc.load import axes_of
 from postproc.maps import monitors
-from postproc.report.grid import plain
-from postproc.units import Scale, scale_for, short_name
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, SIGNAL_NAMES, STATUS
+from postproc.units import Scale, scale_for
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -178,12 +177,6 @@ def seconds_text(seconds: float) -> str:
     if seconds < 5400:
         return f"{seconds / 60:.0f} min"
     return f"{seconds / 3600:.1f} h"
-
-
-def signal_labels(store: xr.Dataset) -> dict[str, str]:
-    """Return what each recorded signal is called."""
-    names = {str(n).removeprefix("spectrum_").removeprefix("section_"): n for n in store.data_vars}
-    return {n: plain(short_name(store[names[n]].rename(n))) for n in SIGNAL_NAMES if n in names}
 
 
 def free_axes(store: xr.Dataset) -> list[str]:

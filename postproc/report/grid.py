@@ -6,16 +6,16 @@ import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from postproc.cells import cell_edges, is_geometric
 from postproc.load import axes_of
-from postproc.map_figure import REGIME_COLORS, STATUS_COLORS
+from postproc.map_figure import categories
 from postproc.maps import MAPPABLE, VALIDITY, validity
-from postproc.units import Scale, displayed, scale_of, short_name
-from rubhpc.schema import DIVERGED, DONE, REGIME, STATUS, VARIABLES
+from postproc.units import Scale, displayed, scale_for, short_name
+from rubhpc.schema import DIVERGED, DONE, SIGNAL_NAMES, VARIABLES
 
 if TYPE_CHECKING:
+    import xarray as xr
     from numpy.typing import NDArray
 
 # What is asked for most often: the first are offered first, and the last go first from a page that is small.
@@ -37,8 +37,14 @@ _FIRST = (
     "peak_to_peak_horizontal",
 )
 _FLAGS = ("status", "regime", "period", "validity")
-_NO_PERIOD = "#D55E00"
 _WITHIN, *_BEYOND = ("#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#F0E442", "#0072B2", "#D55E00", "#8C5A2B")
+_MOTION = ("peak_to_peak_vertical", "peak_to_peak_horizontal")
+# Measures of which all that is named has its unit.
+_SHARED = (
+    (_MOTION, (*_MOTION, "vertical", "horizontal", "stator_axial", "stator_lateral")),
+    (("peak_torsion",), ("torsion",)),
+    (("peak_contact_force",), ("contact_force",)),
+)
 _MATHTEXT = re.compile(r"\s*\$[^$]*\$")
 
 
@@ -70,10 +76,30 @@ class Measures:
         return "stator" in self._data[name].dims
 
     def scale(self, name: str) -> Scale:
-        """Return how the variable is displayed on the whole page."""
+        """Return how the variable, or the signal, is displayed on the whole page.
+
+        Its unit suits nine cases in ten; both directions of the disc, and the stators, have the same.
+        """
         if name == "spin_speed":
             return Scale(30 / np.pi, "rpm")
-        return scale_of(xr.DataArray(self.values(name)), self._unit(name))
+        unit = VARIABLES[name].unit if name in SIGNAL_NAMES else self._unit(name)
+        told = next((group for group, names in _SHARED if name in names), (name,))
+        sizes = np.abs(
+            np.concatenate([np.zeros(1), *(self.values(n).ravel() for n in told if n in self.names)])
+        )
+        sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
+        return scale_for(unit, float(np.quantile(sizes, 0.9)) if sizes.size else 0.0)
+
+    def signals_told(self, store: xr.Dataset) -> dict[str, dict[str, Any]]:
+        """Return name, unit and factor from SI of each signal that the store keeps anything of."""
+        kept = {str(n).removeprefix("spectrum_").removeprefix("section_"): n for n in store.data_vars}
+        told = {}
+        for name in SIGNAL_NAMES:
+            if name in kept:
+                scale = self.scale(name)
+                label = plain(short_name(store[kept[name]].rename(name)))
+                told[name] = {"label": label, "unit": scale.unit, "factor": scale.factor}
+        return told
 
     def label(self, name: str) -> str:
         """Return what the variable is called."""
@@ -112,6 +138,8 @@ class Measures:
         """Return code, name and colour of the values of a flag that occur; [] of what is no flag."""
         if name not in _FLAGS:
             return []
+        from matplotlib.colors import to_hex
+
         values = self.values(name)
         codes = [int(c) for c in np.unique(values[np.isfinite(values)])]
         if name == "validity":
@@ -119,16 +147,9 @@ class Measures:
             return [
                 {"code": c, "name": validity_text(c), "color": next(beyond) if c else _WITHIN} for c in codes
             ]
-        if name == "period":
-            return [{"code": c, "name": f"{c}" if c else "none", "color": _period_color(c)} for c in codes]
-        meanings, colors = (STATUS, STATUS_COLORS) if name == "status" else (REGIME, REGIME_COLORS)
         return [
-            {
-                "code": c,
-                "name": meanings[c].replace("_", "-" if c == 2 else " "),
-                "color": colors[c % len(colors)],
-            }
-            for c in codes
+            {"code": c, "name": text, "color": to_hex(color)}
+            for c, (text, color) in categories(name, np.array(codes)).items()
         ]
 
 
@@ -167,13 +188,3 @@ def axes_told(store: xr.Dataset) -> list[dict[str, Any]]:
 def plain(label: str) -> str:
     """Return a label without the symbols that only mathematical typesetting shows."""
     return _MATHTEXT.sub("", label).strip()
-
-
-def _period_color(period: int) -> str:
-    """Longer periods are darker; none is a colour apart."""
-    if period == 0:
-        return _NO_PERIOD
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    return to_hex(colormaps["viridis_r"](0.05 + 0.75 * min(period - 1, 8) / 8))

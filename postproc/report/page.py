@@ -21,7 +21,6 @@ from postproc.report.facts import (
     failures,
     free_axes,
     run_rows,
-    signal_labels,
     study_rows,
     validity_rows,
 )
@@ -115,7 +114,7 @@ class Page:
             "free": free_axes(store),
             "variables": [described[name] for name in names],
             "nStator": store.sizes.get("stator", 1),
-            "signals": signal_labels(store),
+            "signals": self.measures.signals_told(store),
             "kept": self.cases.kept,
             "places": self._places(),
             "frequencies": self._frequencies(),

@@ -10,12 +10,11 @@ import click
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     import xarray as xr
-    from matplotlib.axes import Axes
 
-    Draw = Callable[[list[Axes]], Any]
+    from postproc.figures import Drawing
 
 REVOLUTIONS = click.IntRange(min=1)
 
@@ -46,33 +45,43 @@ def open_cases(store: str, selection: tuple[str, ...]) -> xr.Dataset:
     return select(open_store(store), dict(pairs(selection, "--select")))
 
 
-def finish(
+def draw(
     command: str,
-    store: str,
-    figure: str | None,
-    data: str | None,
-    shown: xr.Dataset,
-    draw: Draw,
-    n_panel: int = 1,
-    height: float | None = None,
-    width: float | None = None,
-    n_column: int = 1,
-) -> None:
-    """Draw and save the figure, write the data where asked, and tell where they are."""
+    drawing_of: Callable[..., Drawing],
+    words: dict[str, Any],
+    tell: Callable[[Drawing], Iterable[str]] = lambda drawing: drawing.notes,
+) -> Drawing:
+    """Draw and save the figure of a command, write its data where asked, and tell where they are.
+
+    Parameters
+    ----------
+    drawing_of : callable
+        One of `postproc.figures`; takes the cases selected and the command's own words.
+    words : dict
+        All that the command line says, with what `of_store` adds.
+    tell : callable
+        The lines that are printed before the figure is drawn.
+    """
     from postproc.export import check_data_path, write_data
     from postproc.style import check_figure_path, house_style, new_figure, save
     from postproc.units import caption
 
+    own = dict(words)
+    store, selection, figure, data = (own.pop(word) for word in ("store", "selection", "figure", "data"))
     path = check_figure_path(figure or f"{Path(store).resolve().stem}_{command}.png")
     data_path = check_data_path(data) if data else None
+    drawing = drawing_of(open_cases(store, selection), **own)
+    for line in tell(drawing):
+        click.echo(line)
     with house_style():
-        page, axes = new_figure(n_panel, height, width, n_column)
-        draw(axes)
-        page.suptitle(caption(shown), fontsize=7, x=0.02, ha="left")
+        page, axes = new_figure(drawing.n_row, drawing.height, drawing.width, drawing.n_column)
+        drawing.draw(axes)
+        page.suptitle(caption(drawing.shown), fontsize=7, x=0.02, ha="left")
         save(page, path)
     click.echo(str(path))
     if data_path:
-        click.echo(str(write_data(shown, data_path)))
+        click.echo(str(write_data(drawing.shown, data_path)))
+    return drawing
 
 
 def pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, str]]:
@@ -81,11 +90,3 @@ def pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, str]]:
         if not all(part.strip() for part in text.partition("=")):
             raise InputError(f'{option}: "{text}" is no pair; write NAME=VALUE')
     return [(name.strip(), value.strip()) for name, _, value in (text.partition("=") for text in texts)]
-
-
-def number(text: str) -> float | str:
-    """Return a plain number of the command line as one; other text as it stands, for its unit to be read."""
-    try:
-        return float(text)
-    except ValueError:
-        return text

@@ -14,7 +14,7 @@ _STORE = click.argument("store", type=click.Path(path_type=Path))
 @click.option(
     "--output", type=click.Path(path_type=Path), metavar="FILE", help="The page [default: STORE.html here]."
 )
-@click.option("--limit", default="20 MB", show_default=True, metavar="SIZE", help="The page's size, at most.")
+@click.option("--limit", default="10 MB", show_default=True, metavar="SIZE", help="The page's size, at most.")
 def report(store: Path, output: Path | None, limit: str) -> None:
     """Write one HTML page on STORE that needs nothing else: no network, no server, no store.
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from rubhpc.commands.drawing import finish, of_store, open_cases
+from rubhpc.commands.drawing import draw, of_store
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import xarray as xr
 
 
@@ -24,45 +26,38 @@ if TYPE_CHECKING:
     show_default=True,
     help="Of the intervals.",
 )
-@click.option("--draws", type=click.IntRange(min=2), default=500, show_default=True, help="Of axis levels.")
+@click.option(
+    "--draws", type=click.IntRange(min=2), default=500, show_default=True, help="Of levels, or points."
+)
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the draws.")
-def sensitivity(
-    store: str,
-    selection: tuple[str, ...],
-    figure: str | None,
-    data: str | None,
-    scalar: str,
-    confidence: float,
-    draws: int,
-    seed: int,
-) -> None:
+def sensitivity(**words: Any) -> None:
     """First-order and total Sobol indices of a measure over the axes of the study, with intervals.
 
-    They are exact on the levels of the grid, each of which weighs the same; an interval tells what as many
-    other levels of the same range could have given. Cases without a value are counted, and told.
+    They are exact on the levels of a grid, each of which weighs the same; an interval tells what as many
+    other levels of the same range could have given. Those of a sampled study are estimates, with SALib.
+    Cases without a value are counted, and told.
     """
-    from postproc.sensitivity import sensitivity as indices_of
-    from postproc.sensitivity_figure import bars, height
+    from postproc import figures
 
-    found = indices_of(open_cases(store, selection), scalar, n_draw=draws, confidence=confidence, seed=seed)
-    _print_table(found)
-    finish("sensitivity", store, figure, data, found, lambda axes: bars(found, axes[0]), height=height(found))
+    draw("sensitivity", figures.sensitivity, words, lambda drawing: _table(drawing.shown))
 
 
-def _print_table(found: xr.Dataset) -> None:
+def _table(found: xr.Dataset) -> Iterator[str]:
     about = found.attrs
     unit = "" if about["units"] == "1" else f" {about['units']}"
-    click.echo(
+    yield (
         f"{about['scalar']}: mean {about['mean']:.6g}{unit}, standard deviation "
         f"{about['standard_deviation']:.6g}{unit}, {about['cases']} cases"
     )
-    for note in about["notes"].splitlines():
-        click.echo(note)
-    click.echo(f"{'axis':<28} {'levels':>6}  {'first order':<22}  total")
+    yield from about["notes"].splitlines()
+    name = "levels" if "levels" in found else "drawn_from"
+    over = [str(told) for told in found[name].values]
+    width = max(map(len, [name, *over]))
+    yield f"{'axis':<28} {name.replace('_', ' '):>{width}}  {'first order':<22}  total"
     for i, axis in enumerate(found["axis"].values):
         cells = []
         for name in ("first_order", "total"):
             share, low, high = (float(found[n][i]) for n in (name, f"{name}_low", f"{name}_high"))
             cells.append(f"{share:.3f} [{low:.3f}, {high:.3f}]")
-        click.echo(f"{axis:<28} {int(found['levels'][i]):>6}  {cells[0]:<22}  {cells[1]}")
-    click.echo(f"interactions: {about['interactions']:.3f}")
+        yield f"{axis:<28} {over[i]:>{width}}  {cells[0]:<22}  {cells[1]}"
+    yield f"interactions: {about['interactions']:.3f}"

@@ -168,7 +168,7 @@ def _mend(declared: dataclasses.Field[Any], hint: Any, name: str) -> str:
     if kind == "quantity":
         return f"{declared.name} = {example(declared.metadata['unit'])}"
     if kind == "count":
-        return f"{declared.name} = 1"
+        return f"{declared.name} = {declared.metadata['at_least']}"
     if kind == "matrix":
         return f"{declared.name} = [[1.0]], a row for every degree"
     if kind == "degrees":

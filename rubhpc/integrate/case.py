@@ -16,9 +16,10 @@ from rubhpc.integrate.gather import (
     empty_tally,
     scalars_of,
 )
-from rubhpc.integrate.lyapunov import growth
+from rubhpc.integrate.lyapunov import Marches, growth
 from rubhpc.integrate.measures import amplitude_spectrum
 from rubhpc.integrate.modal import ModalMarch, NoClosedForm
+from rubhpc.integrate.modal_neighbours import ModalNeighbours
 from rubhpc.integrate.prepare import CentralDifferenceSetup, ModalSetup
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.rest import state_at_rest
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.lyapunov import Neighbours
     from rubhpc.integrate.march import March
     from rubhpc.integrate.prepare import Setup
     from rubhpc.kernels.observe import Samples
@@ -99,6 +101,9 @@ def compile_kernels(
             return SteppedMarch(setup, clearance, friction, state, check)
 
         _integrate(start, State.at_rest(setup.model), setup, clearance, short)
+        if not setup.is_stepped:
+            march = ModalMarch(setup, clearance, friction, State.at_rest(setup.model), check)
+            ModalNeighbours(march).part(1)
 
 
 def _integrate(
@@ -141,7 +146,7 @@ def _integrate(
                 stators=setup.model.stators,
                 spin=setup.spin,
                 samples_per_revolution=per_revolution,
-                growth=growth(start, final, setup.model, setup.spin, recording),
+                growth=growth(_neighbours(march, start, final, setup, recording)),
             ),
             settings=settings,
             final=final,
@@ -150,6 +155,15 @@ def _integrate(
             record.signals.clear()
     record.scalars.update(transient_revolutions=n_transient, steps=march.n_step)
     return record
+
+
+def _neighbours(
+    march: March, start: Callable[[State], March], final: State, setup: Setup, recording: Recording
+) -> Neighbours:
+    """The motion from where a march has ended, and one beside it."""
+    if type(march) is ModalMarch:
+        return ModalNeighbours(march)
+    return Marches(start, final, setup, recording)
 
 
 def _spectra(samples: Samples) -> dict[str, Floats]:

@@ -26,7 +26,7 @@ class March(ABC):
         """Take what is called between kernel calls, and the samples of the first call."""
         self.n_step = 0
         self.sample = 0
-        self._check = check
+        self.check = check
         self._stride = max(1, first_stride)
 
     def advance(
@@ -35,8 +35,8 @@ class March(ABC):
         """Go on from sample `first` to `last`; returns None, or why the case cannot go on."""
         self.sample = first
         while self.sample < last:
-            if self._check is not None:
-                self._check()
+            if self.check is not None:
+                self.check()
             before = self.n_step
             stop = min(self.sample + self._stride, last)
             reason = self._call(stop, samples, tally, is_recorded=is_recorded)

@@ -48,16 +48,18 @@ def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) ->
     ----------
     vertical, horizontal : (n_revolution * samples_per_revolution,), m
     """
-    size = float(np.var(vertical) + np.var(horizontal))
+    signals = np.stack([vertical, horizontal])
     n_revolution = vertical.size // samples_per_revolution
+    most = PERIOD_TOLERANCE**2 * float(np.var(signals, axis=1).sum())
     for n in range(1, min(LONGEST_PERIOD, n_revolution - 1) + 1):
         shift = n * samples_per_revolution
-        distance = 0.0
-        for signal in (vertical, horizontal):
-            change = signal[shift:] - signal[:-shift]
-            distance += float(np.mean(np.square(change)))
-        if distance <= PERIOD_TOLERANCE**2 * size:
-            return n
+        most_in_all = most * (vertical.size - shift)
+        # The first revolution alone mostly tells that there is no such period.
+        first = signals[:, shift : shift + samples_per_revolution] - signals[:, :samples_per_revolution]
+        if np.square(first).sum() <= most_in_all:
+            change = signals[:, shift:] - signals[:, :-shift]
+            if np.square(change).sum() <= most_in_all:
+                return n
     return 0
 
 
@@ -72,7 +74,8 @@ def whirl_ratio(vertical: Floats, horizontal: Floats, samples_per_revolution: in
     vertical, horizontal : (n_revolution * samples_per_revolution,), m
     spin : float, rad/s
     """
-    whirl = (vertical + 1j * horizontal).reshape(-1, samples_per_revolution).mean(axis=0)
+    cycle = [signal.reshape(-1, samples_per_revolution).mean(axis=0) for signal in (vertical, horizontal)]
+    whirl = cycle[0] + 1j * cycle[1]
     turn = np.exp(2j * np.pi * np.arange(samples_per_revolution) / samples_per_revolution)
     forward, backward = float(abs(np.vdot(turn, whirl))), float(abs(turn @ whirl))
     if forward + backward == 0.0:

@@ -56,7 +56,7 @@ class ModalMarch(March):
         self._clearance = clearance + offsets - sag_at_stators(setup.model)[0]
         self._met = {0, *(1 << i for i in range(self._clearance.size))}  # sets of closed contacts
         turn = setup.interval * setup.samples_per_revolution
-        self._clock = kernel.Clock(
+        self.clock = kernel.Clock(
             spin=setup.spin,
             tick=setup.tick,
             sample_level=setup.sample_level,
@@ -65,15 +65,15 @@ class ModalMarch(March):
             contact_level=math.floor(math.log2(min(setup.interval, turn / CONTACT_STEPS) / setup.tick)),
             n_sample=0,
         )
-        self._bodies = self._book.kernel_reduced(self._clearance, setup.law)
+        self.bodies = self._book.kernel_reduced(self._clearance, setup.law)
         self._motion = self._reduce(initial)
         self._recorder = recorder(self._clearance.size)
         self._progress = np.zeros(kernel.N_PROGRESS, dtype=np.int64)
         self._progress[[kernel.WANTED, kernel.SPAN, kernel.ENTERED]] = -1, -1, -(2**61)
         mask = self._first_closed(initial)
-        self._find(mask)
-        self._progress[kernel.PHASE] = find_phase(self._phases.mask, mask)
-        enter(self._phases, self._progress[kernel.PHASE], self._clearance, 1.0, 0.0, self._motion, self._z)
+        self.find(mask)
+        self._progress[kernel.PHASE] = find_phase(self.phases.mask, mask)
+        enter(self.phases, self._progress[kernel.PHASE], self._clearance, 1.0, 0.0, self._motion, self._z)
 
     def _first_closed(self, initial: State) -> int:
         """Set of the contacts that are closed at the start."""
@@ -81,19 +81,19 @@ class ModalMarch(March):
 
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs are closed, (q,)."""
-        mask = self._phases.mask[self._progress[kernel.PHASE]]
+        mask = self.phases.mask[self._progress[kernel.PHASE]]
         return np.array([bool(mask >> i & 1) for i in range(self._clearance.size)])
 
     def energy(self) -> float:
         """Mechanical energy, J."""
-        n = self._bodies.stiffness.shape[0]
+        n = self.bodies.stiffness.shape[0]
         motion = self._current_motion()
         displacement, velocity = motion[:n], motion[n:]
-        return float(0.5 * (velocity @ velocity + displacement @ self._bodies.stiffness @ displacement))
+        return float(0.5 * (velocity @ velocity + displacement @ self.bodies.stiffness @ displacement))
 
     def final(self) -> State:
         """State at the sample reached, as far as contact and outputs see it."""
-        setup, n = self._setup, self._bodies.stiffness.shape[0]
+        setup, n = self._setup, self.bodies.stiffness.shape[0]
         motion = self._current_motion()
         bodies = [setup.model.rotor, *(stator.body for stator in setup.model.stators)]
         ends = np.cumsum([body.n_dof for body in bodies])[:-1]
@@ -110,19 +110,19 @@ class ModalMarch(March):
     def _contact_force(self) -> Floats:
         """Forces at the sample reached, (q,), N."""
         p = self._progress[kernel.PHASE]
-        force = self._phases.switch_re[p] @ self._z[0] - self._phases.switch_im[p] @ self._z[1]
+        force = self.phases.switch_re[p] @ self._z[0] - self.phases.switch_im[p] @ self._z[1]
         return np.where(self.touching(), force, 0.0)
 
     def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
-        per_sample = 1 << self._clock.sample_level
+        per_sample = 1 << self.clock.sample_level
         first = self._set_clock(samples, is_recorded=is_recorded)
         while True:
             outcome = self._kernel(first, stop * per_sample, samples, tally, is_recorded=is_recorded)
             self.n_step = int(self._progress[kernel.N_STEP])
             first = int(self._progress[kernel.TIME])
-            self.sample = first >> self._clock.sample_level
+            self.sample = first >> self.clock.sample_level
             if outcome == kernel.PHASE_WANTED:
-                self._find(int(self._progress[kernel.WANTED]))
+                self.find(int(self._progress[kernel.WANTED]))
             elif outcome in (kernel.CONTACT_UNSOLVED, kernel.SLIP_TURNED):
                 raise NoClosedForm
             elif outcome == kernel.DIVERGED or self._has_diverged(tally):
@@ -132,21 +132,21 @@ class ModalMarch(March):
 
     def _set_clock(self, samples: Samples, *, is_recorded: bool) -> int:
         """Count time from the sample reached; returns its tick."""
-        first = self.sample << self._clock.sample_level
+        first = self.sample << self.clock.sample_level
         self._progress[kernel.ENTERED] += first - self._progress[kernel.TIME]
         self._progress[kernel.NEXT_SAMPLE] = self.sample
         if not is_recorded:
             self._progress[kernel.SPAN] = -1
-        self._clock = self._clock._replace(n_sample=samples.rotor.shape[1])
+        self.clock = self.clock._replace(n_sample=samples.rotor.shape[1])
         return first
 
     def _kernel(
         self, first_tick: int, last_tick: int, samples: Samples, tally: Tally, *, is_recorded: bool
     ) -> int:
         return advance(
-            self._phases,
-            self._bodies,
-            self._clock,
+            self.phases,
+            self.bodies,
+            self.clock,
             first_tick,
             last_tick,
             is_recorded,
@@ -161,11 +161,20 @@ class ModalMarch(March):
 
     def _has_diverged(self, tally: Tally) -> bool:
         """Whether the output node or a contact degree is, or at a sample was, beyond the limit."""
-        seen = self._setup.reduced.translations @ self._current_motion()[: self._bodies.stiffness.shape[0]]
-        reached = np.concatenate([np.abs(seen), tally.highest[:2], -tally.lowest[:2], tally.peak_lateral])
-        return not np.all(reached <= self._setup.displacement_limit)
+        reached = np.concatenate([tally.highest[:2], -tally.lowest[:2], tally.peak_lateral])
+        limit = self._setup.displacement_limit
+        return not np.all(reached <= limit) or self.is_beyond(self._current_motion())
 
-    def _find(self, mask: int) -> None:
+    def is_beyond(self, motion: Floats) -> bool:
+        """Whether a motion (2 n,) takes the output node or a contact degree beyond the limit."""
+        seen = self._setup.reduced.translations @ motion[: self.bodies.stiffness.shape[0]]
+        return not np.all(np.abs(seen) <= self._setup.displacement_limit)
+
+    def place(self) -> tuple[int, Floats]:
+        """Phase, and modal coordinates (2, m)."""
+        return int(self._progress[kernel.PHASE]), self._z
+
+    def find(self, mask: int) -> None:
         """See that the tables hold a set of contacts.
 
         The kernel is shown no set but those that this case has met: what it does must not depend on what
@@ -179,19 +188,19 @@ class ModalMarch(March):
                 self._book.forget()
             if not self._book.add(mask):
                 raise NoClosedForm
-        self._phases = self._book.tables()
+        self.phases = self._book.tables()
         unmet = [p for p, known in enumerate(self._book.masks) if known not in self._met]
         if unmet:
-            shown = self._phases.mask.copy()
+            shown = self.phases.mask.copy()
             shown[unmet] = -1
-            self._phases = self._phases._replace(mask=shown)
-        self._z = np.zeros((2, self._phases.switch_re.shape[2]))
+            self.phases = self.phases._replace(mask=shown)
+        self._z = np.zeros((2, self.phases.switch_re.shape[2]))
         self._z_next = np.zeros_like(self._z)
 
     def _current_motion(self) -> Floats:
         """Reduced displacements, then velocities (2 n,)."""
         p = self._progress[kernel.PHASE]
-        motion: Floats = self._phases.motion_re[p] @ self._z[0] - self._phases.motion_im[p] @ self._z[1]
+        motion: Floats = self.phases.motion_re[p] @ self._z[0] - self.phases.motion_im[p] @ self._z[1]
         return motion
 
     def _reduce(self, state: State) -> Floats:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 # power of the frequency ratio.
 CUTOFF_RATIO = 10.0
 FEWEST_MODES = 2  # kept of every part, whatever their frequency
+# Static answer to a damper, as a share of the mode that it slows, times sqrt(accuracy), that is left out: the
+# mode's exponent errs by the square.
+LEAST_ANSWER = 0.1
 FREE = 1e-12  # square of a frequency over the greatest, below which a mode is free motion
 UNSEEN = 1e-9  # relative motion or coupling below which a mode is taken for unseen
 
@@ -78,7 +81,8 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
 
     The basis of each uncoupled part holds its undamped modes at standstill up to a cutoff and its static
     answers to a unit force on each degree that contact or outputs see (component modes with residual
-    attachment shapes); gyroscopic and damping terms are then projected. Modes that nothing sees are left out.
+    attachment shapes), and to what dampers and cross-coupled springs draw from those modes; gyroscopic and
+    damping terms are then projected. Modes that nothing sees are left out.
 
     Parameters
     ----------
@@ -94,25 +98,16 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     """
     mass, damping, stiffness, force = whole_system(model, spin)
     degree, output = degrees_of(model), output_degrees(model)
-    seen = np.unique(np.concatenate([degree[degree >= 0], output[output >= 0]]))
-
-    fastest = max(_contact_frequency(mass, stiffness, degree, model), abs(spin))
+    standstill = _at_standstill(model)
+    fastest = max(standstill.contact_frequency, abs(spin))
     cutoff = CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * fastest
-    symmetric = 0.5 * (stiffness + stiffness.T)
-    coupled = (mass != 0) | (stiffness != 0)
-    n_part, part = connected_components(csr_array(coupled), directed=False)
-    _, whole = connected_components(csr_array(coupled | (damping != 0)), directed=False)
-    columns = []
-    for i_part in range(n_part):
-        rows = np.flatnonzero(part == i_part)
-        looked_at = np.flatnonzero(np.isin(rows, seen))
-        if np.isin(whole[rows[0]], whole[seen]):
-            pick = np.ix_(rows, rows)
-            column = np.zeros((mass.shape[0], rows.size))
-            shapes = _basis(mass[pick], symmetric[pick], looked_at, cutoff)
-            column[rows, : shapes.shape[1]] = shapes
-            columns.append(column[:, : shapes.shape[1]])
-    basis = np.hstack(columns)
+    modes = [_parted(part, cutoff) for part in standstill.parts]
+    symmetric, seen = standstill.stiffness, _seen(model)
+    kept = np.hstack([those.low for those in modes])
+    frequency = np.concatenate([those.low_frequency for those in modes])
+    drawn = np.hstack([0.5 * (damping + damping.T) @ kept, (stiffness - symmetric) @ (kept / frequency)])
+    least = LEAST_ANSWER * np.sqrt(accuracy)
+    basis = np.hstack([kept, *(_shapes(those, seen, drawn, least) for those in modes)])
     stiffness, damping = basis.T @ stiffness @ basis, basis.T @ damping @ basis
     keep = np.flatnonzero(_visible(basis[seen], stiffness, damping))
     basis, pick = basis[:, keep], np.ix_(keep, keep)
@@ -126,6 +121,54 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
         degree=np.where((degree >= 0)[:, :, None], basis[np.maximum(degree, 0)], 0.0),
         output=np.where((output >= 0)[:, None], basis[np.maximum(output, 0)], 0.0),
     )
+
+
+class _Part(NamedTuple):
+    """Undamped modes of what mass and stiffness couple, orthonormal in the mass."""
+
+    n_seen: int  # of its degrees are seen by contact or outputs
+    mode: Floats  # (n_all, n)
+    frequency: Floats  # (n,), rad/s
+
+
+class _Standstill(NamedTuple):
+    """What a model is at every speed."""
+
+    stiffness: Floats  # (n_all, n_all), its symmetric part
+    parts: list[_Part]  # those that contact or outputs feel
+    contact_frequency: float  # rad/s
+
+
+@lru_cache(maxsize=4)
+def _at_standstill(model: Model) -> _Standstill:
+    """Find the modes of a model, once for all speeds."""
+    mass, damping, stiffness, _ = whole_system(model, 1.0)  # at a speed, for what gyroscopic terms couple
+    symmetric, seen = 0.5 * (stiffness + stiffness.T), _seen(model)
+    coupled = (mass != 0) | (stiffness != 0)
+    n_part, number = connected_components(csr_array(coupled), directed=False)
+    _, whole = connected_components(csr_array(coupled | (damping != 0)), directed=False)
+    parts = []
+    for i_part in range(n_part):
+        rows = np.flatnonzero(number == i_part)
+        if not np.isin(whole[rows[0]], whole[seen]):
+            continue
+        square, shape = eigh(symmetric[np.ix_(rows, rows)], mass[np.ix_(rows, rows)])
+        if square[0] <= FREE * square[-1]:
+            raise InputError(
+                "[integrator] method: modal needs bodies that are held, and here one is free to move or to "
+                'turn; take method = "central-difference"'
+            )
+        mode = np.zeros((mass.shape[0], rows.size))
+        mode[rows] = shape
+        parts.append(_Part(int(np.isin(rows, seen).sum()), mode, np.sqrt(square)))
+    frequency = _contact_frequency(mass, stiffness, degrees_of(model), model)
+    return _Standstill(symmetric, parts, frequency)
+
+
+def _seen(model: Model) -> Ints:
+    """Degrees that contact or outputs see."""
+    degree, output = degrees_of(model), output_degrees(model)
+    return np.unique(np.concatenate([degree[degree >= 0], output[output >= 0]]))
 
 
 def _contact_frequency(mass: Floats, stiffness: Floats, degree: Ints, model: Model) -> float:
@@ -148,27 +191,42 @@ def _contact_frequency(mass: Floats, stiffness: Floats, degree: Ints, model: Mod
     return float(highest)
 
 
-def _basis(mass: Floats, stiffness: Floats, looked_at: Ints, cutoff: float) -> Floats:
-    """Modes of a part below the cutoff, rad/s, and static shapes, orthonormal in the mass."""
-    n = mass.shape[0]
-    square, mode = eigh(stiffness, mass)
-    if square[0] <= FREE * square[-1]:
-        raise InputError(
-            "[integrator] method: modal needs bodies that are held, and here one is free to move or to turn; "
-            'take method = "central-difference"'
-        )
-    frequency = np.sqrt(np.maximum(square, 0.0))
-    n_keep = max(int(np.count_nonzero(frequency <= cutoff)), min(FEWEST_MODES, n))
-    kept: Floats = mode[:, :n_keep]
-    if n_keep + looked_at.size >= n:
-        return np.asarray(mode)
-    # Static answer of the modes above the cutoff alone: no rigid-body motion is left in it.
-    rest = mode[:, n_keep:]
-    shape = (rest / square[n_keep:]) @ rest[looked_at].T
-    shape /= np.sqrt(np.einsum("ij,ij->j", shape, mass @ shape))
-    size, mix = np.linalg.eigh(shape.T @ mass @ shape)
+class _Modes(NamedTuple):
+    """Undamped modes of a part, orthonormal in the mass."""
+
+    low: Floats  # (n_all, n_low), kept
+    low_frequency: Floats  # (n_low,), rad/s
+    high: Floats  # (n_all, n_high), which answer by static shapes
+    high_frequency: Floats  # (n_high,), rad/s
+
+
+def _parted(part: _Part, cutoff: float) -> _Modes:
+    """Modes up to a cutoff, rad/s, and beyond; all are kept where modes and shapes would be as many."""
+    n_seen, mode, frequency = part
+    n_low = max(int(np.count_nonzero(frequency <= cutoff)), min(FEWEST_MODES, frequency.size))
+    if n_low + n_seen >= frequency.size:
+        n_low = frequency.size
+    return _Modes(mode[:, :n_low], frequency[:n_low], mode[:, n_low:], frequency[n_low:])
+
+
+def _shapes(modes: _Modes, seen: Ints, drawn: Floats, least: float) -> Floats:
+    """Static answers of the modes above the cutoff, (n_all, n_shape), orthonormal in the mass.
+
+    They answer a unit force on each degree seen, and those combinations of the forces `drawn`
+    (n_all, n_force) from modes at unit velocity whose strain energy is over `least`^2 of that mode's.
+    Proportional damping draws none: it keeps modes apart.
+    """
+    if not modes.high_frequency.size:
+        return modes.high
+    answer = modes.high.T / modes.high_frequency[:, np.newaxis]  # its square is twice the strain energy
+    turn, size, _ = np.linalg.svd(answer @ drawn, full_matrices=False)
+    shape = np.hstack([answer[:, seen], turn[:, size > least]]) / modes.high_frequency[:, np.newaxis]
+    length = np.linalg.norm(shape, axis=0)
+    shape = shape[:, length > 0.0] / length[length > 0.0]
+    size, mix = np.linalg.eigh(shape.T @ shape)
     independent = size > 1e-8 * size[-1]
-    return np.hstack([kept, shape @ mix[:, independent] / np.sqrt(size[independent])])
+    mixed: Floats = modes.high @ (shape @ mix[:, independent] / np.sqrt(size[independent]))
+    return mixed
 
 
 def _visible(seen: Floats, stiffness: Floats, damping: Floats) -> NDArray[np.bool_]:

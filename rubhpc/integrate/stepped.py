@@ -43,8 +43,8 @@ class SteppedMarch(ModalMarch):
         self._kicks = self._make_kicks()
         angle = np.array([stator.angle for stator in setup.model.stators])
         q = angle.size
-        step = self._clock.tick * 2**self._kicks.level
-        phases = self._phases
+        step = self.clock.tick * 2**self._kicks.level
+        phases = self.phases
         place = phases.motion_re.shape[1] // 2
         degree = setup.reduced.degree.reshape(q * N_DEGREE, place)
         # Displacement a contact step after a unit force has acted over it: an impulse, then drift.
@@ -84,7 +84,7 @@ class SteppedMarch(ModalMarch):
 
     def _make_kicks(self) -> Kicks:
         """Displacements and kicks of every pair's degrees in the modes of the open system."""
-        setup, phases = self._setup, self._phases
+        setup, phases = self._setup, self.phases
         n = phases.motion_re.shape[1] // 2
         degree = setup.reduced.degree.reshape(-1, n)
         motion = phases.motion_re[0] + 1j * phases.motion_im[0]
@@ -107,13 +107,13 @@ class SteppedMarch(ModalMarch):
         )
 
     def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
-        per_sample = 1 << self._clock.sample_level
+        per_sample = 1 << self.clock.sample_level
         first = self._set_clock(samples, is_recorded=is_recorded)
         while True:
             outcome = advance_stepped(
-                self._phases,
-                self._bodies,
-                self._clock,
+                self.phases,
+                self.bodies,
+                self.clock,
                 self._kicks,
                 self._pairs,
                 self._work,
@@ -130,7 +130,7 @@ class SteppedMarch(ModalMarch):
             )
             self.n_step = int(self._progress[N_STEP])
             first = int(self._progress[TIME])
-            self.sample = first >> self._clock.sample_level
+            self.sample = first >> self.clock.sample_level
             if outcome == CONTACT_UNSOLVED:
                 return NO_FORCES
             if self._has_diverged(tally):

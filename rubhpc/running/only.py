@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.axes import case_id
 from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.integrate.case import run_case
+from rubhpc.points import Points
 from rubhpc.running.worker import metrics_of, put, set_up
 from rubhpc.schema import MISSING, STATUS
 from rubhpc.storage.journal import metrics_type
@@ -102,9 +102,7 @@ def _find(sweep: Sweep, name: str) -> int:
     if len(name) < SHORTEST:
         raise InputError(f"--only {name}: too short; give {SHORTEST} characters of an id at least")
     manifest = Manifest.of(sweep)
-    found = [
-        flat for flat in range(sweep.n_case) if case_id(sweep.identity, manifest.point(flat)).startswith(name)
-    ]
+    found = [flat for flat in range(sweep.n_case) if manifest.case_id(flat).startswith(name)]
     if len(found) != 1:
         what = f"{len(found)} cases have such an id; give more of it" if found else "no case has such an id"
         raise InputError(f"--only {name}: {what}; rubhpc status names those that failed")
@@ -118,10 +116,10 @@ def _compare(
     if not is_store(study.output):
         return f"{study.output} is not there yet"
     store = Store(study.output)
-    grid = {axis.name: axis.values for axis in store.manifest.axes}
+    mine, theirs = Points(study.axes), store.manifest.points
     try:
         index = [
-            grid[axis.name].index(axis.values[i]) for axis, i in zip(study.axes, case.index, strict=True)
+            theirs.along(dim).index(mine.along(dim)[i]) for dim, i in zip(mine.dims, case.index, strict=True)
         ]
     except ValueError:
         return f"{study.output} does not hold it yet"

@@ -109,10 +109,11 @@ def make_plan(study: Study) -> Plan:
     steps = sum(block.cost * share for block, share in left)
     pace, failures = _pace(sweep, manifest, [block for block, _ in left])
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
+    told = {axis.coordinate: axis.name for axis in study.axes}  # a dimension as the study names its axis
     return Plan(
         title=study.title,
         store=study.output,
-        shape=dict(zip((axis.name for axis in study.axes), sweep.shape, strict=True)),
+        shape=dict(zip((told.get(dim, dim) for dim in sweep.dims), sweep.shape, strict=True)),
         counts=count(status),
         n_block=len(blocks),
         n_per_block=math.prod(sweep.chunk),

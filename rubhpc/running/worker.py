@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.fem.model import Model
     from rubhpc.integrate.prepare import Setup
     from rubhpc.integrate.record import Record
     from rubhpc.rig import Rig
@@ -41,14 +42,15 @@ _SYNC_GAP, _SYNC_SHARE = 1.0, 50.0
 _SETUPS = 4  # prepared setups a rank keeps; a block shares one, and neighbours often do
 
 
-def set_up(study: Study, case: Case) -> Setup:
-    """What the cases of this rig and speed share."""
+def set_up(study: Study, case: Case, model: Model | None = None) -> Setup:
+    """What the cases of this rig and speed share; `model` is the rig's, where it has been assembled."""
     return prepare(
         case.rig,
         case.speed,
         contact=study.contact,
         integrator=study.integrator,
         samples_per_revolution=study.recording.samples_per_revolution,
+        model=model,
     )
 
 
@@ -208,7 +210,8 @@ class Worker:
         if key in self._setups:
             setup = self._setups[key][1]
         else:
-            setup = set_up(study, case)
+            model = next((kept.model for rig, kept in self._setups.values() if rig is case.rig), None)
+            setup = set_up(study, case, model)
             self._setups[key] = (case.rig, setup)
             if len(self._setups) > _SETUPS:
                 self._setups.popitem(last=False)

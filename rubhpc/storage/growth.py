@@ -37,10 +37,10 @@ _HELD = 64  # blocks of the old grid kept in memory: neighbours in the new one c
 def origins(before: Manifest, after: Manifest) -> NDArray[np.int64]:
     """Flat index in the grid of `before` of every case of `after`, (n_case,); -1 for a new one."""
     origin, is_new = np.zeros((), np.int64), np.zeros((), bool)
-    for mine, yours in zip(before.axes, after.axes, strict=True):
-        at = {value: i for i, value in enumerate(mine.values)}
-        place = np.array([at.get(value, -1) for value in yours.values])
-        origin = np.add.outer(origin * len(mine.values), place)
+    for dim, n in zip(before.dims, before.shape, strict=True):
+        at = {values: i for i, values in enumerate(before.points.along(dim))}
+        place = np.array([at.get(values, -1) for values in after.points.along(dim)])
+        origin = np.add.outer(origin * n, place)
         is_new = np.logical_or.outer(is_new, place < 0)
     return np.where(is_new, -1, origin).ravel()
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import binascii
 import json
-import math
 import os
 import re
 from dataclasses import dataclass, field
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from numpy.typing import NDArray
+
+    from rubhpc.points import Points
 
 _FORMAT = 1
 _NAME = re.compile(r"run(\d{6})-(\w+)\.journal")
@@ -73,16 +74,11 @@ class Entry:
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What a journal's lines refer to: the study's identity, the values on its axes, the type of metrics."""
+    """What a journal's lines refer to: the study's identity, its cases, the type of metrics."""
 
     identity: str
-    axes: tuple[tuple[float, ...], ...]
+    points: Points
     n_stator: int
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Cases along each axis."""
-        return tuple(len(values) for values in self.axes)
 
     @property
     def told(self) -> dict[str, Any]:
@@ -90,17 +86,14 @@ class Header:
         return {
             "format": _FORMAT,
             "identity": self.identity,
-            "shape": list(self.shape),
-            "axes": [crc32(np.array(values).tobytes()) for values in self.axes],
+            "shape": list(self.points.shape),
+            "axes": [crc32(np.array(values).tobytes()) for values in self.points.values],
             "metrics": [[v.name, v.dtype, self.n_stator if "stator" in v.dims else 0] for v in METRICS],
         }
 
     def id_at(self, flat: int) -> str:
         """Id of the case at a flat index of the grid; "" beyond it."""
-        if flat >= math.prod(self.shape):
-            return ""
-        index = np.unravel_index(flat, self.shape)
-        return case_id(self.identity, [values[i] for values, i in zip(self.axes, index, strict=True)])
+        return case_id(self.identity, self.points.at_flat(flat)) if flat < self.points.n_case else ""
 
     def line(self) -> bytes:
         """The header as the first line of a journal."""
@@ -198,7 +191,7 @@ def next_run(directory: Path) -> int:
 
 def replay(directory: Path, header: Header, *, with_metrics: bool = True) -> Ledger:
     """Read every journal in turn; damaged lines and journals of other identities or grids are passed over."""
-    n_case = math.prod(header.shape)
+    n_case = header.points.n_case
     dtype = metrics_type(header.n_stator)
     metrics = np.zeros(n_case, dtype) if with_metrics else None
     ledger = Ledger(

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from zarr.core.buffer import Buffer
 
     from rubhpc.schema import Variable
+    from rubhpc.study import Study
     from rubhpc.sweep import Sweep
 
 PACKED = (
@@ -166,13 +167,16 @@ def _static(sweep: Sweep) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict
         "section": (np.arange(sizes["section"]), "revolution of the section"),
     }
     static: dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]] = {
-        axis.dimension: (
+        axis.coordinate: (
             (axis.dimension,),
             np.array(axis.values, dtype=np.float64),
             {"units": axis.unit or "1", "long_name": axis.long_name},
         )
         for axis in sweep.study.axes
     }
+    for dim, n_case in zip(sweep.dims, sweep.shape, strict=True):
+        if dim not in static:
+            own[dim] = (np.arange(n_case), "number of the case in its sample")
     for name, (values, text) in own.items():
         dim = "sample" if name == "revolution" else name
         static[name] = ((dim,), values, {"units": "1", "long_name": text})
@@ -205,9 +209,14 @@ def _attributes(sweep: Sweep, *, accepted: tuple[int, ...]) -> dict[str, Any]:
             **{name: _version(name) for name in _PACKAGES},
         },
         # also where no array over the samples is kept
-        "coordinates": " ".join(("revolution", *(name for name, *_ in _PLACES))),
+        "coordinates": " ".join(("revolution", *(name for name, *_ in _PLACES), *_drawn(study))),
         **({"accepted_physics": list(accepted)} if accepted else {}),
     }
+
+
+def _drawn(study: Study) -> list[str]:
+    """Coordinates that share a dimension."""
+    return [axis.coordinate for axis in study.axes if axis.coordinate != axis.dimension]
 
 
 def _version(package: str) -> str:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from dataclasses import asdict, dataclass, fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
-from rubhpc.axes import case_id
+from rubhpc.axes import case_id, coordinate_of
 from rubhpc.errors import StoreError
+from rubhpc.points import Points
 from rubhpc.schema import KEEPABLE, VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import Header
@@ -37,6 +38,11 @@ class AxisRecord:
     long_name: str
     values: tuple[float, ...]
 
+    @property
+    def coordinate(self) -> str:
+        """Name of its values in the store."""
+        return coordinate_of(self.name)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
@@ -49,7 +55,7 @@ class Manifest:
     axes : tuple of AxisRecord
         The grid; the only part that may grow.
     chunk : tuple of int
-        Cases of one block along each axis, fixed for the life of the store.
+        Cases of one block along each dimension, fixed for the life of the store.
     sizes : dict
         Lengths of the dimensions after the axes: stator, sample, order, section.
     keep : tuple of str
@@ -70,27 +76,32 @@ class Manifest:
     files: dict[str, int]
     accepted: tuple[int, ...] = ()
 
+    @cached_property
+    def points(self) -> Points:
+        """Where the cases lie."""
+        return Points(self.axes)
+
     @property
     def dims(self) -> tuple[str, ...]:
         """Dimensions of the grid."""
-        return tuple(axis.dimension for axis in self.axes)
+        return self.points.dims
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Cases along each axis."""
-        return tuple(len(axis.values) for axis in self.axes)
+        """Cases along each dimension."""
+        return self.points.shape
 
     @property
     def n_case(self) -> int:
         """Cases of the grid."""
-        return math.prod(self.shape)
+        return self.points.n_case
 
     @property
     def header(self) -> Header:
         """Header of the journals of this store."""
         return Header(
             identity=self.identity,
-            axes=tuple(axis.values for axis in self.axes),
+            points=self.points,
             n_stator=self.sizes["stator"],
         )
 
@@ -103,24 +114,20 @@ class Manifest:
         """Shape of a variable after the axes."""
         return tuple(self.sizes[dim] for dim in variable.dims)
 
-    def point(self, flat: int) -> list[float]:
-        """Values of a case on the axes."""
-        values = []
-        for axis in reversed(self.axes):
-            flat, i = divmod(flat, len(axis.values))
-            values.append(axis.values[i])
-        return values[::-1]
-
     def case_id(self, flat: int) -> str:
         """Id of a case."""
-        return case_id(self.identity, self.point(flat))
+        return case_id(self.identity, self.points.at_flat(flat))
 
     def name_case(self, flat: int) -> str:
-        """Coordinates of a case, as in `friction=0.3, clearance_ratio=0.7`."""
-        return ", ".join(
+        """Coordinates of a case, as in `friction=0.3, clearance_ratio=0.7`; in a sample its number first."""
+        own = {axis.coordinate for axis in self.axes}
+        index = zip(self.dims, self.points.index(flat), strict=True)
+        numbers = [f"{dim}={i}" for dim, i in index if dim not in own]
+        values = (
             f"{axis.name}={value:.6g}" + (f" {axis.unit}" if axis.unit not in ("", "1") else "")
-            for axis, value in zip(self.axes, self.point(flat), strict=True)
+            for axis, value in zip(self.axes, self.points.at_flat(flat), strict=True)
         )
+        return ", ".join([*numbers, *values])
 
     @classmethod
     def of(cls, sweep: Sweep, *, files: dict[str, int] | None = None, accepted: tuple[int, ...] = ()) -> Self:
@@ -214,12 +221,17 @@ class Manifest:
         if self.dims != other.dims:
             found.append(f"axes were {', '.join(self.dims)}, are {', '.join(other.dims)}")
             return found
-        for mine, yours in zip(self.axes, other.axes, strict=True):
-            lost = sorted(set(mine.values) - set(yours.values))
-            if lost:
+        for dim in self.dims:
+            lost = sorted(set(self.points.along(dim)) - set(other.points.along(dim)))
+            names = [axis.name for axis in self.axes if axis.dimension == dim]
+            if lost and len(names) == 1:
                 rest = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
-                told = ", ".join(f"{value:.12g}" for value in lost[:3])
-                found.append(f"axis {mine.name} lacks {told}{rest}, which is stored")
+                told = ", ".join(f"{value:.12g}" for (value,) in lost[:3])
+                found.append(f"axis {names[0]} lacks {told}{rest}, which is stored")
+            elif lost:
+                n_mine, n_yours = (dict(zip(m.dims, m.shape, strict=True))[dim] for m in (self, other))
+                why = "n can only grow" if n_yours < n_mine else "this SALib or SciPy draws other points"
+                found.append(f"the sample lacks {len(lost)} of its {n_mine} cases ({why})")
         if not found and (
             self.identity != other.identity or self.keep != other.keep or self.sizes != other.sizes
         ):

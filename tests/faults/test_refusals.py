@@ -47,7 +47,7 @@ def test_poisoned_cases_fail_and_the_others_finish(tmp_path, launcher):
     ledger = Store(tmp_path / "tiny.zarr").replay()
     manifest = Store(tmp_path / "tiny.zarr").manifest
     for flat, status in enumerate(ledger.status.tolist()):
-        friction = manifest.point(flat)[2]
+        friction = manifest.points.at_flat(flat)[2]
         assert (status, ledger.reasons.get(flat)) == (
             (DONE, None) if friction == 0.1 else (FAILED, reasons[friction])
         )

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import TYPE_CHECKING
 
+import click
 import matplotlib
 import pytest
 import synthetic_store
 
 import rubhpc
+from postproc.accessor import Rub
+from rubhpc.cli import COMMANDS, commands
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,8 +20,10 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+OF_FILES = ("store", "select", "figure", "data", "scores")
 REST = {"clearance": "84 um", "friction": 0.3, "stator_youngs_modulus": "3 GPa"}
 BIFURCATION = "Torsion,\nonce a revolution (nrad)"
+ORDERS = "Order (multiples of spin speed)"
 ONE = {"speed_ratio": 1.5, **REST}
 
 
@@ -44,11 +50,19 @@ def unseen() -> Iterator[None]:
         ("cascade", REST, ("Frequency (Hz)", "Speed ratio $r$")),
         ("cascade", {"form": "intensity", **REST}, ("Frequency (Hz)", "Speed ratio $r$")),
         ("map", {}, ("Speed ratio $r$", "Clearance (µm)")),
+        ("cascade", {"orders": True, "mark": {"stiff": "53.5 Hz"}, **REST}, (ORDERS, "Speed ratio $r$")),
+        ("map", {"contours": 4}, ("Speed ratio $r$", "Clearance (µm)")),
         ("map", {"value": "regime", "x": "friction"}, ("Friction coefficient", "Speed ratio $r$")),
         ("orbit", ONE, ("Horizontal displacement (µm)", "Vertical displacement (µm)")),
         ("spectrum", ONE, ("Frequency (Hz)", "Torsion amplitude (µrad)")),
-        ("spectrum", {"signal": "whirl", **ONE}, ("Frequency (Hz)", "Whirl amplitude (µm)")),
+        ("spectrum", {"full": True, **ONE}, ("Frequency (Hz)", "Whirl amplitude (µm)")),
         ("section", ONE, ("Horizontal displacement (nm)", "Vertical displacement (µm)")),
+        (
+            "bifurcation",
+            {"signal": "torsion", "along": "speed_ratio", **REST},
+            ("Speed ratio $r$", BIFURCATION),
+        ),
+        ("sensitivity", {"draws": 10}, ("Share of the variance", "")),
         ("section", {"over": "speed_ratio", "y": "torsion", **REST}, ("Speed ratio $r$", BIFURCATION)),
     ],
 )
@@ -56,6 +70,62 @@ def test_each_figure_is_drawn(store: xr.Dataset, name: str, args: dict, labels: 
     ax = getattr(store.rub, name)(**args)
     assert (ax.get_xlabel(), ax.get_ylabel()) == labels
     ax.figure.canvas.draw()
+
+
+def commands_that_draw() -> dict[str, click.Command]:
+    """Return the commands that draw a store, by their names."""
+    found = {}
+    for name in COMMANDS:
+        command = commands.get_command(click.Context(commands), name)
+        assert command is not None
+        if {"store", "figure", "data"} <= {option.name for option in command.params}:
+            found[name] = command
+    return found
+
+
+def told(default: object) -> object:
+    """Return a default as both sides tell it: what is left out is nothing, whatever stands for it."""
+    return default or None
+
+
+def test_no_command_that_draws_is_left_out_and_each_word_is_that_of_its_option() -> None:
+    drawn = commands_that_draw()
+    assert len(drawn) >= 10
+    for name, command in drawn.items():
+        method = inspect.signature(getattr(Rub, name)).parameters
+        words = {n: told(p.default) for n, p in method.items() if n not in ("self", "ax", "choice")}
+        options = {o.name: o.opts[0].removeprefix("--").replace("-", "_") for o in command.params}
+        given = command.make_context(name, ["study.zarr"]).params
+        assert words == {options[n]: told(v) for n, v in given.items() if options[n] not in OF_FILES}, name
+
+
+def test_a_map_for_each_value_of_an_axis(store: xr.Dataset) -> None:
+    maps = store.rub.map(facet="friction")
+    assert [ax.get_title("left") for ax in maps] == [r"$\mu$ = 0.1", r"$\mu$ = 0.3"]
+    again = store.rub.map(facet="friction", ax=maps)
+    assert again == maps
+
+
+def test_as_many_axes_are_asked_for_as_a_figure_has(store: xr.Dataset) -> None:
+    from matplotlib import pyplot
+
+    _, ax = pyplot.subplots()
+    with pytest.raises(InputError, match="ax: 1 of them for a figure that has 2; give as many"):
+        store.rub.map(facet="friction", ax=ax)
+
+
+@pytest.mark.parametrize(
+    ("name", "args", "said"),
+    [
+        ("cascade", {"form": "water"}, 'form: "water" is none of waterfall, intensity'),
+        ("cascade", {"max_frequency": -5.0, **REST}, "out of range"),
+        ("bifurcation", {"color": "red"}, 'color: "red" is none of regime, period'),
+        ("hht", {"contact": "none", **ONE}, "contact: "),
+    ],
+)
+def test_a_wrong_word_is_told(store: xr.Dataset, name: str, args: dict, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        getattr(store.rub, name)(**args)
 
 
 def test_waveforms_stand_above_one_another(store: xr.Dataset) -> None:

@@ -66,13 +66,13 @@ class Physics:
         self.poison: Callable[..., Record | None] = lambda **_: None
         self.on_case: Callable[[], None] = lambda: None
 
-    def prepare(self, rig: Any, speed: float, **_: Any) -> float:
+    def prepare(self, rig: Any, speed: float, **_: Any) -> SimpleNamespace:
         self.prepared.append(speed)
-        return speed
+        return SimpleNamespace(model=None, spin=speed)
 
     def run_case(
         self,
-        setup: float,
+        setup: SimpleNamespace,
         *,
         clearance: float,
         friction: float,
@@ -297,7 +297,7 @@ def test_a_short_case_still_fits_where_a_long_one_does_not(physics, study, monke
     slow = run_slowly(physics, clock, 10)
     fast = run_slowly(physics, clock, 0.5)
     monkeypatch.setattr(
-        worker, "run_case", lambda setup, **rest: (slow if setup < 100 else fast)(setup, **rest)
+        worker, "run_case", lambda setup, **rest: (slow if setup.spin < 100 else fast)(setup, **rest)
     )
     with pytest.raises(StoppedEarly, match="the time limit"):
         run(replace(study, axes=axes), quiet=True, time_limit=35)

@@ -70,7 +70,7 @@ def compute(store: Store, *, all_of_it: bool = False) -> int:
                     data[name][i_case] = values[i_case]
             entries = []
             for i_case in np.flatnonzero(ledger.status[flat] == MISSING).tolist():
-                point = store.manifest.point(int(flat[i_case]))
+                point = store.manifest.points.at_flat(int(flat[i_case]))
                 status = DONE if all_of_it else outcome(point)
                 if status == MISSING:
                     continue
@@ -97,7 +97,7 @@ def known(store: Store) -> dict[tuple[float, ...], tuple[Any, ...]]:
     """What is known of each case, by its coordinates."""
     ledger = store.replay()
     return {
-        tuple(store.manifest.point(flat)): (
+        tuple(store.manifest.points.at_flat(flat)): (
             int(ledger.status[flat]),
             int(ledger.checksum[flat]),
             ledger.metrics[flat].tobytes(),

@@ -1,18 +1,31 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pytest
 
+from rubhpc.points import Points
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, VARIABLES
 from rubhpc.storage.journal import Entry, Header, Journal, journals, metrics_type, next_run, replay
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-HEADER = Header(identity="abc", axes=((0.1, 0.2), (1.0, 2.0, 3.0)), n_stator=2)
+
+class Column(NamedTuple):
+    dimension: str
+    values: tuple[float, ...]
+
+
+def header_of(*values: tuple[float, ...], identity: str = "abc", n_stator: int = 2) -> Header:
+    """Header of a study with an axis for each of these values."""
+    points = Points([Column(f"axis{i}", column) for i, column in enumerate(values)])
+    return Header(identity=identity, points=points, n_stator=n_stator)
+
+
+HEADER = header_of((0.1, 0.2), (1.0, 2.0, 3.0))
 
 
 def write(
@@ -109,13 +122,13 @@ def test_without_its_header_a_line_counts_if_its_id_is_that_of_its_place(tmp_pat
 @pytest.mark.parametrize(
     "foreign",
     [
-        Header(identity="other", axes=HEADER.axes, n_stator=2),
-        Header(identity="abc", axes=HEADER.axes, n_stator=1),
-        Header(identity="abc", axes=((0.1, 0.25), (1.0, 2.0, 3.0)), n_stator=2),
-        Header(identity="abc", axes=((0.1, 0.2), (1.0, 2.0, 3.0, 4.0)), n_stator=2),
-        Header(identity="abc", axes=((0.1, 0.2), (1.0, 2.0)), n_stator=2),
-        Header(identity="abc", axes=((0.2, 0.1), (1.0, 2.0, 3.0)), n_stator=2),
-        Header(identity="abc", axes=((0.1, 0.2),), n_stator=2),
+        header_of(*HEADER.points.values, identity="other"),
+        header_of(*HEADER.points.values, n_stator=1),
+        header_of((0.1, 0.25), (1.0, 2.0, 3.0)),
+        header_of((0.1, 0.2), (1.0, 2.0, 3.0, 4.0)),
+        header_of((0.1, 0.2), (1.0, 2.0)),
+        header_of((0.2, 0.1), (1.0, 2.0, 3.0)),
+        header_of((0.1, 0.2)),
     ],
     ids=["identity", "stators", "values", "larger grid", "smaller grid", "order", "fewer axes"],
 )

@@ -114,19 +114,51 @@ def test_more_accuracy_takes_more_coordinates_and_errs_less():
     assert all(later <= earlier for earlier, later in pairwise(error))
 
 
+@pytest.mark.parametrize("cross", [0.0, 2e5])
+def test_dampers_of_bearings_and_drive_slow_the_modes_as_they_should(cross):
+    """They act where nothing touches and nothing is recorded, and what they do does not keep modes apart."""
+    rig = trial_rig(1, cross=cross)
+    drive = Torsion(node=1, stiffness=3e3, damping=0.4)
+    shaft = replace(rig.rotor.shaft[0], elements=12)
+    disc, unbalance, bearing = (
+        replace(part, node={3: 7, 5: 13}[part.node])
+        for part in (rig.rotor.disc[0], rig.rotor.unbalance[0], rig.rotor.bearing[1])
+    )
+    rotor = replace(
+        rig.rotor,
+        shaft=(shaft,),
+        disc=(disc,),
+        unbalance=(unbalance,),
+        bearing=(rig.rotor.bearing[0], bearing),
+        torsion=drive,
+    )
+    model = assemble(replace(rig, rotor=rotor, stator=(replace(rig.stator[0], node=7),)))
+    mass, damping, stiffness, _ = whole(model, SPIN)
+    reduced = reduce_model(model, SPIN, 1e-3)
+    assert len(reduced.stiffness) < len(mass) / 2
+    known = exponents(mass, damping, stiffness)
+    found = exponents(np.eye(len(reduced.stiffness)), reduced.damping, reduced.stiffness)
+    slow = found[abs(found) < 2e3]
+    assert len(slow) > 8
+    for exponent in slow:
+        assert abs(known - exponent).min() < 3e-5 * abs(exponent)
+
+
+def exponents(mass, damping, stiffness):
+    """Of the free motion, 1/s."""
+    zero, one = np.zeros_like(mass), np.eye(len(mass))
+    rate = [[zero, one], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]]
+    return eigvals(np.block(rate))
+
+
 def test_spin_enters_by_the_gyroscopic_moments_and_the_unbalance():
     model = assemble(trial_rig(1))
     mass, damping, stiffness, _ = whole(model, SPIN)
     reduced = reduce_model(model, SPIN, FULL)
-    n, m = len(mass), len(reduced.stiffness)
-
-    def exponents(size, m, c, k):
-        zero, one = np.zeros((size, size)), np.eye(size)
-        found = eigvals(np.block([[zero, one], [-np.linalg.solve(m, k), -np.linalg.solve(m, c)]]))
-        return found[abs(found) < 3e3]
-
-    known = exponents(n, mass, damping, stiffness)
-    found = exponents(m, np.eye(m), reduced.damping, reduced.stiffness)
+    n = len(mass)
+    known = exponents(mass, damping, stiffness)
+    found = exponents(np.eye(len(reduced.stiffness)), reduced.damping, reduced.stiffness)
+    found = found[abs(found) < 3e3]
     assert len(found) > 8
     for exponent in found:
         assert abs(known - exponent).min() < 1e-7 * abs(exponent)

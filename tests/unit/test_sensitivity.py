@@ -14,7 +14,8 @@ from SALib.analyze import sobol as sobol_estimate
 from SALib.sample import sobol as sobol_sample
 from SALib.test_functions import Ishigami
 
-from postproc.sensitivity import MOST_FILLED, grid_indices, sensitivity
+from postproc.factorial import grid_indices
+from postproc.sensitivity import MOST_FILLED, sensitivity
 from postproc.sensitivity_figure import bars
 from rubhpc.commands.sensitivity import sensitivity as command
 from rubhpc.errors import InputError

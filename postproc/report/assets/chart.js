@@ -14,6 +14,8 @@ const ink = (name) => getComputedStyle(document.documentElement).getPropertyValu
 function makeFigure(options = {}) {
   const figure = Bokeh.Plotting.figure({
     tools: [], toolbar_location: null, sizing_mode: "stretch_both", min_border: 4, min_border_right: 14,
+    // Figures above one another have their axes there too.
+    min_border_left: 64, min_border_bottom: 44,
     outline_line_width: 1, ...options,
   });
   for (const axis of [figure.xaxis, figure.yaxis]) {
@@ -52,6 +54,11 @@ function dress({ figure, paint }) {
   }
   figure.xgrid.grid_line_color = figure.ygrid.grid_line_color = ink("grid");
   paint?.();
+}
+
+function setTicker(figure, side, ticker) {
+  figure[`${side}axis`].ticker = ticker;
+  figure[`${side}grid`].ticker = ticker;
 }
 
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => charts.forEach(dress));

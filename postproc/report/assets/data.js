@@ -56,6 +56,15 @@ const valuesOf = remembered(64, async (name) => {
   return new Float32Array(whole.buffer);
 });
 
+// From second differences, those below 0 between the others, to what they were taken of.
+function unbend(codes) {
+  let slope = 0, value = 0;
+  codes.forEach((code, i) => {
+    slope += code & 1 ? -(code + 1) / 2 : code / 2;
+    codes[i] = value += slope;
+  });
+}
+
 // Waveforms, spectra and sections of one case in display units; null where the page has none.
 const recordOf = remembered(200, async (flat) => {
   if (!told.kept.length) return null;
@@ -64,13 +73,20 @@ const recordOf = remembered(200, async (flat) => {
   const buffer = await inflate(told.isServed ? await fetched("record/" + flat) : fromBase64(text));
   const length = new DataView(buffer).getUint32(0, true);
   const record = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
-  let at = 4 + length;
-  for (const entry of [...record.waves, ...record.spectra, ...record.section]) {
-    const codes = new Uint16Array(buffer, at, entry.n);
-    at += 2 * entry.n;
-    entry.values = Array.from(codes, entry.top === undefined
-      ? (q) => entry.low + q * entry.step
-      : (q) => (q ? entry.top * 10 ** (5 * (q / 65535 - 1)) : 0));
+  const entries = [...record.waves, ...record.spectra, ...record.section];
+  const bytes = new Uint8Array(buffer, 4 + length), n = bytes.length / 2;
+  let at = 0;
+  for (const entry of entries) {
+    const codes = Array.from({ length: entry.n }, (_, i) => bytes[at + i] | (bytes[n + at + i] << 8));
+    at += entry.n;
+    const { factor } = told.signals[entry.name];
+    if (entry.top !== undefined) {
+      entry.top *= factor;
+      entry.values = codes.map((q) => (q ? entry.top * 10 ** (5 * (q / 2047 - 1)) : 0));
+    } else {
+      if (record.waves.includes(entry)) unbend(codes);
+      entry.values = codes.map((q) => factor * (entry.low + q * entry.step));
+    }
   }
   return record;
 });
@@ -92,8 +108,8 @@ function written(x, digits = 4) {
   return String(Number(x.toPrecision(digits)));
 }
 
-function withUnit(x, unit) {
-  return written(x) + (unit && Number.isFinite(x) ? "\u00a0" + unit : "");
+function withUnit(x, unit, digits = 4) {
+  return written(x, digits) + (unit && Number.isFinite(x) ? "\u00a0" + unit : "");
 }
 
 function axisValue(axis, i) {

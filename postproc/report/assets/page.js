@@ -57,7 +57,7 @@ function buildControls() {
   }
   if (told.free.length > 1) place.append(check("Logarithmic colours", state.isLog, (isLog) => update({ isLog })));
   byId("panel-controls").replaceChildren(
-    choice("Signal of spectrum and waveform", Object.entries(told.signals), state.signal, (signal) => update({ signal })),
+    choice("Signal of spectrum and waveform", Object.entries(told.signals).map(([name, { label }]) => [name, label]), state.signal, (signal) => update({ signal })),
     check("Logarithmic amplitudes", state.isLogSpectrum, (isLogSpectrum) => update({ isLogSpectrum })),
     check("Orders instead of Hz", state.isOrder, (isOrder) => update({ isOrder })),
   );
@@ -266,6 +266,8 @@ async function begin() {
     });
   }
   await update({});
+  // What the figures showed before they had any data would stay behind at their edges.
+  for (const { view } of charts) view.request_layout();
 }
 
 begin().catch((error) => {

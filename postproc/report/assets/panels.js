@@ -41,12 +41,16 @@ class Panel {
 class Plane extends Panel {
   async start(add) {
     await this.build({}, add);
-    for (const axis of [this.figure.xaxis, this.figure.yaxis]) axis.ticker = new Bokeh.BasicTicker({ desired_num_ticks: 4 });
+    for (const side of ["x", "y"]) setTicker(this.figure, side, new Bokeh.BasicTicker({ desired_num_ticks: 4 }));
     for (const side of ["inner_width", "inner_height"]) this.figure.properties[side].change.connect(() => this.fit());
   }
 
-  around(y, z, reach) {
-    this.window = { y, z, reach };
+  // Show all points, with a margin, and no less than `least` to either side.
+  frame(y, z, margin, least = 0) {
+    const ends = (v) => [Math.min(...v), Math.max(...v)];
+    const [[bottom, top], [left, right]] = [ends(y), ends(z)];
+    const reach = Math.max((margin * Math.max(top - bottom, right - left)) / 2, least);
+    this.window = { y: (bottom + top) / 2, z: (left + right) / 2, reach };
     this.fit();
   }
 
@@ -58,7 +62,8 @@ class Plane extends Panel {
     setRange(this.figure.y_range, y - (reach * height) / short, y + (reach * height) / short);
   }
 
-  label(unit) {
+  label() {
+    const { unit } = told.signals.vertical;
     this.figure.xaxis.axis_label = `Horizontal (${unit})`;
     this.figure.yaxis.axis_label = `Vertical (${unit})`;
   }
@@ -99,14 +104,15 @@ class Orbit extends Plane {
     const turns = y.map((_, i) => i).filter((i) => i % record.samples === 0);
     this.marks.data = { y: turns.map((i) => y[i]), z: turns.map((i) => z[i]) };
     this.first.data = { y: [y[0]], z: [z[0]] };
-    this.bench(clearance * vertical.factor, vertical.factor, record.places ?? told.places, reach);
-    this.label(vertical.unit);
-    this.around(0, 0, reach);
+    const { unit, factor } = told.signals.vertical;
+    const faces = this.bench(clearance * factor, factor, record.places ?? told.places, reach);
+    this.label();
+    this.frame([0, ...y, ...faces.map((p) => p[1])], [0, ...z, ...faces.map((p) => p[0])], 1.12);
     const n = y.length / record.samples;
-    this.describe(`${n} revolutions, reaching ${withUnit(reach / 1.15, vertical.unit)}; clearance ${withUnit(clearance * vertical.factor, vertical.unit)}`);
+    this.describe(`${n} revolutions, reaching ${withUnit(reach / 1.15, unit)}; clearance ${withUnit(clearance * factor, unit)}`);
   }
 
-  // The circle of the clearance, and the face of each stator.
+  // The circle of the clearance, and the face of each stator; returns the corners of what is seen.
   bench(gap, factor, places, reach) {
     const isSeen = gap > 0 && gap < 3 * reach;
     const turn = isSeen ? Array.from({ length: 121 }, (_, i) => (i * Math.PI) / 60) : [];
@@ -118,6 +124,7 @@ class Orbit extends Plane {
       return [corner(near, -half), corner(near, half), corner(far, half), corner(far, -half)];
     });
     this.faces.data = { zs: faces.map((f) => f.map((p) => p[0])), ys: faces.map((f) => f.map((p) => p[1])) };
+    return faces.flat();
   }
 }
 
@@ -136,12 +143,9 @@ class Section extends Plane {
     this.say("");
     const y = vertical.values, z = horizontal.values;
     this.points.data = { y, z };
-    this.label(vertical.unit);
-    const middle = (v) => (Math.min(...v) + Math.max(...v)) / 2;
-    const half = (v) => (Math.max(...v) - Math.min(...v)) / 2;
+    this.label();
     // Points of a periodic motion differ by rounding; they are not to fill the panel.
-    const least = 0.03 * Math.max(...y.map(Math.abs), ...z.map(Math.abs), 1e-12);
-    this.around(middle(y), middle(z), Math.max(1.25 * Math.max(half(y), half(z)), least));
+    this.frame(y, z, 1.25, 0.03 * Math.max(...y.map(Math.abs), ...z.map(Math.abs), 1e-12));
     this.describe(`${y.length} points, one a revolution`);
   }
 }
@@ -153,7 +157,7 @@ class Spectrum extends Panel {
       this.names = source({ x: [], y: [], text: [] });
       this.modes = source({ x: [], low: [], high: [] });
       this.modeNames = source({ x: [], y: [], text: [] });
-      figure.xaxis.ticker = new Bokeh.BasicTicker({ desired_num_ticks: 5 });
+      setTicker(figure, "x", new Bokeh.BasicTicker({ desired_num_ticks: 5 }));
       const upright = { x0: { field: "x" }, x1: { field: "x" }, y0: { field: "low" }, y1: { field: "high" } };
       const modes = figure.segment({ ...upright, source: this.modes, line_dash: "dashed" });
       figure.segment({ ...upright, source: this.lines, line_width: 1.8, line_color: { field: "color" } });
@@ -188,16 +192,16 @@ class Spectrum extends Panel {
     }));
     this.lines.data = data;
     this.figure.y_scale = isLog ? this.y_scales.log : this.y_scales.linear;
-    this.figure.yaxis.ticker = isLog ? new Bokeh.LogTicker() : new Bokeh.BasicTicker({ desired_num_ticks: 5 });
+    setTicker(this.figure, "y", isLog ? new Bokeh.LogTicker() : new Bokeh.BasicTicker({ desired_num_ticks: 5 }));
     this.figure.yaxis.formatter = isLog ? new Bokeh.LogTickFormatter() : new Bokeh.BasicTickFormatter();
     const end = last * rate;
     setRange(this.figure.x_range, 0, end);
     setRange(this.figure.y_range, floor, isLog ? top * 6 : top * 1.18);
     this.figure.xaxis.axis_label = isOrder ? "Order (multiples of spin speed)" : "Frequency (Hz)";
-    this.figure.yaxis.axis_label = `Amplitude (${shown[0].unit})`;
+    this.figure.yaxis.axis_label = `Amplitude (${told.signals[signal].unit})`;
     const strongest = this.name(shown[0], spacing, rate, end, top);
     this.mark(isOrder ? 2 * Math.PI / spin : 1, end, floor, isLog ? top * 6 : top * 1.18);
-    this.heading.textContent = `Spectrum: ${told.signals[signal]}`;
+    this.heading.textContent = `Spectrum: ${told.signals[signal].label}`;
     this.describe(strongest.length ? `strongest lines ${strongest.join(", ")}` : "no lines");
   }
 
@@ -212,7 +216,7 @@ class Spectrum extends Panel {
     }
     const text = named.map((i) => orderName((i + 1) * spacing, spacing / 2));
     this.names.data = { x: named.map((i) => (i + 1) * spacing * rate), y: named.map((i) => a[i]), text };
-    return named.map((i, k) => `${text[k]} ${withUnit(a[i], s.unit)}`);
+    return named.map((i, k) => `${text[k]} ${withUnit(a[i], told.signals[s.name].unit, 3)}`);
   }
 
   mark(rate, end, floor, top) {
@@ -234,37 +238,38 @@ class Waveform extends Panel {
       figure.multi_line({ xs: { field: "xs" }, ys: { field: "ys" }, line_color: { field: "color" }, line_width: 1.3, source: this.curves });
       return () => (shade.glyph.fill_color = ink("shade"));
     });
-    this.figure.yaxis.ticker = new Bokeh.BasicTicker({ desired_num_ticks: 5 });
+    setTicker(this.figure, "y", new Bokeh.BasicTicker({ desired_num_ticks: 5 }));
   }
 
   draw(record, { signal, spin }) {
     const shown = record.waves.filter((w) => w.name === signal);
     if (!shown.length) return this.say(notKept("waveform", signal));
     this.say("");
-    const n = shown[0].n, x = Array.from({ length: n }, (_, i) => i / record.samples);
+    const { label, unit } = told.signals[signal];
+    const n = Math.min(shown[0].n, record.shown * record.samples), x = Array.from({ length: n }, (_, i) => i / record.samples);
     this.curves.data = {
-      xs: shown.map(() => x), ys: shown.map((w) => w.values), color: shown.map((_, k) => ink(CURVES[k % CURVES.length])),
+      xs: shown.map(() => x), ys: shown.map((w) => w.values.slice(-n)), color: shown.map((_, k) => ink(CURVES[k % CURVES.length])),
     };
-    this.contacts.data = this.touches(record);
+    this.contacts.data = this.touches(record, n);
     let low = Infinity, high = -Infinity;
-    for (const w of shown) for (const value of w.values) { low = Math.min(low, value); high = Math.max(high, value); }
+    for (const w of shown) for (const value of w.values.slice(-n)) { low = Math.min(low, value); high = Math.max(high, value); }
     const margin = 0.06 * (high - low || Math.abs(high) || 1);
     setRange(this.figure.x_range, 0, n / record.samples);
     setRange(this.figure.y_range, low - margin, high + margin);
     this.figure.xaxis.axis_label = "Revolutions";
-    this.figure.yaxis.axis_label = `${told.signals[signal]} (${shown[0].unit})`;
+    this.figure.yaxis.axis_label = `${label} (${unit})`;
     this.heading.textContent = "Waveform, contact shaded";
     const seconds = ((n / record.samples) * 2 * Math.PI) / spin;
-    this.describe(`${told.signals[signal]} over ${written(n / record.samples)} revolutions (${written(1e3 * seconds)} ms), from ${withUnit(low, shown[0].unit)} to ${withUnit(high, shown[0].unit)}`);
+    this.describe(`${label} over ${written(n / record.samples)} revolutions (${written(1e3 * seconds)} ms), from ${withUnit(low, unit)} to ${withUnit(high, unit)}`);
   }
 
-  touches(record) {
-    const forces = record.waves.filter((w) => w.name === "contact_force");
+  touches(record, n) {
+    const forces = record.waves.filter((w) => w.name === "contact_force").map((w) => w.values.slice(-n));
     const found = { x0: [], x1: [] };
     if (!forces.length) return found;
     let start = null;
-    for (let i = 0; i <= forces[0].n; i++) {
-      const touching = i < forces[0].n && forces.some((f) => f.values[i] > 0);
+    for (let i = 0; i <= n; i++) {
+      const touching = i < n && forces.some((values) => values[i] > 0);
       if (touching && start === null) start = i;
       if (!touching && start !== null) {
         found.x0.push((start - 0.5) / record.samples);
@@ -278,6 +283,6 @@ class Waveform extends Panel {
 
 function notKept(role, signal) {
   const what = { waveform: "waveforms", spectrum: "spectra", section: "sections" }[role];
-  if (told.kept.includes(role)) return `No ${what} of ${(told.signals[signal] ?? "this signal").toLowerCase()} here`;
+  if (told.kept.includes(role)) return `No ${what} of ${(told.signals[signal]?.label ?? "this signal").toLowerCase()} here`;
   return `The store keeps no ${what}: put "${role}" into [record] keep`;
 }
