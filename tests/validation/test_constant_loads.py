@@ -165,6 +165,21 @@ def test_rub_under_gravity_balances_and_goes_on_from_its_end(method):
     assert rest.vertical == pytest.approx(whole.vertical[4 * 256 :], abs=1e-6 * scale)
 
 
+def test_mean_of_a_rub_is_the_sag_less_what_contact_holds_up():
+    """E1 under gravity: over whole periods inertia and unbalance average out."""
+    rig = heavy(**{"stator.angle": math.pi})
+    record = simulate(rig, speed_ratio=1.5, clearance="250 um", friction=0.2, transient=60, revolutions=32)
+    force = record.contact_force.mean()
+    assert record.period > 0
+    assert force > 10.0
+    stiffness = 143343.35
+    assert record.vertical.mean() == pytest.approx(
+        sag_at(rig, 8) + force / stiffness, abs=1e-4 * force / stiffness
+    )
+    assert record.horizontal.mean() == pytest.approx(0.2 * force / stiffness, rel=1e-3)
+    assert record.torsion.mean() == pytest.approx(-0.2 * 0.06 * force / 3125.88, rel=1e-3)
+
+
 def test_matrices_take_gravity_and_loads_like_the_beam():
     rig = heavy()
     body_ = assemble(rig).rotor
