@@ -48,18 +48,21 @@ def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) ->
     ----------
     vertical, horizontal : (n_revolution * samples_per_revolution,), m
     """
-    signals = np.stack([vertical, horizontal])
+    signals = vertical - vertical.mean(), horizontal - horizontal.mean()
     n_revolution = vertical.size // samples_per_revolution
-    most = PERIOD_TOLERANCE**2 * float(np.var(signals, axis=1).sum())
+    most = PERIOD_TOLERANCE**2 * sum(float(signal @ signal) for signal in signals) / vertical.size
+
+    def distance(shift: int, end: int) -> float:
+        """Sum of the square distances between the first samples, up to `end`, and those a shift later."""
+        changes = [signal[shift : shift + end] - signal[:end] for signal in signals]
+        return sum(float(change @ change) for change in changes)
+
     for n in range(1, min(LONGEST_PERIOD, n_revolution - 1) + 1):
         shift = n * samples_per_revolution
-        most_in_all = most * (vertical.size - shift)
+        n_pair = vertical.size - shift
         # The first revolution alone mostly tells that there is no such period.
-        first = signals[:, shift : shift + samples_per_revolution] - signals[:, :samples_per_revolution]
-        if np.square(first).sum() <= most_in_all:
-            change = signals[:, shift:] - signals[:, :-shift]
-            if np.square(change).sum() <= most_in_all:
-                return n
+        if all(distance(shift, end) <= most * n_pair for end in (samples_per_revolution, n_pair)):
+            return n
     return 0
 
 

@@ -93,17 +93,17 @@ class ModalMarch(March):
 
     def final(self) -> State:
         """State at the sample reached, as far as contact and outputs see it."""
-        setup, n = self._setup, self.bodies.stiffness.shape[0]
-        motion = self._current_motion()
-        bodies = [setup.model.rotor, *(stator.body for stator in setup.model.stators)]
-        ends = np.cumsum([body.n_dof for body in bodies])[:-1]
-        displacement = np.split(setup.reduced.basis @ motion[:n], ends)
-        velocity = np.split(setup.reduced.basis @ motion[n:], ends)
+        setup = self._setup
+        motion = setup.reduced.basis @ self._current_motion().reshape(2, -1).T  # (n_all, 2)
+        bodies, first = [], 0
+        for body in (setup.model.rotor, *(stator.body for stator in setup.model.stators)):
+            bodies.append(motion[first : first + body.n_dof].T.copy())
+            first += body.n_dof
         return State(
-            rotor_displacement=displacement[0] + setup.model.sag,
-            rotor_velocity=velocity[0],
-            stator_displacement=tuple(displacement[1:]),
-            stator_velocity=tuple(velocity[1:]),
+            rotor_displacement=bodies[0][0] + setup.model.sag,
+            rotor_velocity=bodies[0][1],
+            stator_displacement=tuple(displacement for displacement, _ in bodies[1:]),
+            stator_velocity=tuple(velocity for _, velocity in bodies[1:]),
             contact_force=self._contact_force(),
         )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rubhpc.integrate.gather import empty_samples, empty_tally
 from rubhpc.integrate.modal import NoClosedForm
-from rubhpc.kernels.neighbours import RATIO, Pair, part
+from rubhpc.kernels.neighbours import Pair, part
 from rubhpc.kernels.phases import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -25,6 +25,8 @@ from rubhpc.kernels.sampling import recorder
 if TYPE_CHECKING:
     from rubhpc.integrate.modal import ModalMarch
 
+N_SPAN = 4  # passed by one kernel call
+
 
 class ModalNeighbours:
     """The motion of a march from where it stands on, and one beside it."""
@@ -39,21 +41,36 @@ class ModalNeighbours:
             z=np.zeros((2, 2, n_coordinate)),
             z_next=np.zeros((2, n_coordinate)),
             motion=np.zeros((2, n_motion)),
-            apart=np.zeros(2),
+            size=np.zeros(1),
+            ratio=np.zeros(N_SPAN),
+            n_done=np.full(1, N_SPAN),
         )
+        self._n_read = N_SPAN
         self._pair.progress[:, [WANTED, SPAN]] = -1
         self._pair.progress[0, PHASE], self._pair.z[0] = march.place()
         self._unrecorded = recorder(q), empty_samples(q, 0), empty_tally(q)
 
     def part(self, n_revolution: int) -> float | None:
-        """Go on with both; see `lyapunov.Neighbours`.
+        """Go on with both; see `lyapunov.Neighbours`. Several spans are passed ahead, all of one length.
 
         Raises
         ------
         NoClosedForm
             Only short steps can follow one of them.
         """
+        if self._n_read == N_SPAN:
+            self._pass_spans(n_revolution)
+            self._n_read = 0
+        if self._n_read == self._pair.n_done[0]:
+            return None
+        ratio = float(self._pair.ratio[self._n_read])
+        self._n_read += 1
+        return ratio if math.isfinite(ratio) else None
+
+    def _pass_spans(self, n_revolution: int) -> None:
+        """Fill the ratios, as far as both motions go on."""
         march, pair = self._march, self._pair
+        pair.n_done[0] = 0
         n_tick = n_revolution * march.clock.samples_per_revolution << march.clock.sample_level
         outcome = -1
         while outcome != FINISHED:
@@ -63,11 +80,12 @@ class ModalNeighbours:
             if outcome in (CONTACT_UNSOLVED, SLIP_TURNED):
                 raise NoClosedForm
             if outcome == DIVERGED:
-                return None
+                return
+            if march.is_beyond(pair.motion[0]):
+                pair.n_done[0] = 0
+                return
             if outcome != FINISHED:
                 self._tabulate()
-        ratio = float(pair.apart[RATIO])
-        return ratio if math.isfinite(ratio) and not march.is_beyond(pair.motion[0]) else None
 
     def _tabulate(self) -> None:
         """Have the phases tabulated that are wanted.

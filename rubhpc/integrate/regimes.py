@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-LEAST_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that tells more than a period
+LEAST_REVOLUTIONS = LONGEST_PERIOD  # of a record without a period that is worth following further
+TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may tell a torus, or a longer period, by itself
 N_FIRST, N_ALL = 16, 64  # spans whose growth is measured, and where those leave it open
 CLEAR = 0.05  # per revolution: an exponent beyond that over 16 spans keeps its sign
 ZERO = 0.01  # per revolution: an exponent within that over 64 spans is none
@@ -38,7 +39,9 @@ def regime(
 ) -> tuple[int, float]:
     """Flag of `schema.REGIME`, and the largest Lyapunov exponent where that had to be measured (else NaN).
 
-    A record shorter than 32 revolutions without a period leaves the motion undecided.
+    A record shorter than 16 revolutions without a period leaves the motion undecided: it does not even tell
+    all periods. From 16 to 31 the growth alone decides, for it is measured beyond the record; a longer
+    record may tell a torus, or a period beyond 16, by itself.
 
     Parameters
     ----------
@@ -54,14 +57,16 @@ def regime(
         return REGIME.index("periodic"), math.nan
     if vertical.size < LEAST_REVOLUTIONS * samples_per_revolution:
         return REGIME.index("undecided"), math.nan
-    distances = cycle_distances(vertical, horizontal, samples_per_revolution)
-    size = float(np.var(vertical) + np.var(horizontal))
-    if returns(distances).min() <= PERIOD_TOLERANCE**2 * size:
-        return REGIME.index("periodic"), math.nan  # of more than 16 revolutions
+    distances = None
+    if vertical.size >= TORUS_REVOLUTIONS * samples_per_revolution:
+        distances = cycle_distances(vertical, horizontal, samples_per_revolution)
+        size = float(np.var(vertical) + np.var(horizontal))
+        if returns(distances).min() <= PERIOD_TOLERANCE**2 * size:
+            return REGIME.index("periodic"), math.nan  # of more than 16 revolutions
     spans = iter(growth)
     grown = list(islice(spans, N_FIRST))
     if len(grown) == N_FIRST and abs(np.mean(grown)) < CLEAR:
-        if is_torus(distances):
+        if distances is not None and is_torus(distances):
             return REGIME.index("quasi_periodic"), float(np.mean(grown))
         grown += islice(spans, N_ALL - N_FIRST)
     if len(grown) not in (N_FIRST, N_ALL):

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 MOST_PHASES = 256  # sets of closed contacts of one speed and friction
 MOST_BYTES = 2**30  # of their tables
+GONE = -40.0  # exponent of what has died away
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
 
 
@@ -107,6 +108,7 @@ def tabulate(
         rate_re=rate.real,
         rate_im=rate.imag,
         bound=np.abs(switch) * np.abs(exponent) ** 2 * growth,
+        pace=np.where(exponent.real * tick * 2**kernel.FORCED_LEVEL < GONE, kernel.DYING, np.abs(exponent)),
         power_re=power.real,
         power_im=power.imag,
         output=_outputs(reduced, exponent, motion, tick * 2.0**sample_level),

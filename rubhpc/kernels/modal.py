@@ -20,10 +20,13 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_sum
 from rubhpc.kernels.events import change_contacts
 from rubhpc.kernels.phases import (
+    AGE,
     CONTACT_UNSOLVED,
     DIVERGED,
     ENTERED,
+    FINE,
     FINISHED,
+    FORCED_LEVEL,
     N_STEP,
     NEXT_SAMPLE,
     PHASE,
@@ -51,6 +54,7 @@ from rubhpc.kernels.sampling import (
     begin_span,
     end_span,
     observe_step,
+    resolved_contact,
     take_samples,
 )
 
@@ -60,7 +64,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-FORCED_LEVEL = 6  # steps of up to 2^level ticks follow an event unquestioned, so that time goes on
 MOST_EVENTS = 200_000  # in one call; more is chatter without end
 GAP_TOLERANCE = 1e-13  # m
 
@@ -93,7 +96,7 @@ def advance(
     ----------
     is_recorded : bool
         Whether to fill `samples` and `tally`.
-    progress : (7,)
+    progress : (N_PROGRESS,)
         See `kernels.phases`. Where a set of contacts is met that is not tabulated, PHASE_WANTED is returned
         with the motion in `motion` (2 n,); the caller adds the phase and calls again.
     z, z_next : (2, m)
@@ -128,7 +131,7 @@ def advance(
     if is_recorded and wanted < 0:
         if progress[SPAN] < 0:
             begin_span(phases, p, t, z, progress, recorder)
-        begin_contact(phases, reduced, p, clock.spin, z_re, z_im, recorder)
+        begin_contact(phases, reduced, p, clock.spin, z, z_next, recorder)
     while True:
         if wanted >= 0:  # go over to another set of contacts
             angle = sense * 2.0 * np.pi * (t % ticks_per_revolution) / ticks_per_revolution
@@ -139,11 +142,11 @@ def advance(
             p = found
             enter(phases, p, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
             progress[PHASE], progress[WANTED], progress[ENTERED] = p, -1, t
-            wanted = -1
+            wanted, progress[AGE] = -1, -1
             is_forced, is_halving = True, False
             if is_recorded:
                 begin_span(phases, p, t, z, progress, recorder)
-                begin_contact(phases, reduced, p, clock.spin, z_re, z_im, recorder)
+                begin_contact(phases, reduced, p, clock.spin, z, z_next, recorder)
         is_sample = is_recorded and t == progress[NEXT_SAMPLE] << sample_level
         if t >= last_tick:
             if is_recorded and t == end_tick:
@@ -161,7 +164,10 @@ def advance(
         if is_recorded and not is_free:
             # What an impact sets off is fast at first: no step is longer than the contact has lasted.
             age = floor_log2(max(1, t - progress[ENTERED]))
-            level = min(level, clock.contact_level, max(age, clock.blind_level))
+            if age != progress[AGE]:
+                resolved = min(resolved_contact(phases, p, z_re, z_im) / tick, 1.0 * (1 << highest_level))
+                progress[AGE], progress[FINE] = age, floor_log2(int(max(1.0, resolved)))
+            level = min(level, clock.contact_level, max(age, clock.blind_level), progress[FINE])
         is_proved = False
         if is_forced:
             level, is_forced, is_proved = min(level, FORCED_LEVEL), False, True

@@ -20,19 +20,18 @@ Ints = NDArray[np.int64]
 
 DISPLACED = 1e-5  # of the motion: far above the resolution of events, far below the motion's features
 LOST = 1e-6  # of the displacement: what is left is rounding
-SIZE, RATIO = 0, 1  # of `Pair.apart`
 
 
 class Pair(NamedTuple):
     """A motion and its neighbour, m modal coordinates and n reduced degrees."""
 
-    progress: Ints  # (2, 7), as `kernels.phases` has it
+    progress: Ints  # (2, N_PROGRESS), as `kernels.phases` has it
     z: Floats  # (2, 2, m)
     z_next: Floats  # (2, m), work space
     motion: Floats  # (2, 2 n), reduced displacements and velocities where a phase is to be entered
-    apart: (
-        Floats  # (2,), size of the displacement a span begins with (0: none yet), and the last span's ratio
-    )
+    size: Floats  # (1,), of the displacement that a span begins with; 0: none yet
+    ratio: Floats  # (n_span,), distance at a span's end over that at its beginning
+    n_done: Ints  # (1,), spans passed
 
 
 @jit_sum
@@ -46,9 +45,9 @@ def part(
     samples: Samples,
     tally: Tally,
 ) -> int:
-    """Advance both motions by a span of whole revolutions, and bring the neighbour back to where it began.
+    """Advance both motions by spans of `n_tick`, whole revolutions, until `pair.ratio` is full.
 
-    `pair.apart[RATIO]` is the distance at the span's end over that at its beginning. Distance is the root of
+    After each span the neighbour is brought back to where it began. Distance is the root of
     v'v + spin^2 u'u in reduced coordinates, in which the mass matrix is the identity.
 
     Returns
@@ -57,37 +56,39 @@ def part(
         An outcome of `kernels.modal.advance`; with PHASE_WANTED call again once the phase is tabulated.
     """
     progress = pair.progress
-    if pair.apart[SIZE] == 0.0:
+    if pair.size[0] == 0.0:
         read_motion(phases, progress[0, PHASE], pair.z[0], pair.motion[0])
         displace(phases, clock.spin, pair)
-    for k in range(2):
-        if progress[k, TIME] < n_tick or progress[k, WANTED] >= 0:
-            outcome = advance(
-                phases,
-                reduced,
-                clock,
-                progress[k, TIME],
-                n_tick,
-                False,
-                progress[k],
-                pair.z[k],
-                pair.z_next,
-                pair.motion[k],
-                recorder,
-                samples,
-                tally,
-            )
-            if outcome != FINISHED:
-                return outcome
-    for k in range(2):
-        read_motion(phases, progress[k, PHASE], pair.z[k], pair.motion[k])
-    ratio = distance(pair.motion, clock.spin) / pair.apart[SIZE]
-    pair.apart[RATIO] = ratio
-    if ratio > LOST:
-        bring_back(phases, ratio, pair)
-    else:
-        displace(phases, clock.spin, pair)
-    progress[:, TIME] = 0
+    while pair.n_done[0] < pair.ratio.size:
+        for k in range(2):
+            if progress[k, TIME] < n_tick or progress[k, WANTED] >= 0:
+                outcome = advance(
+                    phases,
+                    reduced,
+                    clock,
+                    progress[k, TIME],
+                    n_tick,
+                    False,
+                    progress[k],
+                    pair.z[k],
+                    pair.z_next,
+                    pair.motion[k],
+                    recorder,
+                    samples,
+                    tally,
+                )
+                if outcome != FINISHED:
+                    return outcome
+        for k in range(2):
+            read_motion(phases, progress[k, PHASE], pair.z[k], pair.motion[k])
+        ratio = distance(pair.motion, clock.spin) / pair.size[0]
+        pair.ratio[pair.n_done[0]] = ratio
+        pair.n_done[0] += 1
+        if ratio > LOST:
+            bring_back(phases, ratio, pair)
+        else:
+            displace(phases, clock.spin, pair)
+        progress[:, TIME] = 0
     return FINISHED
 
 
@@ -116,7 +117,7 @@ def displace(phases: Phases, spin: float, pair: Pair) -> None:
     for k in range(n):
         pair.motion[1, k] = pair.motion[0, k]
         pair.motion[1, n + k] = (1.0 + DISPLACED) * pair.motion[0, n + k]
-    pair.apart[SIZE] = distance(pair.motion, spin)
+    pair.size[0] = distance(pair.motion, spin)
     pair.progress[1, WANTED] = phases.mask[pair.progress[0, PHASE]]
 
 

@@ -21,13 +21,17 @@ LATERAL_ROW, LATERAL_RATE = 1, 2
 
 FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED, SLIP_TURNED = range(5)  # outcomes
 
-# What a call leaves in `progress` (7,) for the next one: tick reached, phase, set of pairs wanted next (-1:
-# none), steps taken, next sample to take, tick at which the phase began, and that from which energies are
-# still to be added (-1: none).
-N_PROGRESS = 7
-TIME, PHASE, WANTED, N_STEP, NEXT_SAMPLE, ENTERED, SPAN = range(N_PROGRESS)
+# What a call leaves in `progress` for the next one: tick reached, phase, set of pairs wanted next (-1: none),
+# steps taken, next sample to take, tick at which the phase began, that from which energies are still to be
+# added (-1: none), how long the contact had lasted, as a level, when its pace was last seen (-1: never),
+# and level of the longest step that resolved it then.
+N_PROGRESS = 9
+TIME, PHASE, WANTED, N_STEP, NEXT_SAMPLE, ENTERED, SPAN, AGE, FINE = range(N_PROGRESS)
 
 SAMPLES_AT_ONCE = 8  # read from one set of modal coordinates
+FORCED_LEVEL = 6  # steps of up to 2^level ticks follow an event unquestioned, so that time goes on
+RESOLVED = 0.02  # of a signal's size: its fourth derivative times the step to the fourth
+DYING = -1.0  # pace of a mode that is gone before anything is asked after an event
 
 
 class Phases(NamedTuple):
@@ -44,6 +48,7 @@ class Phases(NamedTuple):
     rate_re: Floats  # (p, q, m), its time derivative
     rate_im: Floats
     bound: Floats  # (p, q, m), bound on its second time derivative for a unit coordinate
+    pace: Floats  # (p, m), size of the exponent, 1/s, or DYING
     power_re: Floats  # (p, n_level, m), exponential of each mode over 2^level ticks
     power_im: Floats
     output: Floats  # (p, 2 m, SAMPLES_AT_ONCE o), of the real, then the imaginary parts, sample by sample
@@ -213,6 +218,19 @@ def proved_slip(
     elif rate < 0.0:
         proved = -s / rate
     return float(proved)
+
+
+@jit_inline_sum
+def resolved_time(re: Floats, im: Floats, pace: Floats, z_re: Floats, z_im: Floats) -> float:
+    """Time, s, over which Hermite's cubic follows a signal with these rows (m,) to 1e-4 of its size."""
+    size, bend = 0.0, 0.0
+    for k in range(z_re.size):
+        if pace[k] != DYING:
+            share = np.sqrt((re[k] * re[k] + im[k] * im[k]) * (z_re[k] * z_re[k] + z_im[k] * z_im[k]))
+            size += share
+            square = pace[k] * pace[k]
+            bend += share * square * square
+    return float((RESOLVED * size / bend) ** 0.25) if bend > 0.0 else np.inf
 
 
 @jit_inline_sum

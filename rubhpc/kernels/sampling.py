@@ -21,6 +21,7 @@ from rubhpc.kernels.observe import (
     Tally,
 )
 from rubhpc.kernels.phases import (
+    DYING,
     LATERAL_RATE,
     LATERAL_ROW,
     N_ROTOR_ROW,
@@ -31,6 +32,7 @@ from rubhpc.kernels.phases import (
     Phases,
     Reduced,
     dot,
+    resolved_time,
 )
 
 Floats = NDArray[np.float64]
@@ -165,13 +167,34 @@ def read_contact(
 
 
 @jit_sum
+def resolved_contact(phases: Phases, p: int, z_re: Floats, z_im: Floats) -> float:
+    """Time, s, over which cubics follow force and slip of the pairs closed in phase p."""
+    time = np.inf
+    for i in range(phases.switch_re.shape[1]):
+        if (phases.mask[p] >> i) & 1:
+            pace = phases.pace[p]
+            time = min(
+                time,
+                resolved_time(phases.switch_re[p, i], phases.switch_im[p, i], pace, z_re, z_im),
+                resolved_time(phases.slip_re[p, i], phases.slip_im[p, i], pace, z_re, z_im),
+            )
+    return time
+
+
+@jit_sum
 def begin_contact(
-    phases: Phases, reduced: Reduced, p: int, spin: float, z_re: Floats, z_im: Floats, recorder: Recorder
+    phases: Phases, reduced: Reduced, p: int, spin: float, z: Floats, calm: Floats, recorder: Recorder
 ) -> None:
-    """Read the pairs closed in phase p, at its beginning or where a record begins."""
+    """Read the pairs closed in phase p, at its beginning or where a record begins.
+
+    What dies before the first step ends is left out: no cubic follows it. `calm` (2, m) is work space.
+    """
+    for k in range(z.shape[1]):
+        dies = phases.pace[p, k] == DYING
+        calm[0, k], calm[1, k] = (0.0, 0.0) if dies else (z[0, k], z[1, k])
     for i in range(reduced.radius.size):
         if (phases.mask[p] >> i) & 1:
-            force, rate, slip, slip_rate = read_contact(phases, reduced, p, i, spin, z_re, z_im)
+            force, rate, slip, slip_rate = read_contact(phases, reduced, p, i, spin, calm[0], calm[1])
             recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = force, rate
             recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip, slip_rate
 

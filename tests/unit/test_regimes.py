@@ -121,10 +121,22 @@ def test_slow_growth_is_looked_at_four_times_as_long(rate, expected):
 
 
 def test_short_record_stays_undecided():
-    whirl = torus(GOLDEN)[: 31 * SAMPLES]
+    whirl = torus(GOLDEN)[: 15 * SAMPLES]
     name, exponent = of(whirl, unread())
     assert name == "undecided"
     assert math.isnan(exponent)
+
+
+@pytest.mark.parametrize("revolutions", [16, 31])
+@pytest.mark.parametrize(
+    ("rate", "expected", "n_read"),
+    [(0.3, "chaotic", 16), (-0.3, "periodic", 16), (0.0, "quasi_periodic", 64), (0.03, "chaotic", 64)],
+)
+def test_of_a_record_that_tells_no_torus_the_growth_decides(revolutions, rate, expected, n_read):
+    growth = iter([rate] * 100)
+    whirl = torus(GOLDEN)[: revolutions * SAMPLES]
+    assert of(whirl, growth) == (expected, pytest.approx(rate))
+    assert len(list(growth)) == 100 - n_read
 
 
 def test_motion_next_to_one_that_runs_away_stays_undecided():

@@ -119,14 +119,14 @@ def ring():
 
 
 def test_dry_whip_diverges_in_steady_sliding_and_settles_under_coulombs_law(ring):
-    given = {"speed_ratio": 0.75, "clearance": "60 um", "friction": 0.3, "transient": 0, "keep": "waveform"}
-    sliding = simulate(ring, **given, revolutions=20)
-    assert sliding.status == DIVERGED
-    short = {"revolutions": 20, "method": "central-difference", "step": "2 us"}
-    whip = simulate(ring, **given, **short, friction_law="coulomb")
+    given = {"speed_ratio": 0.75, "clearance": "60 um", "friction": 0.3, "keep": "waveform"}
+    assert simulate(ring, **given, transient=0, revolutions=20).status == DIVERGED
+    steps = {"method": "central-difference", "step": "2 us", "friction_law": "coulomb"}
+    start = simulate(ring, **given, **steps, transient=0, revolutions=2)
+    assert np.abs(start.vertical + 1j * start.horizontal).max() < 0.5e-3
+    whip = simulate(ring, **given, **steps, transient=8, revolutions=12)  # too few to have its regime measured
     assert whip.status == DONE
-    orbit = np.abs(whip.vertical + 1j * whip.horizontal).reshape(20, -1).max(axis=1)
-    assert orbit[:2].max() < 0.5e-3
+    orbit = np.abs(whip.vertical + 1j * whip.horizontal).reshape(12, -1).max(axis=1)
     assert orbit[-4:] == pytest.approx(np.full(4, orbit[-1]), rel=0.1)  # no longer growing
     assert orbit[-1] < 2e-3
     assert whip.minimum_slip_speed.max() < 0.0  # the rim rolls and slips backwards
