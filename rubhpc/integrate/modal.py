@@ -206,7 +206,6 @@ class ModalMarch(March):
     def _reduce(self, state: State) -> Floats:
         """Reduced coordinates and velocities of a state."""
         project = self._setup.reduced.project
-        moved = state.rotor_displacement - self._setup.model.sag
-        displacement = np.concatenate([moved, *state.stator_displacement])
-        velocity = np.concatenate([state.rotor_velocity, *state.stator_velocity])
-        return np.concatenate([project @ displacement, project @ velocity])
+        displacement = state.displacement
+        displacement[: self._setup.model.sag.size] -= self._setup.model.sag
+        return np.concatenate([project @ displacement, project @ state.velocity])

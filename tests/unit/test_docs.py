@@ -77,6 +77,7 @@ def in_store_document(variable: Variable) -> list[str]:
         ("Spectra", {"spectrum"}),
         ("Poincaré sections", {"section"}),
         ("State and measures", {"flag", "scalar"}),
+        ("Final state", {"state"}),
         ("Settings", {"setting"}),
     ],
 )

@@ -9,13 +9,14 @@ from lone_bodies import body, set_up, set_up_modal, tip
 
 from rubhpc import InputError, Load, LumpedStator, Rig, assemble, read_rig, simulate
 from rubhpc.fem.statics import sag_at_stators
+from rubhpc.integrate.carry import at_rest
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.packing import degrees_of
+from rubhpc.integrate.prepare import prepare
 from rubhpc.integrate.record import State
-from rubhpc.integrate.rest import state_at_rest
 from rubhpc.kernels.contact import normal_and_gap
 from rubhpc.rig import Bearing, Rotor, ShaftSection, with_keys
-from rubhpc.study import Contact, Recording
+from rubhpc.study import Contact, Integrator, Recording
 
 G = 9.81  # m/s2
 METHODS = ["modal", "central-difference"]
@@ -135,14 +136,19 @@ def test_shaft_at_rest_on_a_stator_stays_there(method, normal):
     """Rotor and stator share the sag as two springs do, and nothing moves from there."""
     rig = heavy(**{"stator.angle": math.pi, "rotor.unbalance.mass": 0.0})
     gap, sag = 1e-4, -sag_at(rig, 8)
-    rest = state_at_rest(assemble(rig), gap)
+    step = 1e-6 if method == "central-difference" else None
+    setup = prepare(
+        rig,
+        150.0,
+        contact=Contact(normal=normal),
+        integrator=Integrator(method=method, step=step),
+        samples_per_revolution=256,
+    )
+    rest = at_rest(setup, gap)
     stiffness = 3e9 * 25e-6 / 0.04
     assert rest.contact_force == pytest.approx([(sag - gap) / (1 / 143343.35 + 1 / stiffness)], rel=1e-4)
-    case = {"step": "1 us"} if method == "central-difference" else {}
-    record = simulate(
-        rig, speed=150.0, clearance=gap, friction=0.0, method=method, normal=normal, transient=0,
-        revolutions=1, **case,
-    )  # fmt: skip
+    recording = Recording(transient=0, revolutions=1)
+    record = run_case(setup, clearance=gap, friction=0.0, recording=recording)
     assert record.contact_fraction == pytest.approx([1.0])
     stands = -gap - rest.contact_force[0] / stiffness
     # The force of short steps comes in kicks, the first of which is half a step early.
