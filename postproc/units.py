@@ -75,6 +75,8 @@ _SHORT = {
     "status": "Status",
     "validity": "Validity",
     "energy_residual": "Energy balance residual",
+    "contact_iterations": "Contact iterations",
+    "contact_residual": "Contact residual",
 }
 _SYMBOLS = {
     "speed_ratio": "r",

@@ -54,7 +54,10 @@ def failures(store: xr.Dataset, axes: list[dict[str, Any]]) -> list[dict[str, An
     told = []
     for code, meaning in (
         (FAILED, "failed: no result"),
-        (DIVERGED, "diverged: the motion grew without bound, which is a result"),
+        (
+            DIVERGED,
+            "diverged: the motion grew without bound, or its contact has no solution, which is a result",
+        ),
     ):
         flats = np.flatnonzero(status == code)
         if flats.size:

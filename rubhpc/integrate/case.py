@@ -7,9 +7,10 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rubhpc.integrate.carry import carried, with_overlap
+from rubhpc.integrate.carry import at_rest, carried, with_overlap
 from rubhpc.integrate.central import CentralDifferenceMarch
 from rubhpc.integrate.gather import (
+    add_sag,
     by_name,
     diverged_record,
     empty_samples,
@@ -60,13 +61,13 @@ def run_case(
     friction : float
         Coefficient of friction.
     initial : State, optional
-        Where to start, with the unbalance at its phase 0; default at rest. Where another case has ended is
-        fitted to the gaps of this one (`carry.carried`).
+        Where to start, with the unbalance at its phase 0; default at rest (`carry.at_rest`). Where another
+        case has ended is fitted to the gaps of this one (`carry.carried`).
     check : callable, optional
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
     """
     began = time.perf_counter()
-    initial = State.at_rest(setup.model) if initial is None else carried(initial, setup, clearance)
+    initial = at_rest(setup, clearance) if initial is None else carried(initial, setup, clearance)
 
     def start(state: State) -> March:
         return _march(setup, clearance, friction, state, check)
@@ -130,6 +131,7 @@ def _integrate(
             f"{reason} in revolution {revolution}", n_stator, recording, settings, march.final()
         )
     else:
+        add_sag(samples, tally, setup.model)
         signals, final = by_name(samples.whole), march.final()
         record = Record(
             status=DONE,

@@ -20,11 +20,13 @@ from rubhpc.kernels.contact import N_DEGREE, Pairs, Workspace, fill_start, is_an
 from rubhpc.kernels.contact_step import is_plain, solve_contact
 from rubhpc.kernels.observe import (
     DAMPING_LOSS,
+    STEP,
     TWIST_ACCELERATION,
     UNBALANCE_WORK,
     Samples,
     Tally,
     observe_contact,
+    observe_solution,
 )
 from rubhpc.kernels.phases import (
     CONTACT_UNSOLVED,
@@ -193,6 +195,7 @@ def advance_stepped(
                 pairs.axis_z,
                 pairs.radius,
                 pairs.clearance,
+                pairs.aside,
                 pairs.is_updated,
                 after,
                 work.at,
@@ -212,6 +215,8 @@ def advance_stepped(
                 progress[TIME] = t
                 return CONTACT_UNSOLVED
             is_touching = n_touching > 0
+            if is_recorded:
+                observe_solution(STEP, int(work.solution[0]), work.solution[1], work.solution[2], tally)
             for i in range(q):
                 for d in range(N_DEGREE):
                     b = i * N_DEGREE + d
