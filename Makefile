@@ -7,11 +7,11 @@ STORE := quickstart.zarr
 FIGURES := figures
 PAPER := paper
 
-.PHONY: help demo paper test lint bench clean
+.PHONY: help demo paper test lint bench bench-scale clean
 .DEFAULT_GOAL := help
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(VENV)/.installed ## a first study on two cores, and two figures of it
 	$(BIN)/mpirun -n $(RANKS) $(BIN)/rubhpc jobs/quickstart.toml --output $(STORE)
@@ -42,8 +42,11 @@ lint: $(VENV)/.ready ## style, types and the layers of imports
 bench: $(VENV)/.ready ## timings
 	$(BIN)/python -m pytest tests/bench -m bench --benchmark-columns=min,median,rounds
 
+bench-scale: $(VENV)/.ready ## reductions of 100 000 cases: s, GB/s, share of the disk's rate, memory; into bench-scale.md
+	$(BIN)/python tests/bench/reductions.py --table bench-scale.md
+
 clean: ## remove .venv, caches, and what demo and paper made
-	rm -rf $(VENV) $(VENV)-openmpi $(STORE) $(FIGURES) $(PAPER) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \
+	rm -rf $(VENV) $(VENV)-openmpi $(STORE) $(FIGURES) $(PAPER) bench-scale.md build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \
 		.benchmarks .hypothesis
 	find rubhpc postproc tests -name __pycache__ -type d -prune -exec rm -rf {} +
 

@@ -53,6 +53,7 @@ _SHORT = {
     "friction": "Friction coefficient",
     "stator_youngs_modulus": "Stator modulus $E_s$",
     "whirl": "Whirl",
+    "case": "Case",
     "frequency": "Frequency",
     "order": "Order (multiples of spin speed)",
     "revolution": "Revolution",
@@ -74,6 +75,8 @@ _SHORT = {
     "status": "Status",
     "validity": "Validity",
     "energy_residual": "Energy balance residual",
+    "contact_iterations": "Contact iterations",
+    "contact_residual": "Contact residual",
 }
 _SYMBOLS = {
     "speed_ratio": "r",

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import re
-import struct
 from dataclasses import Field, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
 from rubhpc.input.dotted import find_key
 from rubhpc.input.fields import check_value, nearest, parse_field, place, quantity
+from rubhpc.input.quantity import brief
 from rubhpc.input.ranges import MOST_VALUES, RANGE_KEYS, Range, read_ends, read_range
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from rubhpc.rig import Rig
 
@@ -41,6 +40,12 @@ _LONG_NAMES = {
 }
 SPEED_AXES = ("speed_ratio", "speed")
 CLEARANCE_AXES = ("clearance_ratio", "clearance")
+_TABLE_KEYS = ("values", *RANGE_KEYS, "sweep")
+SWEEPS = ("from_rest", "up", "down", "both")
+FROM_REST, UP, DOWN, BOTH = SWEEPS
+DIRECTION = "direction"  # the axis that a sweep both ways adds
+DIRECTIONS = (UP, DOWN)  # meanings of 0 and 1 on it
+NO_NEIGHBOURS = "the cases of a sample have no neighbours to carry a motion to; leave out sweep or [sample]"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,11 +61,14 @@ class Axis:
     unit : str
         SI unit of the values, in the notation of the store ("rad s-1"; "1" without dimension).
     values : tuple of float
-        In SI units, each once, in any order; of drawn ones, one a case of the sample.
+        In SI units, each once, in any order, but rising where the axis is swept; of drawn ones, one a case of
+        the sample.
     long_name : str
         What labels and attributes say.
     drawn_from : Range or None
         Where the values are a sample's. Such axes share a dimension.
+    sweep : {"from_rest", "up", "down", "both"}
+        Whether each case starts at rest, or where its neighbour on this axis has ended.
     """
 
     name: str
@@ -69,8 +77,13 @@ class Axis:
     values: tuple[float, ...]
     long_name: str
     drawn_from: Range | None = None
+    sweep: str = FROM_REST
 
     def __post_init__(self) -> None:
+        if self.sweep not in SWEEPS:
+            raise InputError(f"{place('', 'grid', self.name)}: sweep: {_unknown_sweep(self.sweep)}")
+        if self.sweep != FROM_REST:
+            object.__setattr__(self, "values", tuple(sorted(self.values)))
         if problem := _problem(self.name, self.values, is_drawn=self.drawn_from is not None):
             raise InputError(f"{place('', 'grid', self.name)}: {problem}")
 
@@ -82,7 +95,7 @@ class Axis:
     @property
     def is_rig_key(self) -> bool:
         """Whether the axis sets a key of the rig."""
-        return self.name not in _OWN
+        return self.name not in _OWN and self.name != DIRECTION
 
     @property
     def tried(self) -> tuple[float, ...]:
@@ -99,7 +112,7 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
         A dotted key of the rig, or one of speed_ratio, speed, clearance_ratio, clearance, friction.
     values : list, dict or single value
         A dict is a range, stop included: `{start, stop, step}`, or `{start, stop, num}` with the `scale`
-        "lin" or "log".
+        "lin" or "log"; or it holds `values`. Either may say how the axis is swept: `{values, sweep}`.
     rig : Rig
         Whose keys the axis may name.
     file : str
@@ -112,7 +125,17 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     """
     where = place(file, "grid", name)
     declared = _declared(name, rig, where)
-    return _axis(name, declared, _read(declared, values, where), where)
+    sweep = FROM_REST
+    if isinstance(values, dict):
+        values, sweep = _read_table(values, where)
+    return replace(_axis(name, declared, _read(declared, values, where), where), sweep=sweep)
+
+
+def direction_axis() -> Axis:
+    """Return the axis that tells the two runs of a sweep both ways apart."""
+    return Axis(
+        name=DIRECTION, dimension=DIRECTION, unit="1", values=(0.0, 1.0), long_name="direction of the sweep"
+    )
 
 
 def make_range(name: str, table: Mapping[str, object], rig: Rig, file: str = "") -> Axis:
@@ -126,6 +149,8 @@ def make_range(name: str, table: Mapping[str, object], rig: Rig, file: str = "")
         When the name is unknown, or nothing can be drawn from such a range.
     """
     where = place(file, "grid", name)
+    if "sweep" in table:
+        raise InputError(f"{where}: sweep: {NO_NEIGHBOURS}")
     declared = _declared(name, rig, where)
     if declared.metadata["kind"] != "quantity":
         raise InputError(f"{where}: none but a quantity is drawn from a range; write a list of values")
@@ -141,14 +166,11 @@ def coordinate_of(name: str) -> str:
     return name.replace(".", "_")
 
 
-def case_id(identity: str, point: Sequence[float]) -> str:
-    """Return the id of a case: a hash of its study's identity and of its values on the axes.
-
-    It outlives the growth of any axis, and the order of the values on it.
-    """
-    digest = hashlib.sha256(identity.encode())
-    digest.update(struct.pack(f"<{len(point)}d", *point))
-    return digest.hexdigest()[:32]
+def written(name: str, value: float, unit: str) -> str:
+    """Return a value on an axis for people, as in `friction=0.3`."""
+    if name == DIRECTION:
+        return f"{name}={DIRECTIONS[int(value)]}"
+    return f"{name}={value:.6g}" + (f" {unit}" if unit not in ("", "1") else "")
 
 
 def _axis(name: str, declared: Field[Any], values: tuple[float, ...], where: str) -> Axis:
@@ -167,7 +189,7 @@ def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]
     """Return dotted keys and values of a table in which `stator.angle = 0` may stand without quotes."""
     pairs: list[tuple[str, Any]] = []
     for key, value in table.items():
-        is_table = isinstance(value, dict) and value and not set(value) & set(RANGE_KEYS)
+        is_table = isinstance(value, dict) and value and not set(value) & set(_TABLE_KEYS)
         is_table = is_table and prefix + key not in _OWN and prefix.count(".") < 8
         pairs += flatten(value, f"{prefix}{key}.") if is_table else [(prefix + key, value)]
     return pairs
@@ -187,6 +209,29 @@ def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
                 f"{where}: unknown axis; there is {', '.join(_OWN)} and any key of the rig"
             ) from None
         raise InputError(f"{where}: {str(error).replace('unknown key', 'unknown axis')}") from None
+
+
+def _read_table(table: Mapping[str, object], where: str) -> tuple[object, str]:
+    """What stands for the values in `{values, sweep}` or a range with a sweep, and how they are swept."""
+    for key in table:
+        if key not in _TABLE_KEYS:
+            raise InputError(f"{where}: unknown key {brief(key)} in a range; {nearest(key, _TABLE_KEYS)}")
+    sweep = table.get("sweep", FROM_REST)
+    if sweep not in SWEEPS:
+        raise InputError(f"{where}: sweep: {_unknown_sweep(sweep)}")
+    rest = {key: value for key, value in table.items() if key != "sweep"}
+    if "values" not in rest:
+        return rest, str(sweep)
+    if len(rest) > 1:
+        other = next(key for key in rest if key != "values")
+        raise InputError(f"{where}: {other} stands beside values; give a range or values, one of the two")
+    if isinstance(rest["values"], dict):
+        raise InputError(f"{where}: values: {brief(rest['values'])} is no list; write values = [...]")
+    return rest["values"], str(sweep)
+
+
+def _unknown_sweep(sweep: object) -> str:
+    return f"{brief(sweep)} is unknown; {nearest(sweep if isinstance(sweep, str) else '', SWEEPS)}"
 
 
 def _read(declared: Field[Any], values: object, where: str) -> tuple[float, ...]:

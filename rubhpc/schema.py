@@ -10,7 +10,7 @@ class Variable:
     """One stored array; `dims` are those that follow the study's axes."""
 
     name: str
-    role: str  # "waveform", "spectrum", "section", "scalar", "setting" or "flag"
+    role: str  # "waveform", "spectrum", "section", "state", "scalar", "setting" or "flag"
     dims: tuple[str, ...] = ()
     dtype: str = "float64"
     unit: str = "1"
@@ -63,6 +63,15 @@ _SECTIONS = tuple(
     if n in SECTION_NAMES
 )
 
+FINAL_STATE = "final_state"
+_STATE = Variable(
+    name=FINAL_STATE,
+    role="state",
+    dims=("degree",),
+    long_name="where the case ended: displacements of rotor and stators, their velocities, "
+    "contact forces, overlaps (SI)",
+)
+
 
 def _scalar(name: str, unit: str, long_name: str, *dims: str, dtype: str = "float64") -> Variable:
     return Variable(name=name, role="scalar", dims=dims, dtype=dtype, unit=unit, long_name=long_name)
@@ -97,12 +106,15 @@ _SCALARS = (
     _scalar("peak_to_peak_vertical", "m", "peak-to-peak vertical displacement"),
     _scalar("peak_to_peak_horizontal", "m", "peak-to-peak horizontal displacement"),
     _scalar("energy_residual", "1", "residual of the energy balance over the recorded revolutions"),
+    _scalar("contact_iterations", "1", "most iterations that a contact problem took", dtype="int64"),
+    _scalar("contact_residual", "1", "largest residual of the contact problems, relative"),
     _scalar("transient_revolutions", "1", "revolutions thrown away", dtype="int64"),
     _scalar("steps", "1", "integration steps", dtype="int64"),
     _scalar("wall_time", "s", "wall time of the case"),
 )
 
 VARIABLES: dict[str, Variable] = {
-    v.name: v for v in (*_WAVEFORMS, *_SPECTRA, *_SECTIONS, *_SETTINGS, *_FLAGS, *_SCALARS)
+    v.name: v for v in (*_WAVEFORMS, *_SPECTRA, *_SECTIONS, _STATE, *_SETTINGS, *_FLAGS, *_SCALARS)
 }
 KEEPABLE = ("waveform", "spectrum", "section")  # what [record] keep may name; the rest is always stored
+STATE = "state"  # kept where a sweep carries it to the next case

@@ -8,7 +8,19 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.axes import CLEARANCE_AXES, SPEED_AXES, Axis, flatten, make_axis, make_range
+from rubhpc.axes import (
+    BOTH,
+    CLEARANCE_AXES,
+    DIRECTION,
+    FROM_REST,
+    NO_NEIGHBOURS,
+    SPEED_AXES,
+    Axis,
+    direction_axis,
+    flatten,
+    make_axis,
+    make_range,
+)
 from rubhpc.errors import InputError
 from rubhpc.input.fields import place
 from rubhpc.input.quantity import brief
@@ -38,7 +50,9 @@ __all__ = [
 
 _TABLES = ("title", "rig", "output", "grid", "sample", "override", "contact", "integrator", "record", "run")
 # Names that a store takes for itself; an axis `clearance` is the very setting of that name.
-_RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution"}) - {"clearance"}
+_RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution", "degree"}) - {
+    "clearance"
+}
 _MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
 
 
@@ -61,7 +75,8 @@ class Study:
     rig : Rig
         With the study's overrides applied.
     axes : tuple of Axis
-        The cases are the Cartesian product of their dimensions, the last one running fastest.
+        The cases are the Cartesian product of their dimensions, the last one running fastest. An axis that is
+        swept both ways brings a last one, `direction`.
     sample : Sample or None
         How some of the axes have been drawn (`rubhpc.sample.draw`).
     output : Path
@@ -87,6 +102,8 @@ class Study:
     source: Path | None = None
 
     def __post_init__(self) -> None:
+        if any(axis.sweep == BOTH for axis in self.axes) and self.axes[-1].name != DIRECTION:
+            object.__setattr__(self, "axes", (*self.axes, direction_axis()))
         _check_axes(self.axes)
         _check_rigs(self.rig, [axis for axis in self.axes if axis.is_rig_key], self.axes)
 
@@ -105,7 +122,9 @@ class Study:
             "grid": {
                 axis.name: {"unit": axis.unit}
                 | (asdict(axis.drawn_from) if axis.drawn_from else {"values": list(axis.values)})
+                | ({"sweep": axis.sweep} if axis.sweep != FROM_REST else {})
                 for axis in self.axes
+                if axis.name != DIRECTION
             },
             **({"sample": asdict(self.sample)} if self.sample else {}),
             "contact": {key: value for key, value in asdict(self.contact).items() if value is not None},
@@ -218,6 +237,11 @@ def _check_axes(axes: tuple[Axis, ...]) -> None:
             raise InputError(f"[grid] {ways[0]}: missing; add {' or '.join(ways)}, such as {example}")
         if len(given) > 1:
             raise InputError(f"[grid] {given[1]}: stands beside {given[0]}; give one of them")
+    swept = [axis.name for axis in axes if axis.sweep != FROM_REST]
+    if len(swept) > 1:
+        raise InputError(f"[grid] {swept[1]}: sweep: {swept[0]} is swept already; leave one of the two out")
+    if swept and any(axis.dimension != axis.coordinate for axis in axes):
+        raise InputError(f"[grid] {swept[0]}: sweep: {NO_NEIGHBOURS}")
     taken: dict[str, str] = {}
     for axis in axes:
         if axis.coordinate in _RESERVED:

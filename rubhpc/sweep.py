@@ -14,8 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.axes import case_id
+from rubhpc.axes import FROM_REST
+from rubhpc.chain import CaseIds, chain_of
 from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.model import state_size
 from rubhpc.input.fields import place
 from rubhpc.points import Points, boxed
 from rubhpc.rig import with_keys
@@ -30,6 +33,8 @@ if TYPE_CHECKING:
     from rubhpc.study import Study
 
 MOST_CASES = 50_000_000  # beyond, a slip of the pen fills the memory
+_BLOCK = 16  # cases of a block, unless told
+_MOST_RIGS = 64  # along an axis, assembled before the run, 1 ms each; of more, the ends
 PHYSICS = 4  # raised whenever the same study gives other numbers than before
 
 
@@ -65,6 +70,7 @@ class Sweep:
     chunk : tuple of int, optional
         Cases of a block along each dimension, where a store has them already. Default: at most `[run] block`
         cases, taken first from the dimensions that leave speed and rig alone: a block then shares its setup.
+        Where an axis is swept, from that one before all.
 
     Attributes
     ----------
@@ -76,13 +82,18 @@ class Sweep:
         Number of cases, and of stators.
     chunk : tuple of int
         Cases of a block along each dimension.
+    chain : Chain or None
+        How the motion is carried from case to case.
+    n_degree : int
+        Numbers of the final state that a case of a chain keeps; 0 where there are no chains.
     identity, identity_parts : str, dict
         SHA-256 of all that changes results but the values on the axes, and what went into it.
 
     Raises
     ------
     InputError
-        When the step asked for is above the stability limit of a rig.
+        When the step asked for is above the stability limit of a rig, or a sweep meets rigs of different
+        degrees of freedom.
     """
 
     def __init__(self, study: Study, chunk: tuple[int, ...] | None = None) -> None:
@@ -96,10 +107,38 @@ class Sweep:
         self.n_stator = len(study.rig.stator)
         with _named(study):
             self._settings = Settings(study)
+            self.chain = chain_of(study.axes)
+            self.n_degree = count_state(study) if self.chain else 0
         self.chunk = chunk if chunk is not None else self._default_chunk()
         self.identity_parts = identity_parts(study)
         text = json.dumps(self.identity_parts, sort_keys=True, separators=(",", ":"), allow_nan=False)
         self.identity = hashlib.sha256(text.encode()).hexdigest()
+        self._ids = CaseIds(self.identity, self.points.values, self.chain)
+
+    def chains(self) -> list[list[Block]]:
+        """Return the blocks that one rank has to compute in turn, the longest such chain first.
+
+        Without a sweep every block is a chain of its own.
+        """
+        blocks = self.blocks()
+        chain = self.chain
+        if chain is None:
+            return [[block] for block in blocks]
+        together: dict[tuple[int, ...], list[Block]] = {}
+        for block in sorted(blocks, key=lambda block: block.start):
+            at = block.start
+            together.setdefault((*at[: chain.axis], *at[chain.axis + 1 :]), []).append(block)
+        chains = [part[::-1] if chain.goes_down(part[0].start) else part for part in together.values()]
+        return sorted(chains, key=lambda part: -sum(block.cost for block in part))
+
+    def in_turn(self, cases: Sequence[Case]) -> list[int]:
+        """Positions of the cases of a block in the order in which they are to be computed."""
+        chain, order = self.chain, range(len(cases))
+        return sorted(order, key=lambda i: chain.turn(cases[i].index)) if chain is not None else list(order)
+
+    def before(self, index: Sequence[int]) -> tuple[int, ...] | None:
+        """Index of the case that this one goes on from; None where it starts at rest."""
+        return self.chain.before(index, self.shape[self.chain.axis]) if self.chain else None
 
     def blocks(self) -> list[Block]:
         """Return all blocks, the longest first."""
@@ -126,12 +165,12 @@ class Sweep:
 
     def case(self, index: Sequence[int]) -> Case:
         """Return the case at an index of the grid."""
-        return self._case(tuple(index), case_id(self.identity, self.points.at(index)))
+        return self._case(tuple(index), self._ids(self.points.at(index)))
 
     def case_ids(self, block: Block) -> list[str]:
         """Return the ids of the cases of a block, in the order of `cases`."""
         points = self.points.within(block.start, block.shape)
-        return [case_id(self.identity, point) for point in points]
+        return [self._ids(point) for point in points]
 
     def settings(self) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
         """Return what the axes amount to: name -> (dimensions that set it, values in SI units).
@@ -160,15 +199,27 @@ class Sweep:
         )
 
     def _default_chunk(self) -> tuple[int, ...]:
-        wanted = self.study.run.block or min(max(self.n_case // 64, 1), 16)
+        wanted = self.study.run.block or min(max(self.n_case // 64, 1), _BLOCK)
         costly = self._settings.costly_dims
-        others = [i for i in range(len(self.shape)) if i not in costly]
+        order = [*(i for i in reversed(range(len(self.shape))) if i not in costly), *costly]
         chunk = [1] * len(self.shape)
-        for i in [*reversed(others), *costly]:
-            n_block = -(-self.shape[i] // min(self.shape[i], wanted))
-            chunk[i] = -(-self.shape[i] // n_block)  # blocks of one size, rather than full ones and a rest
+        if (chain := self.chain) is not None:
+            # One rank computes a chain anyway: an eighth of it is stored at once, and several only of many.
+            n = self.shape[chain.axis]
+            chunk[chain.axis] = _evenly(n, self.study.run.block or min(max(n // 8, 1), _BLOCK))
+            n_chain = self.n_case // n
+            wanted = (self.study.run.block or min(max(n_chain // 64, 1), _BLOCK)) // chunk[chain.axis]
+            order = [i for i in order if i not in (chain.axis, chain.direction)]  # a block has one direction
+        for i in order:
+            chunk[i] = _evenly(self.shape[i], wanted)
             wanted = max(wanted // chunk[i], 1)
         return tuple(chunk)
+
+
+def _evenly(n: int, most: int) -> int:
+    """Size of blocks of at most so many, all of one size rather than full ones and a rest."""
+    n_block = -(-n // max(min(n, most), 1))
+    return -(-n // n_block)
 
 
 @contextmanager
@@ -195,9 +246,11 @@ def identity_parts(study: Study) -> dict[str, Any]:
     for key in keys:
         _blank(rig, key.split("."))
     del rig["name"]
+    swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
     parts = {
         "physics": PHYSICS,
         "axes": [axis.name for axis in study.axes],
+        **({"sweep": swept} if swept else {}),  # older stores know none
         "rig": rig,
         "contact": asdict(study.contact),
         "integrator": asdict(study.integrator),
@@ -207,6 +260,28 @@ def identity_parts(study: Study) -> dict[str, Any]:
         ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
         parts["sample"] = {"method": study.sample.method, "seed": study.sample.seed, "ranges": ranges}
     return parts
+
+
+def count_state(study: Study) -> int:
+    """Numbers in the final state of a case: displacement and velocity of each degree, two for each stator.
+
+    Raises
+    ------
+    InputError
+        When it is not the same for all cases: a motion cannot be carried from one to another.
+    """
+    first = {axis.name: axis.values[0] for axis in study.axes if axis.is_rig_key}
+    n_state = state_size(assemble(with_keys(study.rig, first)))
+    for axis in study.axes:
+        values = axis.values if len(axis.values) <= _MOST_RIGS else axis.values[:: len(axis.values) - 1]
+        for value in values if axis.is_rig_key else ():
+            if state_size(assemble(with_keys(study.rig, {**first, axis.name: value}))) != n_state:
+                swept = next(a.name for a in study.axes if a.sweep != FROM_REST)
+                problem = "changes the degrees of freedom, so that no motion can be carried"
+                raise InputError(
+                    f"[grid] {axis.name}: {problem}; leave out this axis, or the sweep of {swept}"
+                )
+    return n_state
 
 
 def _blank(table: Any, key: list[str]) -> None:

@@ -3,16 +3,19 @@
     python jobs/cluster/reduce.py map.zarr --what envelope --over friction
     python jobs/cluster/reduce.py map.zarr --on processes --workers 8
     python jobs/cluster/reduce.py map.zarr --on slurm --workers 64 --cores 16 --memory "32 GB" --queue short
+    mpirun -n 18 python jobs/cluster/reduce.py map.zarr --on mpi
 
 `threads` are of this process; `processes` are of this machine; `slurm` has dask-jobqueue submit jobs of
---cores workers each, and is itself to be run where jobs may be submitted and the workers can reach it. The
-last two need `pip install '.[scale]'`. All see the store by the path given, on a file system that they share.
+--cores workers each, and is itself to be run where jobs may be submitted and the workers can reach it; `mpi`
+has dask-mpi make the ranks of one job a scheduler, this script and, all but these two, workers. The last
+three need `pip install '.[scale]'`. All see the store by the path given, on a file system that they share.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import logging
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +26,7 @@ from postproc.selection import select
 from postproc.spectrum_figure import spectrum
 from postproc.style import check_figure_path, house_style, new_figure, save
 from rubhpc.commands.drawing import pairs
-from rubhpc.errors import RubError
+from rubhpc.errors import InputError, RubError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,7 +48,7 @@ def arguments() -> argparse.Namespace:
     )
     parser.add_argument("--data", metavar="FILE", help=".csv, .json, .zarr or .nc [STORE_WHAT.nc here]")
     parser.add_argument("--figure", metavar="FILE", help="where one spectrum is left [STORE_WHAT.png here]")
-    parser.add_argument("--on", choices=("threads", "processes", "slurm"), default="threads")
+    parser.add_argument("--on", choices=("threads", "processes", "slurm", "mpi"), default="threads")
     parser.add_argument("--workers", type=int, default=2, help="processes in all [%(default)s]")
     parser.add_argument("--cores", type=int, default=1, help="of a Slurm job, one worker each [%(default)s]")
     parser.add_argument("--memory", default="4 GB", help="of a Slurm job [%(default)s]")
@@ -62,6 +65,11 @@ def workers(given: argparse.Namespace) -> Iterator[None]:
         return
     from distributed import Client, LocalCluster
 
+    if given.on == "mpi":  # the scheduler is known since `become_worker`
+        with Client() as client:
+            client.wait_for_workers(1)
+            yield
+        return
     cluster: Any
     if given.on == "processes":
         cluster = LocalCluster(n_workers=given.workers, threads_per_worker=1, dashboard_address=None)
@@ -82,9 +90,25 @@ def workers(given: argparse.Namespace) -> Iterator[None]:
         yield
 
 
+def become_worker() -> None:
+    """Make the scheduler of rank 0 and workers of all others but rank 1, which alone comes back."""
+    from dask_mpi import WorldTooSmallException, initialize
+
+    logging.getLogger("distributed").setLevel(logging.WARNING)  # each rank would tell of every connection
+    try:
+        initialize(dashboard=False)
+    except WorldTooSmallException as error:
+        raise InputError(
+            "--on mpi: needs a rank for the scheduler, one for this script and one for each worker; "
+            "start it with mpirun -n 3 or more"
+        ) from error
+
+
 def main() -> int:
     """Reduce, write and draw."""
     given = arguments()
+    if given.on == "mpi":
+        become_worker()
     stem = f"{Path(given.store).resolve().stem}_{given.what}"
     data = check_data_path(given.data or f"{stem}.nc")
     figure = check_figure_path(given.figure or f"{stem}.png")

@@ -93,3 +93,10 @@ class Model:
     unbalance_sine: NDArray[np.float64]  # (n_dof,), kg m
     stators: tuple[StatorModel, ...]
     output_node: int  # whose motion is recorded: the first stator's, or else the first disc's
+    sag: NDArray[np.float64]  # (n_dof,), of the rotor under its constant loads, no stator touching, m or rad
+
+
+def state_size(model: Model) -> int:
+    """Numbers in a state of motion: displacement and velocity of each degree; two of each contact."""
+    bodies = (model.rotor, *(stator.body for stator in model.stators))
+    return 2 * sum(body.n_dof for body in bodies) + 2 * len(model.stators)

@@ -7,8 +7,10 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from rubhpc.integrate.carry import at_rest, carried, with_overlap
 from rubhpc.integrate.central import CentralDifferenceMarch
 from rubhpc.integrate.gather import (
+    add_sag,
     by_name,
     diverged_record,
     empty_samples,
@@ -59,12 +61,13 @@ def run_case(
     friction : float
         Coefficient of friction.
     initial : State, optional
-        Where to start, with the unbalance at its phase; default at rest.
+        Where to start, with the unbalance at its phase 0; default at rest (`carry.at_rest`). Where another
+        case has ended is fitted to the gaps of this one (`carry.carried`).
     check : callable, optional
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
     """
     began = time.perf_counter()
-    initial = initial or State.at_rest(setup.model)
+    initial = at_rest(setup, clearance) if initial is None else carried(initial, setup, clearance)
 
     def start(state: State) -> March:
         return _march(setup, clearance, friction, state, check)
@@ -78,6 +81,7 @@ def run_case(
     except NoClosedForm:
         # Contacts that chatter, or too many sets of them, or slip that turns: short steps need no events.
         record = _integrate(start_stepped, initial, setup, clearance, recording)
+    record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.scalars["wall_time"] = time.perf_counter() - began
     return record
 
@@ -128,6 +132,7 @@ def _integrate(
             f"{reason} in revolution {revolution}", n_stator, recording, settings, march.final()
         )
     else:
+        add_sag(samples, tally, setup.model)
         signals, final = by_name(samples.whole), march.final()
         record = Record(
             status=DONE,

@@ -30,6 +30,9 @@ class State:
         m or rad, m/s or rad/s.
     contact_force : (n_stator,), N
         Normal force at that instant; it fixes the acceleration from which a run goes on.
+    overlap : (n_stator,), m
+        How far disc and tip have entered one another at that instant, as a penalty lets them; default not at
+        all.
     """
 
     rotor_displacement: Floats
@@ -37,13 +40,45 @@ class State:
     stator_displacement: tuple[Floats, ...]
     stator_velocity: tuple[Floats, ...]
     contact_force: Floats
+    overlap: Floats | None = None
+
+    @property
+    def displacement(self) -> Floats:
+        """Of all bodies, rotor first, (n_dof,), m or rad."""
+        return np.concatenate([self.rotor_displacement, *self.stator_displacement])
+
+    @property
+    def velocity(self) -> Floats:
+        """Of all bodies, rotor first, (n_dof,), m/s or rad/s."""
+        return np.concatenate([self.rotor_velocity, *self.stator_velocity])
+
+    def packed(self) -> Floats:
+        """All of it as one vector (`fem.model.state_size`)."""
+        overlap = np.zeros_like(self.contact_force) if self.overlap is None else self.overlap
+        return np.concatenate([self.displacement, self.velocity, self.contact_force, overlap])
+
+    @classmethod
+    def unpacked(cls, values: Floats, model: Model) -> State:
+        """The state of a model that `packed` has put into one vector."""
+        sizes = [model.rotor.n_dof, *(stator.body.n_dof for stator in model.stators)]
+        n_stator = len(model.stators)
+        parts = np.split(values, np.cumsum([*sizes, *sizes, n_stator]))
+        n_body = len(sizes)
+        return cls(
+            rotor_displacement=parts[0],
+            rotor_velocity=parts[n_body],
+            stator_displacement=tuple(parts[1:n_body]),
+            stator_velocity=tuple(parts[n_body + 1 : 2 * n_body]),
+            contact_force=parts[-2],
+            overlap=parts[-1],
+        )
 
     @classmethod
     def at_rest(cls, model: Model) -> State:
-        """Nothing moves but the steady spin."""
+        """Nothing moves but the steady spin; constant loads bend the shaft, and no stator touches."""
         stators = tuple(stator.body for stator in model.stators)
         return cls(
-            rotor_displacement=np.zeros(model.rotor.n_dof),
+            rotor_displacement=model.sag.copy(),
             rotor_velocity=np.zeros(model.rotor.n_dof),
             stator_displacement=tuple(np.zeros(body.n_dof) for body in stators),
             stator_velocity=tuple(np.zeros(body.n_dof) for body in stators),

@@ -183,16 +183,16 @@ def _compute(job: Job, pool: Pool, order: Order) -> None:
     stopping = order.stopping
     sweep = Sweep(job.study, chunk=job.chunk)
     store = Store(job.study.output)
-    every = sweep.blocks()
-    blocks = [every[i] for i in job.pending]
+    every = sweep.chains()
+    chains = [every[i] for i in job.pending]
     quiet = order.quiet or pool.rank > 0
     with (
-        _progress(job, sweep, blocks, quiet=quiet, has_bar=pool.size == 1) as progress,
+        _progress(job, sweep, chains, quiet=quiet, has_bar=pool.size == 1) as progress,
         _desk(job, pool, sweep, store, stopping, "rank", progress) as worker,
     ):
         next_packing = time.monotonic() + _PACKING_GAP
-        for i_block in _claimed(job, pool, stopping):
-            worker.work(blocks[i_block])
+        for block in _claimed(job, sweep, chains, pool, stopping):
+            worker.work(block)
             worker.attend()
             if pool.rank == 0 and time.monotonic() > next_packing:
                 store.pack(store.replay())  # for readers who look on
@@ -209,12 +209,11 @@ def _try_doubtful(job: Job, pool: Pool, stopping: Stopping) -> None:
     sweep = Sweep(job.study, chunk=job.chunk)
     store = Store(job.study.output)
     job = replace(job, ledger=store.replay(with_metrics=False))
-    blocks = {block.start: block for block in sweep.blocks()}
+    blocks = {block.start: (n, block) for n, chain in enumerate(sweep.chains()) for block in chain}
     with _desk(job, pool, sweep, store, stopping, "tail") as worker:
         for flat in sorted(job.doubtful, key=lambda i: job.doubtful[i]):
-            index = np.unravel_index(flat, sweep.shape)
-            block = blocks[tuple(int(i) // c * c for i, c in zip(index, sweep.chunk, strict=True))]
-            if block.number % pool.size == pool.rank and not stopping.look():  # a block has one writer
+            n_chain, block = blocks[store.start_of(flat)]
+            if n_chain % pool.size == pool.rank and not stopping.look():  # a block has one writer
                 worker.missing = np.arange(sweep.n_case) == flat
                 worker.work(block)
 
@@ -248,22 +247,33 @@ def _desk(
         worker.sync()
 
 
-def _claimed(job: Job, pool: Pool, stopping: Stopping) -> Iterator[int]:
-    """Positions of the blocks this rank is to compute, until there are none, or reason to stop."""
+def _claimed(
+    job: Job, sweep: Sweep, chains: list[list[Block]], pool: Pool, stopping: Stopping
+) -> Iterator[Block]:
+    """The blocks this rank is to compute, one chain after another, until there is none, or reason to stop."""
     most_failures = job.study.run.max_failures
+    missing = job.missing.reshape(sweep.shape)
+
+    def is_over(sums: Tally) -> bool:
+        has_failed = most_failures is not None and sums.failed > most_failures
+        return bool(stopping.look() or sums.stop or has_failed)
+
     while not stopping.look():
         sums = pool.claim()
-        has_failed = most_failures is not None and sums.failed > most_failures
-        if sums.claimed >= len(job.pending) or sums.stop or has_failed:
+        if sums.claimed >= len(chains) or is_over(sums):
             return
-        yield sums.claimed
+        for i, block in enumerate(chains[sums.claimed]):
+            if i and is_over(pool.sums()):
+                return
+            if missing_share(block, missing):
+                yield block
 
 
-def _progress(job: Job, sweep: Sweep, blocks: list[Block], *, quiet: bool, has_bar: bool) -> Progress:
+def _progress(job: Job, sweep: Sweep, chains: list[list[Block]], *, quiet: bool, has_bar: bool) -> Progress:
     grid = job.missing.reshape(sweep.shape)
     return Progress(
         sweep.n_case,
-        sum(block.cost * missing_share(block, grid) for block in blocks),
+        sum(block.cost * missing_share(block, grid) for chain in chains for block in chain),
         n_done=sweep.n_case - int(job.missing.sum()),
         quiet=quiet,
         has_bar=has_bar,

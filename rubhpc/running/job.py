@@ -56,9 +56,10 @@ class Job:
     missing : (n_case,) bool
         Cases to be computed, but for the doubtful ones.
     pending : (n,) int
-        Positions in `Sweep.blocks()` of the blocks that hold one.
+        Positions in `Sweep.chains()` of those that hold one.
     doubtful : dict
-        Flat index -> deaths of ranks in this case; these come last, each by itself.
+        Flat index -> deaths of ranks in this case, or in one before it in its chain; these come last, each by
+        itself, those of a chain in their order.
     token : str
         Of the lock on the store.
     """
@@ -92,14 +93,18 @@ def prepare_job(order: Order, n_rank: int) -> Job:
         store.take_back(ledger, find_gone(store, ledger), run, "gone")
         missing = ledger.status == MISSING
         if order.retry_failed:
-            missing |= ledger.status == FAILED
-        doubtful = _judge(store, ledger, missing, run)
+            failed = np.flatnonzero(ledger.status == FAILED).tolist()
+            store.take_back(
+                ledger, _with_those_behind(sweep, failed), run, "anew"
+            )  # a name that comes before those of ranks
+            missing = (ledger.status == MISSING) | (ledger.status == FAILED)
+        doubtful = _with_followers(sweep, _judge(store, ledger, missing, run), missing)
     missing[list(doubtful)] = False
-    blocks = sweep.blocks()
+    chains = sweep.chains()
     grid = missing.reshape(sweep.shape)
-    pending = [i for i, block in enumerate(blocks) if missing_share(block, grid)]
+    pending = [i for i, chain in enumerate(chains) if any(missing_share(block, grid) for block in chain)]
     if pending:
-        _warm_up(sweep, blocks[pending[-1]], stopping)
+        _warm_up(sweep, chains[pending[-1]][0], stopping)
     return Job(
         study=study,
         chunk=sweep.chunk,
@@ -128,6 +133,28 @@ def _judge(store: Store, ledger: Ledger, missing: NDArray[np.bool_], run: int) -
         missing[guilty] = False
         forget(store.hand_directory, ~missing)
     return suspects.doubtful
+
+
+def _with_those_behind(sweep: Sweep, cases: list[int]) -> list[int]:
+    """Cases, by their flat index, and all that go on from them, near or far; none without chains."""
+    if sweep.chain is None:
+        return []
+    marked = np.zeros(sweep.n_case, bool)
+    marked[cases] = True
+    return np.flatnonzero(sweep.chain.highest(marked.reshape(sweep.shape))).tolist()
+
+
+def _with_followers(sweep: Sweep, doubtful: dict[int, int], missing: NDArray[np.bool_]) -> dict[int, int]:
+    """Doubtful cases, and those that have to wait for them; of one chain in the order of the chain."""
+    chain = sweep.chain
+    if chain is None or not doubtful:
+        return doubtful
+    deaths = np.zeros(sweep.n_case, np.int64)
+    deaths[list(doubtful)] = list(doubtful.values())
+    deaths = chain.highest(deaths.reshape(sweep.shape)).ravel()
+    waiting = np.flatnonzero((deaths > 0) & missing).tolist()
+    turns = {flat: chain.turn([int(i) for i in np.unravel_index(flat, sweep.shape)]) for flat in waiting}
+    return {flat: int(deaths[flat]) for flat in sorted(waiting, key=lambda flat: turns[flat])}
 
 
 def _warm_up(sweep: Sweep, block: Block, stopping: Stopping) -> None:

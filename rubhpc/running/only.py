@@ -9,9 +9,11 @@ import numpy as np
 
 from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.integrate.case import run_case
+from rubhpc.integrate.record import State
 from rubhpc.points import Points
+from rubhpc.running.ends import is_sound
 from rubhpc.running.worker import metrics_of, put, set_up
-from rubhpc.schema import MISSING, STATUS
+from rubhpc.schema import DONE, FINAL_STATE, MISSING, STATUS
 from rubhpc.storage.journal import metrics_type
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import is_store, sweep_for
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.record import Record
     from rubhpc.study import Study
     from rubhpc.sweep import Case, Sweep
 
@@ -77,9 +80,7 @@ def reproduce(study: Study, name: str) -> Reproduction:
     case = sweep.case([int(i) for i in np.unravel_index(flat, sweep.shape)])
     told = manifest.name_case(flat)
     try:
-        record = run_case(
-            set_up(study, case), clearance=case.clearance, friction=case.friction, recording=study.recording
-        )
+        record = _compute(sweep, case)
         data = {v.name: np.full((1, *manifest.extent(v)), np.nan, v.dtype) for v in manifest.variables}
         put(record, data, 0)
     except Exception as error:
@@ -95,6 +96,58 @@ def reproduce(study: Study, name: str) -> Reproduction:
         metrics=metrics,
         verdict=_compare(study, case, record.status, data, row),
     )
+
+
+def _compute(sweep: Sweep, case: Case) -> Record:
+    """The record of a case; those before it in its chain are read from the store, or computed on the way."""
+    study, behind, state = sweep.study, [case], None
+    while (index := sweep.before(behind[-1].index)) is not None:
+        before = sweep.case(index)
+        status, state = _stored_end(study, before)
+        if status != MISSING:
+            break
+        behind.append(before)
+    for each in reversed(behind):
+        setup = set_up(study, each)
+        initial = None if state is None else State.unpacked(state, setup.model)
+        record = run_case(
+            setup,
+            clearance=each.clearance,
+            friction=each.friction,
+            recording=study.recording,
+            initial=initial,
+        )
+        state = record.final.packed() if record.status == DONE else None
+    return record
+
+
+def _stored_end(study: Study, case: Case) -> tuple[int, NDArray[np.float64] | None]:
+    """Status of a case in the study's store, missing where it is damaged, and its final state where done."""
+    if not is_store(study.output):
+        return MISSING, None
+    store = Store(study.output)
+    flat = _locate(store, study, case)
+    ledger = store.replay(with_metrics=False)
+    if flat is None or ledger.status[flat] != DONE:
+        return (MISSING if flat is None else int(ledger.status[flat])), None
+    start = store.start_of(flat)
+    stored = store.read_block(start)
+    if stored is None or not is_sound(store, ledger, start, flat, stored):
+        return MISSING, None
+    return DONE, stored[FINAL_STATE][np.searchsorted(store.flat(start), flat)]
+
+
+def _locate(store: Store, study: Study, case: Case) -> int | None:
+    """Flat index of a case in the store's grid; None where it is not there, or in another chain."""
+    mine, theirs = Points(study.axes), store.manifest.points
+    try:
+        index = [
+            theirs.along(dim).index(mine.along(dim)[i]) for dim, i in zip(mine.dims, case.index, strict=True)
+        ]
+    except ValueError:
+        return None
+    flat = int(np.ravel_multi_index(index, store.manifest.shape))
+    return flat if store.manifest.case_id(flat) == case.id else None
 
 
 def _find(sweep: Sweep, name: str) -> int:
@@ -116,24 +169,17 @@ def _compare(
     if not is_store(study.output):
         return f"{study.output} is not there yet"
     store = Store(study.output)
-    mine, theirs = Points(study.axes), store.manifest.points
-    try:
-        index = [
-            theirs.along(dim).index(mine.along(dim)[i]) for dim, i in zip(mine.dims, case.index, strict=True)
-        ]
-    except ValueError:
-        return f"{study.output} does not hold it yet"
-    flat = int(np.ravel_multi_index(index, store.manifest.shape))
+    flat = _locate(store, study, case)
     ledger = store.replay()
     assert ledger.metrics is not None
-    if ledger.status[flat] == MISSING:
+    if flat is None or ledger.status[flat] == MISSING:
         return f"{study.output} does not hold it yet"
     if ledger.status[flat] != status:
         raise StoreError(
             f"{study.output}: case {case.id} is {STATUS[status]} now, but stored as "
             f"{STATUS[ledger.status[flat]]}: {ledger.reasons.get(flat, '')}"
         )
-    start = tuple(int(i) // c * c for i, c in zip(index, store.manifest.chunk, strict=True))
+    start = store.start_of(flat)
     stored = store.read_block(start)
     i_case = int(np.searchsorted(store.flat(start), flat))
     names = [n for n in row.dtype.names or () if n != "wall_time"]

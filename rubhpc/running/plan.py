@@ -40,8 +40,8 @@ class Plan:
     ----------
     counts : tuple of int
         Cases that are missing, done, failed and diverged, in this order.
-    n_block, n_per_block, n_file : int
-        Blocks of the whole grid, and cases in one; files of the finished store, about.
+    n_chain, n_block, n_per_block, n_file : int
+        Chains and blocks of the whole grid, and cases in a block; files of the finished store, about.
     n_byte : int
         Of the finished store before compression, about.
     steps : int
@@ -56,6 +56,7 @@ class Plan:
     store: Path
     shape: dict[str, int]
     counts: tuple[int, ...]
+    n_chain: int
     n_block: int
     n_per_block: int
     n_file: int
@@ -63,6 +64,12 @@ class Plan:
     steps: int
     core_hours: float
     failures: tuple[str, ...] = ()
+
+    @property
+    def _idle(self) -> str:
+        if self.n_chain == self.n_block:
+            return "more ranks would idle"
+        return f"in {self.n_chain} chains: more ranks would idle"
 
     def text(self) -> str:
         """The plan for people, a few lines."""
@@ -77,7 +84,7 @@ class Plan:
             [
                 f"{self.title} -> {self.store}",
                 f"cases       {n_case} = {grid}",
-                f"blocks      {self.n_block}, at most {self.n_per_block} cases each; more ranks would idle",
+                f"blocks      {self.n_block}, at most {self.n_per_block} cases each; {self._idle}",
                 f"store       {_size(self.n_byte)} before compression, {self.n_file} files",
                 "so far      "
                 + ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING)),
@@ -118,6 +125,7 @@ def make_plan(study: Study) -> Plan:
         store=study.output,
         shape=dict(zip((told.get(dim, dim) for dim in sweep.dims), sweep.shape, strict=True)),
         counts=count(status),
+        n_chain=len(sweep.chains()),
         n_block=len(blocks),
         n_per_block=math.prod(sweep.chunk),
         n_file=len(blocks) * len(manifest.variables) + _FIXED_FILES,

@@ -11,9 +11,11 @@ import numpy as np
 
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.prepare import prepare
+from rubhpc.integrate.record import State
+from rubhpc.running.ends import Ends, Start
 from rubhpc.running.pool import Tally
 from rubhpc.running.stopping import Stopped
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
+from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING
 from rubhpc.storage.disk import disk_errors, flush_to_disk
 from rubhpc.storage.journal import Entry, metrics_type
 from rubhpc.storage.store import case_checksum
@@ -85,12 +87,15 @@ class Worker:
     def __post_init__(self) -> None:
         self._record_type = metrics_type(self.sweep.n_stator)
         self._setups: OrderedDict[tuple[int, float], tuple[Rig, Setup]] = OrderedDict()
+        self._ends = Ends(self.sweep, self.store, self.ledger, self._mend)
         self._unsynced: list[Path] = []
         self._next_sync = time.monotonic() + _SYNC_GAP
         self._seconds, self._cost = 0.0, 0.0
 
     def work(self, block: Block) -> None:
         """Compute, store and journal what is missing of a block; what is finished when a stop comes is kept.
+
+        A case of a chain goes on from where the one before it has ended, in this block or another.
 
         Raises
         ------
@@ -112,14 +117,15 @@ class Worker:
             ids = self.sweep.case_ids(block)
             entries = [Entry(int(flat[i]), ids[i], FAILED, reason=reason) for i in np.flatnonzero(wanted)]
             self.report(Tally(failed=len(entries), cost=round(cost * len(entries))))
-        for i_case, case in enumerate(cases):
+        for i_case in self.sweep.in_turn(cases):
             if not wanted[i_case]:
                 continue
             if self.stopping.look() or not self.stopping.fits(cost * self._pace):
                 break
             began = time.perf_counter()
             try:
-                entry = self._enter(case, int(flat[i_case]), data, i_case)
+                start = self._ends.start_of(cases[i_case], flat, data, entries)
+                entry = self._enter(cases[i_case], int(flat[i_case]), data, i_case, start)
             except Stopped:
                 break
             self._seconds += time.perf_counter() - began
@@ -142,6 +148,7 @@ class Worker:
             for entry in entries:
                 self.ledger.status[entry.flat] = entry.status
                 self.ledger.checksum[entry.flat] = entry.checksum
+            self._ends.remember(flat, data)
             self._unsynced += self.store.chunk_files(block.start)
             if time.monotonic() > self._next_sync:
                 self.sync()
@@ -184,11 +191,15 @@ class Worker:
                 data[name][i_case] = values[i_case]
         return data, spoiled
 
-    def _enter(self, case: Case, flat: int, data: Arrays, i_case: int) -> Entry:
+    def _mend(self, start: tuple[int, ...]) -> None:
+        """Compute again what is damaged of a block, which another goes on from."""
+        self.work(next(block for block in self.sweep.blocks() if block.start == start))
+
+    def _enter(self, case: Case, flat: int, data: Arrays, i_case: int, start: Start) -> Entry:
         """Compute a case and put its arrays in the block's; what goes wrong in it is its reason to fail."""
         self.watch.begin(flat, case.id)
         try:
-            record = self._compute(case)
+            record = self._compute(case, start)
             put(record, data, i_case)
             metrics = metrics_of(record, self._record_type).tobytes()
         except Stopped:
@@ -199,9 +210,10 @@ class Worker:
             return Entry(flat, case.id, FAILED, reason=_told(error))
         finally:
             self.watch.end()
-        return Entry(flat, case.id, record.status, case_checksum(data, i_case), metrics, record.remark)
+        remark = "; ".join(text for text in (start.note, record.remark) if text)
+        return Entry(flat, case.id, record.status, case_checksum(data, i_case), metrics, remark)
 
-    def _compute(self, case: Case) -> Record:
+    def _compute(self, case: Case, start: Start) -> Record:
         study = self.sweep.study
         key = (
             id(case.rig),
@@ -226,7 +238,12 @@ class Worker:
                 raise _OverTime(f"over its time limit of {limit:g} s")
 
         return run_case(
-            setup, clearance=case.clearance, friction=case.friction, recording=study.recording, check=check
+            setup,
+            clearance=case.clearance,
+            friction=case.friction,
+            recording=study.recording,
+            initial=None if start.state is None else State.unpacked(start.state, setup.model),
+            check=check,
         )
 
 
@@ -241,6 +258,8 @@ def put(record: Record, data: Arrays, i_case: int) -> None:
     if record.status != DONE:
         return
     told = {**record.signals, **record.spectra, **record.sections}
+    if FINAL_STATE in data:
+        told[FINAL_STATE] = record.final.packed()
     for name, values in data.items():
         if not np.isfinite(told[name]).all():
             raise FloatingPointError(f"{name} is not finite")

@@ -35,13 +35,22 @@ _HELD = 64  # blocks of the old grid kept in memory: neighbours in the new one c
 
 
 def origins(before: Manifest, after: Manifest) -> NDArray[np.int64]:
-    """Flat index in the grid of `before` of every case of `after`, (n_case,); -1 for a new one."""
+    """Flat index in the grid of `before` of every case of `after`, (n_case,); -1 for a new one.
+
+    A case of a chain is new wherever one of those before it is.
+    """
     origin, is_new = np.zeros((), np.int64), np.zeros((), bool)
     for dim, n in zip(before.dims, before.shape, strict=True):
         at = {values: i for i, values in enumerate(before.points.along(dim))}
         place = np.array([at.get(values, -1) for values in after.points.along(dim)])
         origin = np.add.outer(origin * n, place)
         is_new = np.logical_or.outer(is_new, place < 0)
+    if (chain := after.chain) is not None:
+        kept = chain.kept(before.axes[chain.axis].values, after.axes[chain.axis].values)
+        shape = [
+            len(axis.values) if i in (chain.axis, chain.direction) else 1 for i, axis in enumerate(after.axes)
+        ]
+        is_new |= ~kept.reshape(shape)
     return np.where(is_new, -1, origin).ravel()
 
 

@@ -14,12 +14,13 @@ import json
 import os
 import re
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
 import numpy as np
 
-from rubhpc.axes import case_id
+from rubhpc.chain import CaseIds
 from rubhpc.schema import STATUS, VARIABLES
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.chain import Chain
     from rubhpc.points import Points
 
 _FORMAT = 1
@@ -74,11 +76,12 @@ class Entry:
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What a journal's lines refer to: the study's identity, its cases, the type of metrics."""
+    """What a journal's lines refer to: the study's identity, its cases and chains, the type of metrics."""
 
     identity: str
     points: Points
     n_stator: int
+    chain: Chain | None = None
 
     @property
     def told(self) -> dict[str, Any]:
@@ -93,7 +96,11 @@ class Header:
 
     def id_at(self, flat: int) -> str:
         """Id of the case at a flat index of the grid; "" beyond it."""
-        return case_id(self.identity, self.points.at_flat(flat)) if flat < self.points.n_case else ""
+        return self._ids(self.points.at_flat(flat)) if flat < self.points.n_case else ""
+
+    @cached_property
+    def _ids(self) -> CaseIds:
+        return CaseIds(self.identity, self.points.values, self.chain)
 
     def line(self) -> bytes:
         """The header as the first line of a journal."""

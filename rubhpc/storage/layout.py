@@ -17,6 +17,7 @@ from numcodecs.blosc import Blosc
 from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.storage import MemoryStore
 
+from rubhpc.axes import DIRECTION, DIRECTIONS
 from rubhpc.schema import VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import METRICS
@@ -129,10 +130,7 @@ def _create(group: zarr.Group, variable: Variable, manifest: Manifest, *, chunk:
     if "sample" in variable.dims:
         attributes["coordinates"] = "revolution"  # CF: a coordinate that is no dimension
     if variable.flags:
-        attributes |= {
-            "flag_values": list(range(len(variable.flags))),
-            "flag_meanings": " ".join(variable.flags),
-        }
+        attributes |= _flags(variable.flags)
     group.create_array(
         variable.name,
         shape=(*manifest.shape, *extent),
@@ -143,6 +141,11 @@ def _create(group: zarr.Group, variable: Variable, manifest: Manifest, *, chunk:
         dimension_names=(*manifest.dims, *variable.dims),
         attributes=attributes,
     )
+
+
+def _flags(meanings: tuple[str, ...]) -> dict[str, Any]:
+    """CF attributes that name the values 0, 1, ..."""
+    return {"flag_values": list(range(len(meanings))), "flag_meanings": " ".join(meanings)}
 
 
 def _packed_chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -170,7 +173,8 @@ def _static(sweep: Sweep) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict
         axis.coordinate: (
             (axis.dimension,),
             np.array(axis.values, dtype=np.float64),
-            {"units": axis.unit or "1", "long_name": axis.long_name},
+            {"units": axis.unit or "1", "long_name": axis.long_name}
+            | (_flags(DIRECTIONS) if axis.name == DIRECTION else {}),
         )
         for axis in sweep.study.axes
     }

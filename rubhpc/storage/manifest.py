@@ -9,20 +9,22 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
-from rubhpc.axes import case_id, coordinate_of
+from rubhpc.axes import FROM_REST, coordinate_of, written
+from rubhpc.chain import CaseIds, chain_of
 from rubhpc.errors import StoreError
 from rubhpc.points import Points
-from rubhpc.schema import KEEPABLE, VARIABLES
+from rubhpc.schema import STATE, VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import Header
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from rubhpc.chain import Chain
     from rubhpc.schema import Variable
     from rubhpc.sweep import Sweep
 
-_FORMAT = 2
+_FORMAT = 3  # raised with the arrays of the schema too: a store has them all
 PRIVATE = ".rubhpc"  # the directory of a store that zarr does not look into
 GROWTH = "growth"  # in it: what a growth that was decided on has yet to move to its place
 _NAMES = ("manifest.json", "manifest.copy.json")  # one damaged byte must not cost a study
@@ -37,6 +39,7 @@ class AxisRecord:
     unit: str
     long_name: str
     values: tuple[float, ...]
+    sweep: str = FROM_REST
 
     @property
     def coordinate(self) -> str:
@@ -103,12 +106,22 @@ class Manifest:
             identity=self.identity,
             points=self.points,
             n_stator=self.sizes["stator"],
+            chain=self.chain,
         )
+
+    @cached_property
+    def chain(self) -> Chain | None:
+        """How the motion is carried from case to case; None where each starts at rest."""
+        return chain_of(self.axes)
+
+    @cached_property
+    def _ids(self) -> CaseIds:
+        return CaseIds(self.identity, self.points.values, self.chain)
 
     @property
     def variables(self) -> tuple[Variable, ...]:
         """The arrays stored for every case and written block by block, in the order of their checksum."""
-        return tuple(v for v in VARIABLES.values() if v.role in KEEPABLE and v.role in self.keep)
+        return tuple(v for v in VARIABLES.values() if v.role in self.keep)
 
     def extent(self, variable: Variable) -> tuple[int, ...]:
         """Shape of a variable after the axes."""
@@ -116,7 +129,7 @@ class Manifest:
 
     def case_id(self, flat: int) -> str:
         """Id of a case."""
-        return case_id(self.identity, self.points.at_flat(flat))
+        return self._ids(self.points.at_flat(flat))
 
     def name_case(self, flat: int) -> str:
         """Coordinates of a case, as in `friction=0.3, clearance_ratio=0.7`; in a sample its number first."""
@@ -124,7 +137,7 @@ class Manifest:
         index = zip(self.dims, self.points.index(flat), strict=True)
         numbers = [f"{dim}={i}" for dim, i in index if dim not in own]
         values = (
-            f"{axis.name}={value:.6g}" + (f" {axis.unit}" if axis.unit not in ("", "1") else "")
+            written(axis.name, value, axis.unit)
             for axis, value in zip(self.axes, self.points.at_flat(flat), strict=True)
         )
         return ", ".join([*numbers, *values])
@@ -149,8 +162,9 @@ class Manifest:
                 "sample": n_sample,
                 "order": n_sample // 2 + 1,
                 "section": recording.revolutions,
+                **({"degree": sweep.n_degree} if sweep.chain else {}),
             },
-            keep=tuple(sorted(recording.keep)),
+            keep=tuple(sorted([*recording.keep, *([STATE] if sweep.chain else [])])),
             files=files or {},
             accepted=accepted,
         )

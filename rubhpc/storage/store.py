@@ -165,6 +165,11 @@ class Store:
         shape, chunk = self.manifest.shape, self.manifest.chunk
         return tuple(slice(s, min(s + c, n)) for s, c, n in zip(start, chunk, shape, strict=True))
 
+    def start_of(self, flat: int) -> tuple[int, ...]:
+        """First case of the block that holds a case."""
+        index = np.unravel_index(flat, self.manifest.shape)
+        return tuple(int(i) // c * c for i, c in zip(index, self.manifest.chunk, strict=True))
+
     def flat(self, start: tuple[int, ...]) -> NDArray[np.int64]:
         """Flat indices of the cases of a block, in C order."""
         flat = np.zeros(1, np.int64)

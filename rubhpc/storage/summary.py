@@ -30,7 +30,7 @@ class Summary:
     reasons : tuple of (str, str)
         Coordinates and reason of each failed case, the first hundred.
     flawed : int
-        Cases that are done, but whose energy balance is off.
+        Cases that are done with a remark: their energy balance is off, or they broke a chain of a sweep.
     lost : int
         Ranks that died on the way; the others have done their work.
     """
@@ -52,9 +52,7 @@ class Summary:
         """The summary in a line."""
         states = [i for i in (DONE, FAILED, DIVERGED, MISSING) if self.counts[i]]
         told = ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in states)
-        flaw = (
-            f"; the energy balance of {self.flawed} is off, rubhpc status names them" if self.flawed else ""
-        )
+        flaw = f"; {self.flawed} done with a remark, rubhpc status names them" if self.flawed else ""
         return f"{self.store}: {told}; {self.computed} computed in {duration(self.seconds)}{flaw}"
 
     def complaint(self) -> str:

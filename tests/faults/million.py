@@ -33,7 +33,7 @@ record = SimpleNamespace(
 stub = {
     "compile_kernels": lambda *_, **__: None,
     "run_case": lambda *_, **__: record,
-    "prepare": lambda *_, **__: None,
+    "prepare": lambda *_, **__: SimpleNamespace(model=None),
 }
 for module in (job, plan, worker):
     vars(module).update({name: value for name, value in stub.items() if name in vars(module)})

@@ -77,6 +77,7 @@ class Physics:
         clearance: float,
         friction: float,
         recording: Recording,
+        initial: None,
         check: Callable[[], None],
     ) -> Record:
         self.on_case()
@@ -208,7 +209,7 @@ def test_a_balance_that_is_off_is_named(physics, study):
     summary = run(other, quiet=True)
     assert summary.counts == (0, 12, 0, 0)
     assert summary.exit_code == 0
-    assert "the energy balance of 4 is off" in summary.text()
+    assert "4 done with a remark" in summary.text()
     failures = read_status(other.output).failures
     assert len(failures) == 4
     assert {told for _, told in failures} == {"its energy balance is off by 25 %; take a shorter step"}

@@ -201,11 +201,13 @@ def slurm(tmp_path: Path) -> Iterator[dict[str, str]]:
         subprocess.run(["kill", pid], capture_output=True, check=False)
 
 
-@pytest.mark.parametrize("on", ["threads", "slurm"])
+@pytest.mark.parametrize("on", ["threads", "slurm", "mpi"])
 def test_cluster_script_reduces_and_draws(
     on: str, path: Path, loaded: xr.Dataset, slurm: dict[str, str], tmp_path: Path
 ) -> None:
     script = [sys.executable, ROOT / "jobs" / "cluster" / "reduce.py", path, "--what", "envelope", "--on", on]
+    if on == "mpi":
+        script = [Path(sys.executable).with_name("mpirun"), "-n", "3", *script]
     options = ["--workers", "1", "--memory", "1 GB", "--queue", "short", "--select", "friction=0.1"]
     done = subprocess.run(
         [*script, *options], cwd=tmp_path, env=slurm, capture_output=True, text=True, check=False, timeout=120

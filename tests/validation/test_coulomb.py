@@ -124,7 +124,8 @@ def test_dry_whip_diverges_in_steady_sliding_and_settles_under_coulombs_law(ring
     steps = {"method": "central-difference", "step": "2 us", "friction_law": "coulomb"}
     start = simulate(ring, **given, **steps, transient=0, revolutions=2)
     assert np.abs(start.vertical + 1j * start.horizontal).max() < 0.5e-3
-    whip = simulate(ring, **given, **steps, transient=8, revolutions=12)  # too few to have its regime measured
+    # Fewer than have their regime measured.
+    whip = simulate(ring, **given, **steps, transient=8, revolutions=12)
     assert whip.status == DONE
     orbit = np.abs(whip.vertical + 1j * whip.horizontal).reshape(12, -1).max(axis=1)
     assert orbit[-4:] == pytest.approx(np.full(4, orbit[-1]), rel=0.1)  # no longer growing
