@@ -54,6 +54,7 @@ _SHORT = {
     "stator_youngs_modulus": "Stator modulus $E_s$",
     "direction": "Direction",
     "whirl": "Whirl",
+    "case": "Case",
     "frequency": "Frequency",
     "order": "Order (multiples of spin speed)",
     "revolution": "Revolution",
@@ -75,6 +76,8 @@ _SHORT = {
     "status": "Status",
     "validity": "Validity",
     "energy_residual": "Energy balance residual",
+    "contact_iterations": "Contact iterations",
+    "contact_residual": "Contact residual",
 }
 _SYMBOLS = {
     "speed_ratio": "r",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
     from rubhpc.fem.assemble import assemble
     from rubhpc.integrate.record import Record, State
-    from rubhpc.rig import LumpedStator, MatrixStator, Rig, Stator, Unbalance, read_rig
+    from rubhpc.rig import Load, LumpedStator, MatrixStator, Rig, Stator, Unbalance, read_rig
     from rubhpc.running.driver import run
     from rubhpc.simulate import simulate
     from rubhpc.storage.summary import Summary
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "InputError",
+    "Load",
     "LumpedStator",
     "MatrixStator",
     "Record",
@@ -48,6 +49,7 @@ __all__ = [
 # Where each name comes from; imported when it is first asked for, so that `import rubhpc` takes no time.
 _HOMES = {
     "InputError": "rubhpc.errors:InputError",
+    "Load": "rubhpc.rig:Load",
     "LumpedStator": "rubhpc.rig:LumpedStator",
     "MatrixStator": "rubhpc.rig:MatrixStator",
     "Record": "rubhpc.integrate.record:Record",

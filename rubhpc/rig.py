@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
 from rubhpc.input.dotted import replace_keys
-from rubhpc.input.fields import FieldError, check_fields, nearest, parse_field, place, text
+from rubhpc.input.fields import FieldError, check_fields, nearest, parse_field, place, quantity, text
 from rubhpc.input.foreign import MatrixRotor
 from rubhpc.input.parts import (
     HELD_BY_DRIVE,
@@ -20,6 +20,7 @@ from rubhpc.input.parts import (
     Bearing,
     Damping,
     Disc,
+    Load,
     ShaftSection,
     Torsion,
     Unbalance,
@@ -37,6 +38,7 @@ __all__ = [
     "Bearing",
     "Damping",
     "Disc",
+    "Load",
     "LumpedStator",
     "MatrixRotor",
     "MatrixStator",
@@ -65,14 +67,17 @@ class Rotor:
     disc: tuple[Disc, ...] = ()
     bearing: tuple[Bearing, ...] = ()
     unbalance: tuple[Unbalance, ...] = ()
+    load: tuple[Load, ...] = ()
+    gravity: float = quantity("m/s^2", default=0.0, at_least=0)  # of a horizontal shaft, against +y
     torsion: Torsion = HELD_BY_DRIVE
     damping: Damping = UNDAMPED
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for key in ("shaft", "bearing"):
             if not getattr(self, key):
                 raise FieldError(key, f"missing; a rotor has at least one [[rotor.{key}]]")
-        for key in ("disc", "bearing", "unbalance"):
+        for key in ("disc", "bearing", "unbalance", "load"):
             for i, item in enumerate(getattr(self, key), 1):
                 self.check_node(f"{key}.{i}.node", item.node)
         for key in ("fixed_node", "node"):
@@ -125,6 +130,8 @@ class Rig:
         degrees: Sequence[tuple[int, str]],
         stators: Sequence[AnyStator] = (),
         unbalance: Sequence[Unbalance] = (),
+        load: Sequence[Load] = (),
+        gravity: float | str = 0.0,
         output_node: int | None = None,
         displacement_limit: float = 100.0,
         name: str = "matrices",
@@ -143,6 +150,10 @@ class Rig:
         stators : sequence of Stator, LumpedStator or MatrixStator, or one
             Each with its node and, as matrices know no disc, its radius of contact, m.
         unbalance : sequence of Unbalance
+        load : sequence of Load
+            Constant forces.
+        gravity : float (m/s2) or str with a unit
+            Pulls against "v" at every mass of `M`; nothing unless told.
         output_node : int, optional
             Whose v, w and thx are recorded; default the first stator's.
         displacement_limit : float
@@ -168,6 +179,8 @@ class Rig:
             **given,
             degrees=parse_field(declared["degrees"], degrees, "degrees"),
             unbalance=_several(unbalance),
+            load=_several(load),
+            gravity=parse_quantity(gravity, "m/s^2", "gravity"),
             output_node=output_node,
             displacement_limit=displacement_limit,
         )
@@ -180,6 +193,8 @@ class Rig:
         *,
         stators: Sequence[AnyStator] = (),
         unbalance: Sequence[Unbalance] = (),
+        load: Sequence[Load] = (),
+        gravity: float | str = 0.0,
         speed: float | str | None = None,
         torsion: Torsion = HELD_BY_DRIVE,
         output_node: int | None = None,
@@ -199,6 +214,8 @@ class Rig:
             Each with its node (from 1) and its radius of contact.
         unbalance : sequence of Unbalance
             At nodes from 1; ROSS keeps none in its rotor.
+        load : sequence of Load, gravity : float (m/s2) or str with a unit
+            Constant forces at nodes from 1, and weight; none unless told.
         speed : float (rad/s) or str with a unit, optional
             At which bearings are taken whose coefficients depend on it.
         torsion : Torsion
@@ -216,8 +233,12 @@ class Rig:
 
         at = None if speed is None else parse_quantity(speed, "rad/s", "from_ross: speed")
         found = rotor_from_ross(rotor, speed=at, torsion=torsion, unbalance=_several(unbalance))
-        if output_node is not None:
-            found = replace(found, output_node=output_node)
+        found = replace(
+            found,
+            load=_several(load),
+            gravity=parse_quantity(gravity, "m/s^2", "from_ross: gravity"),
+            output_node=output_node,
+        )
         return cls(name=name, rotor=found, stator=_several(stators))
 
     def contact_radius(self, stator: AnyStator) -> float | None:
@@ -234,7 +255,7 @@ class Rig:
 
 def _several(parts: Any) -> tuple[Any, ...]:
     """Parts in a row; one by itself is a row of one."""
-    return (parts,) if isinstance(parts, Seat | Unbalance) else tuple(parts)
+    return (parts,) if isinstance(parts, Seat | Unbalance | Load) else tuple(parts)
 
 
 def rig_from_dict(table: Mapping[str, Any], where: str = "rig") -> Rig:

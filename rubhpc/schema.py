@@ -106,6 +106,8 @@ _SCALARS = (
     _scalar("peak_to_peak_vertical", "m", "peak-to-peak vertical displacement"),
     _scalar("peak_to_peak_horizontal", "m", "peak-to-peak horizontal displacement"),
     _scalar("energy_residual", "1", "residual of the energy balance over the recorded revolutions"),
+    _scalar("contact_iterations", "1", "most iterations that a contact problem took", dtype="int64"),
+    _scalar("contact_residual", "1", "largest residual of the contact problems, relative"),
     _scalar("transient_revolutions", "1", "revolutions thrown away", dtype="int64"),
     _scalar("steps", "1", "integration steps", dtype="int64"),
     _scalar("wall_time", "s", "wall time of the case"),

@@ -32,6 +32,8 @@ class Cases:
         self._shape = tuple(store.sizes[a] for a in self._axes)
         kept = [n for n, v in VARIABLES.items() if v.role in LONG_ROLES and n in store]
         self.kept = tuple(sorted({VARIABLES[n].role for n in kept}))
+        if "waveform" in self.kept:  # of which spectra over whole periods are taken
+            kept = [n for n in kept if VARIABLES[n].role != "spectrum"]
         self._arrays = store[[*kept, *(n for n in ("period",) if n in store)]]
         self.status = store["status"].values.ravel()
         self.done = np.flatnonzero(self.status == DONE)

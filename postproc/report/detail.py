@@ -90,12 +90,13 @@ def pack_case(case: xr.Dataset, detail: Detail, places: list[tuple[float, float]
         header["places"] = places
     arrays: Arrays = []
     waves = _stacked(case, [s for s in detail.signals if s in case], "sample")
-    spectra = _stacked(case, [f"spectrum_{s}" for s in detail.signals if f"spectrum_{s}" in case], "order")
     if waves is not None:
         _add_waves(waves, case, detail, header, arrays)
-        whole = whole_periods(waves, case.get("period"))
-        if spectra is None or whole.sizes["sample"] < waves.sizes["sample"]:
-            spectra = amplitude_spectrum(whole)
+        spectra: xr.DataArray | None = amplitude_spectrum(whole_periods(waves, case.get("period")))
+    else:
+        spectra = _stacked(
+            case, [f"spectrum_{s}" for s in detail.signals if f"spectrum_{s}" in case], "order"
+        )
     if spectra is not None:
         _add_spectra(spectra, detail, header, arrays)
     sections = _stacked(case, [f"section_{s}" for s in SECTION_NAMES if f"section_{s}" in case], "section")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rubhpc.fem.foreign import lumped_stator, matrix_rotor, matrix_stator
 from rubhpc.fem.model import Model
 from rubhpc.fem.rotor import assemble_rotor, unbalance_vectors
+from rubhpc.fem.statics import constant_load, sag_under
 from rubhpc.fem.stator import assemble_stator
 from rubhpc.input.foreign import MatrixRotor
 from rubhpc.input.stators import LumpedStator, MatrixStator
@@ -40,6 +41,7 @@ def assemble(rig: Rig) -> Model:
         unbalance_sine=sine,
         stators=tuple(_stator(rig, stator) for stator in rig.stator),
         output_node=seats[0] if seats else middle,
+        sag=sag_under(body, constant_load(rotor, body)),
     )
 
 

@@ -21,16 +21,16 @@ def find_free(model: Model) -> str:
     """What is free to move of all that contact and outputs depend on, in words; "" where all is held."""
     nodes = {model.output_node, *(stator.node for stator in model.stators)}
     seen = [model.rotor.index(node, name) for node in sorted(nodes) for name in ("v", "w", "thx")]
-    if row := _free_row(model.rotor, [row for row in seen if row >= 0]):
+    if row := free_row(model.rotor, [row for row in seen if row >= 0]):
         motion = "turn (torsion)" if model.rotor.degrees[row - 1][1] in KINDS["torsional"] else "move"
         return f"the rotor is free to {motion}"
     for i, stator in enumerate(model.stators, 1):
-        if _free_row(stator.body, [row for row in (stator.axial, stator.lateral) if row >= 0]):
+        if free_row(stator.body, [row for row in (stator.axial, stator.lateral) if row >= 0]):
             return f"stator {i} is free to move"
     return ""
 
 
-def _free_row(body: Body, seen: list[int]) -> int:
+def free_row(body: Body, seen: list[int]) -> int:
     """Row, from 1, of what moves most in a free motion of the parts that are seen; 0: there is none."""
     couples = csr_array((body.mass != 0) | (body.stiffness != 0))
     part = connected_components(couples, directed=False)[1] if body.n_dof else np.zeros(0)

@@ -93,6 +93,7 @@ class Model:
     unbalance_sine: NDArray[np.float64]  # (n_dof,), kg m
     stators: tuple[StatorModel, ...]
     output_node: int  # whose motion is recorded: the first stator's, or else the first disc's
+    sag: NDArray[np.float64]  # (n_dof,), of the rotor under its constant loads, no stator touching, m or rad
 
 
 def state_size(model: Model) -> int:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray  # noqa: TC002 - read when a rig is built
 
 from rubhpc.input.fields import FieldError, check_fields, count, nearest, quantity
 from rubhpc.input.matrix import MATRIX, is_symmetric
-from rubhpc.input.parts import Unbalance  # noqa: TC001 - likewise
+from rubhpc.input.parts import Load, Unbalance  # noqa: TC001 - likewise
 from rubhpc.input.rows import check_body, checked_matrices
 
 NAMES = ("u", "v", "w", "thx", "thy", "thz")
@@ -31,6 +31,10 @@ class MatrixRotor:
         begins with "q" for coordinates of other kinds. Nodes are whole numbers from 1, in no order.
     unbalance : tuple of Unbalance
         At nodes that move sideways.
+    load : tuple of Load
+        Constant forces, at such nodes too.
+    gravity : float, m/s2
+        Pulls against "v" at every mass.
     output_node : int, optional
         Whose motion is recorded; the first stator's by default.
     displacement_limit : float
@@ -43,6 +47,8 @@ class MatrixRotor:
     gyroscopic: NDArray[np.float64] | None = field(default=None, metadata=MATRIX)
     degrees: tuple[tuple[int, str], ...] = field(metadata={"kind": "degrees"})
     unbalance: tuple[Unbalance, ...] = ()
+    load: tuple[Load, ...] = ()
+    gravity: float = quantity("m/s^2", default=0.0, at_least=0)
     output_node: int | None = count(default=None, is_key=False)
     displacement_limit: float = quantity("m", default=100.0, above=0)
 
@@ -60,8 +66,12 @@ class MatrixRotor:
             raise FieldError("gyroscopic", "is not skew (G^T = -G); what damps belongs into the damping")
         if self.output_node is not None:
             self.check_node("output_node", self.output_node)
-        for i, unbalance in enumerate(self.unbalance, 1):
-            self.check_node(f"unbalance.{i}.node", unbalance.node)
+        for key in ("unbalance", "load"):
+            for i, part in enumerate(getattr(self, key), 1):
+                self.check_node(f"{key}.{i}.node", part.node)
+        if self.gravity and any(name.startswith("q") for _, name in self.degrees):
+            problem = "how it acts on the coordinates q... is not known"
+            raise FieldError("gravity", f"{problem}; give its forces as load, or other degrees")
 
     def check_node(self, key: str, node: int) -> None:
         """Refuse a node that does not move sideways."""

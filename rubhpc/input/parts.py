@@ -183,6 +183,18 @@ class Unbalance:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Load:
+    """A constant force, such as the pull of a belt: up and, at a right angle, along +z."""
+
+    node: int = count()
+    vertical: float = quantity("N", default=0.0)
+    horizontal: float = quantity("N", default=0.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Torsion:
     """Torsional boundary: one node held by the drive, or a spring (and damper) to ground, or neither."""
 

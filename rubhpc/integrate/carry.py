@@ -17,6 +17,7 @@ from rubhpc.fem.held import find_free
 from rubhpc.fem.model import state_size
 from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.prepare import ModalSetup
+from rubhpc.integrate.record import State
 from rubhpc.kernels.complementarity import solve_complementarity
 from rubhpc.kernels.contact import normal_and_gap
 
@@ -24,12 +25,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.prepare import Setup
-    from rubhpc.integrate.record import State
 
     Floats = NDArray[np.float64]
 
 TOLERANCE = 1e-12  # m, ten times what the integrators take for closed: a run that goes on is left as it is
 PARTED = 1e-9  # m, beyond which a closed contact has opened
+LEAST_FORCE = np.finfo(float).tiny  # N, of a contact that is closed, whatever presses it
 MOST_PASSES = 20  # for the curved gap of the updated normal; three or four are taken
 
 
@@ -73,6 +74,18 @@ def carried(state: State, setup: Setup, clearance: float) -> State:
     return replace(state, contact_force=np.where(is_closed, state.contact_force + force, 0.0))
 
 
+def at_rest(setup: Setup, clearance: float) -> State:
+    """Return the shaft at rest under its constant loads, on stators that the sag reaches, without friction.
+
+    Clearance in m; what the stators hold up presses them.
+    """
+    state = State.at_rest(setup.model)
+    if not setup.model.sag.any():
+        return state
+    gap, _ = gaps(state.displacement, setup, clearance)
+    return carried(replace(state, contact_force=np.where(gap < 0.0, LEAST_FORCE, 0.0)), setup, clearance)
+
+
 def with_overlap(state: State, setup: Setup, clearance: float) -> State:
     """Return the state at the end of a case with what its gaps overlap."""
     gap, _ = gaps(state.displacement, setup, clearance)
@@ -88,7 +101,7 @@ def gaps(displacement: Floats, setup: Setup, clearance: float) -> tuple[Floats, 
         at = np.where(rows >= 0, displacement[rows], 0.0)
         ey, ez = float(np.cos(stator.angle)), float(np.sin(stator.angle))
         reach = clearance + stator.clearance_offset
-        ny, nz, gap[i] = normal_and_gap(ey, ez, stator.radius, reach, setup.is_updated, at)
+        ny, nz, gap[i] = normal_and_gap(ey, ez, stator.radius, reach, 0.0, setup.is_updated, at)
         change = np.array([-ny, -nz, 0.0, ny * ey + nz * ez, ny * -ez + nz * ey])
         push[i, rows[rows >= 0]] = change[rows >= 0]
     return gap, push
@@ -98,7 +111,11 @@ def _as_seen(displacement: Floats, setup: Setup) -> Floats:
     """Displacement of all bodies as the integrator will have it: reduced coordinates hold no more."""
     if not isinstance(setup, ModalSetup):
         return displacement
-    seen: Floats = setup.reduced.basis @ (setup.reduced.project @ displacement)
+    n, sag = setup.model.rotor.n_dof, setup.model.sag
+    moved = displacement.copy()
+    moved[:n] -= sag
+    seen: Floats = setup.reduced.basis @ (setup.reduced.project @ moved)
+    seen[:n] += sag
     return seen
 
 

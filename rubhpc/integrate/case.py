@@ -7,9 +7,10 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rubhpc.integrate.carry import carried, with_overlap
+from rubhpc.integrate.carry import at_rest, carried, with_overlap
 from rubhpc.integrate.central import CentralDifferenceMarch
 from rubhpc.integrate.gather import (
+    add_sag,
     by_name,
     diverged_record,
     empty_samples,
@@ -60,13 +61,13 @@ def run_case(
     friction : float
         Coefficient of friction.
     initial : State, optional
-        Where to start, with the unbalance at its phase 0; default at rest. Where another case has ended is
-        fitted to the gaps of this one (`carry.carried`).
+        Where to start, with the unbalance at its phase 0; default at rest (`carry.at_rest`). Where another
+        case has ended is fitted to the gaps of this one (`carry.carried`).
     check : callable, optional
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
     """
     began = time.perf_counter()
-    initial = State.at_rest(setup.model) if initial is None else carried(initial, setup, clearance)
+    initial = at_rest(setup, clearance) if initial is None else carried(initial, setup, clearance)
 
     def start(state: State) -> March:
         return _march(setup, clearance, friction, state, check)
@@ -125,11 +126,13 @@ def _integrate(
         tally.age[tally.is_touching] = IMPACT_STEPS
         reason = march.advance(0, n_sample, samples, tally, is_recorded=True)
     if reason is not None:
-        revolution = math.floor(n_transient + march.sample / per_revolution) + 1
+        seen = math.floor(n_transient + march.sample / per_revolution) + 1
+        revolution = min(seen, n_transient + recording.revolutions)  # what ends the record was in it
         record = diverged_record(
             f"{reason} in revolution {revolution}", n_stator, recording, settings, march.final()
         )
     else:
+        add_sag(samples, tally, setup.model)
         signals, final = by_name(samples.whole), march.final()
         record = Record(
             status=DONE,

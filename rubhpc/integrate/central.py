@@ -8,7 +8,7 @@ import numpy as np
 
 from rubhpc.integrate.contact_work import workspace
 from rubhpc.integrate.gather import empty_samples, empty_tally
-from rubhpc.integrate.march import March
+from rubhpc.integrate.march import NO_FORCES, March
 from rubhpc.integrate.packing import pairs_of
 from rubhpc.integrate.record import State
 from rubhpc.kernels import central_difference as kernel
@@ -80,7 +80,7 @@ class CentralDifferenceMarch(March):
             return np.where(row >= 0, values[row], 0.0)
 
         return State(
-            rotor_displacement=pick(self._state[0], parts[0]),
+            rotor_displacement=pick(self._state[0], parts[0]) + setup.model.sag,
             rotor_velocity=pick(velocity, parts[0]),
             stator_displacement=tuple(pick(self._state[0], part) for part in parts[1:]),
             stator_velocity=tuple(pick(velocity, part) for part in parts[1:]),
@@ -95,7 +95,7 @@ class CentralDifferenceMarch(March):
         if outcome == kernel.DIVERGED:
             return f"a displacement passed {setup.displacement_limit:.3g} m"
         if outcome == kernel.CONTACT_UNSOLVED:
-            return "the contact forces of a step have no solution"
+            return NO_FORCES
         self.n_step += (stop - self.sample) * setup.steps_per_sample
         return None
 
@@ -140,7 +140,7 @@ def _start(setup: CentralDifferenceSetup, initial: State, pairs: Pairs, work: Wo
         values[packed.row[is_seen]] = np.concatenate([rotor, *stators])[is_seen]
         return values
 
-    displacement = gather(initial.rotor_displacement, initial.stator_displacement)
+    displacement = gather(initial.rotor_displacement - setup.model.sag, initial.stator_displacement)
     velocity = gather(initial.rotor_velocity, initial.stator_velocity)
     work.force[:] = initial.contact_force
     is_free = packed.degree_row >= 0

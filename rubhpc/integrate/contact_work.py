@@ -35,6 +35,7 @@ def workspace(pairs: Pairs, step: float) -> Workspace:
         tableau=np.zeros((3 * q, 6 * q + 2)),
         basis=np.zeros(3 * q, dtype=np.int64),
         members=np.zeros(q, dtype=np.int64),
+        solution=np.zeros(3),
     )
     for i in range(q):
         fill_directions(pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.pull[i], work.push[i])

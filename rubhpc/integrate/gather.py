@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.integrate.measures import period, whirl_ratio
+from rubhpc.integrate.packing import output_degrees
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.regimes import regime
 from rubhpc.kernels.observe import (
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.fem.model import StatorModel
+    from rubhpc.fem.model import Model, StatorModel
     from rubhpc.study import Recording
 
     Floats = NDArray[np.float64]
@@ -60,7 +61,20 @@ def empty_tally(n_stator: int) -> Tally:
         peak_force=np.zeros(n_stator),
         peak_lateral=np.zeros(n_stator),
         energy=np.zeros(5),
+        pivots=np.zeros(1, dtype=np.int64),
+        residual=np.zeros((3, 2)),
     )
+
+
+def add_sag(samples: Samples, tally: Tally, model: Model) -> None:
+    """Count the motion of the output node from the shaft without loads, not from where it sags to."""
+    if not model.sag.any():
+        return
+    for k, row in enumerate(output_degrees(model)):
+        sag = model.sag[row] if row >= 0 else 0.0
+        samples.rotor[k] += sag
+        tally.highest[k] += sag
+        tally.lowest[k] += sag
 
 
 def by_name(whole: Floats) -> dict[str, Floats]:
@@ -114,6 +128,7 @@ def scalars_of(
         -tally.energy[DAMPING_LOSS],
         -tally.energy[IMPACT_LOSS],
     ]
+    distance, moved = tally.residual.T
     exchanged = max(0.5 * np.abs(flows).sum(), LEAST_EXCHANGE * max(energy), np.finfo(float).tiny)
     return {
         "period": orbit_period,
@@ -133,6 +148,8 @@ def scalars_of(
         "peak_to_peak_vertical": float(tally.highest[VERTICAL] - tally.lowest[VERTICAL]),
         "peak_to_peak_horizontal": float(tally.highest[HORIZONTAL] - tally.lowest[HORIZONTAL]),
         "energy_residual": float(abs(sum(flows) - (energy[1] - energy[0])) / exchanged),
+        "contact_iterations": int(tally.pivots[0]),
+        "contact_residual": float(np.divide(distance, moved, out=np.zeros(3), where=moved > 0.0).max()),
     }
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 LONGEST_CALL = 0.15  # s; signals are answered between kernel calls
 STEPS_A_SECOND = 5e5  # half of what every integrator does
+NO_FORCES = "no contact forces that obey the laws were found"  # why a case ends
 
 
 class March(ABC):

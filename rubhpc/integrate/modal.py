@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.march import March
 from rubhpc.integrate.record import State
 from rubhpc.kernels import phases as kernel
@@ -51,7 +52,8 @@ class ModalMarch(March):
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(check, FIRST_REVOLUTIONS * setup.samples_per_revolution)
         self._setup, self._book = setup, setup.book(friction)
-        self._clearance = np.array([clearance + stator.clearance_offset for stator in setup.model.stators])
+        offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
+        self._clearance = clearance + offsets - sag_at_stators(setup.model)[0]
         self._met = {0, *(1 << i for i in range(self._clearance.size))}  # sets of closed contacts
         turn = setup.interval * setup.samples_per_revolution
         self.clock = kernel.Clock(
@@ -98,7 +100,7 @@ class ModalMarch(March):
             bodies.append(motion[first : first + body.n_dof].T.copy())
             first += body.n_dof
         return State(
-            rotor_displacement=bodies[0][0],
+            rotor_displacement=bodies[0][0] + setup.model.sag,
             rotor_velocity=bodies[0][1],
             stator_displacement=tuple(displacement for displacement, _ in bodies[1:]),
             stator_velocity=tuple(velocity for _, velocity in bodies[1:]),
@@ -204,4 +206,6 @@ class ModalMarch(March):
     def _reduce(self, state: State) -> Floats:
         """Reduced coordinates and velocities of a state."""
         project = self._setup.reduced.project
-        return np.concatenate([project @ state.displacement, project @ state.velocity])
+        displacement = state.displacement
+        displacement[: self._setup.model.sag.size] -= self._setup.model.sag
+        return np.concatenate([project @ displacement, project @ state.velocity])

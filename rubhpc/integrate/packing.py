@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 from scipy.sparse import csr_array, dia_array
 from scipy.sparse.csgraph import connected_components
 
+from rubhpc.fem.statics import sag_at_stators
 from rubhpc.kernels.contact import AXIAL, LATERAL, MULTIPLIER, N_DEGREE, TORSION, Law, Pairs, V, W
 from rubhpc.kernels.linear import Linear
 
@@ -146,13 +147,15 @@ def pairs_of(
 ) -> Pairs:
     """Contact pairs of a case; clearance in m, friction positive, spin (rad/s) gives its sense."""
     angle = np.array([stator.angle for stator in model.stators])
+    nearer, aside = sag_at_stators(model)
     return Pairs(
         row=packed.degree_row,
         block=packed.degree_block,
         axis_y=np.cos(angle),
         axis_z=np.sin(angle),
         radius=np.array([stator.radius for stator in model.stators]),
-        clearance=np.array([clearance + stator.clearance_offset for stator in model.stators]),
+        clearance=np.array([clearance + stator.clearance_offset for stator in model.stators]) - nearer,
+        aside=aside,
         friction=np.full(angle.size, np.copysign(friction, spin)),
         compliance=packed.compliance,
         is_updated=is_updated,

@@ -75,10 +75,10 @@ class State:
 
     @classmethod
     def at_rest(cls, model: Model) -> State:
-        """Nothing moves but the steady spin."""
+        """Nothing moves but the steady spin; constant loads bend the shaft, and no stator touches."""
         stators = tuple(stator.body for stator in model.stators)
         return cls(
-            rotor_displacement=np.zeros(model.rotor.n_dof),
+            rotor_displacement=model.sag.copy(),
             rotor_velocity=np.zeros(model.rotor.n_dof),
             stator_displacement=tuple(np.zeros(body.n_dof) for body in stators),
             stator_velocity=tuple(np.zeros(body.n_dof) for body in stators),

@@ -147,10 +147,12 @@ def _at_standstill(model: Model) -> _Standstill:
     coupled = (mass != 0) | (stiffness != 0)
     n_part, number = connected_components(csr_array(coupled), directed=False)
     _, whole = connected_components(csr_array(coupled | (damping != 0)), directed=False)
+    is_seen, is_felt = np.zeros((2, len(mass)), dtype=bool)
+    is_seen[seen], is_felt[whole[seen]] = True, True
     parts = []
     for i_part in range(n_part):
         rows = np.flatnonzero(number == i_part)
-        if not np.isin(whole[rows[0]], whole[seen]):
+        if not is_felt[whole[rows[0]]]:
             continue
         square, shape = eigh(symmetric[np.ix_(rows, rows)], mass[np.ix_(rows, rows)])
         if square[0] <= FREE * square[-1]:
@@ -160,9 +162,8 @@ def _at_standstill(model: Model) -> _Standstill:
             )
         mode = np.zeros((mass.shape[0], rows.size))
         mode[rows] = shape
-        parts.append(_Part(int(np.isin(rows, seen).sum()), mode, np.sqrt(square)))
-    frequency = _contact_frequency(mass, stiffness, degrees_of(model), model)
-    return _Standstill(symmetric, parts, frequency)
+        parts.append(_Part(int(is_seen[rows].sum()), mode, np.sqrt(square)))
+    return _Standstill(symmetric, parts, _contact_frequency(parts, degrees_of(model), model))
 
 
 def _seen(model: Model) -> Ints:
@@ -171,22 +172,22 @@ def _seen(model: Model) -> Ints:
     return np.unique(np.concatenate([degree[degree >= 0], output[output >= 0]]))
 
 
-def _contact_frequency(mass: Floats, stiffness: Floats, degree: Ints, model: Model) -> float:
+def _contact_frequency(parts: list[_Part], degree: Ints, model: Model) -> float:
     """Highest frequency, rad/s, of a contact: the rotor's inertia on the stator's static stiffness."""
+    mode = np.hstack([part.mode for part in parts])
+    square = np.concatenate([part.frequency for part in parts]) ** 2
     highest = 0.0
-    for i, stator in enumerate(model.stators):
-        along = np.zeros(mass.shape[0])
-        for a, share in ((V, np.cos(stator.angle)), (W, np.sin(stator.angle))):
-            if degree[i, a] >= 0:
-                along[degree[i, a]] = share
-        if degree[i, AXIAL] < 0:
+    for stator, (v, w, _, axial, _) in zip(model.stators, degree, strict=True):
+        if axial < 0:
             return np.inf  # a rigid wall: no mode is too high
-        tip = np.zeros(mass.shape[0])
-        tip[degree[i, AXIAL]] = 1.0
-        # Inertia of the rotor's static shape under a force at the disc, as that of its first mode.
-        shape = np.linalg.lstsq(stiffness, along, rcond=None)[0]
-        inertia = (shape @ mass @ shape) / (along @ shape) ** 2
-        compliance = tip @ np.linalg.lstsq(stiffness, tip, rcond=None)[0]
+        along = sum(
+            share * mode[row]
+            for row, share in ((v, np.cos(stator.angle)), (w, np.sin(stator.angle)))
+            if row >= 0
+        )
+        answer = along / square  # to a unit force, mode by mode
+        inertia = (answer @ answer) / (along @ answer) ** 2  # of that shape, as that of the first mode
+        compliance = mode[axial] @ (mode[axial] / square)
         highest = max(highest, 1.0 / np.sqrt(inertia * compliance))
     return float(highest)
 

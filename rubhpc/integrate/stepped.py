@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.contact_work import workspace
+from rubhpc.integrate.march import NO_FORCES
 from rubhpc.integrate.modal import ModalMarch
 from rubhpc.kernels.contact import N_DEGREE, Pairs
 from rubhpc.kernels.phases import CONTACT_UNSOLVED, FINISHED, N_STEP, TIME
@@ -59,6 +61,7 @@ class SteppedMarch(ModalMarch):
             axis_z=np.sin(angle),
             radius=np.array([stator.radius for stator in setup.model.stators]),
             clearance=self._clearance,
+            aside=sag_at_stators(setup.model)[1],
             friction=np.full(q, math.copysign(friction, setup.spin)),
             compliance=np.ascontiguousarray(drifted.reshape(q, N_DEGREE, q, N_DEGREE)),
             is_updated=setup.is_updated,
@@ -129,7 +132,7 @@ class SteppedMarch(ModalMarch):
             first = int(self._progress[TIME])
             self.sample = first >> self.clock.sample_level
             if outcome == CONTACT_UNSOLVED:
-                return "the contact forces of a step have no solution"
+                return NO_FORCES
             if self._has_diverged(tally):
                 return f"a displacement passed {self._setup.displacement_limit:.3g} m"
             if outcome == FINISHED:

@@ -12,6 +12,7 @@ from rubhpc.kernels.contact_step import is_plain, solve_contact
 from rubhpc.kernels.linear import Linear, circulatory_power, free_velocity
 from rubhpc.kernels.observe import (
     DAMPING_LOSS,
+    STEP,
     TWIST_ACCELERATION,
     UNBALANCE_WORK,
     Samples,
@@ -19,6 +20,7 @@ from rubhpc.kernels.observe import (
     centred,
     observe_contact,
     observe_motion,
+    observe_solution,
     take_sample,
 )
 
@@ -105,12 +107,13 @@ def advance(
     # Tuples are opened here: a field read inside the loop would count a reference at every step.
     displacement, velocity = state[0], state[1]
     velocity_next, damping_force, residual = scratch[0], scratch[1], scratch[2]
-    row, axis_y, axis_z, radius, clearance = (
+    row, axis_y, axis_z, radius, clearance, aside = (
         pairs.row,
         pairs.axis_y,
         pairs.axis_z,
         pairs.radius,
         pairs.clearance,
+        pairs.aside,
     )
     is_updated, at, gap, contact_force = pairs.is_updated, work.at, work.gap, work.force
     friction, traction = pairs.friction, work.traction
@@ -124,6 +127,7 @@ def advance(
     is_springy = pairs.law.stiffness > 0.0  # a force may act with the gap open at the step's end
     is_bouncing = pairs.law.restitution > 0.0
     start_position, start_rate, delay = work.now, work.rate, work.delay
+    solution = work.solution
     whole, late = np.ones(q), np.zeros(q)
     turn_cosine, turn_sine = np.cos(spin * step), np.sin(spin * step)
     sense = 1.0 if spin >= 0.0 else -1.0
@@ -139,11 +143,15 @@ def advance(
             )
             for k in range(n_dof):
                 residual[k] = displacement[k] + step * velocity_next[k]
-            is_touching = is_any_closed(row, axis_y, axis_z, radius, clearance, is_updated, residual, at, gap)
+            is_touching = is_any_closed(
+                row, axis_y, axis_z, radius, clearance, aside, is_updated, residual, at, gap
+            )
             if is_touching or (is_springy and was_touching):
                 if is_linear_pair and matrix[0, 0] > 0.0:
                     contact_force[0] = -gap[0] / matrix[0, 0]
                     traction[0] = friction[0] * contact_force[0]
+                    solution[0], solution[2] = 1.0, -gap[0]
+                    solution[1] = abs(gap[0] + matrix[0, 0] * contact_force[0])
                 else:
                     if not is_direct:
                         fill_start(row, displacement, velocity, start_position, start_rate)
@@ -151,6 +159,8 @@ def advance(
                     if n_touching == UNSOLVED:
                         return CONTACT_UNSOLVED
                     is_touching = n_touching > 0
+                if is_recorded:
+                    observe_solution(STEP, int(solution[0]), solution[1], solution[2], tally)
                 apply_contact(start, inverse, row, block, pull, contact_force, step, whole, velocity_next)
             elif was_touching:
                 contact_force[:] = 0.0

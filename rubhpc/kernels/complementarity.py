@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit
+from rubhpc.kernels._jit import jit, jit_inline
 
 Floats = NDArray[np.float64]
 
@@ -63,6 +63,28 @@ def solve_active(
             force[i] = work[n, q]
             n += 1
     return True
+
+
+@jit_inline
+def natural_residual(give: float, force: float, gap: float) -> float:
+    """How far a pair is from complementarity, as its gap is measured: |min(give force, gap)|.
+
+    `give` is what a unit force of the pair does to its own gap. Zero for force >= 0, gap >= 0, one of them 0.
+    """
+    return float(abs(min(give * force, gap)))
+
+
+@jit
+def residual_of(compliance: Floats, gap: Floats, force: Floats) -> tuple[float, float]:
+    """Largest residual of a problem at `force`, and the most that a force moves its own gap."""
+    largest, moved = 0.0, 0.0
+    for i in range(gap.size):
+        end = gap[i]
+        for j in range(gap.size):
+            end += compliance[i, j] * force[j]
+        largest = max(largest, natural_residual(compliance[i, i], force[i], end))
+        moved = max(moved, abs(compliance[i, i] * force[i]))
+    return largest, moved
 
 
 @jit

@@ -39,6 +39,7 @@ class Pairs(NamedTuple):
     axis_z: Floats  # (q,)
     radius: Floats  # (q,), of contact, m
     clearance: Floats  # (q,), at rest, m
+    aside: Floats  # (q,), how far a tip at rest stands aside of its axis through the disc, as `lateral`, m
     friction: Floats  # (q,), coefficient, with the sign of the spin
     compliance: Floats  # (q, 5, q, 5), displacement of a degree for a unit force on another over a step, m/N
     is_updated: bool  # the normal follows the line of centres
@@ -71,6 +72,7 @@ class Workspace(NamedTuple):
     tableau: Floats  # (3 q, 6 q + 2)
     basis: Ints  # (3 q,)
     members: Ints  # (q,)
+    solution: Floats  # (3,), of the last one: pivots, distance from the laws and what its forces moved, m
 
 
 @jit_inline
@@ -88,17 +90,17 @@ def force_on_disc(
 
 @jit_inline
 def normal_and_gap(
-    ey: float, ez: float, radius: float, clearance: float, is_updated: bool, at: Floats
+    ey: float, ez: float, radius: float, clearance: float, aside: float, is_updated: bool, at: Floats
 ) -> tuple[float, float, float]:
     """Unit normal (ny, nz) from disc to stator tip, and gap (m), of a pair with its degrees `at` (5,).
 
-    (ey, ez) is the stator's axis; radius and clearance in m.
+    (ey, ez) is the stator's axis; radius, clearance and `aside` in m.
     """
     if not is_updated:
         return ey, ez, clearance + at[AXIAL] - ey * at[V] - ez * at[W]
-    reach = radius + clearance + at[AXIAL]
-    y = reach * ey - at[LATERAL] * ez - at[V]
-    z = reach * ez + at[LATERAL] * ey - at[W]
+    reach, lateral = radius + clearance + at[AXIAL], aside + at[LATERAL]
+    y = reach * ey - lateral * ez - at[V]
+    z = reach * ez + lateral * ey - at[W]
     distance = np.hypot(y, z)
     return y / distance, z / distance, distance - radius
 
@@ -138,7 +140,7 @@ def fill_matrix(pairs: Pairs, rows: Floats, columns: Floats, matrix: Floats) -> 
             matrix[i, j] = total
 
 
-@jit
+@jit_inline
 def fill_moved(pairs: Pairs, work: Workspace, i: int) -> None:
     """Degrees of pair i with the contact forces applied, into `work.moved`."""
     for a in range(N_DEGREE):
@@ -167,6 +169,7 @@ def is_any_closed(
     axis_z: Floats,
     radius: Floats,
     clearance: Floats,
+    aside: Floats,
     is_updated: bool,
     displacement: Floats,
     at: Floats,
@@ -181,14 +184,22 @@ def is_any_closed(
     for i in range(gap.size):
         for a in range(N_DEGREE):
             at[i, a] = displacement[row[i, a]] if row[i, a] >= 0 else 0.0
-        _, _, gap[i] = normal_and_gap(axis_y[i], axis_z[i], radius[i], clearance[i], is_updated, at[i])
+        _, _, gap[i] = normal_and_gap(
+            axis_y[i], axis_z[i], radius[i], clearance[i], aside[i], is_updated, at[i]
+        )
         is_closed = is_closed or gap[i] < 0.0
     return is_closed
 
 
-@jit
+@jit_inline
 def pair_normal_and_gap(pairs: Pairs, i: int, at: Floats) -> tuple[float, float, float]:
     """`normal_and_gap` of pair i."""
     return normal_and_gap(
-        pairs.axis_y[i], pairs.axis_z[i], pairs.radius[i], pairs.clearance[i], pairs.is_updated, at
+        pairs.axis_y[i],
+        pairs.axis_z[i],
+        pairs.radius[i],
+        pairs.clearance[i],
+        pairs.aside[i],
+        pairs.is_updated,
+        at,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rubhpc.kernels._jit import jit, jit_inline
-from rubhpc.kernels.complementarity import UNSOLVED, solve_complementarity
+from rubhpc.kernels.complementarity import UNSOLVED, natural_residual, solve_complementarity
 from rubhpc.kernels.contact import (
     N_DEGREE,
     Law,
@@ -17,10 +17,11 @@ from rubhpc.kernels.contact import (
     fill_moved,
     pair_normal_and_gap,
 )
-from rubhpc.kernels.coulomb import fill_slip, solve_friction
+from rubhpc.kernels.coulomb import fill_slip, friction_residual, solve_friction
 
 GAP_TOLERANCE = 1e-14  # m, to which a closed gap is zero
 N_NEWTON = 25  # passes for the curved gap; two or three are taken
+MOST_RESIDUAL = 1e-6  # over what the forces moved: rounding leaves 1e-9, and more is no solution
 
 
 @jit
@@ -95,6 +96,24 @@ def bounce(restitution: float, step: float, gap: float, opening: float, end: flo
     return gap + step * after, delay
 
 
+@jit_inline
+def fill_residual(pairs: Pairs, work: Workspace) -> None:
+    """How far gaps and slips are from the laws at the end of the step, and how far the forces moved them."""
+    distance, moved = 0.0, 0.0
+    for i in range(pairs.radius.size):
+        end = work.gap[i] - work.target[i]
+        for j in range(pairs.radius.size):
+            end += work.matrix[i, j] * work.force[j]
+            if pairs.law.is_set_valued:
+                end += work.coupling[i, j] * work.traction[j]
+        distance = max(distance, natural_residual(work.matrix[i, i], work.force[i], end))
+        moved = max(moved, work.matrix[i, i] * work.force[i])
+        if pairs.law.is_set_valued:
+            slipped, held = friction_residual(work, i)
+            distance, moved = max(distance, slipped), max(moved, held)
+    work.solution[1], work.solution[2] = distance, moved
+
+
 @jit
 def solve_contact(pairs: Pairs, work: Workspace, step: float, spin: float) -> int:
     """Contact forces of a step (s) at a spin (rad/s); returns the pairs in contact, or UNSOLVED.
@@ -102,10 +121,11 @@ def solve_contact(pairs: Pairs, work: Workspace, step: float, spin: float) -> in
     Called once `is_any_closed` has filled the workspace, and `now` and `rate` too where the law is not plain.
     With the fixed normal the gap is linear and one complementarity problem solves it; the updated normal is
     taken at the free update, and the gap's curvature by Newton's method on |AB| - r_d, so that the gap
-    closes to rounding.
+    closes to rounding. The pivots taken and the residual are left in the workspace.
     """
     q = pairs.radius.size
     law = pairs.law
+    work.solution[0] = 0.0
     for i in range(q):
         work.force[i] = 0.0
         work.active[i] = work.gap[i] < 0.0
@@ -130,8 +150,10 @@ def solve_contact(pairs: Pairs, work: Workspace, step: float, spin: float) -> in
             )
             for i in range(q):
                 work.traction[i] = pairs.friction[i] * work.force[i]
+                work.gap[i] += work.target[i]
         if pivots == UNSOLVED:
             return UNSOLVED
+        work.solution[0] += pivots
         error = 0.0
         if pairs.is_updated:
             for i in range(q):
@@ -147,6 +169,9 @@ def solve_contact(pairs: Pairs, work: Workspace, step: float, spin: float) -> in
                 gap -= work.target[i]
                 error = max(error, abs(gap) if work.force[i] > 0.0 else -gap)
         if error <= 10 * GAP_TOLERANCE:
+            fill_residual(pairs, work)
+            if not work.solution[1] <= MOST_RESIDUAL * work.solution[2] + 10 * GAP_TOLERANCE:
+                return UNSOLVED
             n_touching = 0
             for i in range(q):
                 n_touching += 1 if work.force[i] > 0.0 else 0

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit
+from rubhpc.kernels._jit import jit, jit_inline
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact import N_DEGREE, Pairs, Workspace
 from rubhpc.kernels.lemke import solve_lemke
@@ -87,6 +87,18 @@ def feeds_energy(pairs: Pairs, work: Workspace, i: int, step: float, spin: float
     # positions.
     least = UNNOTICED * abs(work.tangential[1, i, i]) * work.cone[i] * work.force[i]
     return bool(work.traction[i] * (before + after) < -abs(work.traction[i]) * least)
+
+
+@jit_inline
+def friction_residual(work: Workspace, i: int) -> tuple[float, float]:
+    """How far pair i is from Coulomb's law, and how far its friction moved its slip, m."""
+    slip = work.slip[i]
+    for j in range(work.force.size):
+        slip += work.tangential[0, i, j] * work.force[j] + work.tangential[1, i, j] * work.traction[j]
+    give, bound = abs(work.tangential[1, i, i]), work.cone[i] * work.force[i]
+    # The friction that would stop the slip, as far as the cone lets it, is the friction there is.
+    wanted = min(max(work.traction[i] + slip / give, -bound), bound) if give > 0.0 else work.traction[i]
+    return give * abs(work.traction[i] - wanted), give * abs(work.traction[i])
 
 
 @jit

@@ -6,8 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_sum
-from rubhpc.kernels.complementarity import UNSOLVED, solve_complementarity
-from rubhpc.kernels.observe import DRIVE_WORK, FRICTION_LOSS, IMPACT_LOSS, Tally
+from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_complementarity
+from rubhpc.kernels.observe import (
+    DRIVE_WORK,
+    FRICTION_LOSS,
+    IMPACT,
+    IMPACT_LOSS,
+    PRESSING,
+    Tally,
+    observe_solution,
+)
 from rubhpc.kernels.phases import Reduced  # noqa: TC001 - part of a kernel's signature
 
 Floats = NDArray[np.float64]
@@ -55,8 +63,12 @@ def change_contacts(
         active[i] = speed[i] < 0.0
         if active[i]:
             speed[i] *= 1.0 + reduced.restitution
-    if solve_complementarity(reduced.answer, speed, 1e-14, force, active, elimination) == UNSOLVED:
+    pivots = solve_complementarity(reduced.answer, speed, 1e-14, force, active, elimination)
+    if pivots == UNSOLVED:
         return -1
+    if is_recorded:
+        residual, moved = residual_of(reduced.answer, speed, force)
+        observe_solution(IMPACT, pivots, residual, moved, tally)
     for i in range(q):
         if force[i] > 0.0:
             if is_recorded:
@@ -78,8 +90,12 @@ def change_contacts(
             if product(reduced.push[i], velocity) <= OPENING + max(-acceleration, 0.0) * moment:
                 speed[i] = acceleration
         active[i] = speed[i] < 0.0
-    if solve_complementarity(reduced.answer, speed, 1e-12, force, active, elimination) == UNSOLVED:
+    pivots = solve_complementarity(reduced.answer, speed, 1e-12, force, active, elimination)
+    if pivots == UNSOLVED:
         return -1
+    if is_recorded:
+        residual, moved = residual_of(reduced.answer, speed, force)
+        observe_solution(PRESSING, pivots, residual, moved, tally)
     remaining = 0
     for i in range(q):
         if force[i] > 0.0:

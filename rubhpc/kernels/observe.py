@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit, jit_inline
+from rubhpc.kernels._jit import jit_inline
 from rubhpc.kernels.contact import AXIAL, LATERAL, TORSION, Pairs, V, W, Workspace
 
 Floats = NDArray[np.float64]
@@ -42,6 +42,8 @@ class Tally(NamedTuple):
     peak_force: Floats  # (q,), N
     peak_lateral: Floats  # (q,), m
     energy: Floats  # (5,), J: see the indices below
+    pivots: Ints  # (1,), most that one contact problem took
+    residual: Floats  # (3, 2), largest distance from the laws, and what forces moved: see the indices below
 
 
 # A stepping scheme spreads the impulse of an impact, by which the tip's own mass takes the rim's velocity,
@@ -49,6 +51,9 @@ class Tally(NamedTuple):
 IMPACT_STEPS = 2
 
 UNBALANCE_WORK, DRIVE_WORK, DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS = range(5)
+
+# Contact problems: gaps of a step, m; velocities of an impact, m/s; accelerations after it, m/s2.
+STEP, IMPACT, PRESSING = range(3)
 
 
 @jit_inline
@@ -86,7 +91,7 @@ def observe_motion(
             peak_lateral[i] = max(peak_lateral[i], abs(displacement[row]))
 
 
-@jit
+@jit_inline
 def observe_contact(
     pairs: Pairs,
     work: Workspace,
@@ -136,6 +141,14 @@ def observe_contact(
         tally.energy[DRIVE_WORK] += friction_force * pairs.radius[i] * abs(spin) * step
         tally.energy[FRICTION_LOSS] += friction_force * slip * step
         tally.energy[IMPACT_LOSS] -= force * opening * step
+
+
+@jit_inline
+def observe_solution(problem: int, pivots: int, residual: float, moved: float, tally: Tally) -> None:
+    """Note what a contact problem has taken, and how far its solution is from the laws."""
+    tally.pivots[0] = max(tally.pivots[0], pivots)
+    tally.residual[problem, 0] = max(tally.residual[problem, 0], residual)
+    tally.residual[problem, 1] = max(tally.residual[problem, 1], moved)
 
 
 @jit_inline

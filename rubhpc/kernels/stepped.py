@@ -20,11 +20,13 @@ from rubhpc.kernels.contact import N_DEGREE, Pairs, Workspace, fill_start, is_an
 from rubhpc.kernels.contact_step import is_plain, solve_contact
 from rubhpc.kernels.observe import (
     DAMPING_LOSS,
+    STEP,
     TWIST_ACCELERATION,
     UNBALANCE_WORK,
     Samples,
     Tally,
     observe_contact,
+    observe_solution,
 )
 from rubhpc.kernels.phases import (
     CONTACT_UNSOLVED,
@@ -64,25 +66,31 @@ class Kicks(NamedTuple):
 
 @jit_sum
 def book_step(
-    reduced: Reduced, step: float, angle: float, x: Floats, x_after: Floats, energy: Floats
+    reduced: Reduced, skew: Floats, step: float, angle: float, x: Floats, x_after: Floats, energy: Floats
 ) -> None:
     """Add what damping took and the unbalance gave in a step of contact (s), at its mean velocity.
 
-    `x` and `x_after` (n,) are the reduced displacements at its ends, `angle` is that of the shaft amid it. A
-    kick sets off a burst of the fastest modes, which force spread over the step would not: the mean leaves it
-    out.
+    `x` and `x_after` (n,) are the reduced displacements at its ends, `angle` is that of the shaft amid it;
+    `skew` is the skew part of the stiffness, without rows where there is none. A kick sets off a burst of the
+    fastest modes, which force spread over the step would not: the mean leaves it out.
     """
     n = x.size
+    cosine, sine = np.cos(angle), np.sin(angle)
     loss, gain = 0.0, 0.0
     for k in range(n):
+        moved = x_after[k] - x[k]
+        row = reduced.damping[k]
         drawn = 0.0
         for j in range(n):
-            drawn += reduced.damping[k, j] * (x_after[j] - x[j]) / step
-            skew = 0.5 * (reduced.stiffness[k, j] - reduced.stiffness[j, k])
-            drawn += skew * 0.5 * (x_after[j] + x[j])
+            drawn += row[j] * (x_after[j] - x[j])
+        loss += moved * drawn / step
+        gain += moved * (reduced.force_cosine[k] * cosine + reduced.force_sine[k] * sine)
+    for k in range(len(skew)):
+        row = skew[k]
+        drawn = 0.0
+        for j in range(n):
+            drawn += row[j] * 0.5 * (x_after[j] + x[j])
         loss += (x_after[k] - x[k]) * drawn
-        force = reduced.force_cosine[k] * np.cos(angle) + reduced.force_sine[k] * np.sin(angle)
-        gain += (x_after[k] - x[k]) * force
     energy[DAMPING_LOSS] += loss
     energy[UNBALANCE_WORK] += gain
 
@@ -142,6 +150,10 @@ def advance_stepped(
     n_degree = q * N_DEGREE
     before, now, after, rate = ends[0], ends[1], np.zeros(n_degree), np.zeros(n_degree)
     x, x_after = np.zeros(reduced.push.shape[1]), np.zeros(reduced.push.shape[1])
+    is_placed = False  # whether x is where the step begins
+    skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
+    if not np.any(skew):
+        skew = skew[:0]
     step = clock.tick * (1 << kicks.level)
     interval = clock.tick * (1 << clock.sample_level)
     end_tick = clock.n_sample << clock.sample_level
@@ -183,6 +195,7 @@ def advance_stepped(
                 pairs.axis_z,
                 pairs.radius,
                 pairs.clearance,
+                pairs.aside,
                 pairs.is_updated,
                 after,
                 work.at,
@@ -202,6 +215,8 @@ def advance_stepped(
                 progress[TIME] = t
                 return CONTACT_UNSOLVED
             is_touching = n_touching > 0
+            if is_recorded:
+                observe_solution(STEP, int(work.solution[0]), work.solution[1], work.solution[2], tally)
             for i in range(q):
                 for d in range(N_DEGREE):
                     b = i * N_DEGREE + d
@@ -225,10 +240,12 @@ def advance_stepped(
             if progress[SPAN] >= 0:
                 end_span(phases, 0, clock, t, z, progress, recorder, tally)
             for k in range(x.size):
-                x[k] = dot(motion_re[0, k], motion_im[0, k], z_re, z_im)
+                if not is_placed:
+                    x[k] = dot(motion_re[0, k], motion_im[0, k], z_re, z_im)
                 x_after[k] = dot(motion_re[0, k], motion_im[0, k], next_re, next_im)
             angle = clock.spin * clock.tick * (t % per_revolution) + 0.5 * clock.spin * step
-            book_step(reduced, step, angle, x, x_after, tally.energy)
+            book_step(reduced, skew, step, angle, x, x_after, tally.energy)
+            x[:] = x_after
         elif is_recorded and progress[SPAN] < 0:
             begin_span(phases, 0, t, z, progress, recorder)
         if is_recorded and (is_touching or was_touching):
@@ -238,6 +255,7 @@ def advance_stepped(
             for i in range(q):
                 samples.force[i, t >> clock.sample_level] += work.force[i] * step / interval
         was_touching = is_touching
+        is_placed = is_touching and not is_bouncing  # an impact is taken back from where it led
         for a in range(n_degree):
             before[a], now[a] = now[a], after[a]
         if is_touching and is_bouncing:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rubhpc.schema import Variable
     from rubhpc.sweep import Sweep
 
-_FORMAT = 2
+_FORMAT = 3  # raised with the arrays of the schema too: a store has them all
 PRIVATE = ".rubhpc"  # the directory of a store that zarr does not look into
 GROWTH = "growth"  # in it: what a growth that was decided on has yet to move to its place
 _NAMES = ("manifest.json", "manifest.copy.json")  # one damaged byte must not cost a study

@@ -53,7 +53,7 @@ def make(keep: tuple[str, ...] = ("waveform", "spectrum", "section"), n_stator: 
     data: dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]] = {}
     for name, variable in VARIABLES.items():
         attrs = {"units": variable.unit, "long_name": variable.long_name}
-        if variable.role in ("waveform", "spectrum", "section") and variable.role not in keep:
+        if variable.role in ("waveform", "spectrum", "section", "state") and variable.role not in keep:
             continue
         extent = tuple(sizes[d] for d in variable.dims)
         signal = name.removeprefix("spectrum_").removeprefix("section_")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rubhpc.kernels.complementarity import UNSOLVED, solve_active, solve_complementarity
+from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_active, solve_complementarity
 
 TOLERANCE = 1e-12
 
@@ -57,6 +57,27 @@ def test_forces_are_those_of_the_enumeration(problem):
         assert pivots != UNSOLVED
         assert force == pytest.approx(expected, rel=1e-8, abs=1e-8)
         assert not force[expected == 0.0].any()
+
+
+@settings(max_examples=100, deadline=None)
+@given(problems(), st.floats(0.01, 1.0))
+def test_residual_is_nothing_at_the_solution_and_grows_away_from_it(problem, share):
+    compliance, gap, _ = problem
+    force, _ = solve(compliance, gap)
+    residual, moved = residual_of(compliance, gap, force)
+    assert residual <= 1e-9 * max(moved, 1.0)
+    assert moved == pytest.approx((np.diag(compliance) * force).max())
+    if force.any():
+        i = int(force.argmax())
+        force[i] *= 1.0 - share  # the gap that it closed is open by what it lacks
+        assert residual_of(compliance, gap, force)[0] >= 1e-3 * share * compliance[i, i] * force[i]
+
+
+def test_residual_counts_pull_penetration_and_force_at_a_distance():
+    give = np.array([[2.0]])
+    for gap, force, expected in ((0.0, -3.0, 6.0), (-0.5, 0.0, 0.5), (4.0, 0.5, 1.0), (-3.0, 1.0, 1.0)):
+        residual, _ = residual_of(give, np.array([gap]), np.array([force]))
+        assert residual == pytest.approx(expected)
 
 
 def test_open_gaps_take_no_force():

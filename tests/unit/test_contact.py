@@ -32,7 +32,7 @@ angles = st.floats(0.0, 2 * math.pi)
 displacements = st.lists(st.floats(-5e-3, 5e-3), min_size=N_DEGREE, max_size=N_DEGREE).map(np.array)
 
 
-def make_pairs(angle, friction=0.3, *, is_updated=False, compliance=None):
+def make_pairs(angle, friction=0.3, *, is_updated=False, compliance=None, aside=0.0):
     """Pairs at the angles (q,), their degrees in rows 0 to 5 q."""
     axis = np.exp(1j * np.atleast_1d(angle))
     q = axis.size
@@ -44,6 +44,7 @@ def make_pairs(angle, friction=0.3, *, is_updated=False, compliance=None):
         axis_z=axis.imag.copy(),
         radius=np.full(q, RADIUS),
         clearance=np.full(q, CLEARANCE),
+        aside=np.full(q, aside),
         friction=np.full(q, friction),
         compliance=np.zeros((q, N_DEGREE, q, N_DEGREE)) if compliance is None else compliance,
         is_updated=is_updated,
@@ -51,9 +52,9 @@ def make_pairs(angle, friction=0.3, *, is_updated=False, compliance=None):
     )
 
 
-def line_of_centres(axis, at):
+def line_of_centres(axis, at, aside=0.0):
     """From disc centre to tip, m, in the plane y + i z."""
-    tip = (RADIUS + CLEARANCE + at[AXIAL] + 1j * at[LATERAL]) * axis
+    tip = (RADIUS + CLEARANCE + at[AXIAL] + 1j * (at[LATERAL] + aside)) * axis
     return tip - (at[V] + 1j * at[W])
 
 
@@ -66,27 +67,27 @@ def test_friction_opposes_the_rim_at_every_whirl_angle(whirl, friction):
     assert mx == pytest.approx(-friction * 100.0 * 0.06)
 
 
-@given(angles, displacements)
-def test_gap_is_the_distance_of_centre_and_tip_less_the_radius(angle, at):
+@given(angles, displacements, st.floats(-1e-3, 1e-3))
+def test_gap_is_the_distance_of_centre_and_tip_less_the_radius(angle, at, aside):
     axis = np.exp(1j * angle)
-    line = line_of_centres(axis, at)
-    ny, nz, gap = normal_and_gap(axis.real, axis.imag, RADIUS, CLEARANCE, True, at)
+    line = line_of_centres(axis, at, aside)
+    ny, nz, gap = normal_and_gap(axis.real, axis.imag, RADIUS, CLEARANCE, aside, True, at)
     assert complex(ny, nz) == pytest.approx(line / abs(line))
     assert gap == pytest.approx(abs(line) - RADIUS, abs=1e-15)
-    ny, nz, gap = normal_and_gap(axis.real, axis.imag, RADIUS, CLEARANCE, False, at)
+    ny, nz, gap = normal_and_gap(axis.real, axis.imag, RADIUS, CLEARANCE, aside, False, at)
     assert complex(ny, nz) == axis
     assert gap == pytest.approx((line * axis.conjugate()).real - RADIUS, abs=1e-15)
 
 
-@given(angles, displacements, st.booleans())
-def test_push_is_the_change_of_the_gap(angle, at, is_updated):
-    pairs = make_pairs(angle, is_updated=is_updated)
+@given(angles, displacements, st.booleans(), st.sampled_from([0.0, 5e-4]))
+def test_push_is_the_change_of_the_gap(angle, at, is_updated, aside):
+    pairs = make_pairs(angle, is_updated=is_updated, aside=aside)
     axis = (pairs.axis_y[0], pairs.axis_z[0])
 
     def gap(moved):
-        return normal_and_gap(*axis, RADIUS, CLEARANCE, is_updated, moved)[2]
+        return normal_and_gap(*axis, RADIUS, CLEARANCE, aside, is_updated, moved)[2]
 
-    ny, nz, _ = normal_and_gap(*axis, RADIUS, CLEARANCE, is_updated, at)
+    ny, nz, _ = normal_and_gap(*axis, RADIUS, CLEARANCE, aside, is_updated, at)
     pull, push = np.zeros((2, N_DEGREE))
     fill_directions(pairs, 0, ny, nz, pull, push)
     delta = 1e-6
@@ -123,6 +124,7 @@ def test_held_degrees_stand_still():
         pairs.axis_z,
         pairs.radius,
         pairs.clearance,
+        pairs.aside,
         False,
         displacement,
         work.at,
@@ -143,6 +145,7 @@ def closed(pairs, displacement):
         pairs.axis_z,
         pairs.radius,
         pairs.clearance,
+        pairs.aside,
         pairs.is_updated,
         displacement,
         work.at,

@@ -14,7 +14,7 @@ from rubhpc.integrate.contact_work import workspace
 from rubhpc.kernels.central_difference import FINISHED
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact import MULTIPLIER, N_DEGREE, Pairs
-from rubhpc.kernels.contact_step import solve_contact
+from rubhpc.kernels.contact_step import fill_residual, solve_contact
 from rubhpc.kernels.lemke import solve_lemke
 from rubhpc.rig import with_keys
 
@@ -38,6 +38,7 @@ def problems(draw):
         axis_z=np.sin(angle),
         radius=np.full(q, RADIUS),
         clearance=np.full(q, 1e-4),
+        aside=np.zeros(q),
         friction=np.full(q, draw(st.sampled_from([0.0, 0.1, 0.4])) * draw(st.sampled_from([1.0, -1.0]))),
         compliance=compliance.reshape(q, 5, q, 5),
         is_updated=draw(st.booleans()),
@@ -75,6 +76,9 @@ def test_forces_keep_to_coulombs_law(problem):
     work.at[:], work.now[:], work.gap[:] = end, start, free
     work.rate[:] = (end - start) / STEP  # slips turn round in the step only where the forces turn them
     assert solve_contact(pairs, work, STEP, spin) == np.count_nonzero(work.force)
+    pivots, residual, moved = work.solution
+    assert residual <= 1e-9 * moved + 1e-13
+    assert (pivots > 0) == work.force.any()
     force, friction = work.force, work.traction
     along = -normal * force - 1j * normal * friction  # on the disc
     on_tip = -along * (pairs.axis_y - 1j * pairs.axis_z)
@@ -96,6 +100,12 @@ def test_forces_keep_to_coulombs_law(problem):
             assert abs(slip[i]) <= tiny or turned
         else:
             assert slip[i] * friction[i] >= -tiny * bound[i]
+    if bound.any():  # a friction that is not the law's shows
+        i = int(bound.argmax())
+        friction[i] -= 0.1 * math.copysign(bound[i], friction[i])
+        fill_residual(pairs, work)
+        give = np.abs(work.tangential[1]).diagonal()[i]
+        assert work.solution[1] >= 0.05 * give * bound[i]
 
 
 def test_complementarity_with_a_zero_diagonal_is_solved():

@@ -7,7 +7,7 @@ import pytest
 
 from rubhpc.integrate.gather import empty_tally
 from rubhpc.kernels.events import change_contacts
-from rubhpc.kernels.observe import DRIVE_WORK, FRICTION_LOSS, IMPACT_LOSS
+from rubhpc.kernels.observe import DRIVE_WORK, FRICTION_LOSS, IMPACT, IMPACT_LOSS, PRESSING
 from rubhpc.kernels.phases import Reduced
 
 N, SPIN, MOMENT = 7, 150.0, 1e-7
@@ -129,6 +129,10 @@ def test_impact_leaves_no_pair_closing_and_takes_energy(q):
         loss = 0.5 * (motion[N:] @ motion[N:] - after[N:] @ after[N:])
         assert loss >= -1e-12
         assert tally.energy[IMPACT_LOSS] == pytest.approx(loss, abs=1e-12)
+        assert 1 <= tally.pivots[0] <= 20 * q
+        assert tally.residual[IMPACT, 1] == pytest.approx((reduced.answer.diagonal() * tally.impulse).max())
+        for problem in (IMPACT, PRESSING):
+            assert tally.residual[problem, 0] <= 1e-12 * tally.residual[problem, 1]
         lost.append(loss)
     assert max(lost) > 0.1
 
@@ -158,6 +162,8 @@ def test_impact_off_the_record_is_not_added_up():
     assert reduced.push[0] @ after[N:] == pytest.approx(0.0, abs=1e-12)
     assert tally.impulse[0] == 0.0
     assert not tally.energy.any()
+    assert not tally.pivots.any()
+    assert not tally.residual.any()
 
 
 @pytest.mark.parametrize(("pressed", "expected"), [(True, 1), (False, 0)])

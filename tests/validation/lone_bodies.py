@@ -39,7 +39,7 @@ def tip(stator_body, angle, *, radius=1.0, axial=0, lateral=-1):
     )
 
 
-def _model(rotor, stators, spin, force):
+def _model(rotor, stators, spin, force, load):
     force = np.zeros(rotor.n_dof) if force is None else np.asarray(force)
     return Model(
         rotor=rotor,
@@ -47,12 +47,16 @@ def _model(rotor, stators, spin, force):
         unbalance_sine=-force.imag / spin**2,
         stators=tuple(stators),
         output_node=1,
+        sag=np.zeros(rotor.n_dof) if load is None else np.linalg.solve(rotor.stiffness, load),
     )
 
 
-def set_up(rotor, stators, spin, per_revolution, contact, *, force=None, steps_per_sample=1):
-    """Central difference of a body and its stators; `force` (n_dof,), N, is the phasor of exp(i spin t)."""
-    model = _model(rotor, stators, spin, force)
+def set_up(rotor, stators, spin, per_revolution, contact, *, force=None, load=None, steps_per_sample=1):
+    """Central difference of a body and its stators; `force` (n_dof,), N, is the phasor of exp(i spin t).
+
+    `load` (n_dof,), N, is constant.
+    """
+    model = _model(rotor, stators, spin, force, load)
     step = 2 * math.pi / (abs(spin) * per_revolution * steps_per_sample)
     return CentralDifferenceSetup(
         model=model,
@@ -67,9 +71,9 @@ def set_up(rotor, stators, spin, per_revolution, contact, *, force=None, steps_p
     )
 
 
-def set_up_modal(rotor, stators, spin, per_revolution, contact, *, force=None, step=2e-6):
+def set_up_modal(rotor, stators, spin, per_revolution, contact, *, force=None, load=None, step=2e-6):
     """Modal scheme of a body and its stators; `step` (s) is that in contact."""
-    model = _model(rotor, stators, spin, force)
+    model = _model(rotor, stators, spin, force, load)
     return ModalSetup(
         model=model,
         reduced=reduce_model(model, spin, 1e-3),

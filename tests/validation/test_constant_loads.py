@@ -1,0 +1,211 @@
+"""Gravity and other constant loads: the sag of beams, motion about it, and oscillators under a load."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lone_bodies import body, set_up, set_up_modal, tip
+
+from rubhpc import InputError, Load, LumpedStator, Rig, assemble, read_rig, simulate
+from rubhpc.fem.statics import sag_at_stators
+from rubhpc.integrate.carry import at_rest
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.packing import degrees_of
+from rubhpc.integrate.prepare import prepare
+from rubhpc.integrate.record import State
+from rubhpc.kernels.contact import normal_and_gap
+from rubhpc.rig import Bearing, Rotor, ShaftSection, with_keys
+from rubhpc.study import Contact, Integrator, Recording
+
+G = 9.81  # m/s2
+METHODS = ["modal", "central-difference"]
+WALL = tip(body(1.0, 1.0, ((1, "axial"),)), math.pi, axial=-1)  # below, and held
+STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
+
+
+def heavy(**keys):
+    return with_keys(read_rig("mokhtar2017"), {"rotor.gravity": G} | keys)
+
+
+def sag_at(rig, node, name="v"):
+    model = assemble(rig)
+    return model.sag[model.rotor.index(node, name)]
+
+
+def test_beam_sags_as_timoshenko_has_it():
+    """5 w L^4 / 384 E I + w L^2 / 8 k G A in the middle, on supports that give by half the weight over k."""
+    length, diameter, stiffness = 0.8, 0.05, 1e7
+    section = ShaftSection(length=length, outer_diameter=diameter, elements=4, **STEEL)
+    bearings = tuple(Bearing(node=node, stiffness=stiffness) for node in (1, 5))
+    rig = Rig(name="beam", rotor=Rotor(shaft=(section,), bearing=bearings, gravity=G))
+    area, inertia = math.pi * diameter**2 / 4, math.pi * diameter**4 / 64
+    weight = STEEL["density"] * area * G  # a metre
+    nu = STEEL["youngs_modulus"] / (2 * STEEL["shear_modulus"]) - 1
+    shear = 6 * (1 + nu) / (7 + 6 * nu) * STEEL["shear_modulus"] * area
+    bending = 5 * weight * length**4 / (384 * STEEL["youngs_modulus"] * inertia)
+    expected = bending + weight * length**2 / (8 * shear) + weight * length / (2 * stiffness)
+    assert sag_at(rig, 3) == pytest.approx(-expected, rel=1e-6)
+    assert sag_at(rig, 3, "w") == 0.0
+    assert sag_at(rig, 1) == pytest.approx(-weight * length / (2 * stiffness), rel=1e-9)
+
+
+def test_load_on_the_disc_bends_the_shaft_by_its_stiffness():
+    rig = read_rig("mokhtar2017")
+    pulled = replace(rig, rotor=replace(rig.rotor, load=(Load(node=8, vertical=-50.0, horizontal=20.0),)))
+    assert sag_at(pulled, 8) == pytest.approx(-50 / 143343.35, rel=1e-4)  # L6
+    assert sag_at(pulled, 8, "w") == pytest.approx(20 / 143343.35, rel=1e-4)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_motion_without_contact_is_the_sag_and_the_unbalance_response(method):
+    case = {"speed_ratio": 1.5, "clearance": 1.0, "method": method, "transient": 2, "revolutions": 2}
+    case |= {"step": "1 us"} if method == "central-difference" else {}
+    light, loaded = simulate("mokhtar2017", **case), simulate(heavy(), **case)
+    assert loaded.vertical == pytest.approx(light.vertical + sag_at(heavy(), 8), abs=1e-17)
+    assert np.array_equal(loaded.horizontal, light.horizontal)
+    assert loaded.peak_to_peak_vertical == pytest.approx(light.peak_to_peak_vertical, rel=1e-12)
+    assert loaded.contact_free_amplitude == light.contact_free_amplitude
+    assert loaded.spectrum_vertical[1:] == pytest.approx(light.spectrum_vertical[1:], abs=1e-16)
+
+
+def test_gap_is_that_of_the_whole_displacement():
+    """Stators all around, fixed and updated normal: motion counted from the sag, or from the centre."""
+    rig = heavy()
+    rig = replace(rig, stator=tuple(replace(rig.stator[0], angle=angle) for angle in (0.0, 0.9, 2.0, 4.0)))
+    model = assemble(rig)
+    nearer, aside = sag_at_stators(model)
+    rng = np.random.default_rng(3)
+    for i, (stator, row) in enumerate(zip(model.stators, degrees_of(model), strict=True)):
+        axis = np.cos(stator.angle), np.sin(stator.angle)
+        at = rng.normal(scale=1e-4, size=5)
+        whole = at + np.pad(model.sag[row[:2]], (0, 3))
+        for is_updated in (False, True):
+            from_sag = normal_and_gap(*axis, stator.radius, 2e-4 - nearer[i], aside[i], is_updated, at)
+            from_centre = normal_and_gap(*axis, stator.radius, 2e-4, 0.0, is_updated, whole)
+            assert from_sag == pytest.approx(from_centre, abs=1e-15)
+
+
+def oscillator(method, contact, load, per_revolution=2000):
+    """A mass of 1 kg on a spring of 1 N/m under a load, above a wall."""
+    given = body(1.0, 1.0, ((1, "v"),)), [WALL], 0.5, per_revolution, contact
+    if method == "modal":
+        return set_up_modal(*given, load=[load], step=1e-4)
+    return set_up(*given, load=[load], steps_per_sample=4)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_oscillator_let_go_under_a_load_meets_a_spring(method):
+    """From rest, unloaded, 3 m above where the load would hold it; a stop of 99 N/m begins 1 m below."""
+    load, gap, stop = -3.0, 1.0, 99.0
+    setup = oscillator(method, Contact(law="penalty", stiffness=stop), load)
+    start = replace(State.at_rest(setup.model), rotor_displacement=np.zeros(1))
+    recording = Recording(transient=0, revolutions=1, samples_per_revolution=2000)
+    record = run_case(setup, clearance=gap, friction=0.0, recording=recording, initial=start)
+    # u = -3 (1 - cos t) down to -1; then about (load - stop gap) / 100 at the frequency 10.
+    arrives, speed = math.acos(2 / 3), 3 * math.sin(math.acos(2 / 3))
+    middle = (load - stop * gap) / 100
+    swing = math.hypot(middle + gap, speed / 10)
+    stays = 2 * (math.pi - math.acos((-gap - middle) / swing)) / 10
+    assert record.vertical[0] == 0.0
+    assert record.peak_contact_force[0] == pytest.approx(stop * (swing - gap - middle), rel=3e-4)
+    assert record.contact_duration[0] == pytest.approx(stays, rel=1e-2)
+    touch = np.flatnonzero(record.contact_force[0])[0] * 2 * math.pi / 0.5 / 2000
+    assert touch == pytest.approx(arrives, abs=2 * math.pi / 0.5 / 2000)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_bounces_under_a_load_die_out_on_the_wall(method):
+    """Let go 1 m above a wall that is 1 m above the sag: after the last bounce the load rests on the wall."""
+    setup = oscillator(method, Contact(restitution=0.5), -2.0, 4000)
+    start = replace(State.at_rest(setup.model), rotor_displacement=np.zeros(1))
+    recording = Recording(transient=0, revolutions=3, samples_per_revolution=4000)
+    record = run_case(setup, clearance=1.0, friction=0.0, recording=recording, initial=start)
+    # Energy about the sag at -2: 4/2 when let go, 1/2 at the wall; the impact at sqrt 3 m/s halves the speed.
+    assert record.contacts_per_revolution[0] > 1
+    first = np.flatnonzero(record.contact_force[0])[0]
+    rises = record.vertical[first:][: round(2.0 / (4 * math.pi / 4000))].max()
+    assert rises == pytest.approx(-2.0 + math.sqrt(1.0 + 3.0 / 4.0), abs=1e-4)
+    assert record.vertical[-2000:] == pytest.approx(np.full(2000, -1.0), abs=1e-6)
+    assert record.contact_force[0, -2000:] == pytest.approx(np.full(2000, 1.0), rel=1e-3)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+def test_shaft_at_rest_on_a_stator_stays_there(method, normal):
+    """Rotor and stator share the sag as two springs do, and nothing moves from there."""
+    rig = heavy(**{"stator.angle": math.pi, "rotor.unbalance.mass": 0.0})
+    gap, sag = 1e-4, -sag_at(rig, 8)
+    step = 1e-6 if method == "central-difference" else None
+    setup = prepare(
+        rig,
+        150.0,
+        contact=Contact(normal=normal),
+        integrator=Integrator(method=method, step=step),
+        samples_per_revolution=256,
+    )
+    rest = at_rest(setup, gap)
+    stiffness = 3e9 * 25e-6 / 0.04
+    assert rest.contact_force == pytest.approx([(sag - gap) / (1 / 143343.35 + 1 / stiffness)], rel=1e-4)
+    recording = Recording(transient=0, revolutions=1)
+    record = run_case(setup, clearance=gap, friction=0.0, recording=recording)
+    assert record.contact_fraction == pytest.approx([1.0])
+    stands = -gap - rest.contact_force[0] / stiffness
+    # The force of short steps comes in kicks, the first of which is half a step early.
+    still = 2e-5 if (method, normal) == ("modal", "updated") else 1e-9
+    assert record.vertical == pytest.approx(np.full(256, stands), rel=still)
+    assert record.contact_force[0, 1:] == pytest.approx(np.full(255, rest.contact_force[0]), rel=1e-4)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_rub_under_gravity_balances_and_goes_on_from_its_end(method):
+    rig = heavy(**{"stator.angle": "150 deg"})
+    case = {"speed_ratio": 0.75, "clearance": "320 um", "method": method}
+    case |= {"step": "1 us"} if method == "central-difference" else {}
+    whole = simulate(rig, **case, transient=0, revolutions=6)
+    assert whole.contact_impulse[0] > 0.0
+    assert whole.energy_residual < 1e-4
+    first = simulate(rig, **case, transient=0, revolutions=4)
+    rest = simulate(rig, **case, transient=0, revolutions=2, initial=first.final)
+    scale = np.ptp(whole.vertical)
+    assert rest.vertical == pytest.approx(whole.vertical[4 * 256 :], abs=1e-6 * scale)
+
+
+def test_mean_of_a_rub_is_the_sag_less_what_contact_holds_up():
+    """E1 under gravity: over whole periods inertia and unbalance average out."""
+    rig = heavy(**{"stator.angle": math.pi})
+    record = simulate(rig, speed_ratio=1.5, clearance="250 um", friction=0.2, transient=60, revolutions=32)
+    force = record.contact_force.mean()
+    assert record.period > 0
+    assert force > 10.0
+    lifted = force / 143343.35
+    assert record.vertical.mean() == pytest.approx(sag_at(rig, 8) + lifted, abs=1e-4 * lifted)
+    assert record.horizontal.mean() == pytest.approx(0.2 * lifted, rel=1e-3)
+    assert record.torsion.mean() == pytest.approx(-0.2 * 0.06 * force / 3125.88, rel=1e-3)
+
+
+def test_matrices_take_gravity_and_loads_like_the_beam():
+    rig = heavy()
+    body_ = assemble(rig).rotor
+    stop = LumpedStator(node=8, mass=1e-3, stiffness=1e6, radius=0.06)
+    given = {"degrees": body_.degrees, "stators": stop, "gravity": "9.81 m/s^2"}
+    matrices = Rig.from_matrices(body_.mass, body_.damping, body_.stiffness, body_.gyroscopic, **given)
+    assert assemble(matrices).sag == pytest.approx(assemble(rig).sag, rel=1e-9, abs=1e-15)
+    given["load"] = Load(node=8, vertical=50.0)
+    lifted = Rig.from_matrices(body_.mass, body_.damping, body_.stiffness, body_.gyroscopic, **given)
+    assert sag_at(lifted, 8) - sag_at(rig, 8) == pytest.approx(50 / 143343.35, rel=1e-4)
+
+
+def test_what_nothing_holds_is_refused():
+    wall = LumpedStator(node=1, rigid=True, radius=1.0)
+    with pytest.raises(InputError, match="nothing holds it there; add a bearing"):
+        assemble(Rig.from_matrices([[1.0]], K=[[0.0]], degrees=[(1, "v")], stators=wall, gravity=G))
+    with pytest.raises(InputError, match=r"gravity: how it acts on the coordinates q\.\.\. is not known"):
+        Rig.from_matrices(np.eye(2), K=np.eye(2), degrees=[(1, "v"), (1, "q1")], stators=wall, gravity=G)
+    rotor = read_rig("mokhtar2017").rotor
+    with pytest.raises(InputError, match=r"load\.1\.node: 99 is not on the shaft"):
+        replace(rotor, load=(Load(node=99, vertical=1.0),))
+    with pytest.raises(InputError, match=r"gravity: -9\.81 m/s\^2 is out of range"):
+        heavy(**{"rotor.gravity": -G})
+    with pytest.raises(InputError, match='has neither "v" nor "w"'):
+        Rig.from_matrices([[1.0]], K=[[1.0]], degrees=[(1, "v")], stators=wall, load=Load(node=2))
