@@ -251,6 +251,15 @@ def test_dry_whip_diverges_and_says_so(normal):
     assert record.steps > 0
 
 
+def test_divergence_seen_at_the_end_was_in_the_last_revolution():
+    """Displacements are looked at when a kernel call ends, here with the record."""
+    rig = read_rig("mokhtar2017")
+    limp = replace(rig, stator=(replace(rig.stator[0], youngs_modulus=1e7),))
+    record = simulate(limp, speed=300.0, clearance="1 um", friction=0.9, transient=0, revolutions=3)
+    assert record.status == DIVERGED
+    assert record.reason.endswith(" in revolution 3")
+
+
 def test_free_twist_is_refused_with_the_mend():
     rig = trial_rig(1)
     free = replace(rig, rotor=replace(rig.rotor, torsion=Torsion(free=True)))
