@@ -147,7 +147,8 @@ def _pace(sweep: Sweep, manifest: Manifest, blocks: list[Block]) -> tuple[float,
     block: the first cases of all blocks share a value on every axis that a block spans.
     """
     paces, failures = [], []
-    picked = np.unique(np.linspace(0, len(blocks) - 1, _PILOTS).round().astype(int)) if blocks else []
+    spread = np.linspace(0, len(blocks) - 1, _PILOTS).round().astype(int)
+    picked: list[int] = np.unique(spread).tolist() if blocks else []
     began = time.monotonic()
     for k, i in enumerate(picked):
         if k >= _FEW_PILOTS and time.monotonic() - began > _ENOUGH:
