@@ -47,7 +47,8 @@ def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
 def natural_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str, xr.DataArray]:
     """Return the first lateral and the first torsional natural frequency of the rotor at standstill, Hz.
 
-    Where `along` is an axis of the rig, such as a bearing's stiffness, each is an array over it.
+    Where keys of the rig lie on the dimension `along`, such as a bearing's stiffness on its own or all that
+    was drawn on that of a sample, each is an array over it.
     """
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.modes import modes
@@ -77,16 +78,17 @@ def _first_of_kinds(found: Sequence[Mode], kinds: Sequence[str]) -> dict[str, fl
 def _over_rig(
     case: xr.Dataset, along: str | None, frequencies_of: Callable[[Rig], dict[str, float]]
 ) -> dict[str, xr.DataArray]:
-    """Return the frequencies of a case's rig, Hz, as arrays over `along` where that is one of its keys."""
-    is_rig_axis = along in rig_axes(case) and along in case.dims
-    points: list[dict[str, float]] = (
-        [{along: float(v)} for v in case[along].values] if is_rig_axis and along else [{}]
-    )
+    """Return the frequencies of a case's rig, Hz, as arrays over `along` where keys of the rig lie on it."""
+    keys = [key for key in rig_axes(case) if key in case.coords and case[key].dims == (along,)]
+    points: list[dict[str, float]] = [
+        {key: float(v) for key, v in zip(keys, values, strict=True)}
+        for values in zip(*(case[key].values for key in keys), strict=True)
+    ] or [{}]
     found: dict[str, list[float]] = {}
     for point in points:
         for name, frequency in frequencies_of(rig_of(case, point)).items():
             found.setdefault(name, []).append(frequency)
-    dims = (along,) if is_rig_axis and along else ()
+    dims = (along,) if keys else ()
     return {
         name: xr.DataArray(values if dims else values[0], dims=dims, attrs={"units": "Hz"})
         for name, values in found.items()
@@ -106,6 +108,6 @@ def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
 
 
 def rig_axes(case: xr.Dataset) -> dict[str, str]:
-    """Return the axes of the study that are keys of the rig: dimension to dotted key."""
+    """Return the axes of the study that are keys of the rig: coordinate to dotted key."""
     study: dict[str, Any] = case.attrs.get("study", {})
     return {name.replace(".", "_"): name for name in study.get("grid", {}) if "." in name}

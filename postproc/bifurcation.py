@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.load import axes_of, find_axis, need_results, source
+from postproc.load import find_axis, need_results, ordered_axes
 from postproc.map_figure import categories
 from postproc.sections import section_of
 from postproc.selection import narrow
 from postproc.units import displayed, scale_of, short_name
-from rubhpc.errors import InputError
 from rubhpc.schema import DONE
 
 if TYPE_CHECKING:
@@ -34,11 +33,7 @@ def default_axis(store: xr.Dataset, along: str | None = None) -> str:
     """
     if along:
         return find_axis(store, along)
-    axes = [a for a in axes_of(store) if store.sizes[a] > 1]
-    if not axes:
-        raise InputError(
-            f"{source(store)}: a bifurcation diagram needs an axis of several values; none is left"
-        )
+    axes = ordered_axes(store, "a bifurcation diagram")
     return max(axes, key=lambda a: store.sizes[a])
 
 

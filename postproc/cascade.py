@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from postproc.load import axes_of, find_axis, source
+from postproc.load import find_axis, ordered_axes
 from postproc.spectra import periodic_spectrum, with_frequency
-from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -43,11 +42,7 @@ def cascade(store: xr.Dataset, signal: str = "torsion", along: str | None = None
 
 def default_axis(store: xr.Dataset) -> str:
     """Return the axis that a cascade spreads over unless told: the speed, or else the longest."""
-    axes = [a for a in axes_of(store) if store.sizes[a] > 1]
-    if not axes:
-        raise InputError(
-            f"{source(store)}: this selection is one case; a cascade needs an axis of several values"
-        )
+    axes = ordered_axes(store, "a cascade")
     return next((a for a in SPEED_AXES if a in axes), max(axes, key=lambda a: store.sizes[a]))
 
 

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from postproc.load import find_axis
+from postproc.load import drawn_axes, find_axis, source
 from rubhpc.errors import InputError
+from rubhpc.sample import CASE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -107,20 +108,35 @@ def map_of(
     contours: int | None = None,
     log: bool = False,
 ) -> Drawing:
-    """A measure, the regime or the status over two axes, in small multiples over up to two more."""
+    """A measure, the regime or the status over two axes, or points over two quantities that were drawn.
+
+    In small multiples over up to two more axes.
+    """
     from postproc.map_figure import value_maps
     from postproc.maps import default_axes, facet_axes, map_data
+    from postproc.scatter import scatter_axes, scatter_maps
     from postproc.selection import first_of_rest
 
-    across, up = default_axes(cases, x, y)
-    facets = facet_axes(cases, _several(facet), [across, up])
-    cases, notes = first_of_rest(cases, [across, up, *facets], value)
-    shown = map_data(cases, value, across, up, facets)
+    is_sample = bool(drawn_axes(cases))
+    if is_sample and contours:
+        raise InputError(f"{source(cases)}: map: points of a sample have no contours; leave --contours out")
+    across, up = (scatter_axes if is_sample else default_axes)(cases, x, y)
+    spread = [CASE] if is_sample else [across, up]
+    facets = facet_axes(cases, _several(facet), spread)
+    cases, notes = first_of_rest(cases, [*spread, *facets], value)
+    shown = map_data(cases, value, spread, facets)
+
+    def draw(axes: list[Axes]) -> None:
+        if is_sample:
+            scatter_maps(shown, value, across, up, axes, log)
+        else:
+            value_maps(shown, value, axes, log, contours or 0)
+
     n_row, n_column = ([1, 1] + [shown.sizes[axis] for axis in facets])[-2:]
     height, width = (30.0 + 45.0 * n_row, 180.0) if facets else (75.0, None)
     return Drawing(
         shown=shown,
-        draw=lambda axes: value_maps(shown, value, axes, log, contours or 0),
+        draw=draw,
         n_row=n_row,
         n_column=n_column,
         height=height,

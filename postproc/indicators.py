@@ -150,8 +150,9 @@ def indicator_scores(
 
 
 def _natural(data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the natural frequencies of torsion and of the stator, Hz, over the axis of the rig if any."""
-    along = [a for a in axes_of(data) if a in rig_axes(data) and data.sizes[a] > 1]
+    """Return the natural frequencies of torsion and of the stator, Hz, along what sets the rig, if any."""
+    keys = [data[key] for key in rig_axes(data) if key in data.coords]
+    along = list(dict.fromkeys(str(dim) for key in keys if key.size > 1 for dim in key.dims))
     if len(along) > 1:
         raise InputError(f"{source(data)}: select one value of {' or of '.join(along)}")
     axis = along[0] if along else None

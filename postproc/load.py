@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rubhpc.axes import coordinate_of
 from rubhpc.errors import InputError, StoreError
+from rubhpc.sample import CASE
 from rubhpc.schema import VARIABLES
 
 if TYPE_CHECKING:
@@ -65,8 +67,8 @@ def _open(path: Path, chunks: Any, without: list[str]) -> xr.Dataset:
         store = xr.open_zarr(
             path, chunks=chunks, drop_variables=without, decode_times=False, decode_timedelta=False
         )
-    revolution = {n: store[n].compute() for n in ("revolution",) if n in store}
-    opened: xr.Dataset = store.assign_coords(revolution)
+    held = {n: store[n].compute() for n in ("revolution", *drawn_axes(store)) if n in store}
+    opened: xr.Dataset = store.assign_coords(held)
     return opened
 
 
@@ -78,6 +80,32 @@ def source(store: xr.Dataset) -> str:
 def axes_of(store: xr.Dataset) -> tuple[str, ...]:
     """Return the study's axes that are still there, in the order of its grid; none for a single record."""
     return tuple(str(d) for d in store["status"].dims) if "status" in store else ()
+
+
+def ordered_axes(store: xr.Dataset, figure: str) -> list[str]:
+    """Return the axes of several values, along which a figure can run; the cases of a sample are in no order.
+
+    Raises
+    ------
+    InputError
+        There is none; `figure` says what needs one.
+    """
+    axes = [axis for axis in axes_of(store) if store.sizes[axis] > 1 and axis != CASE]
+    if not axes:
+        what = "the cases of a sample lie in no order, rubhpc map draws them"
+        left = what if drawn_axes(store) else "this selection is one case"
+        raise InputError(f"{source(store)}: {figure} needs an axis of several values; {left}")
+    return axes
+
+
+def drawn_axes(store: xr.Dataset) -> list[str]:
+    """Return the coordinates that a sampled study has drawn, in the order of its grid; [] of a grid."""
+    if CASE not in axes_of(store):
+        return []
+    study = store.attrs.get("study")
+    keys = [coordinate_of(key) for key in study["grid"]] if isinstance(study, dict) else []
+    drawn = [str(name) for name, at in store.coords.items() if at.dims == (CASE,) and name != CASE]
+    return sorted(drawn, key=lambda name: keys.index(name) if name in keys else len(keys))
 
 
 def find_axis(store: xr.Dataset, name: str) -> str:
@@ -94,6 +122,11 @@ def find_axis(store: xr.Dataset, name: str) -> str:
         return axis
     if axis in store.coords and store.coords[axis].ndim == 0:
         raise InputError(f"{source(store)}: {name}: has been selected already; leave one of the two out")
+    if axis in drawn_axes(store):
+        raise InputError(
+            f"{source(store)}: {name}: was drawn at random, so that nothing runs along it; rubhpc map draws "
+            "measures over what was drawn"
+        )
     near = difflib.get_close_matches(axis, known, n=1)
     hint = f"did you mean {near[0]}?" if near else f"the axes are {', '.join(known) or 'none'}"
     raise InputError(f"{source(store)}: no axis {name}; {hint}")

@@ -18,22 +18,23 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.colorbar import Colorbar
     from matplotlib.colors import Normalize
     from numpy.typing import NDArray
 
     Edges = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 # Cases without a result: name, grey, hatch.
-_NOT_DONE = {
+NOT_DONE = {
     MISSING: ("missing", "0.93", "...."),
     FAILED: ("failed", "0.8", "xxxx"),
     DIVERGED: ("diverged", "0.6", "////"),
 }
 REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
 PERIOD_COLORS = ("#D55E00", "#56B4E9", "#0072B2", "#009E73", "#CC79A7")  # none, P1 to P4
-_WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
+WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
 _LEGEND_WIDTH = 64  # characters that fit a column of a page, 6 of them taken by each handle
-_CATEGORIES = ("status", "regime", "period")
+CATEGORIES = ("status", "regime", "period")
 STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
 
 
@@ -63,11 +64,9 @@ def value_maps(
     x, x_label = displayed(data[x_name])
     y, y_label = displayed(data[y_name])
     edges = cell_edges(x), cell_edges(y)
-    # Settings and the status are known before any case is done.
-    is_known = value == "status" or VARIABLES[value].role == "setting"
-    shown = data[value] if is_known else data[value].where(data["status"] == DONE)
-    paint = _category_paint(shown) if value in _CATEGORIES else _scalar_paint(shown, log)
-    if n_contour and value in _CATEGORIES:
+    shown, is_known = coloured(data, value)
+    paint = paint_of(shown, log)
+    if n_contour and value in CATEGORIES:
         raise InputError(f"map: {value} has no contours; draw it without --contours")
     levels = _levels(paint, n_contour) if n_contour and min(x.size, y.size) > 1 else np.array([])
     handles: dict[str, Artist] = {}
@@ -79,29 +78,48 @@ def value_maps(
         if len(inside):
             ax.contour(x, y, cells, levels=inside, colors="white", linewidths=0.5)
         if not is_known:
-            for patch in _hatch(ax, edges, data.isel(here), value, _reasons(data)):
+            for patch in _hatch(ax, edges, data.isel(here), value, reasons_of(data)):
                 handles[str(patch.get_label())] = patch
         for values, name in ((x, "x"), (y, "y")):
             if is_geometric(values):
                 getattr(ax, f"set_{name}scale")("log")
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
-    figure = axes[0].figure
-    bar = figure.colorbar(mesh, ax=list(axes), pad=0.02, aspect=25, ticks=paint.ticks)
-    bar.set_label(paint.label)
+    bar = color_bar(axes, mesh, paint)
     bar.ax.hlines(levels, *bar.ax.get_xlim(), color="white", linewidth=0.5)
-    if paint.names:
-        bar.ax.set_yticklabels(paint.names)
-        bar.ax.tick_params(which="both", length=0)
-    _name_facets(axes, data, facets, x_label, y_label)
-    if handles:
-        n_column = _columns([len(label) for label in handles])
-        figure.legend(
-            handles=list(handles.values()), loc="outside lower center", ncols=n_column, fontsize=6.5
-        )
+    name_facets(axes, data, facets, x_label, y_label)
+    legend_below(axes[0], list(handles.values()))
     return axes
 
 
-class _Paint(NamedTuple):
+def coloured(data: xr.Dataset, value: str) -> tuple[xr.DataArray, bool]:
+    """Return the values that have a colour, and whether all have, being known before any case is done."""
+    is_known = value == "status" or VARIABLES[value].role == "setting"
+    return (data[value] if is_known else data[value].where(data["status"] == DONE)), is_known
+
+
+def paint_of(shown: xr.DataArray, log: bool) -> Paint:
+    """Return how values become colours: those of a flag or a period distinct ones, others of a scale."""
+    return _category_paint(shown) if shown.name in CATEGORIES else _scalar_paint(shown, log)
+
+
+def color_bar(axes: Sequence[Axes], mesh: Any, paint: Paint) -> Colorbar:
+    """Draw the scale of colours beside all panels."""
+    bar = axes[0].figure.colorbar(mesh, ax=list(axes), pad=0.02, aspect=25, ticks=paint.ticks)
+    bar.set_label(paint.label)
+    if paint.names:
+        bar.ax.set_yticklabels(paint.names)
+        bar.ax.tick_params(which="both", length=0)
+    return bar
+
+
+def legend_below(ax: Axes, handles: list[Artist]) -> None:
+    """Name what is marked, below all panels, in as many columns as fit."""
+    if handles:
+        n_column = _columns([len(str(handle.get_label())) for handle in handles])
+        ax.figure.legend(handles=handles, loc="outside lower center", ncols=n_column, fontsize=6.5)
+
+
+class Paint(NamedTuple):
     """How values become colours, the same on every panel."""
 
     cells: Callable[[NDArray[Any]], np.ma.MaskedArray[Any, Any]]  # values to what is drawn
@@ -112,7 +130,7 @@ class _Paint(NamedTuple):
     names: list[str] | None = None
 
 
-def _scalar_paint(shown: xr.DataArray, log: bool) -> _Paint:
+def _scalar_paint(shown: xr.DataArray, log: bool) -> Paint:
     from matplotlib.colors import LogNorm, Normalize
 
     scale = scale_of(shown)
@@ -130,10 +148,10 @@ def _scalar_paint(shown: xr.DataArray, log: bool) -> _Paint:
         raise InputError(f"map: {shown.name} is nowhere positive; draw it without --log")
     limits = float(everything.min()), float(everything.max())
     norm = LogNorm(*limits) if log else Normalize(*limits)
-    return _Paint(cells, norm, "cividis", scale.label(short_name(shown)))
+    return Paint(cells, norm, "cividis", scale.label(short_name(shown)))
 
 
-def _category_paint(shown: xr.DataArray) -> _Paint:
+def _category_paint(shown: xr.DataArray) -> Paint:
     from matplotlib.colors import ListedColormap, Normalize
 
     def coded(values: NDArray[Any]) -> NDArray[np.int64]:
@@ -142,7 +160,7 @@ def _category_paint(shown: xr.DataArray) -> _Paint:
 
     known = categories(str(shown.name), coded(shown.values))
     if not known:
-        return _Paint(
+        return Paint(
             lambda values: np.ma.masked_where(coded(values) < 0, values),
             None,
             "Greys",
@@ -156,7 +174,7 @@ def _category_paint(shown: xr.DataArray) -> _Paint:
         codes = coded(values)
         return np.ma.masked_where(codes < 0, np.searchsorted(present, codes).clip(max=len(present) - 1))
 
-    return _Paint(
+    return Paint(
         cells,
         Normalize(-0.5, len(present) - 0.5),
         ListedColormap([color for _, color in known.values()]),
@@ -166,7 +184,7 @@ def _category_paint(shown: xr.DataArray) -> _Paint:
     )
 
 
-def _reasons(data: xr.Dataset) -> str:
+def reasons_of(data: xr.Dataset) -> str:
     """Name what leaves the model's range in any case that is done."""
     validity = np.where(data["status"].values == DONE, data["validity"].values, 0)
     return ", ".join(text for bit, text, _ in VALIDITY.values() if (validity & bit).any())
@@ -176,17 +194,17 @@ def _hatch(ax: Axes, edges: Edges, data: xr.Dataset, value: str, reasons: str) -
     """Hatch what has no result, no value, or is out of the model's range, and return what names them."""
     status = data["status"].values
     handles: list[Artist] = []
-    for code, (name, color, hatch) in _NOT_DONE.items():
+    for code, (name, color, hatch) in NOT_DONE.items():
         handles += hatch_cells(ax, edges, status == code, name, hatch, facecolor=color)
     # Such as durations without contact.
     empty = (status == DONE) & np.isnan(np.asarray(data[value].values, dtype=float))
     handles += hatch_cells(ax, edges, empty, "no value", "", facecolor="white")
     invalid = (status == DONE) & (data["validity"].values > 0)
-    color = "k" if value in _CATEGORIES else _WARNING
+    color = "k" if value in CATEGORIES else WARNING
     return handles + hatch_cells(ax, edges, invalid, f"out of range: {reasons}", "\\\\\\\\", color=color)
 
 
-def _levels(paint: _Paint, n_contour: int) -> NDArray[np.float64]:
+def _levels(paint: Paint, n_contour: int) -> NDArray[np.float64]:
     """Return about so many levels for contours, round ones on a linear scale."""
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import MaxNLocator
@@ -200,7 +218,7 @@ def _levels(paint: _Paint, n_contour: int) -> NDArray[np.float64]:
     return levels[(levels > low) & (levels < high)]
 
 
-def _name_facets(
+def name_facets(
     axes: Sequence[Axes], data: xr.Dataset, facets: Sequence[str], x_label: str, y_label: str
 ) -> None:
     """Label the outer axes, and each panel with its values of the facets."""

@@ -58,7 +58,7 @@ def facet_axes(store: xr.Dataset, names: Sequence[str], taken: Sequence[str]) ->
     return facets[::-1]
 
 
-def map_data(store: xr.Dataset, value: str, x: str, y: str, facets: Sequence[str] = ()) -> xr.Dataset:
+def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Sequence[str] = ()) -> xr.Dataset:
     """Return what a map shows, loaded: no more than this scalar, the status and the validity monitors.
 
     Parameters
@@ -67,10 +67,12 @@ def map_data(store: xr.Dataset, value: str, x: str, y: str, facets: Sequence[str
         All other axes of more than one value must have been selected.
     value : str
         A scalar, setting or flag of the store.
+    spread : sequence of str
+        The axes x and y of a map, or the one along which the cases of a sample lie.
 
     Returns
     -------
-    Dataset over (*facets, y, x)
+    Dataset over (*facets, y, x), or (*facets, case)
         The value, `status`, and `validity`: 0 within the model's range, else the sum of 1 (slip reverses, so
         that steady sliding is wrong), 2 (force over the stator's Euler load) and 4 (tip over a tenth of its
         length).
@@ -79,8 +81,9 @@ def map_data(store: xr.Dataset, value: str, x: str, y: str, facets: Sequence[str
         need(store, [value])
         raise InputError(f"{source(store)}: {value}: no scalar of a case; choose {', '.join(MAPPABLE)}")
     store = store.assign(validity=validity(store))
-    data = narrow(store, dict.fromkeys([value, "status", "validity"]), spread=[x, y, *facets])
-    loaded: xr.Dataset = data.broadcast_like(store[[x, y, *facets]]).transpose(*facets, y, x).load()
+    data = narrow(store, dict.fromkeys([value, "status", "validity"]), spread=[*spread, *facets])
+    over = [*facets, *reversed(spread)]
+    loaded: xr.Dataset = data.broadcast_like(store[over]).transpose(*over).load()
     return loaded
 
 

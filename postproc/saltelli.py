@@ -12,25 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from postproc.load import axes_of, source
+from postproc.load import drawn_axes, source
 from postproc.units import displayed
 from rubhpc.axes import coordinate_of
 from rubhpc.errors import InputError
-from rubhpc.sample import CASE, cases_per_point
+from rubhpc.sample import cases_per_point
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
-
-
-def drawn_axes(store: xr.Dataset) -> list[str]:
-    """Return the coordinates that a sampled study has drawn, in the order of its grid; [] of a grid."""
-    if CASE not in axes_of(store):
-        return []
-    drawn = [str(name) for name, at in store.coords.items() if at.dims == (CASE,) and name != CASE]
-    keys = [coordinate_of(key) for key in _study(store).get("grid", {})]
-    return sorted(drawn, key=lambda name: keys.index(name) if name in keys else len(keys))
 
 
 def by_point(values: xr.DataArray, store: xr.Dataset) -> Floats:
@@ -50,6 +41,12 @@ def by_point(values: xr.DataArray, store: xr.Dataset) -> Floats:
         )
     rows: Floats = values.values.reshape(shape)
     return rows
+
+
+def is_log(store: xr.Dataset, name: str) -> bool:
+    """Whether a quantity was drawn evenly in the logarithm."""
+    told = [about for key, about in _study(store).get("grid", {}).items() if coordinate_of(key) == name]
+    return bool(told) and told[0].get("scale") == "log"
 
 
 def ranges_told(store: xr.Dataset) -> list[str]:

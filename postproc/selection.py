@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.load import axes_of, find_axis, need, source
+from postproc.load import axes_of, drawn_axes, find_axis, need, source
 from postproc.units import scale_for
+from rubhpc.axes import coordinate_of
 from rubhpc.errors import InputError
 from rubhpc.input.reading import parse_quantity
+from rubhpc.sample import CASE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -32,7 +34,8 @@ def select(store: xr.Dataset, choice: Mapping[str, Any]) -> xr.Dataset:
     choice : mapping of axis name to value
         A number (SI) or a text such as ``"0.3"`` or ``"84 um"`` selects one grid value and drops the axis. A
         list, or a text with commas, keeps several; a slice, or a text such as ``"1.2..2.4"``, keeps all
-        between. Dotted rig keys are known by either spelling; stators count from 1.
+        between, which is also how the cases of a sample are chosen by what was drawn. Dotted rig keys are
+        known by either spelling; stators count from 1.
 
     Raises
     ------
@@ -40,6 +43,10 @@ def select(store: xr.Dataset, choice: Mapping[str, Any]) -> xr.Dataset:
         No such axis, or no such value on it; the message names what is near.
     """
     for name, wanted in choice.items():
+        if (drawn := coordinate_of(name)) in drawn_axes(store):
+            places = _positions(store, drawn, wanted, is_drawn=True)
+            store = store.isel({CASE: places})
+            continue
         axis = find_axis(store, name)
         store = store.isel({axis: _positions(store, axis, wanted)})
     return store
@@ -113,7 +120,9 @@ def _typed(axis: xr.DataArray, value: float) -> str:
     return f"{value * scale.factor:.6g} {scale.unit.replace('µ', 'u')}".rstrip()
 
 
-def _positions(store: xr.Dataset, axis: str, wanted: Any) -> int | NDArray[np.intp]:
+def _positions(
+    store: xr.Dataset, axis: str, wanted: Any, *, is_drawn: bool = False
+) -> int | NDArray[np.intp]:
     """Return the index, or the indices, along `axis` of what is wanted."""
     if isinstance(wanted, str) and ".." in wanted:
         start, stop = wanted.split("..", 1)
@@ -122,6 +131,12 @@ def _positions(store: xr.Dataset, axis: str, wanted: Any) -> int | NDArray[np.in
         wanted = wanted.split(",")
     if isinstance(wanted, slice):
         return _between(store, axis, wanted)
+    if is_drawn:
+        low, high = (_typed(store[axis], float(end)) for end in (store[axis].min(), store[axis].max()))
+        raise InputError(
+            f"{source(store)}: {axis}: was drawn at random; select a range of it, such as {low}..{high}, or "
+            f"a case by its number, {CASE}={int(store[CASE][0])}"
+        )
     if isinstance(wanted, (list, tuple, np.ndarray)):
         return np.array([_nearest(store, axis, _number(store, axis, w)) for w in wanted])
     return _nearest(store, axis, _number(store, axis, wanted))

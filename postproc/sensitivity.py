@@ -15,8 +15,8 @@ import numpy as np
 import xarray as xr
 
 from postproc.factorial import filled_in, grid_indices, half_widths
-from postproc.load import axes_of, need, source
-from postproc.saltelli import by_point, drawn_axes, estimate, ranges_told
+from postproc.load import axes_of, drawn_axes, need, source
+from postproc.saltelli import by_point, estimate, ranges_told
 from postproc.selection import narrow, written_values
 from rubhpc.errors import InputError
 from rubhpc.sample import CASE

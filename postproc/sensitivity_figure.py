@@ -36,9 +36,10 @@ def bars(indices: xr.Dataset, ax: Axes) -> Axes:
     about = indices.attrs
     scalar = xr.DataArray(name=about["scalar"], attrs={"long_name": about["scalar_name"]})
     told = f"{about['interactions']:.0%} interactions, {about['confidence']:.0%} intervals"
-    ax.set_title(f"{short_name(scalar)} ({told})", fontsize=7)
+    # To the left of the panel there is room that long names of axes take.
+    ax.set_title(f"{short_name(scalar)} ({told})", fontsize=7, loc="right")
     low, high = (indices[[f"first_order_{e}", f"total_{e}"]].to_dataarray() for e in ("low", "high"))
-    ends_at = min(0.0, float(low.min())), max(1.0, float(high.max()))  # estimates may lie beyond
+    ends_at = min(0.0, 1.1 * float(low.min())), max(1.0, 1.03 * float(high.max()))  # of estimates
     ax.set(xlim=ends_at, xlabel="Share of the variance")
     ax.xaxis.grid(visible=True, zorder=0)
     handles, labels = ax.get_legend_handles_labels()

@@ -53,6 +53,7 @@ _SHORT = {
     "friction": "Friction coefficient",
     "stator_youngs_modulus": "Stator modulus $E_s$",
     "whirl": "Whirl",
+    "case": "Case",
     "frequency": "Frequency",
     "order": "Order (multiples of spin speed)",
     "revolution": "Revolution",

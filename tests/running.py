@@ -26,7 +26,7 @@ friction = {friction}
 [record]
 transient = {transient}
 revolutions = {revolutions}
-samples_per_revolution = 32
+samples_per_revolution = {samples_per_revolution}
 keep = {keep}
 [run]
 block = {block}
@@ -42,6 +42,7 @@ def write_study(folder: Path, name: str = "tiny.toml", **changes: object) -> Pat
         "friction": [0.1, 0.3, 0.5],
         "transient": 1,
         "revolutions": 2,
+        "samples_per_revolution": 32,
         "keep": '["waveform", "spectrum", "section"]',
         "block": 2,
         "integrator": 'method = "modal"',

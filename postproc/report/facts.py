@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from postproc.load import axes_of
+from postproc.load import axes_of, drawn_axes
 from postproc.maps import VALIDITY, monitors
-from postproc.units import Scale, scale_for
+from postproc.report.grid import plain
+from postproc.saltelli import ranges_told
+from postproc.units import Scale, scale_for, short_name
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 
 if TYPE_CHECKING:
@@ -131,6 +133,14 @@ def axis_rows(axes: list[dict[str, Any]]) -> list[dict[str, str]]:
             {"label": axis["label"], "listed": f"{text} {axis['unit']}".rstrip(), "n": str(len(shown))}
         )
     return rows
+
+
+def drawn_rows(store: xr.Dataset) -> list[dict[str, str]]:
+    """Return name and range of what a sampled study has drawn."""
+    told = zip(drawn_axes(store), ranges_told(store), strict=True)
+    return [
+        {"label": plain(short_name(store[name])), "listed": f"drawn, {text}", "n": ""} for name, text in told
+    ]
 
 
 def study_rows(store: xr.Dataset) -> list[tuple[str, str]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.cells import cell_edges, is_geometric
-from postproc.load import axes_of
+from postproc.load import axes_of, drawn_axes
 from postproc.map_figure import categories
 from postproc.maps import MAPPABLE, VALIDITY, validity
 from postproc.units import Scale, displayed, scale_for, short_name
@@ -52,8 +52,9 @@ class Measures:
     """Scalars, flags and settings of every case, loaded; those of cases without a result are NaN."""
 
     def __init__(self, store: xr.Dataset) -> None:
-        store = store.assign(validity=validity(store))
-        names = [n for n in (*MAPPABLE, "validity") if n in store.data_vars]
+        self._drawn = drawn_axes(store)
+        store = store.assign(validity=validity(store)).reset_coords(self._drawn)
+        names = [n for n in (*MAPPABLE, "validity", *self._drawn) if n in store.data_vars]
         names.sort(key=lambda n: _FIRST.index(n) if n in _FIRST else len(_FIRST))
         self._data = store[names].load()
         self._dims = axes_of(store)
@@ -128,7 +129,7 @@ class Measures:
         return str(self._data[name].attrs.get("units", "1"))
 
     def _is_setting(self, name: str) -> bool:
-        return name in VARIABLES and VARIABLES[name].role == "setting"
+        return name in self._drawn or (name in VARIABLES and VARIABLES[name].role == "setting")
 
     def _is_fill(self, name: str, values: NDArray[np.float64]) -> NDArray[np.bool_]:
         is_integer = name in VARIABLES and VARIABLES[name].dtype.startswith("int")

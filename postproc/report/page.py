@@ -18,6 +18,7 @@ from postproc.report.end_view import end_view
 from postproc.report.facts import (
     axis_rows,
     counts,
+    drawn_rows,
     failures,
     free_axes,
     run_rows,
@@ -94,7 +95,7 @@ class Page:
             "rig_name": (store.attrs.get("rig") or {}).get("name", ""),
             "drawing": drawing,
             "rig_axes": list(rig_axes(store).values()),
-            "axis_rows": axis_rows(axes),
+            "axis_rows": [*axis_rows(axes), *drawn_rows(store)],
             "study_rows": study_rows(store),
             "run_rows": run_rows(store, self.measures),
             "validity_rows": validity_rows(store, self.measures, axes, len(self.cases.done)),

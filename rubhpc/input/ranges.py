@@ -85,8 +85,6 @@ def read_ends(table: Mapping[str, object], unit: str, where: str) -> Range:
     InputError
         When nothing can be drawn from it.
     """
-    if "sweep" in table:
-        raise InputError(f"{where}: sweep: a sample has no order to follow; leave sweep or [sample] out")
     for key in ("step", "num"):
         if key in table:
             problem = f"{key}: a sample is drawn from start to stop"

@@ -126,7 +126,8 @@ def _integrate(
         tally.age[tally.is_touching] = IMPACT_STEPS
         reason = march.advance(0, n_sample, samples, tally, is_recorded=True)
     if reason is not None:
-        revolution = math.floor(n_transient + march.sample / per_revolution) + 1
+        seen = math.floor(n_transient + march.sample / per_revolution) + 1
+        revolution = min(seen, n_transient + recording.revolutions)  # what ends the record was in it
         record = diverged_record(
             f"{reason} in revolution {revolution}", n_stator, recording, settings, march.final()
         )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.case import run_case
+from rubhpc.integrate.case import compile_kernels, run_case
 from rubhpc.running.worker import set_up
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 from rubhpc.storage.duration import duration
@@ -21,10 +22,12 @@ from rubhpc.storage.store import Store
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rubhpc.study import Study
+    from rubhpc.study import Recording, Study
     from rubhpc.sweep import Block, Sweep
 
-_PILOT_STEPS = 400_000  # of one pilot case, about; enough for the caches to be warm
+_PILOTS, _FEW_PILOTS, _ENOUGH = 9, 3, 20.0  # asked; asked even where they take more than so many seconds
+_FIRST_STEPS, _PILOT_TIME = 50_000, 1.0  # predicted, of a pilot's first try; seconds of its longest, about
+_SECTION = 0.618  # golden: shares k * _SECTION (mod 1) spread evenly, however many
 _LINE = 400  # bytes of a case in a journal, about, for one stator
 _FIXED_FILES = 85  # metadata, packed arrays and coordinates
 
@@ -136,38 +139,60 @@ def make_plan(study: Study) -> Plan:
 def _pace(sweep: Sweep, manifest: Manifest, blocks: list[Block]) -> tuple[float, list[str]]:
     """Seconds a predicted step takes, and what failed.
 
-    The mean over a case of the longest, the middle and the last block.
+    The mean over cases spread evenly from the longest block to the last, each from another place in its
+    block: the first cases of all blocks share a value on every axis that a block spans.
     """
     paces, failures = [], []
-    for block in [blocks[i] for i in sorted({0, len(blocks) // 2, len(blocks) - 1})] if blocks else []:
+    picked = np.unique(np.linspace(0, len(blocks) - 1, _PILOTS).round().astype(int)) if blocks else []
+    began = time.monotonic()
+    for k, i in enumerate(picked):
+        if k >= _FEW_PILOTS and time.monotonic() - began > _ENOUGH:
+            break
+        block = blocks[i]
+        box = np.unravel_index(int(k * _SECTION % 1.0 * math.prod(block.shape)), block.shape)
+        index = tuple(int(start + step) for start, step in zip(block.start, box, strict=True))
         try:
-            paces.append(_pilot(sweep, block))
+            paces.append(_pilot(sweep, index, block.cost / math.prod(block.shape)))
         except Exception as error:  # whatever is wrong with the case: the others are asked all the same
-            where = manifest.name_case(int(np.ravel_multi_index(block.start, sweep.shape)))
+            where = manifest.name_case(int(np.ravel_multi_index(index, sweep.shape)))
             failures.append(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}")
     return (float(np.mean(paces)) if paces else math.nan), failures
 
 
-def _pilot(sweep: Sweep, block: Block) -> float:
-    """Seconds per predicted step of the block's first case, shortened.
+def _pilot(sweep: Sweep, index: tuple[int, ...], steps: float) -> float:
+    """Seconds per predicted step of a case, shortened where the whole of it takes long.
 
     Revolutions that are recorded cost more than those thrown away: their shares stay.
     """
-    study, case = sweep.study, sweep.cases(block)[0]
+    study, case = sweep.study, sweep.case(index)
     whole = study.recording
-    steps = block.cost / math.prod(block.shape)
-    share = min(1.0, _PILOT_STEPS / steps)
-    transient, revolutions = round(share * whole.longest_transient), max(1, round(share * whole.revolutions))
     setup = set_up(study, case)
 
-    def seconds(transient: int, revolutions: int) -> float:
-        recording = replace(whole, transient=transient, revolutions=revolutions)
+    def seconds(recording: Recording) -> float:
         record = run_case(setup, clearance=case.clearance, friction=case.friction, recording=recording)
         return float(record.scalars["wall_time"])
 
-    seconds(0, 1)  # compiles
-    done = (transient + revolutions) / (whole.longest_transient + whole.revolutions)
-    return seconds(transient, revolutions) / (steps * done)
+    def shortened(transient: int, revolutions: int) -> Recording:
+        return replace(
+            whole,
+            transient=transient,
+            transient_limit=None,
+            transient_tolerance=None,
+            revolutions=revolutions,
+        )
+
+    compile_kernels(setup, clearance=case.clearance, friction=case.friction, recording=shortened(0, 1))
+    share = min(1 / 16, _FIRST_STEPS / steps)
+    while True:
+        transient, revolutions = round(share * whole.longest_transient), round(share * whole.revolutions) or 1
+        taken = seconds(shortened(transient, revolutions))
+        done = (transient + revolutions) / (whole.longest_transient + whole.revolutions)
+        longer = min(1.0, done * _PILOT_TIME / taken, 4 * share)  # a rub may begin late, and then costs more
+        if longer == 1.0:
+            return seconds(whole) / steps
+        if longer < 2 * share:
+            return taken / (steps * done)
+        share = longer
 
 
 def _size(n_byte: float) -> str:

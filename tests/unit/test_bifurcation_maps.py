@@ -29,7 +29,7 @@ def axes():
 
 
 def data(path, value):
-    return map_data(open_store(path), value, "speed_ratio", "clearance", FACETS)
+    return map_data(open_store(path), value, ["speed_ratio", "clearance"], FACETS)
 
 
 def test_each_panel_shows_its_own_cases_in_one_scale(path, axes):

@@ -232,6 +232,26 @@ def test_plan_foresees_the_time_of_the_cases(tmp_path):
     assert taken / 5 < foreseen < 5 * taken
 
 
+def test_plan_times_a_transient_that_ends_by_itself(tmp_path, capsys):
+    study = write_study(tmp_path, transient='"auto"\ntransient_limit = 9\ntransient_tolerance = 1e-3')
+    code, out, err = call(capsys, "plan", study)
+    assert (code, err) == (0, "")
+    assert "core-hours (" in out
+    assert "failed      " not in out
+
+
+def test_pilots_see_every_value_of_an_axis_within_blocks(tmp_path, monkeypatch):
+    """The first cases of blocks, which hold all of a friction axis, would never rub."""
+    from rubhpc.running import plan
+    from rubhpc.study import read_study
+
+    asked = []
+    monkeypatch.setattr(plan, "_pilot", lambda sweep, index, steps: asked.append(sweep.case(index)) or 1.0)
+    study = read_study(write_study(tmp_path))
+    plan.make_plan(study)
+    assert {case.friction for case in asked} == set(study.axis("friction").values)
+
+
 def test_plan_tells_why_its_pilots_failed(tmp_path, monkeypatch, capsys):
     from rubhpc.running import plan
 

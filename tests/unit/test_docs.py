@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import subprocess
@@ -18,6 +17,7 @@ import pytest
 import rubhpc
 from rubhpc.cli import commands
 from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
+from rubhpc.points import Points
 from rubhpc.running.crash import Crashed
 from rubhpc.running.pool import RankLost
 from rubhpc.schema import VARIABLES, Variable
@@ -184,7 +184,7 @@ def test_readme_tells_of_targets_that_exist() -> None:
 def test_readme_tells_of_every_study_and_its_cases() -> None:
     told = {re.search(r"\((.*)\)", row[0]).group(1): int(row[2]) for row in rows(README, STUDIES)}  # type: ignore[union-attr]
     axes = {path: read_study(path).axes for path in (ROOT / "jobs").glob("*.toml")}
-    cases = {f"jobs/{path.name}": math.prod(len(axis.values) for axis in axes[path]) for path in axes}
+    cases = {f"jobs/{path.name}": Points(axes[path]).n_case for path in axes}
     assert told == cases
 
 

@@ -46,7 +46,7 @@ def ax():
 @pytest.fixture
 def plain_map(store):
     chosen = select(store, {"friction": 0.1, "stator_youngs_modulus": 3e9})
-    return lambda value: map_data(chosen, value, "speed_ratio", "clearance")
+    return lambda value: map_data(chosen, value, ["speed_ratio", "clearance"])
 
 
 # maps
@@ -79,7 +79,7 @@ def test_one_bad_stator_spoils_the_case():
     store = synthetic_store.make(n_stator=2)
     store["minimum_slip_speed"][..., 1] = -1.0
     chosen = select(store, {"friction": 0.1, "stator_youngs_modulus": 3e9})
-    data = map_data(chosen, "peak_torsion", "speed_ratio", "clearance")
+    data = map_data(chosen, "peak_torsion", ["speed_ratio", "clearance"])
     assert list(data["validity"].sel(clearance=84e-6).values) == [1, 1, 1, 1, 3]
 
 
@@ -123,7 +123,7 @@ def test_the_status_is_a_map_too(plain_map, ax):
 
 def test_a_map_of_settings_needs_no_result(store, ax):
     chosen = select(store, {"friction": 0.1, "stator_youngs_modulus": 3e9})
-    data = map_data(chosen, "spin_speed", "speed_ratio", "clearance")
+    data = map_data(chosen, "spin_speed", ["speed_ratio", "clearance"])
     value_map(data, "spin_speed", ax)
     assert np.ma.count_masked(ax.collections[0].get_array()) == 0
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from matplotlib.figure import Figure
 from SALib.test_functions import Ishigami
 
-from postproc.saltelli import drawn_axes
+from postproc.load import drawn_axes
 from postproc.sensitivity import sensitivity
 from postproc.sensitivity_figure import bars
 from rubhpc.axes import make_range
@@ -151,7 +151,8 @@ def test_bars_reach_beyond_the_shares() -> None:
     low = min(float(found[f"{name}_low"].min()) for name in ("first_order", "total"))
     high = max(float(found[f"{name}_high"].max()) for name in ("first_order", "total"))
     assert low < 0
-    assert ax.get_xlim() == (low, max(high, 1.0))
+    assert ax.get_xlim()[0] < low
+    assert ax.get_xlim()[1] > high
 
 
 def test_command_tells_ranges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,14 +72,15 @@ def test_each_case_has_the_speed_and_the_rig_of_its_row(tmp_path):
 
 
 def test_a_larger_sample_keeps_every_case(tmp_path):
-    run_here(read_study(write_sample(tmp_path, n=8)), quiet=True)
+    few = {"keep": '["section"]', "block": 8}
+    run_here(read_study(write_sample(tmp_path, n=8, **few)), quiet=True)
     before = xr.open_zarr(tmp_path / "tiny.zarr").load()
-    summary = run_here(read_study(write_sample(tmp_path, n=16)), quiet=True)
+    summary = run_here(read_study(write_sample(tmp_path, n=16, **few)), quiet=True)
     assert (summary.computed, sum(summary.counts)) == (64, 128)
     after = xr.open_zarr(tmp_path / "tiny.zarr").load()
     xr.testing.assert_equal(after.isel(case=slice(32)), before)
     assert not verify(tmp_path / "tiny.zarr")
-    whole = read_study(write_sample(tmp_path, n=16), tmp_path / "whole.zarr")
+    whole = read_study(write_sample(tmp_path, n=16, **few), tmp_path / "whole.zarr")
     run_here(whole, quiet=True)
     xr.testing.assert_equal(
         after.drop_vars("wall_time"), xr.open_zarr(whole.output).load().drop_vars("wall_time")
@@ -145,7 +146,7 @@ def test_a_store_tells_its_sample(tmp_path):
         ("start = 1.2, ", "", "[grid] speed_ratio: a range without start"),
         ("stop = 2.4", "stop = 1.2", "start and stop are both 1.2; write that value alone"),
         ("stop = 2.4", "stop = 2.4, step = 0.1", "step: a sample is drawn from start to stop; leave step or"),
-        ("stop = 2.4", 'stop = 2.4, sweep = "up"', "sweep: a sample has no order to follow; leave sweep or"),
+        ("stop = 2.4", 'stop = 2.4, sweep = "up"', "sweep: the cases of a sample have no neighbours"),
         ("stop = 2.4", "stpo = 2.4", 'unknown key "stpo" in a range; did you mean stop?'),
         ("start = 1.2", "start = -1.2", "holds 0, which is no speed"),
         ("start = 0.05", "start = 0", "a logarithmic range from 0 to 0.5"),
