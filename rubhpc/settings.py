@@ -230,8 +230,10 @@ class Settings:
             if free := find_free(self._model_at(self._on(self._response_axes, index))):
                 where = self._told(self._response_axes, index)
                 problem = f"modal needs bodies that are held, and {free}{f' at {where}' if where else ''}"
+                # Friction turns a free rotor back for ever: it has no steady twist.
+                hold = "give it a stiffness, however soft" if "torsion" in free else "hold it"
                 raise InputError(
-                    f'[integrator] method: {problem}; hold it, or take method = "central-difference"'
+                    f'[integrator] method: {problem}; {hold}, or take method = "central-difference"'
                 )
 
     def _check_gap(self, least: float) -> None:

@@ -60,13 +60,13 @@ def write_report(store: xr.Dataset, path: Path, limit: float) -> Load:
 
 
 def _load_measures(page: Page, load: Load, room: float, limit: float) -> int:
-    """Add the measures that may have room, and return the bytes that they and their descriptions take."""
+    """Load what fits, and return the bytes that it takes, with what is told of each measure."""
     left_out = []
     used = 0
-    described = {told["name"]: len(json.dumps(told)) for told in page.measures.described()}
+    told = {str(variable["name"]): len(json.dumps(variable)) for variable in page.measures.described()}
     for name in page.measures.names:
         packed = pack_floats(page.measures.values(name))
-        size = text_size(packed) + described[name]
+        size = text_size(packed) + told[name]
         share = room if name in _NEEDED or not page.cases.kept else room * _SHARE_OF_MEASURES
         if used + size <= share:
             load.values[name] = packed

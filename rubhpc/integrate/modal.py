@@ -129,6 +129,8 @@ class ModalMarch(March):
                 return f"a displacement passed {self._setup.displacement_limit:.3g} m"
             elif outcome == kernel.FINISHED:
                 return None
+            elif self.check is not None:
+                self.check()
 
     def _set_clock(self, samples: Samples, *, is_recorded: bool) -> int:
         """Count time from the sample reached; returns its tick."""

@@ -137,3 +137,5 @@ class SteppedMarch(ModalMarch):
                 return f"a displacement passed {self._setup.displacement_limit:.3g} m"
             if outcome == FINISHED:
                 return None
+            if self.check is not None:
+                self.check()

@@ -27,8 +27,10 @@ from rubhpc.kernels.phases import (
     FINE,
     FINISHED,
     FORCED_LEVEL,
+    MOST_STEPS,
     N_STEP,
     NEXT_SAMPLE,
+    PAUSED,
     PHASE,
     PHASE_WANTED,
     SAMPLES_AT_ONCE,
@@ -105,8 +107,8 @@ def advance(
     Returns
     -------
     int
-        FINISHED, DIVERGED (not finite), CONTACT_UNSOLVED, PHASE_WANTED, or SLIP_TURNED: set-valued friction
-        has no closed form from there on.
+        FINISHED, DIVERGED (not finite), CONTACT_UNSOLVED, PHASE_WANTED, PAUSED after many steps, or
+        SLIP_TURNED: set-valued friction has no closed form from there on.
     """
     q, n = reduced.push.shape
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
@@ -126,7 +128,7 @@ def advance(
     ceiling = -1  # while halving: the longest level worth a try
     is_halving = False
     is_forced = False
-    n_event = 0
+    n_event, last_step = 0, progress[N_STEP] + MOST_STEPS
     wanted = progress[WANTED]
     if is_recorded and wanted < 0:
         if progress[SPAN] < 0:
@@ -155,6 +157,9 @@ def advance(
                 end_span(phases, p, clock, t, z, progress, recorder, tally)
             progress[TIME] = t
             return FINISHED
+        if progress[N_STEP] > last_step and not (is_forced or is_halving):
+            progress[TIME] = t
+            return PAUSED
         is_free = mask[p] == 0
         limit = last_tick
         if is_recorded:

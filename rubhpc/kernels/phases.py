@@ -19,7 +19,8 @@ TWIST_ACCELERATION_ROW = 6
 LATERAL_ROW, LATERAL_RATE = 1, 2
 
 
-FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED, SLIP_TURNED = range(5)  # outcomes
+FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED, SLIP_TURNED, PAUSED = range(6)  # outcomes
+MOST_STEPS = 50_000  # of one call: signals are answered between calls
 
 # What a call leaves in `progress` for the next one: tick reached, phase, set of pairs wanted next (-1: none),
 # steps taken, next sample to take, tick at which the phase began, that from which energies are still to be

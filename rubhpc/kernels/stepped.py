@@ -31,8 +31,10 @@ from rubhpc.kernels.observe import (
 from rubhpc.kernels.phases import (
     CONTACT_UNSOLVED,
     FINISHED,
+    MOST_STEPS,
     N_STEP,
     NEXT_SAMPLE,
+    PAUSED,
     SPAN,
     TIME,
     Clock,
@@ -162,9 +164,12 @@ def advance_stepped(
     is_direct, is_springy = is_plain(pairs.law), pairs.law.stiffness > 0.0
     is_bouncing = pairs.law.restitution > 0.0
     is_followed = is_recorded or not is_direct  # the steps before and after a force are looked at
-    t = first_tick
+    t, last_step = first_tick, progress[N_STEP] + MOST_STEPS
     was_touching = bool(np.any(work.force > 0.0))
     while True:
+        if progress[N_STEP] > last_step:
+            progress[TIME] = t
+            return PAUSED
         is_sample = is_recorded and t == progress[NEXT_SAMPLE] << clock.sample_level
         is_end = t >= last_tick
         if is_sample and (not is_end or t == end_tick):

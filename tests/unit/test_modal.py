@@ -2,6 +2,7 @@
 
 import math
 import re
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from rubhpc.integrate.march import NO_FORCES
 from rubhpc.integrate.phases import PhaseBook
 from rubhpc.integrate.prepare import prepare
 from rubhpc.kernels.phases import CONTACT_UNSOLVED
-from rubhpc.rig import Torsion, with_keys
+from rubhpc.rig import LumpedStator, Rig, Torsion, with_keys
 from rubhpc.schema import DIVERGED, DONE
 from rubhpc.study import Contact, Integrator, Recording
 
@@ -287,3 +288,35 @@ def test_run_goes_on_from_its_final_state(is_touching):
     impulse = first.contact_impulse + second.contact_impulse
     assert impulse == pytest.approx(2 * whole.contact_impulse, rel=1e-6)
     assert first.contact_force.mean() * turn(SPEED) == pytest.approx(first.contact_impulse.mean(), rel=1e-3)
+
+
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+def test_signals_are_answered_however_long_a_revolution_lasts(normal):
+    """A mass that bounces for ever off a wall, 200 times a second, and a sample every 100 s."""
+
+    asked = []
+
+    def check():
+        asked.append(time.perf_counter())
+        if len(asked) == 4:
+            raise KeyboardInterrupt
+
+    wall = LumpedStator(node=1, rigid=True, radius=1.0)
+    setup = prepare(
+        Rig.from_matrices([[1.0]], None, [[4e5]], degrees=[(1, "v")], stators=[wall]),
+        turn(1600.0),
+        contact=Contact(normal=normal, restitution=1.0),
+        integrator=Integrator(),
+        samples_per_revolution=16,
+    )
+    thrown = replace(State.at_rest(setup.model), rotor_velocity=np.array([0.1]))
+    with pytest.raises(KeyboardInterrupt):
+        run_case(
+            setup,
+            clearance=1e-5,
+            friction=0.0,
+            recording=Recording(transient=0, revolutions=1, samples_per_revolution=16),
+            initial=thrown,
+            check=check,
+        )
+    assert max(np.diff(asked[1:])) < 5.0  # 0.1 s where nothing else runs
