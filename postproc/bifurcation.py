@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.cells import is_geometric
 from postproc.load import find_axis, need_results, ordered_axes, source
 from postproc.map_figure import categories
 from postproc.sections import section_of
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 COLORINGS = ("regime", "period", DIRECTION)
 WIDTH = 180  # mm: two columns, since an axis has hundreds of values
 _MOST_DRAWN = 200_000  # points in a pdf or svg; of more, they become a picture in it
-_SIZES = 0.6, 2.0  # of the points, pt
+_SIZES = 0.6, 3.5  # of the points, pt
+_LEAST_RANGE = 0.02  # of the largest value: points of one motion differ by rounding over all cases
 _WAYS = (("^", "#E69F00", 2.4), ("v", "#0072B2", 1.2))  # up and down: marker, colour, size
 
 
@@ -82,7 +84,7 @@ def bifurcation(data: xr.Dataset, signal: str, ax: Axes, color: str | None = "re
     along = str(section.dims[-2])
     x, x_label = displayed(data[along])
     scale = scale_of(section)
-    size = float(np.clip(_SIZES[1] * np.sqrt(80 / x.size), *_SIZES))
+    size = float(np.clip(2.0 * np.sqrt(80 / x.size), *_SIZES))
     groups = _directions(data, section, size) if color == DIRECTION else _groups(data, section, size, color)
     for style, chosen, values in groups:
         ax.plot(
@@ -98,6 +100,9 @@ def bifurcation(data: xr.Dataset, signal: str, ax: Axes, color: str | None = "re
             loc="outside upper right", ncols=16, markerscale=4.0 / size, handletextpad=0.2, columnspacing=1.0
         )
     ax.margins(x=0.01)
+    if is_geometric(x):
+        ax.set_xscale("log")
+    _widen(ax, section.values * scale.factor)
     ax.set(xlabel=x_label, ylabel=scale.label(f"{short_name(section)},\nonce a revolution"))
     return ax
 
@@ -124,3 +129,11 @@ def _directions(
         marker, shade, larger = _WAYS[i]
         style = {"marker": marker, "color": shade, "markersize": larger * size, "label": name}
         yield style, np.ones(section.shape[1], bool), section.values[i]
+
+
+def _widen(ax: Axes, y: NDArray[np.float64]) -> None:
+    """Keep points that differ by rounding from filling the axes."""
+    low, high = float(np.nanmin(y)), float(np.nanmax(y))
+    least = _LEAST_RANGE * max(abs(low), abs(high))
+    if high - low < least:
+        ax.set_ylim((low + high - least) / 2, (low + high + least) / 2)
