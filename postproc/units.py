@@ -52,6 +52,7 @@ _SHORT = {
     "clearance": "Clearance",
     "friction": "Friction coefficient",
     "stator_youngs_modulus": "Stator modulus $E_s$",
+    "direction": "Direction",
     "whirl": "Whirl",
     "case": "Case",
     "frequency": "Frequency",
@@ -126,7 +127,9 @@ def scale_for(unit: str, size: float) -> Scale:
 
 
 def scale_of(data: xr.DataArray, unit: str | None = None) -> Scale:
-    """Return the scale that suits the largest finite magnitude in `data`."""
+    """Return the scale that suits the largest finite magnitude in `data`; speeds are read in rpm."""
+    if data.name in _SPEEDS and unit is None:
+        return _RPM
     values = np.abs(np.asarray(data.values, dtype=float))
     finite = values[np.isfinite(values)]
     size = float(finite.max()) if finite.size else 0.0
@@ -135,8 +138,13 @@ def scale_of(data: xr.DataArray, unit: str | None = None) -> Scale:
 
 def displayed(data: xr.DataArray) -> tuple[NDArray[np.float64], str]:
     """Return the values in their display unit and the label of the axis they stand on."""
-    scale = _RPM if data.name in _SPEEDS else scale_of(data)
+    scale = scale_of(data)
     return np.asarray(data.values, dtype=float) * scale.factor, scale.label(short_name(data))
+
+
+def meanings(axis: xr.DataArray) -> list[str]:
+    """Return what the values 0, 1, ... of an axis mean, as up and down; none where they are quantities."""
+    return str(axis.attrs.get("flag_meanings", "")).split()
 
 
 def short_name(data: xr.DataArray) -> str:
@@ -149,6 +157,8 @@ def short_name(data: xr.DataArray) -> str:
 def written_value(coordinate: xr.DataArray) -> str:
     """Write one setting as a caption does: `$r$ = 1.7`, `$g$ = 84 µm`."""
     name, value = str(coordinate.name), float(coordinate.values)
+    if names := meanings(coordinate):
+        return f"{name.replace('_', ' ')} {names[int(value)]}"
     scale = _RPM if name in _SPEEDS else scale_for(str(coordinate.attrs.get("units", "1")), abs(value))
     symbol = f"${_SYMBOLS[name]}$" if name in _SYMBOLS else name.replace("_", " ")
     return f"{symbol} = {value * scale.factor:.4g} {scale.unit}".rstrip()
