@@ -41,11 +41,16 @@ def counts(status: NDArray[np.float64]) -> list[dict[str, Any]]:
     ]
 
 
+def _shown(axis: dict[str, Any]) -> list[str]:
+    """Return the values of an axis as people read them, without their unit."""
+    return axis["names"] or [f"{value:.6g}" for value in axis["values"]]
+
+
 def case_text(axes: list[dict[str, Any]], flat: int) -> str:
     """Return where a case stands on the grid, as in `speed ratio 1.7, clearance 84 µm`."""
     at = np.unravel_index(flat, [len(axis["values"]) for axis in axes]) if axes else ()
     places = (
-        f"{axis['label'][:1].lower()}{axis['label'][1:]} {axis['values'][i]:.6g} {axis['unit']}".rstrip()
+        f"{axis['label'][:1].lower()}{axis['label'][1:]} {_shown(axis)[i]} {axis['unit']}".rstrip()
         for axis, i in zip(axes, at, strict=True)
     )
     return ", ".join(places)
@@ -127,7 +132,7 @@ def axis_rows(axes: list[dict[str, Any]]) -> list[dict[str, str]]:
     """Return name, values and their number of each axis."""
     rows = []
     for axis in axes:
-        shown = [f"{v:.6g}" for v in axis["values"]]
+        shown = _shown(axis)
         text = ", ".join(shown) if len(shown) <= 8 else f"{shown[0]}, {shown[1]}, … {shown[-1]}"
         rows.append(
             {"label": axis["label"], "listed": f"{text} {axis['unit']}".rstrip(), "n": str(len(shown))}

@@ -177,7 +177,7 @@ def axes_told(store: xr.Dataset) -> list[dict[str, Any]]:
                 "label": plain(name),
                 "unit": unit.rstrip(")"),
                 "values": shown.tolist(),
-                "names": meanings(axis),
+                "names": [meanings(axis)[int(v)] for v in axis.values] if meanings(axis) else [],
                 "typed": [f"{v:.10g}" for v in np.asarray(axis.values, dtype=float)],
                 "order": order.tolist(),
                 "edges": cell_edges(shown[order]).tolist(),
