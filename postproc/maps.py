@@ -104,5 +104,5 @@ def validity(store: xr.Dataset) -> xr.DataArray:
             # One stator out of range spoils the case, whichever is drawn.
             bad = bad.any([d for d in ("stator",) if d in bad.dims])
             found = found + np.int8(bit) * bad.astype(np.int8)
-    legend = "sum of " + ", ".join(f"{bit} ({text} out of range)" for bit, text, _ in VALIDITY.values())
-    return found.rename("validity").assign_attrs(units="1", long_name=legend)
+    legend = ", ".join(f"{bit} ({text} out of range)" for bit, text, _ in monitors(store).values())
+    return found.rename("validity").assign_attrs(units="1", long_name=f"sum of {legend}")

@@ -111,21 +111,24 @@ class Settings:
         InputError
             When a clearance leaves no gap at a stator.
         """
-        along_response = sorted(self._dims(self._speed_axis, *self._response_axes))
+        along = sorted(self._dims(self._speed_axis, *self._response_axes))
+        pairs = np.array([self.response(index) for index in self._indices(along)])
+        table = pairs.reshape(*(self.points.shape[dim] for dim in along), 2)
+        amplitude = table[..., 1]
         along_speed = sorted(self._dims(*self._speed_setters))
+        speed = table[tuple(slice(None) if dim in along_speed else 0 for dim in along)][..., 0]
         along_clearance = self._dims(self._clearance_axis)
+        clearance = np.array(self._values[self._clearance_axis], dtype=np.float64)
         if self._is_clearance_ratio:
-            along_clearance = sorted({*along_response, *along_clearance})
-        found = {
-            "spin_speed": (along_speed, self._tabulated(along_speed, lambda at: self.response(at)[0])),
-            "clearance": (along_clearance, self._tabulated(along_clearance, self.clearance)),
-            "contact_free_amplitude": (
-                along_response,
-                self._tabulated(along_response, lambda at: self.response(at)[1]),
-            ),
+            whole = sorted({*along, *along_clearance})
+            clearance = self._laid(clearance, along_clearance, whole) * self._laid(amplitude, along, whole)
+            along_clearance = whole
+        self._check_gap(float(clearance.min()))
+        return {
+            "spin_speed": (along_speed, speed),
+            "clearance": (along_clearance, clearance),
+            "contact_free_amplitude": (along, amplitude),
         }
-        self._check_gap(float(found["clearance"][1].min()))
-        return found
 
     @cached_property
     def steps(self) -> NDArray[np.float64]:
@@ -173,6 +176,10 @@ class Settings:
         """Every index along some dimensions, the first place of the others."""
         along = set(dims)
         return itertools.product(*(range(n if d in along else 1) for d, n in enumerate(self.points.shape)))
+
+    def _laid(self, table: NDArray[np.float64], dims: list[int], among: list[int]) -> NDArray[np.float64]:
+        """A table over some dimensions, of length 1 along the others among which it is to lie."""
+        return table.reshape([self.points.shape[dim] if dim in dims else 1 for dim in among])
 
     def _tabulated(self, dims: list[int], value: Callable[[Index], float]) -> NDArray[np.float64]:
         """Values along some dimensions, taken at the first place of the others."""
@@ -230,8 +237,10 @@ class Settings:
             if free := find_free(self._model_at(self._on(self._response_axes, index))):
                 where = self._told(self._response_axes, index)
                 problem = f"modal needs bodies that are held, and {free}{f' at {where}' if where else ''}"
+                # Friction turns a free rotor back for ever: it has no steady twist.
+                hold = "give it a stiffness, however soft" if "torsion" in free else "hold it"
                 raise InputError(
-                    f'[integrator] method: {problem}; hold it, or take method = "central-difference"'
+                    f'[integrator] method: {problem}; {hold}, or take method = "central-difference"'
                 )
 
     def _check_gap(self, least: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -48,8 +49,7 @@ def write_report(store: xr.Dataset, path: Path, limit: float) -> Load:
     # What the notes will say of the rest takes some room too.
     room = limit - least_size(page) - 4096
     load = Load()
-    _load_measures(page, load, room, limit)
-    room -= sum(text_size(packed) for packed in load.values.values())
+    room -= _load_measures(page, load, room, limit)
     _load_records(page, load, room)
     text = page.html(load.values, load.records, load.notes)
     try:
@@ -59,12 +59,14 @@ def write_report(store: xr.Dataset, path: Path, limit: float) -> Load:
     return load
 
 
-def _load_measures(page: Page, load: Load, room: float, limit: float) -> None:
+def _load_measures(page: Page, load: Load, room: float, limit: float) -> int:
+    """Load what fits, and return the bytes that it takes, with what is told of each measure."""
     left_out = []
     used = 0
+    told = {str(variable["name"]): len(json.dumps(variable)) for variable in page.measures.described()}
     for name in page.measures.names:
         packed = pack_floats(page.measures.values(name))
-        size = text_size(packed)
+        size = text_size(packed) + told[name]
         share = room if name in _NEEDED or not page.cases.kept else room * _SHARE_OF_MEASURES
         if used + size <= share:
             load.values[name] = packed
@@ -79,6 +81,7 @@ def _load_measures(page: Page, load: Load, room: float, limit: float) -> None:
             left_out.append(page.measures.label(name).lower())
     if left_out:
         load.notes.append(f"Measures left out: {', '.join(left_out)}.")
+    return used
 
 
 def _load_records(page: Page, load: Load, room: float) -> None:

@@ -55,8 +55,9 @@ class Body:
 
     def rows(self, names: Sequence[str]) -> list[int]:
         """Rows of the degrees with these names, and of all that is coupled to them."""
-        named = [row for row, (_, name) in enumerate(self.degrees) if name in names]
-        return np.flatnonzero(np.isin(self.part, self.part[named])).tolist()
+        part = self.part.tolist()
+        wanted = {part[row] for row, (_, name) in enumerate(self.degrees) if name in names}
+        return [row for row, number in enumerate(part) if number in wanted]
 
     def index(self, node: int, name: str) -> int:
         """Row of a degree of freedom; -1 where it is held or absent."""

@@ -149,7 +149,7 @@ def _integrate(
                 stators=setup.model.stators,
                 spin=setup.spin,
                 samples_per_revolution=per_revolution,
-                growth=growth(_neighbours(march, start, final, setup, recording)),
+                growth=growth(lambda: _neighbours(march, start, final, setup, recording)),
             ),
             settings=settings,
             final=final,

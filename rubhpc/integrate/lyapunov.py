@@ -38,13 +38,19 @@ class Neighbours(Protocol):
         """
 
 
-def growth(neighbours: Neighbours) -> Iterator[float]:
+def growth(begin: Callable[[], Neighbours]) -> Iterator[float]:
     """Yield the logarithm of how much a small displacement grows per revolution, over spans of 4.
 
     After each span the displacement is brought back to its first size (Benettin, Galgani, Giorgilli and
     Strelcyn 1980). The mean of what is yielded tends to the largest Lyapunov exponent per revolution; it ends
     where a motion cannot go on.
+
+    Parameters
+    ----------
+    begin : callable
+        Makes the two motions, once the first span is wanted.
     """
+    neighbours = begin()
     for i in count():
         ratio = neighbours.part(SPAN)
         if ratio is None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from rubhpc.integrate.case import compile_kernels, run_case
 from rubhpc.running.worker import set_up
+from rubhpc.sample import CASE
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 from rubhpc.storage.duration import duration
 from rubhpc.storage.growth import origins
@@ -120,6 +121,9 @@ def make_plan(study: Study) -> Plan:
     pace, failures = _pace(sweep, manifest, [block for block, _ in left])
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
     told = {axis.coordinate: axis.name for axis in study.axes}  # a dimension as the study names its axis
+    if study.sample is not None:
+        n_range = sum(axis.drawn_from is not None for axis in study.axes)
+        told[CASE] = f"{CASE} ({study.sample.n} points of {n_range} ranges)"
     return Plan(
         title=study.title,
         store=study.output,
@@ -143,7 +147,8 @@ def _pace(sweep: Sweep, manifest: Manifest, blocks: list[Block]) -> tuple[float,
     block: the first cases of all blocks share a value on every axis that a block spans.
     """
     paces, failures = [], []
-    picked = np.unique(np.linspace(0, len(blocks) - 1, _PILOTS).round().astype(int)) if blocks else []
+    spread = np.linspace(0, len(blocks) - 1, _PILOTS).round().astype(int)
+    picked: list[int] = np.unique(spread).tolist() if blocks else []
     began = time.monotonic()
     for k, i in enumerate(picked):
         if k >= _FEW_PILOTS and time.monotonic() - began > _ENOUGH:

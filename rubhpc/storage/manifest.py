@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
@@ -171,7 +171,9 @@ class Manifest:
 
     def write(self, store: Path) -> None:
         """Put the manifest into a store, twice."""
-        text = json.dumps(asdict(self), indent=1).encode()
+        told = {f.name: getattr(self, f.name) for f in fields(self)}
+        axes = [{f.name: getattr(axis, f.name) for f in fields(axis)} for axis in self.axes]
+        text = json.dumps(told | {"axes": axes}).encode()
         for name in _NAMES:
             write_whole(store / PRIVATE / name, b"rubhpc %d %08x\n%s" % (_FORMAT, crc32(text), text))
 

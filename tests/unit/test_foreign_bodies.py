@@ -3,16 +3,28 @@
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rubhpc import InputError, LumpedStator, MatrixStator, Rig, Stator, Unbalance, assemble, read_rig
+from rubhpc import (
+    InputError,
+    LumpedStator,
+    MatrixStator,
+    Rig,
+    Stator,
+    Unbalance,
+    assemble,
+    read_rig,
+    simulate,
+)
 from rubhpc.fem.held import find_free
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import first_lateral_frequency, steady_response
 from rubhpc.rig import Torsion, rig_from_dict, with_key, with_keys
-from rubhpc.sweep import identity_parts
+from rubhpc.study import Study, make_axis
+from rubhpc.sweep import Sweep, identity_parts
 
 PLANE = [(1, "v"), (1, "w")]
 ONE = np.eye(2)
@@ -276,6 +288,22 @@ def test_free_motion_is_found_where_contact_or_outputs_see_it():
     assert (
         find_free(assemble(rotor(stators=[WALL, replace(adrift, angle=1.0)]))) == "stator 2 is free to move"
     )
+
+
+def test_rotor_free_in_torsion_is_refused_with_the_mend_and_a_soft_drive_twists_alike():
+    """Four revolutions: 0.01 N m/rad holds next to nothing of what friction turns back by then."""
+    packaged = read_rig("mokhtar2017")
+    free = with_key(packaged, "rotor.torsion.free", True)
+    given = {"speed": 150.0, "clearance": 1e-4, "friction": 0.2}
+    axes = tuple(make_axis(name, value, free) for name, value in given.items())
+    with pytest.raises(InputError, match=r"free to turn \(torsion\); give it a stiffness, however soft, or"):
+        Sweep(Study(title="free", rig=free, axes=axes, output=Path("none.zarr")))
+    case = given | {"transient": 0, "revolutions": 4}
+    drifts = simulate(free, **case, method="central-difference", step="1 us")
+    soft = simulate(with_key(packaged, "rotor.torsion.stiffness", 0.01), **case)
+    assert np.ptp(drifts.torsion) > 5e-3
+    assert soft.vertical == pytest.approx(drifts.vertical, abs=1e-4 * np.ptp(drifts.vertical))
+    assert soft.torsion == pytest.approx(drifts.torsion, abs=5e-3 * np.ptp(drifts.torsion))
 
 
 def ross(**changed):

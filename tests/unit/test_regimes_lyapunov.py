@@ -57,11 +57,13 @@ def growth_of(rig, given, state, n_span, march=ModalMarch):
         state = State.at_rest(setup.model)
     recording = Recording(samples_per_revolution=given["samples_per_revolution"])
     start = partial(march, setup, given["clearance"], given["friction"], check=None)
-    if march is ModalMarch:
-        neighbours = ModalNeighbours(start(initial=state))
-    else:
-        neighbours = Marches(lambda initial: start(initial=initial), state, setup, recording)
-    return np.array(list(islice(growth(neighbours), n_span)))
+
+    def begin():
+        if march is ModalMarch:
+            return ModalNeighbours(start(initial=state))
+        return Marches(lambda initial: start(initial=initial), state, setup, recording)
+
+    return np.array(list(islice(growth(begin), n_span)))
 
 
 def next_impact(time, speed, spin):

@@ -117,7 +117,7 @@ def test_a_store_tells_its_sample(tmp_path):
     path = write_sample(tmp_path)
     study = read_study(path)
     plan = make_plan(study).text()
-    assert "64 = 32 case x 2 clearance_ratio" in plan
+    assert "64 = 32 case (8 points of 2 ranges) x 2 clearance_ratio" in plan
     run_here(study, quiet=True)
     cases = xr.open_zarr(study.output)
     assert cases["peak_torsion"].dims == ("case", "clearance_ratio")

@@ -5,10 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kernel_case import KernelCase
 from lone_bodies import body, set_up, set_up_modal, tip
+from trial_rig import trial_rig
 
 from rubhpc import State
 from rubhpc.integrate.case import run_case
+from rubhpc.kernels.central_difference import FINISHED
+from rubhpc.kernels.contact import MULTIPLIER
+from rubhpc.rig import with_keys
 from rubhpc.study import Contact, Recording
 
 WALL = tip(body(1.0, 1.0, ((1, "axial"),)), 0.0, axial=-1)  # it is held
@@ -97,3 +102,34 @@ def test_bounces_die_out_into_contact():
     assert record.contacts_per_revolution[0] > 1
     assert at_rest == pytest.approx(np.full(4000, 0.5), abs=1e-6)
     assert record.contact_force[0, -4000:] == pytest.approx(np.full(4000, 0.5), rel=1e-3)
+
+
+@pytest.mark.parametrize("elements", [2, 12])
+@pytest.mark.parametrize("restitution", [0.2, 0.8])
+def test_impact_on_a_meshed_stator_reverses_the_pair_and_moves_all_by_one_impulse(elements, restitution):
+    """Moreau's law of the discrete bodies: v+ = -e v- of the pair, M dv = P p for every degree."""
+    rig = with_keys(
+        trial_rig(1, elements=elements), {"rotor.unbalance.mass": 0.0, "stator.damping.beta": 0.0}
+    )
+    law = MULTIPLIER._replace(restitution=restitution)
+    case = KernelCase.of(rig, 300.0, 200_000, clearance=2e-5, friction=0.1, law=law)
+    row = case.packed.degree_row[0]
+    case.state[1, row[:2]] = 0.1 * np.cos(0.3), 0.1 * np.sin(0.3)  # the rim's node, towards the stator
+    for i in range(20_000):
+        (u, before), push = case.state.copy(), case.work.push[0]
+        assert case.advance(i, i + 1) == FINISHED
+        if case.work.force[0] > 0.0:
+            break
+    after, step, packed = case.state[1], case.step, case.packed
+    arrives = -push @ before[row]
+    assert arrives > 0.01
+    assert push @ after[row] == pytest.approx(restitution * arrives, abs=2e-3 * arrives)
+    given = packed.mass @ (after - before) / step + packed.stiffness @ u
+    given += packed.damping @ (after + before) / 2
+    expected = np.zeros_like(given)
+    expected[row] = case.work.pull[0] * case.work.force[0]
+    assert given == pytest.approx(expected, abs=1e-6 * expected.max())
+    unit = np.zeros_like(given)
+    unit[row] = case.work.pull[0]
+    yields = push @ np.linalg.solve(packed.mass, unit)[row]
+    assert case.work.force[0] * step == pytest.approx((1 + restitution) * arrives / yields, rel=5e-3)
