@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.cells import is_geometric
 from postproc.load import find_axis, need_results, ordered_axes
 from postproc.map_figure import categories
 from postproc.sections import section_of
@@ -16,11 +17,13 @@ from rubhpc.schema import DONE
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
 COLORINGS = ("regime", "period")
 WIDTH = 180  # mm: two columns, since an axis has hundreds of values
 _MOST_DRAWN = 200_000  # points in a pdf or svg; of more, they become a picture in it
-_SIZES = 0.6, 2.0  # of the points, pt
+_SIZES = 0.6, 3.5  # of the points, pt
+_LEAST_RANGE = 0.02  # of the largest value: points of one motion differ by rounding over all cases
 
 
 def default_axis(store: xr.Dataset, along: str | None = None) -> str:
@@ -59,7 +62,7 @@ def bifurcation(data: xr.Dataset, signal: str, ax: Axes, color: str | None = "re
     x, x_label = displayed(data[along])
     scale = scale_of(section)
     y = section.values * scale.factor
-    size = float(np.clip(_SIZES[1] * np.sqrt(80 / x.size), *_SIZES))
+    size = float(np.clip(2.0 * np.sqrt(80 / x.size), *_SIZES))
     style: dict[str, Any] = {
         "linestyle": "",
         "marker": "o",
@@ -79,5 +82,16 @@ def bifurcation(data: xr.Dataset, signal: str, ax: Axes, color: str | None = "re
             loc="outside upper right", ncols=16, markerscale=4.0 / size, handletextpad=0.2, columnspacing=1.0
         )
     ax.margins(x=0.01)
+    if is_geometric(x):
+        ax.set_xscale("log")
+    _widen(ax, y)
     ax.set(xlabel=x_label, ylabel=scale.label(f"{short_name(section)},\nonce a revolution"))
     return ax
+
+
+def _widen(ax: Axes, y: NDArray[np.float64]) -> None:
+    """Keep points that differ by rounding from filling the axes."""
+    low, high = float(np.nanmin(y)), float(np.nanmax(y))
+    least = _LEAST_RANGE * max(abs(low), abs(high))
+    if high - low < least:
+        ax.set_ylim((low + high - least) / 2, (low + high + least) / 2)

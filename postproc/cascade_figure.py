@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.cascade import below, hold_peaks, hold_rows
-from postproc.cells import cell_edges
+from postproc.cells import cell_edges, is_geometric
 from postproc.lines import SPIKE, spikes
 from postproc.load import need_results
 from postproc.units import displayed, scale_of, short_name
@@ -46,7 +46,7 @@ def waterfall(
     """
     spectra = hold_rows(below(spectra, limit, abscissa), _ROWS).compute()
     need_results(spectra, spectra.to_dataset(name="spectra"))
-    rows, label = displayed(spectra[spectra.dims[0]])
+    rows, label = _ordinate(spectra)
     spectra = spectra.where(np.abs(spectra["order"]) > 1e-9)  # the mean is no line
     peak = float(spectra.max())
     span = float(np.ptp(rows)) or 1.0
@@ -63,6 +63,7 @@ def waterfall(
     below_rows = 0.1 if _start(spectra, limit) < 0 else 0.04  # room for the senses of whirl
     ax.set_ylim(rows.min() - below_rows * span, rows.max() + (height + 0.02) * span)
     ax.set_yticks([t for t in ax.get_yticks() if abs(t - rows.mean()) <= 0.55 * span])
+    _name_decades(ax, spectra)
     _scale_bar(spectra, ax, peak, gain)
     _name_senses(ax)
     return ax
@@ -80,7 +81,7 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
     )  # the mean is no line
     held = hold_rows(hold_peaks(lines, limit, _PIXELS[0], abscissa), _PIXELS[1]).compute()
     need_results(held, held.to_dataset(name="spectra"))
-    rows, label = displayed(held[held.dims[0]])
+    rows, label = _ordinate(held)
     scale = scale_of(held)
     values = held.values * scale.factor
     peak = float(np.nanmax(values)) or 1.0
@@ -95,6 +96,7 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
     )
     ax.set_facecolor("0.85")  # shows where a case is missing
     ax.set(xlim=(_start(spectra, limit), limit), xlabel=_NAMES[abscissa], ylabel=label)
+    _name_decades(ax, held)
     _name_senses(ax, "0.9")
     bar = ax.figure.colorbar(mesh, ax=ax, pad=0.02, aspect=30, extend="min")
     bar.set_label(scale.label(f"{short_name(held)} amplitude"))
@@ -199,10 +201,26 @@ def _name_senses(ax: Axes, color: str = "k") -> None:
 
 def _rows_and_rate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the displayed ordinates, ascending, and the spin rate (Hz) at each."""
-    rows, _ = displayed(spectra[spectra.dims[0]])
+    rows, _ = _ordinate(spectra)
     ascending = np.argsort(rows)
     rate = np.broadcast_to(spectra["spin_speed"].values, rows.shape) / (2 * math.pi)
     return rows[ascending], rate[ascending]
+
+
+def _ordinate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], str]:
+    """Return where the rows stand, and the label; the logarithm of values that are spaced by a ratio."""
+    rows, label = displayed(spectra[spectra.dims[0]])
+    return np.log10(rows) if is_geometric(np.sort(rows)) else rows, label
+
+
+def _name_decades(ax: Axes, spectra: xr.DataArray) -> None:
+    """Have round values name an ordinate that shows their logarithm."""
+    rows, _ = displayed(spectra[spectra.dims[0]])
+    if is_geometric(np.sort(rows)):
+        low, high = 0.99 * rows.min(), 1.01 * rows.max()
+        decades = 10.0 ** np.arange(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+        named = [v for v in np.outer(decades, (1, 2, 5)).ravel() if low <= v <= high]
+        ax.set_yticks(np.log10(named), [f"{value:g}" for value in named])
 
 
 def _tag(ax: Axes, x: float, y: float, text: str, color: str, ha: str) -> None:

@@ -21,9 +21,10 @@ def cell_edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
         edges: NDArray[np.float64] = np.exp(cell_edges(np.log(values)))
         return edges
     middle = (values[1:] + values[:-1]) / 2
-    return np.concatenate(
-        ([1.5 * values[0] - 0.5 * values[1]], middle, [1.5 * values[-1] - 0.5 * values[-2]])
-    )
+    first = 1.5 * values[0] - 0.5 * values[1]
+    if values[0] > 0:
+        first = max(first, 0.0)  # what is above 0, such as friction, has no cell below
+    return np.concatenate(([first], middle, [1.5 * values[-1] - 0.5 * values[-2]]))
 
 
 def hatch_cells(

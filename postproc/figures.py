@@ -120,7 +120,7 @@ def map_of(
     is_sample = bool(drawn_axes(cases))
     if is_sample and contours:
         raise InputError(f"{source(cases)}: map: points of a sample have no contours; leave --contours out")
-    across, up = (scatter_axes if is_sample else default_axes)(cases, x, y)
+    across, up = scatter_axes(cases, x, y) if is_sample else default_axes(cases, x, y, _several(facet))
     spread = [CASE] if is_sample else [across, up]
     facets = facet_axes(cases, _several(facet), spread)
     cases, notes = first_of_rest(cases, [*spread, *facets], value)

@@ -74,7 +74,7 @@ def _open(path: Path, chunks: Any, without: list[str]) -> xr.Dataset:
 
 def source(store: xr.Dataset) -> str:
     """Return the path the dataset came from, for messages."""
-    return str(store.encoding.get("source", "store"))
+    return str(store.encoding.get("source", "this store"))
 
 
 def axes_of(store: xr.Dataset) -> tuple[str, ...]:

@@ -84,8 +84,9 @@ def value_maps(
             if is_geometric(values):
                 getattr(ax, f"set_{name}scale")("log")
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
-    bar = color_bar(axes, mesh, paint)
-    bar.ax.hlines(levels, *bar.ax.get_xlim(), color="white", linewidth=0.5)
+    if paint.names != []:  # a flag that no case has needs no colours
+        bar = color_bar(axes, mesh, paint)
+        bar.ax.hlines(levels, *bar.ax.get_xlim(), color="white", linewidth=0.5)
     name_facets(axes, data, facets, x_label, y_label)
     legend_below(axes[0], list(handles.values()))
     return axes

@@ -25,15 +25,21 @@ VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
 }
 
 
-def default_axes(store: xr.Dataset, x: str | None = None, y: str | None = None) -> tuple[str, str]:
-    """Return the axes a map spreads over, across and up: those named, and else the longest ones."""
+def default_axes(
+    store: xr.Dataset, x: str | None = None, y: str | None = None, facets: Sequence[str] = ()
+) -> tuple[str, str]:
+    """Return the axes a map spreads over, across and up: those named, and else the longest but the facets."""
     named = [find_axis(store, name) for name in (x, y) if name]
+    if len(set(named)) < len(named):
+        raise InputError(f"{source(store)}: --x and --y are both {named[0]}; a map needs two axes")
     axes = axes_of(store)
-    free = [a for a in axes if store.sizes[a] > 1 and a not in named]
+    taken = {*named, *(find_axis(store, name) for name in facets)}
+    free = [a for a in axes if store.sizes[a] > 1 and a not in taken]
     free.sort(key=lambda a: -store.sizes[a])  # stable: of two equal ones the first in the grid
-    if len(set(named)) + len(free) < 2 or len(set(named)) < len(named):
+    if len(named) + len(free) < 2:
         sizes = ", ".join(f"{a} ({store.sizes[a]})" for a in axes) or "none"
-        raise InputError(f"{source(store)}: a map needs two axes of several values; there is {sizes}")
+        mend = "over one axis, draw rubhpc bifurcation or open rubhpc report"
+        raise InputError(f"{source(store)}: a map needs two axes of several values; there is {sizes}; {mend}")
     across = named.pop(0) if x else free.pop(0)
     return across, named.pop(0) if y else free.pop(0)
 

@@ -126,7 +126,9 @@ def scale_for(unit: str, size: float) -> Scale:
 
 
 def scale_of(data: xr.DataArray, unit: str | None = None) -> Scale:
-    """Return the scale that suits the largest finite magnitude in `data`."""
+    """Return the scale that suits the largest finite magnitude in `data`; speeds are read in rpm."""
+    if data.name in _SPEEDS and unit is None:
+        return _RPM
     values = np.abs(np.asarray(data.values, dtype=float))
     finite = values[np.isfinite(values)]
     size = float(finite.max()) if finite.size else 0.0
@@ -135,7 +137,7 @@ def scale_of(data: xr.DataArray, unit: str | None = None) -> Scale:
 
 def displayed(data: xr.DataArray) -> tuple[NDArray[np.float64], str]:
     """Return the values in their display unit and the label of the axis they stand on."""
-    scale = _RPM if data.name in _SPEEDS else scale_of(data)
+    scale = scale_of(data)
     return np.asarray(data.values, dtype=float) * scale.factor, scale.label(short_name(data))
 
 

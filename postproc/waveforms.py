@@ -84,7 +84,7 @@ def panels(data: xr.Dataset, axes: Sequence[Axes]) -> list[Axes]:
             shade_contacts(data["contact_force"], ax)
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
-        axes[0].figure.legend(handles, labels, loc="outside upper center", ncols=min(len(handles), 4))
+        axes[0].figure.legend(handles, labels, loc="outside lower center", ncols=min(len(handles), 4))
     return list(axes)
 
 

@@ -105,3 +105,17 @@ def test_command_takes_the_first_of_other_axes_and_writes_the_points(path, tmp_p
     table = np.genfromtxt("points.csv", delimiter=",", names=True, deletechars="")
     assert len(table) == 3 * POINTS
     assert set(np.unique(table["clearance_(m)"])) == {70e-6, 84e-6, 100e-6}
+
+
+def test_an_axis_of_even_ratios_is_drawn_on_a_log_scale(path, ax):
+    store = select(open_store(path), {"friction": 0.3, "stator.youngs_modulus": "30 GPa", "speed_ratio": 1.0})
+    store = store.assign_coords(clearance=store["clearance"].copy(data=[1e-5, 1e-4, 1e-3]))
+    bifurcation(bifurcation_data(store, "vertical", "clearance"), "vertical", ax)
+    assert ax.get_xscale() == "log"
+
+
+def test_points_that_differ_by_rounding_do_not_fill_the_axes(path, ax):
+    data = bifurcation_data(select(open_store(path), CHOICE), "vertical", "speed_ratio").load()
+    data["section_vertical"][...] = 1e-4 * (1 + 1e-9 * np.random.default_rng(1).random((5, POINTS)))
+    bifurcation(data, "vertical", ax)
+    assert np.ptp(ax.get_ylim()) == pytest.approx(2.0)  # um, of 100

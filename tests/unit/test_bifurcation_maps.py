@@ -5,12 +5,14 @@ import pytest
 import synthetic_store
 from click.testing import CliRunner
 
+from postproc.cells import cell_edges
 from postproc.load import open_store
 from postproc.map_figure import value_maps
-from postproc.maps import facet_axes, map_data
+from postproc.maps import default_axes, facet_axes, map_data
 from postproc.style import house_style, new_figure
 from rubhpc.commands.figures import map as map_command
 from rubhpc.errors import InputError
+from rubhpc.schema import FAILED
 
 FACETS = ["stator_youngs_modulus", "friction"]  # down, across
 
@@ -99,3 +101,31 @@ def test_command_draws_a_panel_for_each_value(path, tmp_path, monkeypatch):
     assert said[-2:] == ["study_map.png", "map.csv"]
     table = np.genfromtxt("map.csv", delimiter=",", names=True, deletechars="")
     assert len(table) == 2 * 3 * 5
+
+
+def test_maps_spread_over_what_the_facets_leave(path):
+    store = open_store(path).isel(clearance=[0, 1], speed_ratio=[1, 2, 3])
+    assert default_axes(store) == ("speed_ratio", "clearance")
+    assert default_axes(store, facets=["speed_ratio"]) == ("clearance", "friction")
+    with pytest.raises(InputError, match="--x and --y are both friction"):
+        default_axes(store, "friction", "friction")
+    with pytest.raises(InputError, match="over one axis, draw rubhpc bifurcation"):
+        default_axes(store.isel(clearance=0, friction=0, stator_youngs_modulus=0))
+
+
+def test_regimes_that_no_case_has_need_no_bar(path, axes):
+    shown = data(path, "regime")
+    shown["status"][...] = FAILED
+    value_maps(shown, "regime", axes)
+    assert axes[0].figure.axes == axes
+
+
+def test_a_map_reads_speeds_in_rpm_as_its_axes_do(path, axes):
+    value_maps(data(path, "spin_speed"), "spin_speed", axes)
+    assert axes[0].figure.axes[-1].get_ylabel() == "Spin speed (rpm)"
+    assert axes[0].collections[0].get_clim()[1] == pytest.approx(1.7 * synthetic_store.FIRST_LATERAL * 60)
+
+
+def test_what_is_above_zero_has_no_cell_below():
+    assert list(cell_edges(np.array([0.1, 0.4]))) == pytest.approx([0.0, 0.25, 0.55])
+    assert list(cell_edges(np.array([0.0, 0.2]))) == pytest.approx([-0.1, 0.1, 0.3])

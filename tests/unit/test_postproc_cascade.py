@@ -253,3 +253,11 @@ def test_speeds_in_rpm_are_written_out(spectra, ax):
     ax.figure.canvas.draw()
     assert ax.get_ylabel() == "Spin speed (rpm)"
     assert any("10000" in tick.get_text() for tick in ax.get_yticklabels())
+
+
+@pytest.mark.parametrize("draw", [waterfall, intensity])
+def test_rows_of_even_ratios_stand_at_their_logarithm(draw, ax):
+    spectra = made(np.ones((3, 13)), [1.0, 10.0, 100.0])
+    draw(spectra, ax, 3.0, "order")
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["1", "2", "5", "10", "20", "50", "100"]
+    assert ax.get_yticks()[-1] == pytest.approx(2.0)
