@@ -170,11 +170,14 @@ class Rub:
         signal: str = "vertical",
         *,
         along: str | None = None,
-        color: str = "regime",
+        color: str | None = None,
         ax: Axes | None = None,
         **choice: Any,
     ) -> Axes:
-        """Draw the section points of a signal over an axis, coloured by "regime" or "period"."""
+        """Draw the section points of a signal over an axis, coloured by "regime", "period" or "direction".
+
+        By default by direction where an axis was swept both ways, else by regime.
+        """
         return _draw(figures.bifurcation(self.select(**choice), signal, along=along, color=color), ax)[0]
 
     def hht(

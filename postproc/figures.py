@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from postproc.load import drawn_axes, find_axis, source
+from rubhpc.axes import DIRECTION
 from rubhpc.errors import InputError
 from rubhpc.sample import CASE
 
@@ -214,22 +215,26 @@ def section(
 
 
 def bifurcation(
-    cases: xr.Dataset, signal: str = "vertical", *, along: str | None = None, color: str = "regime"
+    cases: xr.Dataset, signal: str = "vertical", *, along: str | None = None, color: str | None = None
 ) -> Drawing:
-    """Section points of a signal over an axis, coloured by regime or period."""
-    from postproc.bifurcation import COLORINGS, WIDTH, bifurcation_data, default_axis
+    """Section points of a signal over an axis, coloured by regime, period or direction of the sweep."""
+    from postproc.bifurcation import COLORINGS, WIDTH, bifurcation_data, default_axis, default_coloring
     from postproc.bifurcation import bifurcation as picture
     from postproc.sections import section_of
     from postproc.selection import first_of_rest
 
-    _choose(color, COLORINGS, "color")
+    if color is not None:
+        _choose(color, COLORINGS, "color")
+    coloring = default_coloring(cases, color)
     axis = default_axis(cases, along)
+    over = coloring if coloring == DIRECTION else None
     name = f"section_{signal}"
-    cases, notes = first_of_rest(cases.assign({name: section_of(cases, signal)}), [axis], name)
-    shown = bifurcation_data(cases, signal, axis)
+    kept = [axis] if over is None else [axis, over]
+    cases, notes = first_of_rest(cases.assign({name: section_of(cases, signal)}), kept, name)
+    shown = bifurcation_data(cases, signal, axis, over)
     return Drawing(
         shown=shown,
-        draw=lambda axes: picture(shown, signal, axes[0], color),
+        draw=lambda axes: picture(shown, signal, axes[0], coloring),
         height=90,
         width=WIDTH,
         notes=tuple(notes),

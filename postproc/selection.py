@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.load import axes_of, drawn_axes, find_axis, need, source
-from postproc.units import scale_for
+from postproc.units import meanings, scale_for
 from rubhpc.axes import coordinate_of
 from rubhpc.errors import InputError
 from rubhpc.input.reading import parse_quantity
@@ -116,6 +116,9 @@ def _written(axis: xr.DataArray, i: int) -> str:
 
 
 def _typed(axis: xr.DataArray, value: float) -> str:
+    names = meanings(axis)
+    if 0 <= value < len(names) and value == int(value):
+        return names[int(value)]
     scale = scale_for(str(axis.attrs.get("units", "1")), abs(value))
     return f"{value * scale.factor:.6g} {scale.unit.replace('µ', 'u')}".rstrip()
 
@@ -158,6 +161,13 @@ def _number(store: xr.Dataset, axis: str, wanted: Any) -> float:
     try:
         return float(wanted)  # SI, whatever the axis
     except (TypeError, ValueError):
+        if names := meanings(store[axis]):
+            if wanted in names:
+                return float(names.index(wanted))
+            told = ", ".join(names)
+            raise InputError(
+                f"{source(store)}: {axis} = {wanted}: not on the grid; there is {told}"
+            ) from None
         unit = str(store[axis].attrs.get("units", "1"))
         # "rad s-2" to "rad * s**-2": a store spells units as netCDF does, a study as pint does.
         spelt = "" if unit == "1" else re.sub(r"(?<=[A-Za-z])(-?\d+)", r"**\1", unit).replace(" ", " * ")

@@ -52,6 +52,7 @@ _SHORT = {
     "clearance": "Clearance",
     "friction": "Friction coefficient",
     "stator_youngs_modulus": "Stator modulus $E_s$",
+    "direction": "Direction",
     "whirl": "Whirl",
     "case": "Case",
     "frequency": "Frequency",
@@ -141,6 +142,11 @@ def displayed(data: xr.DataArray) -> tuple[NDArray[np.float64], str]:
     return np.asarray(data.values, dtype=float) * scale.factor, scale.label(short_name(data))
 
 
+def meanings(axis: xr.DataArray) -> list[str]:
+    """Return what the values 0, 1, ... of an axis mean, as up and down; none where they are quantities."""
+    return str(axis.attrs.get("flag_meanings", "")).split()
+
+
 def short_name(data: xr.DataArray) -> str:
     """Return a name of the quantity that fits an axis at column width."""
     name = str(data.name).removeprefix("spectrum_").removeprefix("section_")
@@ -151,6 +157,8 @@ def short_name(data: xr.DataArray) -> str:
 def written_value(coordinate: xr.DataArray) -> str:
     """Write one setting as a caption does: `$r$ = 1.7`, `$g$ = 84 µm`."""
     name, value = str(coordinate.name), float(coordinate.values)
+    if names := meanings(coordinate):
+        return f"{name.replace('_', ' ')} {names[int(value)]}"
     scale = _RPM if name in _SPEEDS else scale_for(str(coordinate.attrs.get("units", "1")), abs(value))
     symbol = f"${_SYMBOLS[name]}$" if name in _SYMBOLS else name.replace("_", " ")
     return f"{symbol} = {value * scale.factor:.4g} {scale.unit}".rstrip()

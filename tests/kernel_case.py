@@ -94,4 +94,5 @@ class KernelCase:
             np.zeros((3, self.state.shape[1])),
             self.samples,
             self.tally,
+            np.zeros(1, dtype=np.int64),
         )

@@ -11,7 +11,7 @@ from postproc.cells import cell_edges, is_geometric
 from postproc.load import axes_of, drawn_axes
 from postproc.map_figure import categories
 from postproc.maps import MAPPABLE, VALIDITY, validity
-from postproc.units import Scale, displayed, scale_for, short_name
+from postproc.units import Scale, displayed, meanings, scale_for, short_name
 from rubhpc.schema import DIVERGED, DONE, SIGNAL_NAMES, VARIABLES
 
 if TYPE_CHECKING:
@@ -177,6 +177,7 @@ def axes_told(store: xr.Dataset) -> list[dict[str, Any]]:
                 "label": plain(name),
                 "unit": unit.rstrip(")"),
                 "values": shown.tolist(),
+                "names": meanings(axis),
                 "typed": [f"{v:.10g}" for v in np.asarray(axis.values, dtype=float)],
                 "order": order.tolist(),
                 "edges": cell_edges(shown[order]).tolist(),

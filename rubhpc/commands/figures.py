@@ -109,9 +109,13 @@ def section(**words: Any) -> None:
 @of_store
 @click.option("--signal", default="vertical", show_default=True, help="vertical, horizontal or torsion.")
 @click.option("--along", metavar="AXIS", help="The axis of the diagram [default: the longest].")
-@click.option("--color", type=click.Choice(["regime", "period"]), default="regime", show_default=True)
+@click.option(
+    "--color",
+    type=click.Choice(["regime", "period", "direction"]),
+    help="[default: direction, where an axis was swept both ways; else regime]",
+)
 def bifurcation_diagram(**words: Any) -> None:
-    """Section points of a signal, one a revolution, over an axis, coloured by regime or period."""
+    """Section points of a signal, one a revolution, over an axis, coloured by regime, period or direction."""
     from postproc import figures
 
     draw("bifurcation", figures.bifurcation, words)

@@ -55,6 +55,7 @@ class CentralDifferenceMarch(March):
         self._work = workspace(self._pairs, setup.step)
         self._state = _start(setup, initial, self._pairs, self._work)
         self._scratch = np.zeros((3, self._state.shape[1]))
+        self._reached = np.zeros(1, dtype=np.int64)
 
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs pressed in the last step, (q,)."""
@@ -92,6 +93,9 @@ class CentralDifferenceMarch(March):
         outcome = self._kernel(
             self._state, stop, setup.steps_per_sample, samples, tally, is_recorded=is_recorded
         )
+        if outcome != kernel.FINISHED:
+            self.n_step += (int(self._reached[0]) - self.sample) * setup.steps_per_sample
+            self.sample = int(self._reached[0])
         if outcome == kernel.DIVERGED:
             return f"a displacement passed {setup.displacement_limit:.3g} m"
         if outcome == kernel.CONTACT_UNSOLVED:
@@ -127,6 +131,7 @@ class CentralDifferenceMarch(March):
             self._scratch,
             samples,
             tally,
+            self._reached,
         )
 
 

@@ -78,6 +78,7 @@ def advance(
     scratch: Floats,
     samples: Samples,
     tally: Tally,
+    reached: Ints,
 ) -> int:
     """Advance a case over samples `first_sample` to `last_sample` (excluded).
 
@@ -98,6 +99,8 @@ def advance(
         Displacement, and velocity half a step earlier; advanced in place.
     scratch : (3, n_dof)
         Work space.
+    reached : (1,)
+        The sample from which a case went that could not go on.
 
     Returns
     -------
@@ -157,6 +160,7 @@ def advance(
                         fill_start(row, displacement, velocity, start_position, start_rate)
                     n_touching = solve_contact(pairs, work, step, spin)
                     if n_touching == UNSOLVED:
+                        reached[0] = i_sample
                         return CONTACT_UNSOLVED
                     is_touching = n_touching > 0
                 if is_recorded:
@@ -194,6 +198,7 @@ def advance(
             was_touching = is_touching
         flush_decayed(state)
         if has_diverged(displacement, output_row, row, displacement_limit):
+            reached[0] = i_sample
             return DIVERGED
     return FINISHED
 

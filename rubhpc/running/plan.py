@@ -70,7 +70,7 @@ class Plan:
     def _idle(self) -> str:
         if self.n_chain == self.n_block:
             return "more ranks would idle"
-        return f"in {self.n_chain} chains: more ranks would idle"
+        return f"in {self.n_chain} chain{'s' * (self.n_chain > 1)}: more ranks than that would idle"
 
     def text(self) -> str:
         """The plan for people, a few lines."""

@@ -100,7 +100,7 @@ def test_cases_without_a_result_say_so(visit: Visit, pages: dict[str, str]) -> N
     page = visit(pages["whole"])
     page.get_by_role("button", name=re.compile("^speed ratio 0.75, clearance 70 µm")).click()
     expect(page.locator("#case-text")).to_contain_text("diverged")
-    expect(page.locator("#orbit .message")).to_have_text("This case is diverged")
+    expect(page.locator("#orbit .message")).to_have_text("This case has diverged")
     assert set(page.locator("#legend span").all_inner_texts()) >= {
         "missing",
         "failed",

@@ -79,6 +79,7 @@ def test_a_resumed_run_of_other_size_stores_equal_bytes(tmp_path, alone):
 def test_a_sample_killed_on_its_way_and_resumed_on_two_ranks_stores_equal_bytes(tmp_path):
     """Ranges of speed and friction, and a list of clearances: each row of the sample has its own set-up."""
     slow = {"integrator": 'method = "central-difference"\nstep = "2 us"', "block": 3, "revolutions": 1}
+    slow["speed_ratio"] = "{ start = 4.0, stop = 5.0 }"
     study, store, whole = write_sample(tmp_path, **slow), tmp_path / "tiny.zarr", tmp_path / "whole.zarr"
     assert run(study, "--output", whole).returncode == 0
     job = start(study, ranks=2)

@@ -293,7 +293,7 @@ def test_a_sweep_is_part_of_what_a_study_is(finished, tmp_path):
 
 
 def test_the_plan_tells_how_many_ranks_have_work(finished):
-    assert "12, at most 2 cases each; in 4 chains: more ranks would idle" in make_plan(finished).text()
+    assert "12, at most 2 cases each; in 4 chains: more ranks than that would idle" in make_plan(finished).text()
     assert make_plan(finished).counts[DONE] == 20
 
 

@@ -113,6 +113,7 @@ function withUnit(x, unit, digits = 4) {
 }
 
 function axisValue(axis, i) {
+  if (axis.names.length) return axis.names[axis.values[i]];
   return written(axis.values[i], 6) + (axis.unit ? "\u00a0" + axis.unit : "");
 }
 

@@ -141,6 +141,7 @@ class CaseMap {
     for (const [axis, bokeh] of [[this.x, figure.xaxis], [this.y, figure.yaxis]]) {
       if (axis && axis.values.length <= 10) bokeh.ticker = new Bokeh.FixedTicker({ ticks: axis.order.map((i) => axis.values[i]) });
       bokeh.formatter = new Bokeh.BasicTickFormatter({ use_scientific: false });
+      if (axis?.names.length) bokeh.major_label_overrides = new Map(axis.names.map((name, i) => [i, name]));
     }
     if (this.y) {
       figure.yaxis.axis_label = label(this.y);

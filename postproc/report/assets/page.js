@@ -166,7 +166,7 @@ async function drawCase(flat) {
   byId("case-text").textContent = `${caseWords() || "The only case"} – ${status === 1 ? words : meaning + reason}${range}`.replace(/^./, (c) => c.toUpperCase());
   const record = status === 1 ? await recordOf(flat) : null;
   if (!record) {
-    const why = status !== 1 ? `This case is ${meaning}${reason}`
+    const why = status !== 1 ? `This case ${status === 0 ? "is" : "has"} ${meaning}${reason}`
       : `Left out to keep this page small. To see it: rubhpc view ${told.store}`;
     for (const panel of Object.values(panels)) panel.say(why);
     return;
@@ -233,6 +233,7 @@ async function startAt() {
   [state.x = null, state.y = null] = axes;
   const first = ["regime", "peak_contact_force", "status"];
   if (state.y === null) first.unshift("peak_contact_force");
+  if (!status.includes(1)) first.unshift("status");
   state.value = first.find((name) => variable[name]);
   state.signal = Object.keys(told.signals).includes("torsion") ? "torsion" : Object.keys(told.signals)[0] ?? "";
 }
