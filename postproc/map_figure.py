@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ NOT_DONE = {
 REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
 PERIOD_COLORS = ("#D55E00", "#56B4E9", "#0072B2", "#009E73", "#CC79A7")  # none, P1 to P4
 WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
+_TITLE_WIDTH = 90  # characters of the titles of a row of panels
 _LEGEND_WIDTH = 64  # characters that fit a column of a page, 6 of them taken by each handle
 CATEGORIES = ("status", "regime", "period")
 STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
@@ -233,7 +235,7 @@ def name_facets(
             ax.set_ylabel(y_label)
         places = (row, column)[-len(facets) :] if facets else ()
         names = [written_value(data[f][place]) for f, place in zip(facets, places, strict=True)]
-        ax.set_title(", ".join(names), fontsize=7)
+        ax.set_title(textwrap.fill(", ".join(names), _TITLE_WIDTH // n_column), fontsize=7)
 
 
 def _columns(lengths: list[int]) -> int:

@@ -89,6 +89,9 @@ def _print_tables(found: list[tuple[float, list[Mode]]], stators: list[list[Mode
     tables += [(f"Stator {number}", stator) for number, stator in enumerate(stators, start=1)]
     click.echo("Natural and damped frequency in Hz, damping as a fraction of critical.")
     for title, listed in tables:
+        if not listed:
+            click.echo(f"\n{title}: a wall, which does not move")
+            continue
         click.echo(f"\n{title}\n{'natural':>12} {'damped':>12} {'damping':>9}  {'kind':<10} whirl")
         for mode in listed[:count]:
             numbers = f"{mode.frequency:12.4f} {mode.damped_frequency:12.4f} {mode.damping_ratio:9.5f}"

@@ -22,6 +22,8 @@ _MEND = {
     errno.EACCES: "permission denied; mend the permissions or choose another place with --output",
     errno.EPERM: "not permitted; mend the permissions or choose another place with --output",
     errno.ENOTDIR: "its parent is not a directory; choose another place with --output",
+    errno.EEXIST: "a file stands in its way; move that away or choose another place with --output",
+    errno.ENOENT: "part of its path is missing and cannot be made; choose another place with --output",
     errno.EIO: "the disk reports an input/output error; verify the store once it is mended",
 }
 

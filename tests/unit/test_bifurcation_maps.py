@@ -1,13 +1,16 @@
 """Small multiples of a map of a synthetic store, and its contours."""
 
+import itertools
+
 import numpy as np
 import pytest
 import synthetic_store
+import xarray as xr
 from click.testing import CliRunner
 
 from postproc.cells import cell_edges
 from postproc.load import open_store
-from postproc.map_figure import value_maps
+from postproc.map_figure import name_facets, value_maps
 from postproc.maps import default_axes, facet_axes, map_data
 from postproc.style import house_style, new_figure
 from rubhpc.commands.figures import map as map_command
@@ -129,3 +132,17 @@ def test_a_map_reads_speeds_in_rpm_as_its_axes_do(path, axes):
 def test_what_is_above_zero_has_no_cell_below():
     assert list(cell_edges(np.array([0.1, 0.4]))) == pytest.approx([0.0, 0.25, 0.55])
     assert list(cell_edges(np.array([0.0, 0.2]))) == pytest.approx([-0.1, 0.1, 0.3])
+
+
+def test_names_of_facets_stay_within_their_panels():
+    name = "rotor_unbalance_radius"
+    told = {"long_name": name.replace("_", " "), "units": "m"}
+    radius = xr.DataArray(0.1 + 0.05 * np.arange(5.0), dims=name, attrs=told)
+    data = xr.Dataset(coords={"friction": [0.0, 0.1], name: radius})
+    with house_style():
+        figure, axes = new_figure(2, 120, 180, 5)
+        name_facets(axes, data, ["friction", name], "x", "y")
+        figure.canvas.draw()
+        panels = [ax.get_tightbbox(for_layout_only=False) for ax in axes[1:5]]  # no labels on their left
+    for one, other in itertools.pairwise(panels):
+        assert one.x1 < other.x0

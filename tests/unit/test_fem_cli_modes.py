@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from rubhpc.commands.modes import modes
 from rubhpc.errors import InputError
+from rubhpc.rig import PACKAGED
 
 
 def run(*arguments):
@@ -55,6 +56,13 @@ def test_table_stands_still_unless_told():
 def test_table_says_how_many_modes_it_leaves_out():
     assert "(76 more; --count 88 shows all)" in run("mokhtar2017")
     assert "more;" not in run("mokhtar2017", "--count", "88")
+
+
+def test_a_wall_has_no_table(tmp_path):
+    rig = (PACKAGED / "mokhtar2017.toml").read_text()
+    (tmp_path / "walled.toml").write_text(rig + "\n[[stator]]\nnode = 8\nangle = 3.0\nrigid = true\n")
+    lines = run(str(tmp_path / "walled.toml"), "--count", "3").splitlines()
+    assert lines[-1] == "Stator 2: a wall, which does not move"
 
 
 @pytest.mark.parametrize("extension", ["png", "svg"])

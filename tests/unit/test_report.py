@@ -17,7 +17,9 @@ from unpacking import unpacked_floats, unpacked_record
 
 from postproc.load import open_store
 from postproc.maps import validity
+from postproc.report import budget
 from postproc.report.budget import write_report
+from postproc.report.cases import Cases
 from postproc.report.grid import axes_told
 from postproc.report.page import Page, least_size
 from rubhpc.commands.report import report
@@ -26,6 +28,7 @@ from rubhpc.rig import Rig, read_rig
 
 if TYPE_CHECKING:
     from pathlib import Path
+
 
 MB = 1e6
 
@@ -168,6 +171,20 @@ def test_the_size_is_kept_and_what_is_left_out_is_said(
     assert (n_kept < 57) == is_cut
     assert (f"sections of {57 - n_kept} cases" in text) == is_cut
     assert all(note in html.unescape(text) for note in load.notes)
+
+
+def test_foreseeing_the_size_reads_no_case_but_the_pilots(
+    store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What lies around the pilots of 100 000 cases took longer to read than all that is on the page."""
+    asked: list[int] = []
+    records = Cases.records
+    monkeypatch.setattr(
+        Cases, "records", lambda self, flats, level: records(self, asked.append(1) or flats, level)
+    )
+    monkeypatch.setattr(budget, "_PILOTS", 3)
+    write_report(open_store(store), tmp_path / "page.html", 20e6)
+    assert len(asked) == 1  # for those that are on the page
 
 
 def test_a_limit_that_nothing_fits_is_refused(store: Path, tmp_path: Path) -> None:

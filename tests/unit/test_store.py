@@ -372,3 +372,13 @@ def test_a_diverged_case_keeps_its_metrics(store):
         lines.write([Entry(0, "a", DIVERGED, 0, row.tobytes(), "grew")])
     packed = store.packed_values(store.replay())
     assert packed["steps"].ravel()[:2].tolist() == [1234, -1]
+
+
+def test_a_file_on_the_way_to_a_store_is_told_with_the_mend(tmp_path):
+    (tmp_path / "taken").write_text("mine")
+    store = tmp_path / "taken" / "study.zarr"
+    with pytest.raises(StoreError, match="--output"), disk_errors(store):
+        store.mkdir(parents=True)
+    with pytest.raises(StoreError, match="a file stands in its way"), disk_errors(store):
+        store.parent.mkdir(parents=True)
+    assert (tmp_path / "taken").read_text() == "mine"
