@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
-FIRST_REVOLUTIONS = 8  # of the first kernel call
+ALL_SAMPLES = 2**62  # in one kernel call, which pauses by itself
 MOST_BOOKS = 8  # of phases that one case may meet; where it meets more, short steps cost less
 
 
@@ -50,7 +50,7 @@ class ModalMarch(March):
         check: Callable[[], None] | None,
     ) -> None:
         """Start from `initial`, with the contacts closed that its forces press."""
-        super().__init__(check, FIRST_REVOLUTIONS * setup.samples_per_revolution)
+        super().__init__(check, ALL_SAMPLES)
         self._setup, self._book = setup, setup.book(friction)
         offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
         self._clearance = clearance + offsets - sag_at_stators(setup.model)[0]
@@ -65,7 +65,7 @@ class ModalMarch(March):
             contact_level=math.floor(math.log2(min(setup.interval, turn / CONTACT_STEPS) / setup.tick)),
             n_sample=0,
         )
-        self.bodies = self._book.kernel_reduced(self._clearance, setup.law)
+        self.bodies = self._book.kernel_reduced(self._clearance, setup.law, setup.displacement_limit)
         self._motion = self._reduce(initial)
         self._recorder = recorder(self._clearance.size)
         self._progress = np.zeros(kernel.N_PROGRESS, dtype=np.int64)
@@ -136,7 +136,7 @@ class ModalMarch(March):
         """Count time from the sample reached; returns its tick."""
         first = self.sample << self.clock.sample_level
         self._progress[kernel.ENTERED] += first - self._progress[kernel.TIME]
-        self._progress[kernel.NEXT_SAMPLE] = self.sample
+        self._progress[kernel.NEXT_SAMPLE], self._progress[kernel.N_EVENT] = self.sample, 0
         if not is_recorded:
             self._progress[kernel.SPAN] = -1
         self.clock = self.clock._replace(n_sample=samples.rotor.shape[1])

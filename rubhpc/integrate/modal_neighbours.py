@@ -16,6 +16,7 @@ from rubhpc.kernels.phases import (
     FINISHED,
     N_PROGRESS,
     PHASE,
+    PHASE_WANTED,
     SLIP_TURNED,
     SPAN,
     WANTED,
@@ -84,7 +85,7 @@ class ModalNeighbours:
             if march.is_beyond(pair.motion[0]):
                 pair.n_done[0] = 0
                 return
-            if outcome != FINISHED:
+            if outcome == PHASE_WANTED:
                 self._tabulate()
 
     def _tabulate(self) -> None:

@@ -105,8 +105,10 @@ class PhaseBook:
             )
         )
 
-    def kernel_reduced(self, clearance: Floats, law: Law = MULTIPLIER) -> kernel.Reduced:
-        """The reduced bodies as the kernel takes them, with a case's clearances (q,), m, and law."""
+    def kernel_reduced(
+        self, clearance: Floats, law: Law = MULTIPLIER, displacement_limit: float = np.inf
+    ) -> kernel.Reduced:
+        """The reduced bodies as the kernel takes them, with a case's clearances (q,), m, law and limit, m."""
         return kernel.Reduced(
             stiffness=self.reduced.stiffness,
             damping=self.reduced.damping,
@@ -121,6 +123,8 @@ class PhaseBook:
             restitution=law.restitution,
             clearance=clearance,
             is_set_valued=law.is_set_valued,
+            translations=self.reduced.translations,
+            displacement_limit=displacement_limit,
         )
 
     def tables(self) -> kernel.Phases:

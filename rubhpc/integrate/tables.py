@@ -25,7 +25,7 @@ STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero
 
 
 class Tables:
-    """Tables of phases of one width, one after the other; what stands is not computed or copied again.
+    """Tables of phases of one width, one after the other.
 
     Attributes
     ----------
@@ -46,8 +46,10 @@ class Tables:
         if not self._room:
             n_bytes = sum(field.nbytes for field in rows)
             self.n_most = max(self._n_least, min(MOST_PHASES, MOST_BYTES // n_bytes))
-            # Memory that is never written to is never given out.
-            self._room = [np.empty((self.n_most, *field.shape[1:]), field.dtype) for field in rows]
+            self._room = [np.empty((self._n_least, *field.shape[1:]), field.dtype) for field in rows]
+        elif self._n_phase == len(self._room[0]):  # twice the room: most books never need it
+            n_room = min(2 * self._n_phase, self.n_most)
+            self._room = [np.resize(field, (n_room, *field.shape[1:])) for field in self._room]
         for field, new in zip(self._room, rows, strict=True):
             field[self._n_phase] = new[0]
         self._n_phase += 1

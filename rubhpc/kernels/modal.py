@@ -28,6 +28,7 @@ from rubhpc.kernels.phases import (
     FINISHED,
     FORCED_LEVEL,
     MOST_STEPS,
+    N_EVENT,
     N_STEP,
     NEXT_SAMPLE,
     PAUSED,
@@ -46,6 +47,7 @@ from rubhpc.kernels.phases import (
     find_phase,
     floor_log2,
     has_turned,
+    is_beyond,
     propagate,
     proved_slip,
     proved_time,
@@ -66,7 +68,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-MOST_EVENTS = 200_000  # in one call; more is chatter without end
+MOST_EVENTS = 200_000  # between two counts from 0; more is chatter without end
 GAP_TOLERANCE = 1e-13  # m
 
 
@@ -107,7 +109,7 @@ def advance(
     Returns
     -------
     int
-        FINISHED, DIVERGED (not finite), CONTACT_UNSOLVED, PHASE_WANTED, PAUSED after many steps, or
+        FINISHED, DIVERGED (at an event), CONTACT_UNSOLVED, PHASE_WANTED, PAUSED after many steps, or
         SLIP_TURNED: set-valued friction has no closed form from there on.
     """
     q, n = reduced.push.shape
@@ -128,7 +130,7 @@ def advance(
     ceiling = -1  # while halving: the longest level worth a try
     is_halving = False
     is_forced = False
-    n_event, last_step = 0, progress[N_STEP] + MOST_STEPS
+    last_step = progress[N_STEP] + MOST_STEPS
     wanted = progress[WANTED]
     if is_recorded and wanted < 0:
         if progress[SPAN] < 0:
@@ -242,16 +244,16 @@ def advance(
                 is_halving = ceiling >= 0
             continue
         # An event within the next tick: take it here.
-        n_event += 1
+        progress[N_EVENT] += 1
         crossing = 0
         for i in range(q):
             if crossing_at[i]:
                 crossing |= 1 << i
         for k in range(2 * n):
             motion[k] = dot(phases.motion_re[p, k], phases.motion_im[p, k], z_re, z_im)
-            if not abs(motion[k]) < np.inf:
-                progress[TIME] = t
-                return DIVERGED
+        if is_beyond(reduced, motion):
+            progress[TIME] = t
+            return DIVERGED
         if is_recorded:
             end_span(phases, p, clock, t, z, progress, recorder, tally)
             impulse[:] = tally.impulse
@@ -282,7 +284,7 @@ def advance(
                 if ((mask[p] | crossing) >> i) & 1 and has_turned(reduced, i, clock.spin, motion[n:]):
                     progress[TIME] = t
                     return SLIP_TURNED
-        if wanted < 0 or n_event > MOST_EVENTS:
+        if wanted < 0 or progress[N_EVENT] > MOST_EVENTS:
             progress[TIME] = t
             return CONTACT_UNSOLVED
         if is_recorded:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_sum
 from rubhpc.kernels.modal import advance
-from rubhpc.kernels.phases import FINISHED, PHASE, TIME, WANTED, Clock, Phases, Reduced, dot
+from rubhpc.kernels.phases import FINISHED, N_EVENT, PHASE, TIME, WANTED, Clock, Phases, Reduced, dot
 
 if TYPE_CHECKING:
     from rubhpc.kernels.observe import Samples, Tally
@@ -88,7 +88,7 @@ def part(
             bring_back(phases, ratio, pair)
         else:
             displace(phases, clock.spin, pair)
-        progress[:, TIME] = 0
+        progress[:, TIME], progress[:, N_EVENT] = 0, 0
     return FINISHED
 
 

@@ -25,9 +25,9 @@ MOST_STEPS = 50_000  # of one call: signals are answered between calls
 # What a call leaves in `progress` for the next one: tick reached, phase, set of pairs wanted next (-1: none),
 # steps taken, next sample to take, tick at which the phase began, that from which energies are still to be
 # added (-1: none), how long the contact had lasted, as a level, when its pace was last seen (-1: never),
-# and level of the longest step that resolved it then.
-N_PROGRESS = 9
-TIME, PHASE, WANTED, N_STEP, NEXT_SAMPLE, ENTERED, SPAN, AGE, FINE = range(N_PROGRESS)
+# level of the longest step that resolved it then, and events since the caller last set that to 0.
+N_PROGRESS = 10
+TIME, PHASE, WANTED, N_STEP, NEXT_SAMPLE, ENTERED, SPAN, AGE, FINE, N_EVENT = range(N_PROGRESS)
 
 SAMPLES_AT_ONCE = 8  # read from one set of modal coordinates
 FORCED_LEVEL = 6  # steps of up to 2^level ticks follow an event unquestioned, so that time goes on
@@ -87,6 +87,8 @@ class Reduced(NamedTuple):
     restitution: float  # normal velocity after an impact over that before it
     clearance: Floats  # (q,), m
     is_set_valued: bool  # friction, so that it is known only while the rim outruns the stator
+    translations: Floats  # (r, n), displacements that none may pass the limit with
+    displacement_limit: float  # m
 
 
 class Clock(NamedTuple):
@@ -232,6 +234,18 @@ def resolved_time(re: Floats, im: Floats, pace: Floats, z_re: Floats, z_im: Floa
             square = pace[k] * pace[k]
             bend += share * square * square
     return float((RESOLVED * size / bend) ** 0.25) if bend > 0.0 else np.inf
+
+
+@jit_inline_sum
+def is_beyond(reduced: Reduced, displacement: Floats) -> bool:
+    """Whether reduced displacements, the first n of a motion, pass the limit, or are no numbers."""
+    for row in range(reduced.translations.shape[0]):
+        seen = 0.0
+        for k in range(reduced.translations.shape[1]):
+            seen += reduced.translations[row, k] * displacement[k]
+        if not abs(seen) <= reduced.displacement_limit:
+            return True
+    return False
 
 
 @jit_inline_sum
