@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import count
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from rubhpc.integrate.regimes import N_ALL
 from rubhpc.integrate.settle import pass_revolutions
 from rubhpc.kernels.neighbours import DISPLACED, LOST
 
@@ -29,7 +29,15 @@ N_ALIGNING = 4  # spans in which the displacement turns into the direction that 
 
 
 class Neighbours(Protocol):
-    """A motion and a second one close to it."""
+    """A motion and a second one close to it.
+
+    Attributes
+    ----------
+    most_spans : int
+        For how many spans they are worth following, alignment included.
+    """
+
+    most_spans: int
 
     def part(self, n_revolution: int) -> float | None:
         """Go on with both; return their distance over what it was, or None where one cannot go on.
@@ -43,7 +51,7 @@ def growth(begin: Callable[[], Neighbours]) -> Iterator[float]:
 
     After each span the displacement is brought back to its first size (Benettin, Galgani, Giorgilli and
     Strelcyn 1980). The mean of what is yielded tends to the largest Lyapunov exponent per revolution; it ends
-    where a motion cannot go on.
+    where a motion cannot go on, or is not worth following.
 
     Parameters
     ----------
@@ -51,7 +59,7 @@ def growth(begin: Callable[[], Neighbours]) -> Iterator[float]:
         Makes the two motions, once the first span is wanted.
     """
     neighbours = begin()
-    for i in count():
+    for i in range(neighbours.most_spans):
         ratio = neighbours.part(SPAN)
         if ratio is None:
             return
@@ -74,6 +82,7 @@ class Marches:
         self, start: Callable[[State], March], state: State, setup: Setup, recording: Recording
     ) -> None:
         """Start at `state`, and beside it."""
+        self.most_spans = N_ALIGNING + N_ALL  # of short steps; more may take minutes
         self._start, self._recording = start, recording
         self._model, self._spin = setup.model, setup.spin
         self._state = state

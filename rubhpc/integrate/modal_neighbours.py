@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.gather import empty_samples, empty_tally
+from rubhpc.integrate.lyapunov import N_ALIGNING
 from rubhpc.integrate.modal import NoClosedForm
+from rubhpc.integrate.regimes import N_MOST
 from rubhpc.kernels.neighbours import Pair, part
 from rubhpc.kernels.phases import (
     CONTACT_UNSOLVED,
@@ -34,6 +36,7 @@ class ModalNeighbours:
 
     def __init__(self, march: ModalMarch) -> None:
         """Start where `march` is, which itself stays there."""
+        self.most_spans = N_ALIGNING + N_MOST
         self._march = march
         n_coordinate, n_motion = march.phases.switch_re.shape[2], march.phases.motion_re.shape[1]
         q = march.touching().size

@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 
 LEAST_REVOLUTIONS = LONGEST_PERIOD  # of a record without a period that is worth following further
 TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may tell a torus, or a longer period, by itself
-N_FIRST, N_ALL = 16, 64  # spans whose growth is measured, and where those leave it open
+N_FIRST, N_ALL, N_MOST = 16, 64, 256  # spans whose growth is measured, each where the last left it open
 CLEAR = 0.05  # per revolution: an exponent beyond that over 16 spans keeps its sign
-ZERO = 0.01  # per revolution: an exponent within that over 64 spans is none
+ZERO = 0.01  # per revolution: an exponent within that is none
+SURE = 2.0  # standard errors: an exponent within that is none, too
 # A torus: the nearest return is that near, of the distance between cycles; that of twice as many revolutions
 # is twice as far, by 8 %; and neither half of the record has the farther ones.
 NEAR, TWICE, EVEN = 0.21, (1.85, 2.16), 1.5
@@ -69,12 +70,19 @@ def regime(
         if distances is not None and is_torus(distances):
             return REGIME.index("quasi_periodic"), float(np.mean(grown))
         grown += islice(spans, N_ALL - N_FIRST)
-    if len(grown) not in (N_FIRST, N_ALL):
+        if len(grown) == N_ALL and ZERO < abs(np.mean(grown)) < SURE * standard_error(grown):
+            grown += islice(spans, N_MOST - N_ALL)
+    if len(grown) < N_FIRST or N_FIRST < len(grown) < N_ALL:
         return REGIME.index("undecided"), math.nan  # the motion next to it cannot go on
     exponent = float(np.mean(grown))
-    if abs(exponent) <= ZERO:
+    if len(grown) > N_FIRST and abs(exponent) <= max(ZERO, SURE * standard_error(grown)):
         return REGIME.index("quasi_periodic"), exponent
     return REGIME.index("chaotic" if exponent > 0.0 else "periodic"), exponent
+
+
+def standard_error(grown: list[float]) -> float:
+    """Standard error of the mean of growths that follow one another by chance."""
+    return float(np.std(grown)) / math.sqrt(len(grown))
 
 
 def cycle_distances(vertical: Floats, horizontal: Floats, samples_per_revolution: int) -> Floats:

@@ -127,6 +127,15 @@ def test_short_record_stays_undecided():
     assert math.isnan(exponent)
 
 
+def test_growth_that_chance_may_have_made_is_none():
+    """Of +-0.4 about 0.02 the mean over 64 spans errs by 0.05, over 256 by 0.025."""
+    growth = iter([0.42, -0.38] * 200)
+    assert of(swollen(logistic(3.8)), growth) == ("quasi_periodic", pytest.approx(0.02))
+    assert len(list(growth)) == 400 - 256
+    growth = iter([0.48, -0.32] * 200)
+    assert of(swollen(logistic(3.8)), growth)[0] == "chaotic"
+
+
 @pytest.mark.parametrize("revolutions", [16, 31])
 @pytest.mark.parametrize(
     ("rate", "expected", "n_read"),

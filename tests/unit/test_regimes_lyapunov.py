@@ -10,7 +10,7 @@ from scipy.optimize import brentq, fsolve
 
 from rubhpc import LumpedStator, Rig, State, Unbalance, simulate
 from rubhpc.integrate.central import CentralDifferenceMarch
-from rubhpc.integrate.lyapunov import Marches, growth
+from rubhpc.integrate.lyapunov import N_ALIGNING, Marches, growth
 from rubhpc.integrate.modal import ModalMarch
 from rubhpc.integrate.modal_neighbours import ModalNeighbours
 from rubhpc.integrate.prepare import prepare
@@ -60,8 +60,11 @@ def growth_of(rig, given, state, n_span, march=ModalMarch):
 
     def begin():
         if march is ModalMarch:
-            return ModalNeighbours(start(initial=state))
-        return Marches(lambda initial: start(initial=initial), state, setup, recording)
+            neighbours = ModalNeighbours(start(initial=state))
+        else:
+            neighbours = Marches(lambda initial: start(initial=initial), state, setup, recording)
+        neighbours.most_spans = n_span + N_ALIGNING
+        return neighbours
 
     return np.array(list(islice(growth(begin), n_span)))
 
