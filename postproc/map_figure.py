@@ -40,11 +40,6 @@ CATEGORIES = ("status", "regime", "period")
 STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
 
 
-def value_map(data: xr.Dataset, value: str, ax: Axes, log: bool = False, n_contour: int = 0) -> Axes:
-    """Draw a map from `map_data` over two axes; see `value_maps`."""
-    return value_maps(data, value, [ax], log, n_contour)[0]
-
-
 def value_maps(
     data: xr.Dataset, value: str, axes: Sequence[Axes], log: bool = False, n_contour: int = 0
 ) -> Sequence[Axes]:

@@ -7,7 +7,7 @@ from matplotlib.colors import to_rgba
 
 from postproc.cells import cell_edges, hatch_cells
 from postproc.lines import strongest_lines
-from postproc.map_figure import value_map
+from postproc.map_figure import value_maps
 from postproc.maps import default_axes, map_data
 from postproc.orbits import orbit, orbit_data
 from postproc.overlay import overlaid
@@ -91,7 +91,7 @@ def test_no_map_of_what_is_no_scalar(plain_map):
 
 
 def test_a_map_is_drawn_with_units_and_hatching(plain_map, ax):
-    assert value_map(plain_map("peak_contact_force"), "peak_contact_force", ax) is ax
+    assert value_maps(plain_map("peak_contact_force"), "peak_contact_force", [ax]) == [ax]
     assert ax.get_xlabel() == "Speed ratio $r$"
     assert ax.get_ylabel() == "Clearance (µm)"
     assert ax.figure.axes[1].get_ylabel() == "Peak contact force (N)"
@@ -101,7 +101,7 @@ def test_a_map_is_drawn_with_units_and_hatching(plain_map, ax):
 
 
 def test_regimes_have_colours_of_their_own(plain_map, ax):
-    value_map(plain_map("regime"), "regime", ax)
+    value_maps(plain_map("regime"), "regime", [ax])
     assert bar_names(ax) == ["no contact", "periodic", "quasi-periodic", "chaotic"]
     mesh = ax.collections[0]
     colors = mesh.to_rgba(mesh.get_array()).reshape(3, 5, 4)  # (clearance, speed)
@@ -111,12 +111,12 @@ def test_regimes_have_colours_of_their_own(plain_map, ax):
 
 
 def test_periods_are_named(plain_map, ax):
-    value_map(plain_map("period"), "period", ax)
+    value_maps(plain_map("period"), "period", [ax])
     assert bar_names(ax) == ["none", "P1", "P2"]
 
 
 def test_the_status_is_a_map_too(plain_map, ax):
-    value_map(plain_map("status"), "status", ax)
+    value_maps(plain_map("status"), "status", [ax])
     assert bar_names(ax) == ["missing", "done", "failed", "diverged"]
     assert not ax.figure.legends
 
@@ -124,24 +124,24 @@ def test_the_status_is_a_map_too(plain_map, ax):
 def test_a_map_of_settings_needs_no_result(store, ax):
     chosen = select(store, {"friction": 0.1, "stator_youngs_modulus": 3e9})
     data = map_data(chosen, "spin_speed", ["speed_ratio", "clearance"])
-    value_map(data, "spin_speed", ax)
+    value_maps(data, "spin_speed", [ax])
     assert np.ma.count_masked(ax.collections[0].get_array()) == 0
 
 
 def test_a_finished_case_may_have_no_value(plain_map, ax):
     data = plain_map("contact_duration")
     data["contact_duration"][1, 2] = np.nan  # it never touched
-    value_map(data, "contact_duration", ax)
+    value_maps(data, "contact_duration", [ax])
     labels = [text.get_text() for text in ax.figure.legends[0].get_texts()]
     assert "no value" in labels
 
 
 def test_a_logarithmic_map_needs_positive_values(plain_map, ax):
-    value_map(plain_map("peak_contact_force"), "peak_contact_force", ax, log=True)
+    value_maps(plain_map("peak_contact_force"), "peak_contact_force", [ax], log=True)
     data = plain_map("peak_contact_force")
     data["peak_contact_force"] = 0 * data["peak_contact_force"]
     with pytest.raises(InputError, match="nowhere positive"):
-        value_map(data, "peak_contact_force", ax, log=True)
+        value_maps(data, "peak_contact_force", [ax], log=True)
 
 
 def test_cells_meet_half_way_also_on_a_log_scale():
