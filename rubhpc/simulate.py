@@ -9,10 +9,10 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.input.reading import parse_quantity
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.prepare import prepare
 from rubhpc.integrate.record import State
-from rubhpc.rig import Rig, read_rig, with_keys
-from rubhpc.study import Contact, Integrator, Recording
+from rubhpc.integrate.setup import prepare
+from rubhpc.rig.rig import Rig, read_rig, with_keys
+from rubhpc.study.study import Contact, Integrator, Recording
 
 if TYPE_CHECKING:
     from os import PathLike

@@ -20,11 +20,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from postproc.export import check_data_path, write_data
-from postproc.reduce import computed, envelope, mean_spectrum, open_in_pieces
-from postproc.selection import select
-from postproc.spectrum_figure import spectrum
-from postproc.style import check_figure_path, house_style, new_figure, save
+from postproc.cases.reduction import computed, envelope, mean_spectrum, open_in_pieces
+from postproc.figures.spectrum_figure import spectrum
+from postproc.figures.style import check_figure_path, house_style, new_figure, save
+from postproc.store.export import check_data_path, write_data
+from postproc.store.select import select
 from rubhpc.commands.drawing import pairs
 from rubhpc.errors import InputError, RubError
 

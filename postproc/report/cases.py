@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.bench import stator_places
-from postproc.load import LONG_ROLES, axes_of
 from postproc.report.detail import pack_case
+from postproc.store.open import LONG_ROLES, axes_of
+from postproc.store.rig import stator_places
 from rubhpc.schema import DONE, VARIABLES
 
 if TYPE_CHECKING:

@@ -10,7 +10,12 @@ import numpy as np
 import xarray as xr
 
 from postproc.report.packing import STEPS, WAVE_STEPS, bends, pack_record, quantised, quantised_spectrum
-from postproc.spectra import amplitude_spectrum, last_revolutions, samples_per_revolution, whole_periods
+from postproc.signals.spectra import (
+    amplitude_spectrum,
+    last_revolutions,
+    samples_per_revolution,
+    whole_periods,
+)
 from rubhpc.schema import SECTION_NAMES, SIGNAL_NAMES
 
 if TYPE_CHECKING:

@@ -6,11 +6,11 @@ import math
 from typing import TYPE_CHECKING
 
 from postproc.report.drawing import FOOT, LEAST, Frame, line, scale_bar, svg, wall
-from rubhpc.rig import LumpedStator, Rotor, Stator
+from rubhpc.rig.rig import LumpedStator, Rotor, Stator
 
 if TYPE_CHECKING:
-    from rubhpc.input.stators import AnyStator
-    from rubhpc.rig import Rig
+    from rubhpc.rig.rig import Rig
+    from rubhpc.rig.stators import AnyStator
 
     Point = tuple[float, float]
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from postproc.load import axes_of, drawn_axes
-from postproc.maps import VALIDITY, monitors
+from postproc.cases.maps import VALIDITY, monitors
+from postproc.cases.saltelli import ranges_told
 from postproc.report.grid import plain
-from postproc.saltelli import ranges_told
-from postproc.units import Scale, scale_for, short_name
+from postproc.store.open import axes_of, drawn_axes
+from postproc.store.units import Scale, scale_for, short_name
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 
 if TYPE_CHECKING:

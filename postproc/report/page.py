@@ -11,8 +11,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from postproc.bench import natural_frequencies, rig_axes, rig_of, stator_places
-from postproc.load import source
 from postproc.report.cases import Cases
 from postproc.report.end_view import end_view
 from postproc.report.facts import (
@@ -28,6 +26,8 @@ from postproc.report.facts import (
 from postproc.report.grid import Measures, axes_told, validity_text
 from postproc.report.packing import as_text
 from postproc.report.side_view import description, side_view
+from postproc.store.open import source
+from postproc.store.rig import natural_frequencies, rig_axes, rig_of, stator_places
 from rubhpc.errors import RubError
 from rubhpc.version import __version__
 

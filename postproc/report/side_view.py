@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from postproc.report.drawing import FOOT, LEAST, Frame, line, rect, scale_bar, svg, wall
 from postproc.report.end_view import depth, tip_and_root
-from rubhpc.rig import Rotor, Stator
+from rubhpc.rig.rig import Rotor, Stator
 
 if TYPE_CHECKING:
-    from rubhpc.input.parts import Disc
-    from rubhpc.input.stators import AnyStator
-    from rubhpc.rig import Rig
+    from rubhpc.rig.parts import Disc
+    from rubhpc.rig.rig import Rig
+    from rubhpc.rig.stators import AnyStator
 
 _WIDTH, _HEIGHT = 620.0, 250.0  # px
 _MARGIN = 34.0

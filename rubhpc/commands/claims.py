@@ -29,9 +29,9 @@ def claims(number: int | None, stores: str, is_json: bool, document: str | None,
 
     `make paper` runs the studies. What the paper leaves open or contradicts itself on is reported only.
     """
-    from postproc.claims.index import CLAIMS, FAILS, evaluate, on_figure, open_studies
-    from postproc.claims.table import as_json, document_of, text
-    from postproc.paper.index import FIGURES, draw_figures
+    from postproc.mokhtar2017.claims.index import CLAIMS, FAILS, evaluate, on_figure, open_studies
+    from postproc.mokhtar2017.claims.table import as_json, document_of, text
+    from postproc.mokhtar2017.figures.index import FIGURES, draw_figures
 
     if document and number is not None:
         raise InputError("--document: is of all claims; leave out --figure")

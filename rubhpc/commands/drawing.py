@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from postproc.figures import Drawing
+    from postproc.figures.catalogue import Drawing
 
 REVOLUTIONS = click.IntRange(min=1)
 
@@ -39,8 +39,8 @@ def of_store(function: Callable[..., None]) -> Callable[..., None]:
 
 def open_cases(store: str, selection: tuple[str, ...]) -> xr.Dataset:
     """Return the cases of a store that the command line selects."""
-    from postproc.load import open_store
-    from postproc.selection import select
+    from postproc.store.open import open_store
+    from postproc.store.select import select
 
     return select(open_store(store), dict(pairs(selection, "--select")))
 
@@ -56,15 +56,15 @@ def draw(
     Parameters
     ----------
     drawing_of : callable
-        One of `postproc.figures`; takes the cases selected and the command's own words.
+        One of `postproc.figures.catalogue`; takes the cases selected and the command's own words.
     words : dict
         All that the command line says, with what `of_store` adds.
     tell : callable
         The lines that are printed before the figure is drawn.
     """
-    from postproc.export import check_data_path, write_data
-    from postproc.style import check_figure_path, house_style, new_figure, save
-    from postproc.units import caption
+    from postproc.figures.style import check_figure_path, house_style, new_figure, save
+    from postproc.store.export import check_data_path, write_data
+    from postproc.store.units import caption
 
     own = dict(words)
     store, selection, figure, data = (own.pop(word) for word in ("store", "selection", "figure", "data"))

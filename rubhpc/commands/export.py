@@ -26,7 +26,7 @@ def export(store: str, selection: tuple[str, ...], names: tuple[str, ...], outpu
 
     Names, dimensions, units and coordinates are those of the store; study and rig are attributes.
     """
-    from postproc.export import HDF5, check_data_path, write_hdf5
+    from postproc.store.export import HDF5, check_data_path, write_hdf5
     from rubhpc.input.fields import nearest
 
     cases = open_cases(store, selection)

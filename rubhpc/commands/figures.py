@@ -32,7 +32,7 @@ _OVER = click.option("--over", metavar="AXIS", help="Draw the cases along AXIS o
 @click.option("--mark", multiple=True, metavar="NAME=HZ", help="Mark one more frequency.")
 def cascade(**words: Any) -> None:
     """Spectra of a signal along the speed, with order lines and the rotor's natural frequencies."""
-    from postproc import figures
+    from postproc.figures import catalogue as figures
 
     draw("cascade", figures.cascade, words | {"mark": dict(pairs(words["mark"], "--mark"))})
 
@@ -49,7 +49,7 @@ def cascade(**words: Any) -> None:
 @click.option("--log", is_flag=True, help="Colours on a logarithmic scale.")
 def map(**words: Any) -> None:  # noqa: A001 - the name of the command
     """A scalar, the regime or the status over two axes; what is missing or out of range is hatched."""
-    from postproc import figures
+    from postproc.figures import catalogue as figures
 
     draw("map", figures.map_of, words)
 
@@ -60,7 +60,7 @@ def map(**words: Any) -> None:  # noqa: A001 - the name of the command
 @_OVER
 def orbit(**words: Any) -> None:
     """Orbit of the disc with the clearance, the stators, and a point a revolution."""
-    from postproc import figures
+    from postproc.figures import catalogue as figures
 
     draw("orbit", figures.orbit, words)
 
@@ -76,7 +76,7 @@ def orbit(**words: Any) -> None:
 @_OVER
 def spectrum(**words: Any) -> None:
     """Spectrum of a signal, or of the whirl, its strongest lines named as fractions of the spin speed."""
-    from postproc import figures
+    from postproc.figures import catalogue as figures
 
     draw("spectrum", figures.spectrum, words)
 
@@ -88,7 +88,7 @@ def spectrum(**words: Any) -> None:
 @_OVER
 def waveform(**words: Any) -> None:
     """Waveforms of some signals in panels above one another; contact is shaded."""
-    from postproc import figures
+    from postproc.figures import catalogue as figures
 
     draw("waveform", figures.waveform, words)
 
@@ -100,7 +100,7 @@ def waveform(**words: Any) -> None:
 @click.option("--over", metavar="AXIS", help="Draw signal Y of the cases along AXIS: a bifurcation diagram.")
 def section(**words: Any) -> None:
     """Poincaré section: a point a revolution, in the plane of two signals or along an axis."""
-    from postproc import figures
+    from postproc.figures import catalogue as figures
 
     draw("section", figures.section, words)
 
@@ -116,7 +116,7 @@ def section(**words: Any) -> None:
 )
 def bifurcation_diagram(**words: Any) -> None:
     """Section points of a signal, one a revolution, over an axis, coloured by regime, period or direction."""
-    from postproc import figures
+    from postproc.figures import catalogue as figures
 
     draw("bifurcation", figures.bifurcation, words)
 

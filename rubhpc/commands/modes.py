@@ -41,11 +41,11 @@ def modes(
     RIG is the name of a packaged rig, the path of a rig file, or FILE.py:FUNCTION. Without --speed the rotor
     stands still.
     """
-    from postproc.style import check_figure_path
+    from postproc.figures.style import check_figure_path
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.modes import modes as find_modes
     from rubhpc.input.quantity import parse_quantity
-    from rubhpc.rig import read_rig
+    from rubhpc.rig.rig import read_rig
 
     spins = [parse_quantity(_number(speed), "rad/s", "--speed") for speed in speeds] or [0.0]
     path = check_figure_path(figure) if figure else None
@@ -110,8 +110,8 @@ def _draw(model: Model, top_speed: float, count: int | None, path: Path) -> None
 
     import numpy as np
 
-    from postproc.campbell import campbell_diagram
-    from postproc.style import house_style, new_figure, save
+    from postproc.figures.campbell import campbell_diagram
+    from postproc.figures.style import house_style, new_figure, save
     from rubhpc.fem.campbell import campbell, critical_speeds
     from rubhpc.fem.response import first_lateral_frequency
 

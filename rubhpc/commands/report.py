@@ -22,9 +22,9 @@ def report(store: Path, output: Path | None, limit: str) -> None:
     case shows its orbit, spectrum, waveform and Poincaré section. Works while a run is on.
     """
     from postproc.report.budget import write_report
+    from postproc.store.live import latest
     from rubhpc.errors import InputError
     from rubhpc.input.quantity import parse_quantity
-    from rubhpc.storage.latest import latest
 
     size = parse_quantity(_number(limit), "byte", "--limit")
     path = output or Path(f"{store.resolve().stem}.html")
@@ -51,7 +51,7 @@ def view(store: Path, port: int) -> None:
     import contextlib
 
     from postproc.report.server import Library, Server
-    from rubhpc.storage.latest import latest
+    from postproc.store.live import latest
 
     with Server(Library(lambda: latest(store)), port) as server, contextlib.suppress(KeyboardInterrupt):
         click.echo(f"{store} is at {server.url} until Ctrl-C")

@@ -85,8 +85,8 @@ def run(
 
 
 def _reproduce(study: Path, output: Path | None, name: str, *, trust_rig: bool) -> int:
-    from rubhpc.running.only import reproduce
-    from rubhpc.study import read_study
+    from rubhpc.running.recompute import reproduce
+    from rubhpc.study.study import read_study
 
     if launch().rank == 0:
         click.echo(reproduce(read_study(study, output, trust_rig=trust_rig), name).text())
@@ -103,7 +103,7 @@ def plan(study: Path, output: Path | None, trust_rig: bool) -> int:
     Core-hours come from a few short pilot cases, timed on this machine and scaled by the predicted steps.
     """
     from rubhpc.running.plan import make_plan
-    from rubhpc.study import read_study
+    from rubhpc.study.study import read_study
 
     click.echo(make_plan(read_study(study, output, trust_rig=trust_rig)).text())
     return 0

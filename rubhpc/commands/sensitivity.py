@@ -37,7 +37,7 @@ def sensitivity(**words: Any) -> None:
     other levels of the same range could have given. Those of a sampled study are estimates, with SALib.
     Cases without a value are counted, and told.
     """
-    from postproc import figures
+    from postproc.figures import catalogue as figures
 
     draw("sensitivity", figures.sensitivity, words, lambda drawing: _table(drawing.shown))
 

@@ -39,7 +39,7 @@ def hht(**words: Any) -> None:
 
     Prints the amplitude-weighted median frequency between contacts, of all spans and of each.
     """
-    from postproc import figures
+    from postproc.figures import catalogue as figures
 
     draw("hht", figures.hht, words, lambda drawing: _frequencies(drawing.shown, words["mode"]))
 
@@ -59,8 +59,8 @@ def indicators(scores: str | None, **words: Any) -> None:
     Noise of level 1 is as strong as the median vibration of the cases that touch. Thresholds for one half of
     the cases come from those of the other half that do not touch.
     """
-    from postproc import figures
-    from postproc.export import check_data_path, write_data
+    from postproc.figures import catalogue as figures
+    from postproc.store.export import check_data_path, write_data
 
     scores_path = check_data_path(scores) if scores else None
     judged = draw("indicators", figures.indicators, words, lambda drawing: _table(drawing.found)).found
@@ -69,7 +69,7 @@ def indicators(scores: str | None, **words: Any) -> None:
 
 
 def _frequencies(shown: xr.Dataset, mode: int) -> Iterator[str]:
-    from postproc.hilbert_huang import contact_bandwidth, median_frequency, span_frequencies
+    from postproc.signals.hilbert_huang import contact_bandwidth, median_frequency, span_frequencies
 
     middle = float(median_frequency(shown, mode))
     each = ", ".join(f"{f:.1f}" for f in span_frequencies(shown, mode).dropna("span").values)

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rubhpc.fem.foreign import lumped_stator, matrix_rotor, matrix_stator
+from rubhpc.fem.matrices import lumped_stator, matrix_rotor, matrix_stator
 from rubhpc.fem.model import Model
 from rubhpc.fem.rotor import assemble_rotor, unbalance_vectors
 from rubhpc.fem.statics import constant_load, sag_under
 from rubhpc.fem.stator import assemble_stator
-from rubhpc.input.foreign import MatrixRotor
-from rubhpc.input.stators import LumpedStator, MatrixStator
+from rubhpc.rig.matrices import MatrixRotor
+from rubhpc.rig.stators import LumpedStator, MatrixStator
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import StatorModel
-    from rubhpc.input.stators import AnyStator
-    from rubhpc.rig import Rig
+    from rubhpc.rig.rig import Rig
+    from rubhpc.rig.stators import AnyStator
 
 
 def assemble(rig: Rig) -> Model:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.rig import ShaftSection, Stator
+    from rubhpc.rig.rig import ShaftSection, Stator
 
     Matrix = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.rig import Rotor, Unbalance
+    from rubhpc.rig.rig import Rotor, Unbalance
 
 
 def assemble_rotor(rotor: Rotor) -> Body:

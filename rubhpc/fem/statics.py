@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fem.held import free_row
+from rubhpc.fem.constraints import free_row
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Body, Model
-    from rubhpc.input.foreign import MatrixRotor
-    from rubhpc.rig import Rotor
+    from rubhpc.rig.matrices import MatrixRotor
+    from rubhpc.rig.rig import Rotor
 
     Floats = NDArray[np.float64]
 

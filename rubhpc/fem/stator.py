@@ -11,7 +11,7 @@ from rubhpc.fem.damping import rayleigh_coefficients
 from rubhpc.fem.model import Body, StatorModel
 
 if TYPE_CHECKING:
-    from rubhpc.rig import Stator
+    from rubhpc.rig.rig import Stator
 
 
 def assemble_stator(stator: Stator, radius: float) -> StatorModel:

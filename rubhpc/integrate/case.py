@@ -7,9 +7,12 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rubhpc.integrate.carry import at_rest, carried, with_overlap
-from rubhpc.integrate.central import CentralDifferenceMarch
-from rubhpc.integrate.gather import (
+from rubhpc.integrate.central_difference_march import CentralDifferenceMarch
+from rubhpc.integrate.contact_stepping_march import SteppedMarch
+from rubhpc.integrate.event_driven_march import ModalMarch, NoClosedForm
+from rubhpc.integrate.initial_state import at_rest, carried, with_overlap
+from rubhpc.integrate.lyapunov import Marches, growth
+from rubhpc.integrate.measures import (
     add_sag,
     by_name,
     diverged_record,
@@ -17,15 +20,12 @@ from rubhpc.integrate.gather import (
     empty_tally,
     scalars_of,
 )
-from rubhpc.integrate.lyapunov import Marches, growth
-from rubhpc.integrate.measures import amplitude_spectrum
-from rubhpc.integrate.modal import ModalMarch, NoClosedForm
-from rubhpc.integrate.modal_neighbours import ModalNeighbours
-from rubhpc.integrate.prepare import CentralDifferenceSetup, ModalSetup
+from rubhpc.integrate.neighbour_motions import ModalNeighbours
+from rubhpc.integrate.orbit_measures import amplitude_spectrum
 from rubhpc.integrate.record import Record, State
-from rubhpc.integrate.settle import pass_transient
-from rubhpc.integrate.stepped import SteppedMarch
-from rubhpc.kernels.observe import IMPACT_STEPS
+from rubhpc.integrate.setup import CentralDifferenceSetup, ModalSetup
+from rubhpc.integrate.transient import pass_transient
+from rubhpc.kernels.accumulators import IMPACT_STEPS
 from rubhpc.schema import DONE, SECTION_NAMES
 
 if TYPE_CHECKING:
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.lyapunov import Neighbours
     from rubhpc.integrate.march import March
-    from rubhpc.integrate.prepare import Setup
-    from rubhpc.kernels.observe import Samples
-    from rubhpc.study import Recording
+    from rubhpc.integrate.setup import Setup
+    from rubhpc.kernels.accumulators import Samples
+    from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from rubhpc.integrate.regimes import N_ALL
-from rubhpc.integrate.settle import pass_revolutions
-from rubhpc.kernels.neighbours import DISPLACED, LOST
+from rubhpc.integrate.transient import pass_revolutions
+from rubhpc.kernels.separation import DISPLACED, LOST
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.march import March
-    from rubhpc.integrate.prepare import Setup
     from rubhpc.integrate.record import State
-    from rubhpc.study import Recording
+    from rubhpc.integrate.setup import Setup
+    from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
 

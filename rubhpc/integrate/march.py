@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.record import State
-    from rubhpc.kernels.observe import Samples, Tally
+    from rubhpc.kernels.accumulators import Samples, Tally
 
 LONGEST_CALL = 0.15  # s; signals are answered between kernel calls
 STEPS_A_SECOND = 5e5  # half of what every integrator does

@@ -1,86 +1,185 @@
-"""Measures of recorded signals: spectra, period and sense of the whirl."""
+"""From the kernels' sums and samples to named signals and scalars of the schema."""
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.fft
+
+from rubhpc.integrate.orbit_measures import period, whirl_ratio
+from rubhpc.integrate.packing import output_degrees
+from rubhpc.integrate.record import Record, State
+from rubhpc.integrate.regimes import regime
+from rubhpc.kernels.accumulators import (
+    DAMPING_LOSS,
+    DRIVE_WORK,
+    FRICTION_LOSS,
+    HORIZONTAL,
+    IMPACT_LOSS,
+    TWIST,
+    TWIST_ACCELERATION,
+    UNBALANCE_WORK,
+    VERTICAL,
+    Samples,
+    Tally,
+)
+from rubhpc.schema import DIVERGED, VARIABLES
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model, StatorModel
+    from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
 
-LONGEST_PERIOD = 16  # revolutions
-PERIOD_TOLERANCE = 1e-2  # rms distance of whole cycles over the orbit's size
+
+LEAST_EXCHANGE = 1e-6  # of the mechanical energy: a motion that exchanges less is balanced against that
 
 
-def amplitude_spectrum(signal: Floats) -> Floats:
-    """Single-sided amplitude (zero to peak) of signals that span whole revolutions.
+def empty_samples(n_stator: int, n_sample: int) -> Samples:
+    """Room for the samples of a record: one array, so that their spectra are taken together."""
+    whole = np.zeros((4 + 3 * n_stator, n_sample))
+    axial, lateral, force = whole[4:].reshape(3, n_stator, n_sample)
+    return Samples(rotor=whole[:4], axial=axial, lateral=lateral, force=force, whole=whole)
+
+
+def empty_tally(n_stator: int) -> Tally:
+    """Sums at zero, extrema at their neutral ends."""
+    return Tally(
+        highest=np.full(3, -np.inf),
+        lowest=np.full(3, np.inf),
+        is_touching=np.zeros(n_stator, dtype=np.bool_),
+        age=np.zeros(n_stator, dtype=np.int64),
+        n_contact=np.zeros(n_stator, dtype=np.int64),
+        contact_time=np.zeros(n_stator),
+        impulse=np.zeros(n_stator),
+        friction_work=np.zeros(n_stator),
+        least_slip=np.full(n_stator, np.inf),
+        peak_force=np.zeros(n_stator),
+        peak_lateral=np.zeros(n_stator),
+        energy=np.zeros(5),
+        pivots=np.zeros(1, dtype=np.int64),
+        residual=np.zeros((3, 2)),
+    )
+
+
+def add_sag(samples: Samples, tally: Tally, model: Model) -> None:
+    """Count the motion of the output node from the shaft without loads, not from where it sags to."""
+    if not model.sag.any():
+        return
+    for k, row in enumerate(output_degrees(model)):
+        sag = model.sag[row] if row >= 0 else 0.0
+        samples.rotor[k] += sag
+        tally.highest[k] += sag
+        tally.lowest[k] += sag
+
+
+def by_name(whole: Floats) -> dict[str, Floats]:
+    """Rows of `Samples.whole`, or their spectra, by their names in the schema: (n,) or (n_stator, n)."""
+    n_stator = (len(whole) - 4) // 3
+    axial, lateral, force = whole[4:].reshape(3, n_stator, -1)
+    return {
+        "vertical": whole[VERTICAL],
+        "horizontal": whole[HORIZONTAL],
+        "torsion": whole[TWIST],
+        "torsion_acceleration": whole[TWIST_ACCELERATION],
+        "stator_axial": axial,
+        "stator_lateral": lateral,
+        "contact_force": force,
+    }
+
+
+def scalars_of(
+    tally: Tally,
+    signals: dict[str, Floats],
+    *,
+    energy: tuple[float, float],
+    stators: tuple[StatorModel, ...],
+    spin: float,
+    samples_per_revolution: int,
+    growth: Iterable[float],
+) -> dict[str, Any]:
+    """Scalars of a finished case; those of a contact that never happened are zero, or NaN where undefined.
 
     Parameters
     ----------
-    signal : (..., n_sample)
-        n_sample even; no window is needed where the samples are locked to the shaft.
-
-    Returns
-    -------
-    (..., n_sample // 2 + 1)
-        In the signal's unit; line k is order k over the revolutions recorded, line 0 the size of the mean.
-    """
-    n_sample = signal.shape[-1]
-    spectrum: Floats = np.abs(scipy.fft.rfft(signal, axis=-1)) * (2.0 / n_sample)
-    spectrum[..., 0] *= 0.5
-    if n_sample % 2 == 0:
-        spectrum[..., -1] *= 0.5
-    return spectrum
-
-
-def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) -> int:
-    """Period of the orbit in revolutions; 0 where it has none up to 16 (or the record is too short to tell).
-
-    Whole cycles are compared: the rms distance between revolutions k and k + n over the orbit's size stays
-    under 1e-2. A stroboscopic point alone would take a period-2 orbit for period 1.
-
-    Parameters
-    ----------
-    vertical, horizontal : (n_revolution * samples_per_revolution,), m
-    """
-    signals = vertical - vertical.mean(), horizontal - horizontal.mean()
-    n_revolution = vertical.size // samples_per_revolution
-    most = PERIOD_TOLERANCE**2 * sum(float(signal @ signal) for signal in signals) / vertical.size
-
-    def distance(shift: int, end: int) -> float:
-        """Sum of the square distances between the first samples, up to `end`, and those a shift later."""
-        changes = [signal[shift : shift + end] - signal[:end] for signal in signals]
-        return sum(float(change @ change) for change in changes)
-
-    for n in range(1, min(LONGEST_PERIOD, n_revolution - 1) + 1):
-        shift = n * samples_per_revolution
-        n_pair = vertical.size - shift
-        # The first revolution alone mostly tells that there is no such period.
-        if all(distance(shift, end) <= most * n_pair for end in (samples_per_revolution, n_pair)):
-            return n
-    return 0
-
-
-def whirl_ratio(vertical: Floats, horizontal: Floats, samples_per_revolution: int, spin: float) -> float:
-    """Sense of the whirl at the spin frequency: 1 on a forward circle, 0 on a line, -1 on a backward circle.
-
-    The amplitudes of the two-sided first order, (forward - backward) / (forward + backward); NaN without
-    motion at that frequency.
-
-    Parameters
-    ----------
-    vertical, horizontal : (n_revolution * samples_per_revolution,), m
+    energy : (float, float), J
+        Mechanical energy at the beginning and at the end of the record.
     spin : float, rad/s
+    growth : iterable of float
+        How a small displacement grows after the record (`lyapunov.growth`); read where that tells the regime.
     """
-    cycle = [signal.reshape(-1, samples_per_revolution).mean(axis=0) for signal in (vertical, horizontal)]
-    whirl = cycle[0] + 1j * cycle[1]
-    turn = np.exp(2j * np.pi * np.arange(samples_per_revolution) / samples_per_revolution)
-    forward, backward = float(abs(np.vdot(turn, whirl))), float(abs(turn @ whirl))
-    if forward + backward == 0.0:
-        return math.nan
-    return math.copysign(1.0, spin) * (forward - backward) / (forward + backward)
+    n_sample = signals["vertical"].size
+    n_revolution = n_sample // samples_per_revolution
+    duration = 2.0 * np.pi * n_revolution / abs(spin)
+    has_touched = tally.impulse > 0
+    n_contact = np.maximum(tally.n_contact, 1)  # one that lasts throughout never begins in the record
+    orbit = signals["vertical"], signals["horizontal"], samples_per_revolution
+    orbit_period = period(*orbit)
+    flag, exponent = regime(*orbit, period=orbit_period, is_contact=bool(has_touched.any()), growth=growth)
+    # Drive and friction exchange a hundred times what the vibration feels of them: only their difference
+    # counts.
+    flows = [
+        tally.energy[UNBALANCE_WORK],
+        tally.energy[DRIVE_WORK] - tally.energy[FRICTION_LOSS],
+        -tally.energy[DAMPING_LOSS],
+        -tally.energy[IMPACT_LOSS],
+    ]
+    distance, moved = tally.residual.T
+    exchanged = max(0.5 * np.abs(flows).sum(), LEAST_EXCHANGE * max(energy), np.finfo(float).tiny)
+    return {
+        "period": orbit_period,
+        "regime": flag,
+        "lyapunov_exponent": exponent,
+        "whirl_ratio": whirl_ratio(*orbit, spin),
+        "contact_fraction": tally.contact_time / duration,
+        "contacts_per_revolution": tally.n_contact / n_revolution,
+        "contact_duration": np.where(has_touched, tally.contact_time / n_contact, 0.0),
+        "peak_contact_force": tally.peak_force,
+        "contact_impulse": tally.impulse / n_revolution,
+        "friction_work": tally.friction_work / n_revolution,
+        "minimum_slip_speed": np.where(np.isfinite(tally.least_slip), tally.least_slip, np.nan),
+        "force_over_euler_load": tally.peak_force / [stator.euler_load for stator in stators],
+        "tip_deflection_ratio": tally.peak_lateral / [stator.length for stator in stators],
+        "peak_torsion": float(max(tally.highest[TWIST], -tally.lowest[TWIST])),
+        "peak_to_peak_vertical": float(tally.highest[VERTICAL] - tally.lowest[VERTICAL]),
+        "peak_to_peak_horizontal": float(tally.highest[HORIZONTAL] - tally.lowest[HORIZONTAL]),
+        "energy_residual": float(abs(sum(flows) - (energy[1] - energy[0])) / exchanged),
+        "contact_iterations": int(tally.pivots[0]),
+        "contact_residual": float(np.divide(distance, moved, out=np.zeros(3), where=moved > 0.0).max()),
+    }
+
+
+def diverged_record(
+    reason: str, n_stator: int, recording: Recording, settings: dict[str, float], final: State
+) -> Record:
+    """Record of a case that ran away: not-a-number wherever a result would stand."""
+    per_revolution = recording.samples_per_revolution
+    n_sample = recording.revolutions * per_revolution
+    length = {
+        "stator": n_stator,
+        "sample": n_sample,
+        "order": n_sample // 2 + 1,
+        "section": recording.revolutions,
+    }
+    groups: dict[str, dict[str, Any]] = {"waveform": {}, "spectrum": {}, "section": {}, "scalar": {}}
+    for name, variable in VARIABLES.items():
+        if variable.role == "scalar" and not variable.dims:
+            groups["scalar"][name] = -1 if variable.dtype.startswith("int") else np.nan
+        elif variable.role == "scalar" or variable.role in recording.keep:
+            groups[variable.role][name] = np.full([length[dim] for dim in variable.dims], np.nan)
+    groups["scalar"]["regime"] = -1
+    return Record(
+        status=DIVERGED,
+        reason=reason,
+        samples_per_revolution=per_revolution,
+        signals=groups["waveform"],
+        spectra=groups["spectrum"],
+        sections=groups["section"],
+        scalars=groups["scalar"],
+        settings=settings,
+        final=final,
+    )

@@ -12,14 +12,14 @@ from scipy.sparse import csr_array, dia_array
 from scipy.sparse.csgraph import connected_components
 
 from rubhpc.fem.statics import sag_at_stators
-from rubhpc.kernels.contact import AXIAL, LATERAL, MULTIPLIER, N_DEGREE, TORSION, Law, Pairs, V, W
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, MULTIPLIER, N_DEGREE, TORSION, Law, Pairs, V, W
 from rubhpc.kernels.linear import Linear
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.study import Contact
+    from rubhpc.study.study import Contact
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]

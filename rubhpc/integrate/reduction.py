@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.packing import degrees_of, output_degrees, whole_system
-from rubhpc.kernels.contact import AXIAL, LATERAL, N_DEGREE, V, W
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, N_DEGREE, V, W
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.measures import LONGEST_PERIOD, PERIOD_TOLERANCE
+from rubhpc.integrate.orbit_measures import LONGEST_PERIOD, PERIOD_TOLERANCE
 from rubhpc.schema import REGIME
 
 if TYPE_CHECKING:

@@ -6,11 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit, jit_inline
-from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact import N_DEGREE, TORSION, Pairs, Workspace, fill_start, is_any_closed
-from rubhpc.kernels.contact_step import is_plain, solve_contact
-from rubhpc.kernels.linear import Linear, circulatory_power, free_velocity
-from rubhpc.kernels.observe import (
+from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     STEP,
     TWIST_ACCELERATION,
@@ -23,6 +19,10 @@ from rubhpc.kernels.observe import (
     observe_solution,
     take_sample,
 )
+from rubhpc.kernels.complementarity import UNSOLVED
+from rubhpc.kernels.contact_pairs import N_DEGREE, TORSION, Pairs, Workspace, fill_start, is_any_closed
+from rubhpc.kernels.contact_step import is_plain, solve_contact
+from rubhpc.kernels.linear import Linear, circulatory_power, free_velocity
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -6,7 +6,7 @@ import numpy as np
 
 from rubhpc.kernels._jit import jit, jit_inline
 from rubhpc.kernels.complementarity import UNSOLVED, natural_residual, solve_complementarity
-from rubhpc.kernels.contact import (
+from rubhpc.kernels.contact_pairs import (
     N_DEGREE,
     Law,
     Pairs,
@@ -17,7 +17,7 @@ from rubhpc.kernels.contact import (
     fill_moved,
     pair_normal_and_gap,
 )
-from rubhpc.kernels.coulomb import fill_slip, friction_residual, solve_friction
+from rubhpc.kernels.coulomb_friction import fill_slip, friction_residual, solve_friction
 
 GAP_TOLERANCE = 1e-14  # m, to which a closed gap is zero
 N_NEWTON = 25  # passes for the curved gap; two or three are taken

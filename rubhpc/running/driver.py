@@ -22,21 +22,21 @@ from rubhpc.running.watch import Watch
 from rubhpc.running.worker import Worker
 from rubhpc.schema import DONE, FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
-from rubhpc.storage.hand import Hand, forget
+from rubhpc.storage.in_progress import Hand, forget
 from rubhpc.storage.journal import count
 from rubhpc.storage.manifest import PRIVATE
 from rubhpc.storage.resume import missing_share
 from rubhpc.storage.store import Store
 from rubhpc.storage.summary import Summary
-from rubhpc.study import Study, read_study
-from rubhpc.sweep import Sweep
+from rubhpc.study.cases import Sweep
+from rubhpc.study.study import Study, read_study
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Iterator
 
     from rubhpc.running.job import Job
-    from rubhpc.sweep import Block
+    from rubhpc.study.cases import Block
 
 _PACKING_GAP = 600.0  # s between packings while a run is on; one takes 5 s for a million cases
 _REASONS = 100  # failed cases a summary names, at most

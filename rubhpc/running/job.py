@@ -13,7 +13,7 @@ from rubhpc.running.stopping import Stopped, Stopping
 from rubhpc.running.worker import set_up
 from rubhpc.schema import FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
-from rubhpc.storage.hand import find_suspects, forget
+from rubhpc.storage.in_progress import find_suspects, forget
 from rubhpc.storage.journal import Entry, Ledger, next_run
 from rubhpc.storage.resume import bring_up_to_date, find_gone, missing_share, open_store, sweep_for
 from rubhpc.storage.runs import record_run
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.lock import Lock
     from rubhpc.storage.store import Store
-    from rubhpc.study import Study
-    from rubhpc.sweep import Block, Sweep
+    from rubhpc.study.cases import Block, Sweep
+    from rubhpc.study.study import Study
 
 
 @dataclass(kw_only=True)

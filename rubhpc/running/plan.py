@@ -11,7 +11,6 @@ import numpy as np
 
 from rubhpc.integrate.case import compile_kernels, run_case
 from rubhpc.running.worker import set_up
-from rubhpc.sample import CASE
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 from rubhpc.storage.duration import duration
 from rubhpc.storage.growth import origins
@@ -19,12 +18,13 @@ from rubhpc.storage.journal import count
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import find_gone, is_store, missing_share, sweep_for
 from rubhpc.storage.store import Store
+from rubhpc.study.sampling import CASE
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rubhpc.study import Recording, Study
-    from rubhpc.sweep import Block, Sweep
+    from rubhpc.study.cases import Block, Sweep
+    from rubhpc.study.study import Recording, Study
 
 _PILOTS, _FEW_PILOTS, _ENOUGH = 9, 3, 20.0  # asked; asked even where they take more than so many seconds
 _FIRST_STEPS, _PILOT_TIME = 50_000, 1.0  # predicted, of a pilot's first try; seconds of its longest, about

@@ -13,7 +13,7 @@ from rubhpc.running.launch import launch
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from rubhpc.storage.hand import Hand
+    from rubhpc.storage.in_progress import Hand
 
 PATIENCE = 10.0  # s over its limit that a case may take to be asked: a kernel call lasts 0.25 s
 _LOOK = 0.5  # s between looks

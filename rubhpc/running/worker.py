@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.prepare import prepare
 from rubhpc.integrate.record import State
-from rubhpc.running.ends import Ends, Start
+from rubhpc.integrate.setup import prepare
+from rubhpc.running.initial_states import Ends, Start
 from rubhpc.running.pool import Tally
 from rubhpc.running.stopping import Stopped
 from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.prepare import Setup
     from rubhpc.integrate.record import Record
-    from rubhpc.rig import Rig
+    from rubhpc.integrate.setup import Setup
+    from rubhpc.rig.rig import Rig
     from rubhpc.running.stopping import Stopping
     from rubhpc.running.watch import Watch
     from rubhpc.storage.journal import Journal, Ledger
     from rubhpc.storage.store import Store
-    from rubhpc.study import Study
-    from rubhpc.sweep import Block, Case, Sweep
+    from rubhpc.study.cases import Block, Case, Sweep
+    from rubhpc.study.study import Study
 
     Arrays = dict[str, NDArray[Any]]
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.storage.journal import Ledger
-    from rubhpc.sweep import Sweep
+    from rubhpc.study.cases import Sweep
 
 _HELD = 64  # blocks of the old grid kept in memory: neighbours in the new one come from few of them
 

@@ -20,8 +20,8 @@ from zlib import crc32
 
 import numpy as np
 
-from rubhpc.chain import CaseIds
 from rubhpc.schema import STATUS, VARIABLES
+from rubhpc.study.continuation import CaseIds
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.chain import Chain
-    from rubhpc.points import Points
+    from rubhpc.study.continuation import Chain
+    from rubhpc.study.points import Points
 
 _FORMAT = 1
 _NAME = re.compile(r"run(\d{6})-(\w+)\.journal")

@@ -17,11 +17,11 @@ from numcodecs.blosc import Blosc
 from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.storage import MemoryStore
 
-from rubhpc.axes import DIRECTION, DIRECTIONS
 from rubhpc.schema import VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import METRICS
 from rubhpc.storage.manifest import PRIVATE, Manifest
+from rubhpc.study.axes import DIRECTION, DIRECTIONS
 from rubhpc.version import __version__
 
 if TYPE_CHECKING:
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from zarr.core.buffer import Buffer
 
     from rubhpc.schema import Variable
-    from rubhpc.study import Study
-    from rubhpc.sweep import Sweep
+    from rubhpc.study.cases import Sweep
+    from rubhpc.study.study import Study
 
 PACKED = (
     VARIABLES["status"],

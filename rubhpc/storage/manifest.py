@@ -9,20 +9,20 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
-from rubhpc.axes import FROM_REST, coordinate_of, written
-from rubhpc.chain import CaseIds, chain_of
 from rubhpc.errors import StoreError
-from rubhpc.points import Points
 from rubhpc.schema import STATE, VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import Header
+from rubhpc.study.axes import FROM_REST, coordinate_of, written
+from rubhpc.study.continuation import CaseIds, chain_of
+from rubhpc.study.points import Points
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rubhpc.chain import Chain
     from rubhpc.schema import Variable
-    from rubhpc.sweep import Sweep
+    from rubhpc.study.cases import Sweep
+    from rubhpc.study.continuation import Chain
 
 _FORMAT = 3  # raised with the arrays of the schema too: a store has them all
 PRIVATE = ".rubhpc"  # the directory of a store that zarr does not look into

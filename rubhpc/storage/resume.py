@@ -10,7 +10,7 @@ from rubhpc.schema import DIVERGED, DONE
 from rubhpc.storage.growth import grow, settle
 from rubhpc.storage.manifest import Manifest, manifests
 from rubhpc.storage.store import Store
-from rubhpc.sweep import Sweep
+from rubhpc.study.cases import Sweep
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.storage.journal import Ledger
-    from rubhpc.study import Study
-    from rubhpc.sweep import Block
+    from rubhpc.study.cases import Block
+    from rubhpc.study.study import Study
 
 
 def is_store(path: Path) -> bool:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.sweep import Sweep
+    from rubhpc.study.cases import Sweep
 
 
 class Store:

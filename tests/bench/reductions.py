@@ -25,10 +25,10 @@ import numpy as np
 import zarr
 
 sys.path.append(str(Path(__file__).parents[2]))
-sys.path.append(str(Path(__file__).parents[1] / "unit"))
+sys.path.append(str(Path(__file__).parents[1] / "support"))
 import many_cases
 
-from postproc.reduce import computed, envelope, mean_spectrum, open_in_pieces
+from postproc.cases.reduction import computed, envelope, mean_spectrum, open_in_pieces
 
 if TYPE_CHECKING:
     from collections.abc import Callable

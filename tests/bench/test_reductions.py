@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-sys.path.append(str(Path(__file__).parents[1] / "unit"))
+sys.path.append(str(Path(__file__).parents[1] / "support"))
 import many_cases
 from reductions import compare, table
 
-from postproc.reduce import open_in_pieces
+from postproc.cases.reduction import open_in_pieces
 
 pytestmark = pytest.mark.bench
 MOST_MEMORY = 2000.0  # MB

@@ -3,9 +3,9 @@
 import pytest
 
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.prepare import prepare
-from rubhpc.rig import read_rig
-from rubhpc.study import Contact, Integrator, Recording
+from rubhpc.integrate.setup import prepare
+from rubhpc.rig.rig import read_rig
+from rubhpc.study.study import Contact, Integrator, Recording
 
 pytestmark = pytest.mark.bench
 

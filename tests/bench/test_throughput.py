@@ -14,9 +14,9 @@ import rubhpc
 from rubhpc.integrate import case as case_module
 from rubhpc.integrate import modal, modal_neighbours
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.prepare import prepare
-from rubhpc.rig import read_rig, with_keys
-from rubhpc.study import Contact, Integrator, Recording
+from rubhpc.integrate.setup import prepare
+from rubhpc.rig.rig import read_rig, with_keys
+from rubhpc.study.study import Contact, Integrator, Recording
 
 pytestmark = pytest.mark.bench
 

@@ -8,10 +8,10 @@ import pytest
 from browsers import find_browser
 from unit import synthetic_store
 
-from postproc.load import open_store
 from postproc.report.budget import write_report
 from postproc.report.page import Page as ReportPage
 from postproc.report.page import least_size
+from postproc.store.open import open_store
 from rubhpc.schema import MISSING
 
 if TYPE_CHECKING:

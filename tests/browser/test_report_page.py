@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import pytest
 from playwright.sync_api import expect
 
-from postproc.load import open_store
 from postproc.report.server import Library, Server
+from postproc.store.open import open_store
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.axes import Axis
-from rubhpc.rig import read_rig
+from rubhpc.rig.rig import read_rig
 from rubhpc.running import driver, job, plan, worker
 from rubhpc.schema import DONE
 from rubhpc.storage.journal import METRICS
 from rubhpc.storage.status import read_status
-from rubhpc.study import Recording, Study
+from rubhpc.study.axes import Axis
+from rubhpc.study.study import Recording, Study
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,7 +8,7 @@ import pytest
 from running import each_launcher, run, stored_bytes, write_study
 
 from rubhpc.schema import DONE, FAILED
-from rubhpc.storage.hand import Hand, find_suspects
+from rubhpc.storage.in_progress import Hand, find_suspects
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
 
@@ -123,7 +123,7 @@ def test_a_record_of_another_grid_or_of_no_case_says_nothing(store):
 
 
 def test_want_of_memory_is_told_from_other_kills(store, monkeypatch):
-    from rubhpc.storage import hand
+    from rubhpc.storage import in_progress as hand
 
     is_missing = store.replay().status == 0
     monkeypatch.setattr(hand, "_oom_kills", lambda: 7)

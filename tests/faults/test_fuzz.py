@@ -20,7 +20,7 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-import rubhpc.rig
+import rubhpc.rig.rig
 from rubhpc.cli import main
 from rubhpc.running import job
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 ROOT = Path(__file__).parents[2]
-RIG = Path(rubhpc.rig.__file__).parent / "rigs" / "mokhtar2017.toml"
+RIG = Path(rubhpc.__file__).parent / "rigs" / "mokhtar2017.toml"
 STUDIES = sorted((ROOT / "jobs").glob("*.toml"))
 LONGEST = 20.0  # s that any file may take, on a busy machine
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from rubhpc.fem.model import Body, Model, StatorModel
 from rubhpc.integrate.packing import law_of, pack
-from rubhpc.integrate.prepare import CentralDifferenceSetup, ModalSetup
 from rubhpc.integrate.reduction import reduce_model
+from rubhpc.integrate.setup import CentralDifferenceSetup, ModalSetup
 
 
 def body(mass, stiffness, degrees, damping=0.0):

@@ -9,14 +9,14 @@ from lone_bodies import body, set_up, set_up_modal, tip
 
 from rubhpc import InputError, Load, LumpedStator, Rig, assemble, read_rig, simulate
 from rubhpc.fem.statics import sag_at_stators
-from rubhpc.integrate.carry import at_rest
 from rubhpc.integrate.case import run_case
+from rubhpc.integrate.initial_state import at_rest
 from rubhpc.integrate.packing import degrees_of
-from rubhpc.integrate.prepare import prepare
 from rubhpc.integrate.record import State
-from rubhpc.kernels.contact import normal_and_gap
-from rubhpc.rig import Bearing, Rotor, ShaftSection, with_keys
-from rubhpc.study import Contact, Integrator, Recording
+from rubhpc.integrate.setup import prepare
+from rubhpc.kernels.contact_pairs import normal_and_gap
+from rubhpc.rig.rig import Bearing, Rotor, ShaftSection, with_keys
+from rubhpc.study.study import Contact, Integrator, Recording
 
 G = 9.81  # m/s2
 METHODS = ["modal", "central-difference"]

@@ -11,7 +11,7 @@ from lone_bodies import body, set_up, set_up_modal, tip
 from rubhpc import State, read_rig, simulate
 from rubhpc.integrate.case import run_case
 from rubhpc.schema import DIVERGED, DONE
-from rubhpc.study import Contact, Recording
+from rubhpc.study.study import Contact, Recording
 
 COULOMB = Contact(friction_law="coulomb")
 PRESSED = 10.0  # N, by which the rotor's vertical spring presses it onto a stator that is held

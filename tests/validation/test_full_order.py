@@ -13,7 +13,7 @@ import pytest
 import reference
 
 from rubhpc import simulate
-from rubhpc.rig import Bearing, Damping, Disc, Rig, Rotor, ShaftSection, Stator, Torsion, Unbalance
+from rubhpc.rig.rig import Bearing, Damping, Disc, Rig, Rotor, ShaftSection, Stator, Torsion, Unbalance
 
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 STEPPED = (

@@ -17,10 +17,10 @@ import xarray as xr
 from scipy.optimize import brentq
 
 from rubhpc import LumpedStator, assemble, read_rig, run
-from rubhpc.axes import make_axis
 from rubhpc.fem.response import first_lateral_frequency, steady_response
-from rubhpc.options import Recording
-from rubhpc.study import Study
+from rubhpc.study.axes import make_axis
+from rubhpc.study.study import Study
+from rubhpc.study.tables import Recording
 
 COUNT, STIFFNESS, CLEARANCE = 8, 1e5, 3e-4
 SPRINGS = LumpedStator(node=8, radius=0.06, count=COUNT, mass=1e-3, damping=2.0, stiffness=STIFFNESS)

@@ -10,10 +10,10 @@ from scipy.linalg import eigh
 from rubhpc import State, read_rig
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.packing import pack
-from rubhpc.integrate.prepare import prepare
 from rubhpc.integrate.reduction import reduce_model
-from rubhpc.rig import with_keys
-from rubhpc.study import Contact, Integrator, Recording
+from rubhpc.integrate.setup import prepare
+from rubhpc.rig.rig import with_keys
+from rubhpc.study.study import Contact, Integrator, Recording
 
 STILL = {
     "rotor.damping.alpha": 0.0,

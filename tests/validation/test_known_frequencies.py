@@ -15,7 +15,7 @@ from rubhpc.fem.modes import modes
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.fem.undamped import undamped_modes
-from rubhpc.rig import Bearing, Damping, Rotor, ShaftSection, Torsion, read_rig
+from rubhpc.rig.rig import Bearing, Damping, Rotor, ShaftSection, Torsion, read_rig
 
 RIG = read_rig("mokhtar2017")
 

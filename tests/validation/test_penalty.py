@@ -8,10 +8,10 @@ import pytest
 from lone_bodies import body, set_up, set_up_modal, tip
 
 from rubhpc import State, read_rig, simulate
-from rubhpc.input.stators import LumpedStator
 from rubhpc.integrate.case import run_case
-from rubhpc.rig import with_keys
-from rubhpc.study import Contact, Recording
+from rubhpc.rig.rig import with_keys
+from rubhpc.rig.stators import LumpedStator
+from rubhpc.study.study import Contact, Recording
 
 MASS, STIFFNESS, SPEED = 2.0, 1e6, 1.5  # kg, N/m, m/s
 

@@ -10,7 +10,7 @@ from siconos_reference import CASES, CLEARANCE, DISC, DURATION, N_SAMPLE, RADIUS
 
 from rubhpc import State
 from rubhpc.integrate.case import run_case
-from rubhpc.study import Contact, Recording
+from rubhpc.study.study import Contact, Recording
 
 DEGREES = ((1, "v"), (1, "w"), (1, "thx"))
 SCHEMES = {  # in steps of 0.5 us

@@ -1,0 +1,1 @@
+"""Analysis over many cases: maps, reduction, detection, sensitivity."""

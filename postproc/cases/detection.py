@@ -1,0 +1,124 @@
+"""How often rub indicators tell rub from no rub, each alone and all together."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.signals.indicators import INDICATORS
+from postproc.store.open import source
+from rubhpc.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+TOGETHER = "all_together"
+_LEAST = 10  # cases of each kind in either half, to learn from and to judge by
+
+
+def judge(scores: xr.Dataset, false_alarm: float = 0.05, seed: int = 1) -> xr.Dataset:
+    """Return every case's verdict, and how often it is right.
+
+    The cases are parted at random into halves, and each half is judged by what the other one taught: from its
+    cases without contact come the mean and the standard deviation of each indicator, and its threshold, which
+    a share `false_alarm` of them passes. All indicators together are taken by Fisher's method: the sum of
+    `-ln p`, with `p` the probability that an indicator is as high without contact, from a normal distribution
+    of that mean and deviation.
+
+    Parameters
+    ----------
+    scores : Dataset
+        From `indicator_scores`.
+    false_alarm : float
+        Between 0 and 1.
+    seed : int
+        Of the halves.
+
+    Returns
+    -------
+    Dataset
+        Over (indicator, level): `detection_rate` (of the cases that touch), `false_alarm_rate` (of those that
+        do not) and `area_under_curve` (the probability that a case which touches scores higher than one that
+        does not; the mean of both halves). Over (indicator, axes, level): `verdict`, the share of the draws
+        in which rub is told. Over the axes: `rub`. Over (axes, level, draw): the indicators.
+
+    Raises
+    ------
+    InputError
+        There are too few cases without contact, or none that touches.
+    """
+    if not 0 < false_alarm < 1:
+        raise InputError(f"false_alarm: {false_alarm:g} is out of range; it must lie between 0 and 1")
+    axes = tuple(str(d) for d in scores["rub"].dims)
+    rub = scores["rub"].values
+    score = scores[list(INDICATORS)].to_dataarray("indicator").compute()
+    values = score.transpose("indicator", *axes, "level", "draw").values
+    done = np.isfinite(values).all(axis=(0, -2, -1))
+    is_first = np.random.default_rng(seed).permutation(rub.size).reshape(rub.shape) < rub.size / 2
+    halves = [half & done for half in (is_first, ~is_first)]
+    fewest = min(int((half & kind).sum()) for half in halves for kind in (rub, ~rub))
+    if fewest < _LEAST:
+        raise InputError(
+            f"{source(scores)}: {int((done & ~rub).sum())} cases without contact and "
+            f"{int((done & rub).sum())} with it are too few to learn from; take some {4 * _LEAST} of each"
+        )
+    names = [*INDICATORS, TOGETHER]
+    told = np.full((len(names), *values.shape[1:]), math.nan)
+    areas = np.zeros((2, len(names), values.shape[-2]))
+    for i_half, (learnt, judged) in enumerate((halves, halves[::-1])):
+        known = np.concatenate((values, _together(values, learnt & ~rub)[None]))
+        threshold = np.quantile(known[:, learnt & ~rub], 1 - false_alarm, axis=(1, 3))
+        told[:, judged] = known[:, judged] > threshold[:, None, :, None]
+        for place in np.ndindex(*threshold.shape):
+            level = known[place[0]][..., place[1], :]
+            areas[(i_half, *place)] = area_under_curve(
+                level[judged & rub].ravel(), level[judged & ~rub].ravel()
+            )
+    found = {
+        "detection_rate": (told[:, done & rub].mean(axis=(1, 3)), "share of cases with rub told as such"),
+        "false_alarm_rate": (
+            told[:, done & ~rub].mean(axis=(1, 3)),
+            "share of cases without rub told as rub",
+        ),
+        "area_under_curve": (areas.mean(axis=0), "area under the receiver operating curve"),
+        "verdict": (told.mean(axis=-1), "share of draws in which rub is told"),
+    }
+    return scores.assign_coords(indicator=names).assign(
+        {
+            name: (
+                ("indicator", *(axes if name == "verdict" else ()), "level"),
+                value,
+                {"units": "1", "long_name": text},
+            )
+            for name, (value, text) in found.items()
+        }
+    )
+
+
+def area_under_curve(with_rub: Floats, without: Floats) -> float:
+    """Return the area under the receiver operating curve, (n,), (m,) -> 0 to 1; 0.5 tells nothing.
+
+    It is the share of pairs in which the case with rub scores higher, ties counted half (Mann and Whitney).
+    """
+    from scipy.stats import rankdata
+
+    n, m = with_rub.size, without.size
+    ranks = rankdata(np.concatenate((with_rub, without)))[:n]
+    return float((ranks.sum() - n * (n + 1) / 2) / (n * m))
+
+
+def _together(values: Floats, learnt: NDArray[np.bool_]) -> Floats:
+    """(n_indicator, ..., n_level, n_draw) -> (..., n_level, n_draw), the sum of -ln p."""
+    from scipy.special import log_ndtr
+
+    known = values[:, learnt]  # (n_indicator, n_case, n_level, n_draw)
+    shape = (len(values), *(1 for _ in learnt.shape), known.shape[-2], 1)
+    mean = known.mean(axis=(1, 3)).reshape(shape)
+    deviation = known.std(axis=(1, 3)).reshape(shape)
+    together: Floats = -log_ndtr(-(values - mean) / deviation).sum(axis=0)
+    return together

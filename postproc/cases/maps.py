@@ -1,0 +1,114 @@
+"""Maps: a scalar, the regime or the status of every case over two axes of the study."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from postproc.store.open import axes_of, find_axis, need, source
+from postproc.store.select import narrow
+from rubhpc.errors import InputError
+from rubhpc.schema import VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in ("scalar", "flag", "setting"))
+MOST_FACETS, MOST_PANELS = 2, 6
+# Where the model leaves its range, by variable: the flag, what is out of range, and the test.
+VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
+    "minimum_slip_speed": (1, "slip", lambda slip: slip < 0),
+    "force_over_euler_load": (2, "Euler load", lambda ratio: ratio > 1),
+    "tip_deflection_ratio": (4, "bending", lambda ratio: ratio > 0.1),
+}
+
+
+def default_axes(
+    store: xr.Dataset, x: str | None = None, y: str | None = None, facets: Sequence[str] = ()
+) -> tuple[str, str]:
+    """Return the axes a map spreads over, across and up: those named, and else the longest but the facets."""
+    named = [find_axis(store, name) for name in (x, y) if name]
+    if len(set(named)) < len(named):
+        raise InputError(f"{source(store)}: --x and --y are both {named[0]}; a map needs two axes")
+    axes = axes_of(store)
+    taken = {*named, *(find_axis(store, name) for name in facets)}
+    free = [a for a in axes if store.sizes[a] > 1 and a not in taken]
+    free.sort(key=lambda a: -store.sizes[a])  # stable: of two equal ones the first in the grid
+    if len(named) + len(free) < 2:
+        sizes = ", ".join(f"{a} ({store.sizes[a]})" for a in axes) or "none"
+        mend = "over one axis, draw rubhpc bifurcation or open rubhpc report"
+        raise InputError(f"{source(store)}: a map needs two axes of several values; there is {sizes}; {mend}")
+    across = named.pop(0) if x else free.pop(0)
+    return across, named.pop(0) if y else free.pop(0)
+
+
+def facet_axes(store: xr.Dataset, names: Sequence[str], taken: Sequence[str]) -> list[str]:
+    """Return the axes of small multiples, down and across: at most two, of at most six values each.
+
+    Raises
+    ------
+    InputError
+        No such axis, too many of them or of their values, or one that the maps spread over already.
+    """
+    facets = [find_axis(store, name) for name in names]
+    if len(facets) > MOST_FACETS or len({*facets, *taken}) < len(facets) + len(taken):
+        raise InputError(f"{source(store)}: --facet: take one or two axes, and not {' or '.join(taken)}")
+    for axis in facets:
+        if store.sizes[axis] > MOST_PANELS:
+            raise InputError(
+                f"{source(store)}: --facet {axis}: {store.sizes[axis]} values are more than {MOST_PANELS}; "
+                f"keep some with --select {axis}=..."
+            )
+    return facets[::-1]
+
+
+def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Sequence[str] = ()) -> xr.Dataset:
+    """Return what a map shows, loaded: no more than this scalar, the status and the validity monitors.
+
+    Parameters
+    ----------
+    store : Dataset
+        All other axes of more than one value must have been selected.
+    value : str
+        A scalar, setting or flag of the store.
+    spread : sequence of str
+        The axes x and y of a map, or the one along which the cases of a sample lie.
+
+    Returns
+    -------
+    Dataset over (*facets, y, x), or (*facets, case)
+        The value, `status`, and `validity`: 0 within the model's range, else the sum of 1 (slip reverses, so
+        that steady sliding is wrong), 2 (force over the stator's Euler load) and 4 (tip over a tenth of its
+        length).
+    """
+    if value not in MAPPABLE:
+        need(store, [value])
+        raise InputError(f"{source(store)}: {value}: no scalar of a case; choose {', '.join(MAPPABLE)}")
+    store = store.assign(validity=validity(store))
+    data = narrow(store, dict.fromkeys([value, "status", "validity"]), spread=[*spread, *facets])
+    over = [*facets, *reversed(spread)]
+    loaded: xr.Dataset = data.broadcast_like(store[over]).transpose(*over).load()
+    return loaded
+
+
+def monitors(store: xr.Dataset) -> dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]]:
+    """Return the monitors that hold for a store: under Coulomb's law a slip that reverses is no fault."""
+    study = store.attrs.get("study")
+    contact = study.get("contact", {}) if isinstance(study, dict) else {}
+    has_stick = contact.get("friction_law") == "coulomb"
+    return {n: told for n, told in VALIDITY.items() if not (has_stick and n == "minimum_slip_speed")}
+
+
+def validity(store: xr.Dataset) -> xr.DataArray:
+    """Return how each case leaves the model's range, over the axes: 0, or a sum of bits of `VALIDITY`."""
+    found = xr.zeros_like(store["status"], dtype=np.int8)
+    for name, (bit, _, is_bad) in monitors(store).items():
+        if name in store:
+            bad = is_bad(store[name])
+            # One stator out of range spoils the case, whichever is drawn.
+            bad = bad.any([d for d in ("stator",) if d in bad.dims])
+            found = found + np.int8(bit) * bad.astype(np.int8)
+    legend = ", ".join(f"{bit} ({text} out of range)" for bit, text, _ in monitors(store).values())
+    return found.rename("validity").assign_attrs(units="1", long_name=f"sum of {legend}")

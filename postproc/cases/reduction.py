@@ -1,0 +1,248 @@
+"""Reductions of stores too big to be loaded: mean spectra, worst-case envelopes, quantiles, histograms.
+
+Spectra are read in pieces of whole chunks, reduced piece by piece and put together in a tree, so that memory
+holds some pieces and the result. They stay lazy, on whatever dask runs: threads, or the processes of a
+`distributed` client here or on a cluster; `computed` waits for them with a progress bar. Of scalars, 8 bytes
+a case, one is held at a time.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import warnings
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+import dask.array as da
+import numpy as np
+import xarray as xr
+import zarr
+
+from postproc.signals.spectra import spectrum_of, with_frequency
+from postproc.store.open import LONG_ROLES, axes_of, find_axis, need, open_store, source
+from rubhpc.errors import InputError
+from rubhpc.schema import DONE, VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+
+SCALARS = tuple(n for n, v in VARIABLES.items() if v.role in ("scalar", "setting"))
+# Chunks decoded in Rust, where zarrs is installed, checksums included: a mean takes 0.65 of the time.
+_FAST = {"codec_pipeline.path": "zarrs.ZarrsCodecPipeline"}
+_MEMORY = 1e9  # bytes that pieces may take together, each some four times: as stored, as read, and on the way
+_SMALLEST, _LARGEST = 4e6, 64e6  # bytes of a piece: below, the scheduler's 1 ms a piece counts
+
+
+def open_in_pieces(path: str | Path, n_byte: float | None = None) -> xr.Dataset:
+    """Return the store as `open_store` does, with waveforms, spectra and sections in bigger pieces.
+
+    Parameters
+    ----------
+    n_byte : float, optional
+        Of a piece, about; it holds whole chunks, one at least. Default: what lets all cores work within 1 GB.
+    """
+    if n_byte is None:
+        n_byte = min(max(_MEMORY / (4 * (os.cpu_count() or 1)), _SMALLEST), _LARGEST)
+    store = open_store(path)
+    with warnings.catch_warnings(), zarr.config.set(_FAST if find_spec("zarrs") else {}):
+        warnings.simplefilter("ignore", RuntimeWarning)  # as in `open_store`
+        bare = xr.open_zarr(path, chunks=None, decode_times=False, decode_timedelta=False)
+    pieces: dict[str, xr.DataArray] = {}
+    for name, variable in VARIABLES.items():
+        if variable.role in LONG_ROLES and name in store:
+            pieces[name] = bare[name].chunk(_piece(store[name], axes_of(store), n_byte))
+    found: xr.Dataset = store.assign(pieces)
+    found.encoding = store.encoding
+    return found
+
+
+def mean_spectrum(store: xr.Dataset, signal: str, over: Iterable[str] = ()) -> xr.Dataset:
+    """Return the mean over cases of a signal's amplitude spectrum; lazy.
+
+    Parameters
+    ----------
+    store : Dataset
+        From `open_in_pieces`, whole or selected.
+    over : iterable of axes
+        To average over; none: all of them. "stator" may be one.
+
+    Returns
+    -------
+    Dataset over the other axes and `order`
+        The spectrum in the unit of the signal, with `frequency` (Hz) where the axes that set the spin speed
+        are kept, and `cases`: how many it is taken over. Cases that are not done have no part in it; NaN
+        where none is done.
+    """
+    return _spectrum(store, signal, over, _mean, "mean over cases of the ")
+
+
+def envelope(store: xr.Dataset, signal: str, over: Iterable[str] = ()) -> xr.Dataset:
+    """Return the largest amplitude of a signal's spectrum over cases, order by order; lazy.
+
+    To learn where the worst lies along an axis, keep that axis and take `idxmax` of what comes back.
+    Arguments and result as of `mean_spectrum`.
+    """
+    return _spectrum(store, signal, over, _largest, "largest over cases of the ")
+
+
+def quantiles(
+    store: xr.Dataset, scalar: str, levels: Sequence[float], over: Iterable[str] = ()
+) -> xr.Dataset:
+    """Return quantiles of a scalar over cases that are done, exact and loaded.
+
+    Parameters
+    ----------
+    levels : sequence of float
+        0 to 1.
+    over : iterable of axes
+        None: all of them.
+
+    Returns
+    -------
+    Dataset over `quantile` and the other axes
+        The scalar, and `cases`.
+    """
+    values, axes = _done(store, scalar, over)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "All-NaN", RuntimeWarning)  # `cases` is 0 there
+        found = values.quantile(list(levels), axes, keep_attrs=True)
+    return found.to_dataset(name=scalar).assign(cases=_count(values.notnull(), axes))
+
+
+def histogram(
+    store: xr.Dataset, scalar: str, bins: int | Sequence[float] = 50, over: Iterable[str] = ()
+) -> xr.Dataset:
+    """Return how many cases that are done have a scalar in each bin, loaded.
+
+    Parameters
+    ----------
+    bins : int or sequence of float
+        How many of equal width from the least value to the largest, or their edges, rising, in SI units.
+        The last bin holds its upper edge; values outside are in none.
+    over : iterable of axes
+        None: all of them.
+
+    Returns
+    -------
+    Dataset over the other axes and `bin`
+        `count`, and `cases`, inside the edges or not; `bin` is the middle of a bin, `lower` and `upper` are
+        its edges.
+    """
+    values, axes = _done(store, scalar, over)
+    known = values.values[np.isfinite(values.values)]
+    if not known.size:
+        raise InputError(f"{source(store)}: {scalar}: no case of this selection is done; select others")
+    edges = np.histogram_bin_edges(known, bins)
+    others = [d for d in values.dims if d not in axes]
+    rows = values.transpose(*others, *axes)
+    table = rows.values.reshape(math.prod(rows.sizes[d] for d in others), -1)
+    # One bincount of (cell, bin) for all cells; outside the edges, or NaN, is a bin that is thrown away.
+    n = edges.size - 1
+    at = np.searchsorted(edges, table, side="right") - 1
+    at[table == edges[-1]] = n - 1
+    at = np.where((at >= 0) & (at < n), at, n) + (n + 1) * np.arange(len(table))[:, None]
+    counts = np.bincount(at.ravel(), minlength=len(table) * (n + 1)).reshape(len(table), n + 1)[:, :n]
+    about = {"units": values.attrs.get("units", "1"), "long_name": values.attrs.get("long_name", scalar)}
+    shape = [rows.sizes[d] for d in others]
+    kept = {str(d): rows[d] for d in others}
+    count = (*others, "bin"), counts.reshape(*shape, n), {"units": "1", "long_name": "cases in the bin"}
+    return xr.Dataset(
+        {"count": count, "cases": _count(values.notnull(), axes)},
+        coords={
+            **kept,
+            "bin": ("bin", (edges[:-1] + edges[1:]) / 2, about),
+            "lower": ("bin", edges[:-1], about),
+            "upper": ("bin", edges[1:], about),
+        },
+    )
+
+
+def computed(lazy: xr.Dataset, *, is_told: bool = True) -> xr.Dataset:
+    """Return the loaded dataset, with a progress bar; a `distributed` client is used if there is one."""
+    client = _client()
+    if client is not None:
+        if find_spec("zarrs"):
+            client.run(zarr.config.set, _FAST)  # processes go by their own settings
+        lazy = lazy.persist()
+        if is_told:
+            sys.modules["distributed"].progress(lazy, notebook=False)
+    elif is_told:
+        from dask.diagnostics.progress import ProgressBar
+
+        with ProgressBar():  # type: ignore[no-untyped-call]  # dask leaves it untyped
+            return lazy.compute()
+    return lazy.compute()
+
+
+def _client() -> Any:
+    """Return the current `distributed` client; None where there is none, or the package is not loaded."""
+    distributed = sys.modules.get("distributed")
+    try:
+        return distributed.default_client() if distributed else None
+    except ValueError:
+        return None
+
+
+def _spectrum(store: xr.Dataset, signal: str, over: Iterable[str], reduction: Any, before: str) -> xr.Dataset:
+    spectra = spectrum_of(store, signal)
+    axes = _axes(store, spectra, over)
+    found: xr.DataArray = spectra.reduce(reduction, axes, keep_attrs=True)
+    found.attrs["long_name"] = before + str(spectra.attrs.get("long_name", spectra.name))
+    cases = _count(store["status"] == DONE, [a for a in axes if a != "stator"])
+    if "spin_speed" in store and set(store["spin_speed"].dims) <= set(found.dims):
+        found = with_frequency(found, store["spin_speed"].compute())
+    return found.to_dataset(name=str(spectra.name)).assign(cases=cases)
+
+
+def _axes(store: xr.Dataset, values: xr.DataArray, over: Iterable[str]) -> list[str]:
+    """Return the dimensions to reduce; all of the study's axes when none is named."""
+    axes = [find_axis(store, name) for name in over] or list(axes_of(store))
+    if lost := [a for a in axes if a not in values.dims]:
+        raise InputError(f"{source(store)}: {values.name}: does not depend on {lost[0]}; leave that one out")
+    return axes
+
+
+def _done(store: xr.Dataset, scalar: str, over: Iterable[str]) -> tuple[xr.DataArray, list[str]]:
+    """Return a scalar of the cases that are done, loaded, NaN for others, and the dimensions to reduce."""
+    if scalar not in SCALARS:
+        need(store, [scalar])
+        raise InputError(f"{source(store)}: {scalar}: no scalar of a case; choose {', '.join(SCALARS)}")
+    values = store[scalar].astype(float).where(store["status"] == DONE).assign_attrs(store[scalar].attrs)
+    return values.rename(scalar).compute(), _axes(store, values.rename(scalar), over)
+
+
+def _count(is_there: xr.DataArray, axes: list[str]) -> xr.DataArray:
+    return is_there.sum(axes).assign_attrs(units="1", long_name="cases")
+
+
+def _mean(values: Any, axis: tuple[int, ...]) -> Any:
+    """Mean of what is no NaN; in double precision, since 100 000 singles lose three digits of their sum."""
+    return da.nanmean(_lazy(values), axis=axis, dtype=np.float64)
+
+
+def _largest(values: Any, axis: tuple[int, ...]) -> Any:
+    """Largest of what is no NaN; NaN, without a warning, where nothing else is."""
+    values = _lazy(values)
+    return da.reduction(  # type: ignore[no-untyped-call]
+        values, np.fmax.reduce, np.fmax.reduce, axis=axis, dtype=values.dtype
+    )
+
+
+def _lazy(values: Any) -> Any:
+    return da.asarray(values)  # type: ignore[no-untyped-call]  # dask leaves it untyped
+
+
+def _piece(values: xr.DataArray, axes: tuple[str, ...], n_byte: float) -> dict[str, int]:
+    """Return lengths of a piece: as many stored chunks as fit, along the last axes first."""
+    length = dict(zip(map(str, values.dims), values.data.chunksize, strict=True))
+    budget = n_byte / (math.prod(length.values()) * values.dtype.itemsize)
+    for axis in reversed(axes):
+        most = -(-values.sizes[axis] // max(length[axis], 1))  # chunks along it
+        take = max(min(most, int(budget)), 1)
+        length[axis] *= take
+        budget /= take
+    return length

@@ -1,0 +1,91 @@
+"""Sobol indices from a sample: those of a scalar over the ranges that a study has drawn its cases from.
+
+Estimated with SALib from Saltelli's design (`rubhpc.study.sampling`): total indices after Jansen, first-order
+ones after Saltelli (A. Saltelli et al., Comput. Phys. Commun. 181, 2010), intervals from base points drawn again.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from postproc.store.open import drawn_axes, source
+from postproc.store.units import displayed
+from rubhpc.errors import InputError
+from rubhpc.study.axes import coordinate_of
+from rubhpc.study.sampling import cases_per_point
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+
+def by_point(values: xr.DataArray, store: xr.Dataset) -> Floats:
+    """Return a scalar over the cases of a sample by base point, (n_point, n_range + 2).
+
+    Raises
+    ------
+    InputError
+        When some of the sample has been left out by selection.
+    """
+    n_point = int(_study(store).get("sample", {}).get("n", 0))
+    shape = (n_point, cases_per_point(len(drawn_axes(store))))
+    if values.size != math.prod(shape):
+        raise InputError(
+            f"{source(store)}: {values.size} of the {math.prod(shape)} cases of the sample are selected, and "
+            "its indices need all of them; select nothing of what was drawn"
+        )
+    rows: Floats = values.values.reshape(shape)
+    return rows
+
+
+def is_log(store: xr.Dataset, name: str) -> bool:
+    """Whether a quantity was drawn evenly in the logarithm."""
+    told = [about for key, about in _study(store).get("grid", {}).items() if coordinate_of(key) == name]
+    return bool(told) and told[0].get("scale") == "log"
+
+
+def ranges_told(store: xr.Dataset) -> list[str]:
+    """Return what each drawn axis was drawn from: "1.4 to 2.2", "1 to 30 GPa, log"."""
+    told = []
+    for name in drawn_axes(store):
+        key = next(key for key in _study(store)["grid"] if coordinate_of(key) == name)
+        about = _study(store)["grid"][key]
+        ends = np.array([about["start"], about["stop"]])
+        shown, label = displayed(xr.DataArray(ends, name=name, attrs={"units": about["unit"]}))
+        unit = label.rpartition(" (")[2].rstrip(")") if label.endswith(")") else ""
+        text = f"{shown[0]:.6g} to {shown[1]:.6g} {unit}".rstrip()
+        told.append(text + (", log" if about["scale"] == "log" else ""))
+    return told
+
+
+def _study(store: xr.Dataset) -> dict[str, Any]:
+    study = store.attrs.get("study")
+    return study if isinstance(study, dict) else {}
+
+
+def estimate(values: Floats, n_draw: int, confidence: float, seed: int) -> tuple[Floats, Floats]:
+    """Return first-order and total indices and half the width of their intervals, (2, n_range) each.
+
+    Parameters
+    ----------
+    values : (n_point, n_range + 2)
+        Of whole base points.
+    """
+    from SALib.analyze import sobol
+
+    n_range = values.shape[1] - 2
+    problem = {"num_vars": n_range, "names": list(range(n_range)), "bounds": [[0.0, 1.0]] * n_range}
+    found = sobol.analyze(
+        problem,
+        values.ravel(),
+        calc_second_order=False,
+        num_resamples=n_draw,
+        conf_level=confidence,
+        seed=np.random.default_rng(seed),  # a bare 0 would be no seed to SALib
+    )
+    return np.array([found["S1"], found["ST"]]), np.array([found["S1_conf"], found["ST_conf"]])

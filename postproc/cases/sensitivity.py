@@ -1,0 +1,213 @@
+"""Sobol indices of a scalar over the axes of a study: which of them it depends on, and which act together.
+
+A grid is a full factorial, so nothing is estimated where all cases are done (`postproc.cases.factorial`):
+with every level of an axis weighing the same and axes independent, the decomposition of the variance (I. M.
+Sobol', Math. Modelling Comput. Exp. 1, 1993) is a matter of means along axes, exact on the levels that were
+computed. The intervals tell what else could have come of other levels of the same range. The indices of a
+sampled study are estimates (`postproc.cases.saltelli`).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from postproc.cases.factorial import filled_in, grid_indices, half_widths
+from postproc.cases.saltelli import by_point, estimate, ranges_told
+from postproc.store.open import axes_of, drawn_axes, need, source
+from postproc.store.select import narrow, written_values
+from rubhpc.errors import InputError
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, VARIABLES
+from rubhpc.study.sampling import CASE
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+SCALARS = tuple(n for n, v in VARIABLES.items() if v.role in ("scalar", "setting"))
+MOST_FILLED = 0.1  # of the cases: a tenth, filled, moves an index of the Ishigami function by up to 0.04
+MOST_DROPPED = 0.5  # of the base points of a sample: one goes with each of its cases that has no value
+_CLOSE = 1e-10  # of the largest value: less is no spread
+
+
+def sensitivity(
+    store: xr.Dataset, scalar: str, *, n_draw: int = 500, confidence: float = 0.95, seed: int = 1
+) -> xr.Dataset:
+    """Return first-order and total Sobol indices of a scalar over the axes of several values, or of a sample.
+
+    Of a grid, levels without any usable case are left out; other cases without a value (missing, failed,
+    diverged, or done with a value that is not finite) are filled with the sum of main effects that fits the
+    rest best. Of a sample, a base point is left out with all its cases where one of them has no value. All of
+    it is told in `notes`.
+
+    Half the width of an interval is the normal quantile times the deviation over `n_draw` draws, as in SALib.
+    A draw takes as many levels of every axis again, with replacement and at least two different ones, and
+    adds a residual of the fit to each filled case; or it takes as many base points of a sample again.
+
+    Parameters
+    ----------
+    store : Dataset
+        All stators but one must have been left out by selection, and of a sampled study all but one value of
+        each other axis; axes of one value are dropped.
+    scalar : str
+        A measure or setting of a case.
+    confidence : float
+        Of the intervals, 0 to 1.
+
+    Returns
+    -------
+    Dataset over `axis`, the largest total index first
+        `first_order`, `total`: shares of the variance; `first_order_low`, `_high`, `total_low`, `_high`: ends
+        of the intervals, within 0 to 1 on a grid, while estimates may lie beyond; `levels`: how many were
+        used, or `drawn_from`: which range. Attributes `scalar`, `mean`, `standard_deviation`, `interactions`
+        (share of the variance that no axis has for itself), `cases` and how many of them were `filled` or
+        `dropped`, `notes` (text, one a line).
+
+    Raises
+    ------
+    InputError
+        No such scalar, fewer than one axis of two levels, too many cases without a value, or no variance.
+    """
+    if scalar not in SCALARS:
+        need(store, [scalar])
+        raise InputError(f"{source(store)}: {scalar}: no scalar of a case; choose {', '.join(SCALARS)}")
+    if drawn_axes(store):
+        found = _sampled(store, scalar, n_draw, confidence, seed)
+    else:
+        found = _gridded(store, scalar, n_draw, confidence, seed)
+    return found.isel(axis=np.argsort(-found["total"].values, kind="stable"))
+
+
+def _gridded(store: xr.Dataset, scalar: str, n_draw: int, confidence: float, seed: int) -> xr.Dataset:
+    values, notes = _levels(store, scalar)
+    usable = np.isfinite(values.values)
+    n_fill = usable.size - int(usable.sum())
+    _refuse_gaps(store, scalar, usable, notes, "filled")
+    filled, residuals = filled_in(values.values, usable)
+    if n_fill:
+        notes.append(f"{n_fill} of {usable.size} cases filled with the main effects of the others")
+    _need_variance(store, scalar, filled)
+    half = half_widths(filled, ~usable, residuals, n_draw, confidence, seed)
+    shares = grid_indices(filled)
+    found = _described(store, values, filled, [str(d) for d in values.dims], shares, half, confidence)
+    for name in ("first_order", "total"):  # shares, but for rounding
+        for end in ("", "_low", "_high"):
+            found[name + end] = found[name + end].clip(0.0, 1.0, keep_attrs=True)
+    found["levels"] = ("axis", np.array(values.shape), {"units": "1", "long_name": "levels of the axis"})
+    return found.assign_attrs(filled=n_fill, notes="\n".join(notes))
+
+
+def _sampled(store: xr.Dataset, scalar: str, n_draw: int, confidence: float, seed: int) -> xr.Dataset:
+    values, notes = _usable_values(store, scalar, [CASE])
+    rows = by_point(values, store)
+    usable = np.isfinite(rows)
+    whole = np.array([row.all() for row in usable])
+    _refuse_gaps(store, scalar, usable, notes, "left out")
+    n_drop = int((~whole).sum())
+    if n_drop > MOST_DROPPED * whole.size:
+        raise InputError(
+            f"{source(store)}: {scalar}: {n_drop} of {whole.size} base points of the sample have a case "
+            f"without a value ({'; '.join(notes)}); at most {MOST_DROPPED:.0%} can be left out: run the "
+            "study to its end"
+        )
+    if n_drop:
+        notes.append(f"{n_drop} of {whole.size} base points left out, since one of their cases has no value")
+    kept = rows[whole]
+    _need_variance(store, scalar, kept)
+    shares, half = estimate(kept, n_draw, confidence, seed)
+    # Of one base point the first and the last case are independent; the others repeat their values.
+    found = _described(store, values, kept[:, [0, -1]], drawn_axes(store), shares, half, confidence)
+    found["drawn_from"] = ("axis", ranges_told(store), {"long_name": "what the axis was drawn from"})
+    return found.assign_attrs(dropped=n_drop * rows.shape[1], notes="\n".join(notes))
+
+
+def _refuse_gaps(
+    store: xr.Dataset, scalar: str, usable: NDArray[np.bool_], notes: list[str], fate: str
+) -> None:
+    n_gap = usable.size - int(usable.sum())
+    if n_gap > MOST_FILLED * usable.size:
+        raise InputError(
+            f"{source(store)}: {scalar}: {n_gap} of {usable.size} cases have no value ({'; '.join(notes)}); "
+            f"at most {MOST_FILLED:.0%} can be {fate}: run the study to its end, or select axis values with "
+            "fewer of them"
+        )
+
+
+def _need_variance(store: xr.Dataset, scalar: str, values: Floats) -> None:
+    if not values.std() > _CLOSE * np.abs(values).max():
+        raise InputError(f"{source(store)}: {scalar}: the same in all cases; there is no variance to share")
+
+
+def _usable_values(store: xr.Dataset, scalar: str, spread: list[str]) -> tuple[xr.DataArray, list[str]]:
+    """Return the scalar over some axes, NaN where a case has no value, and what to tell of those."""
+    data = narrow(store, [scalar, "status"], spread).load()
+    status = data["status"]
+    values = data[scalar].astype(float).broadcast_like(status).transpose(*status.dims)
+    values.attrs = data[scalar].attrs
+    is_done = status == DONE
+    usable = is_done & np.isfinite(values)
+    return values.where(usable), _cases_told(status.values, (is_done & ~usable).values)
+
+
+def _levels(store: xr.Dataset, scalar: str) -> tuple[xr.DataArray, list[str]]:
+    """Return the scalar over axes and levels with cases, NaN where one has no value, and what to tell."""
+    spread = [a for a in axes_of(store) if store.sizes[a] > 1]
+    values, notes = _usable_values(store, scalar, spread)
+    usable = values.notnull()
+    for axis in spread:
+        is_level = usable.any([d for d in usable.dims if d != axis])
+        if is_level.any() and not is_level.all():
+            lost = written_values(store[axis][~is_level.values])
+            notes.append(f"{axis} = {lost}: no case with a value; left out")
+            values = values.isel({axis: np.flatnonzero(is_level)})
+    values = values.squeeze()
+    if not values.ndim or not usable.any():
+        raise InputError(
+            f"{source(store)}: {scalar}: no axis has two values with cases that are done; "
+            "run the study to its end, or select others"
+        )
+    return values, notes
+
+
+def _cases_told(status: NDArray[np.int8], is_odd: NDArray[np.bool_]) -> list[str]:
+    """How many cases have no value, and why."""
+    kinds = {MISSING: "missing", FAILED: "failed", DIVERGED: "diverged"}
+    counts = {text: int((status == code).sum()) for code, text in kinds.items()}
+    counts["done, but the value is not finite"] = int(is_odd.sum())
+    told = ", ".join(f"{n} {text}" for text, n in counts.items() if n)
+    return [f"of {status.size} cases {told}"] if told else []
+
+
+def _described(
+    store: xr.Dataset,
+    values: xr.DataArray,
+    used: Floats,
+    axes: list[str],
+    shares: Floats,
+    half: Floats,
+    confidence: float,
+) -> xr.Dataset:
+    """Shares and ends of their intervals, (2, n_axis) each, as a dataset over `axis`."""
+    found: dict[str, Any] = {}
+    texts = {"first_order": "first-order Sobol index", "total": "total Sobol index"}
+    for (name, text), share, width in zip(texts.items(), shares, half, strict=True):
+        found[name] = ("axis", share, {"units": "1", "long_name": text})
+        for end, value in (("low", share - width), ("high", share + width)):
+            about = {"units": "1", "long_name": f"{end} end of the {confidence:.0%} interval of the {text}"}
+            found[f"{name}_{end}"] = ("axis", value, about)
+    names = [str(store[a].attrs.get("long_name", a)) for a in axes]
+    selected = {str(name): at for name, at in values.coords.items() if at.ndim == 0}
+    about_all: dict[str, Any] = {
+        "scalar": str(values.name),
+        "scalar_name": str(values.attrs.get("long_name", values.name)),
+        "units": str(values.attrs.get("units", "1")),
+        "mean": float(used.mean()),
+        "standard_deviation": float(used.std()),
+        "interactions": max(0.0, 1.0 - float(shares[0].sum())),
+        "confidence": confidence,
+        "cases": values.size,
+    }
+    return xr.Dataset(found, {"axis": axes, "axis_name": ("axis", names), **selected}, about_all)

@@ -1,0 +1,139 @@
+"""Bifurcation diagrams: section points of a signal over an axis, by regime, period or way of the sweep."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postproc.figures.cells import is_geometric
+from postproc.figures.map_figure import categories
+from postproc.figures.section import section_of
+from postproc.store.open import find_axis, need_results, ordered_axes, source
+from postproc.store.select import narrow
+from postproc.store.units import displayed, meanings, scale_of, short_name
+from rubhpc.errors import InputError
+from rubhpc.schema import DONE
+from rubhpc.study.axes import DIRECTION
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+COLORINGS = ("regime", "period", DIRECTION)
+WIDTH = 180  # mm: two columns, since an axis has hundreds of values
+_MOST_DRAWN = 200_000  # points in a pdf or svg; of more, they become a picture in it
+_SIZES = 0.6, 3.5  # of the points, pt
+_LEAST_RANGE = 0.02  # of the largest value: points of one motion differ by rounding over all cases
+_WAYS = (("^", "#E69F00", 2.4), ("v", "#0072B2", 1.2))  # up and down: marker, colour, size
+
+
+def default_axis(store: xr.Dataset, along: str | None = None) -> str:
+    """Return the axis named, or else the longest one.
+
+    Raises
+    ------
+    InputError
+        There is no such axis, or none of several values.
+    """
+    if along:
+        return find_axis(store, along)
+    axes = ordered_axes(store, "a bifurcation diagram")
+    return max(axes, key=lambda a: store.sizes[a])
+
+
+def default_coloring(store: xr.Dataset, color: str | None = None) -> str:
+    """Return the colouring named, or else the way of the sweep where there are two of them, or the regime.
+
+    Raises
+    ------
+    InputError
+        By the way of the sweep in a store that holds but one.
+    """
+    ways = store.sizes.get(DIRECTION, 1)
+    if color == DIRECTION and ways < 2:
+        raise InputError(
+            f'{source(store)}: color: no two directions to tell apart; sweep an axis "both" ways, '
+            'or color by "regime"'
+        )
+    return color or (DIRECTION if ways > 1 else "regime")
+
+
+def bifurcation_data(store: xr.Dataset, signal: str, along: str, over: str | None = None) -> xr.Dataset:
+    """Return the section of a signal with regime, period and status, over ([over,] along, section); lazy.
+
+    Raises
+    ------
+    InputError
+        Axes besides these have several values, or the store keeps neither section nor waveform.
+    """
+    name = f"section_{signal}"
+    store = store.assign({name: section_of(store, signal)})
+    spread = [along] if over is None else [over, along]
+    data = narrow(store, [name, "regime", "period", "status"], spread).sortby(along)
+    return data.transpose(*spread, "section", ...)
+
+
+def bifurcation(data: xr.Dataset, signal: str, ax: Axes, color: str | None = "regime") -> Axes:
+    """Draw the points of `bifurcation_data` over its axis, by regime, period, direction or in one colour."""
+    section = data[f"section_{signal}"].load()
+    need_results(section, data)
+    along = str(section.dims[-2])
+    x, x_label = displayed(data[along])
+    scale = scale_of(section)
+    size = float(np.clip(2.0 * np.sqrt(80 / x.size), *_SIZES))
+    groups = _directions(data, section, size) if color == DIRECTION else _groups(data, section, size, color)
+    for style, chosen, values in groups:
+        ax.plot(
+            np.repeat(x[chosen], values.shape[1]),
+            values.ravel() * scale.factor,
+            linestyle="",
+            markeredgewidth=0.0,
+            rasterized=section.size > _MOST_DRAWN,
+            **style,
+        )
+    if color is not None:
+        ax.figure.legend(
+            loc="outside upper right", ncols=16, markerscale=4.0 / size, handletextpad=0.2, columnspacing=1.0
+        )
+    ax.margins(x=0.01)
+    if is_geometric(x):
+        ax.set_xscale("log")
+    _widen(ax, section.values * scale.factor)
+    ax.set(xlabel=x_label, ylabel=scale.label(f"{short_name(section)},\nonce a revolution"))
+    return ax
+
+
+def _groups(
+    data: xr.Dataset, section: xr.DataArray, size: float, color: str | None
+) -> Iterator[tuple[dict[str, Any], NDArray[np.bool_], NDArray[Any]]]:
+    """Yield how to draw each regime, period or all of them, where along the axis it is, and its points."""
+    style: dict[str, Any] = {"marker": "o", "markersize": size}
+    if color is None:
+        yield {**style, "color": "C0"}, np.ones(len(section), bool), section.values
+        return
+    codes = np.where(data["status"].values == DONE, data[color].values, -1)
+    for code, (name, shade) in categories(color, codes).items():
+        chosen = codes == code
+        yield {**style, "color": shade, "label": name}, chosen, section.values[chosen]
+
+
+def _directions(
+    data: xr.Dataset, section: xr.DataArray, size: float
+) -> Iterator[tuple[dict[str, Any], NDArray[np.bool_], NDArray[Any]]]:
+    """Yield how to draw each way of the sweep; of points that both have, one shows around the other."""
+    for i, name in enumerate(meanings(data[DIRECTION])):
+        marker, shade, larger = _WAYS[i]
+        style = {"marker": marker, "color": shade, "markersize": larger * size, "label": name}
+        yield style, np.ones(section.shape[1], bool), section.values[i]
+
+
+def _widen(ax: Axes, y: NDArray[np.float64]) -> None:
+    """Keep points that differ by rounding from filling the axes."""
+    low, high = float(np.nanmin(y)), float(np.nanmax(y))
+    least = _LEAST_RANGE * max(abs(low), abs(high))
+    if high - low < least:
+        ax.set_ylim((low + high - least) / 2, (low + high + least) / 2)

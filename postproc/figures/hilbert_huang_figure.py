@@ -1,0 +1,132 @@
+"""Hilbert-Huang analysis as a figure: the signal, and its energy over time and frequency."""
+
+from __future__ import annotations
+
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.signals.hilbert_huang import energy_picture, median_frequency
+from postproc.store.units import scale_for, scale_of, short_name
+from rubhpc.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+
+_DECIBELS = 40.0  # of energy below its peak that are shown
+_BLUR = 0.006  # of the ordinate: the half width of a line
+_LABEL_WIDTH = 20  # characters that fit beside a panel
+_SHADE = "0.9"
+
+
+def energy_time_frequency(
+    hht: xr.Dataset,
+    ax: Axes,
+    limit: float | None = None,
+    natural: Mapping[str, float] | None = None,
+    mode: int = 1,
+    colorbar: bool = True,
+) -> Axes:
+    """Draw the energy of an intrinsic mode over time and frequency; contact is shaded.
+
+    Parameters
+    ----------
+    limit : float, optional
+        End of the ordinate, Hz; by default twice the median frequency.
+    natural : mapping of name to Hz, optional
+        Natural frequencies to be marked.
+    colorbar : bool
+        Beside `ax`.
+    """
+    mesh = _draw_energy(hht, ax, limit, natural or {}, mode)
+    if colorbar:
+        _add_bar(ax, [ax], mesh)
+    return ax
+
+
+def panels(
+    hht: xr.Dataset,
+    axes: Sequence[Axes],
+    limit: float | None = None,
+    natural: Mapping[str, float] | None = None,
+    mode: int = 1,
+) -> list[Axes]:
+    """Draw the signal with its intrinsic mode in the upper axes, its energy in the lower ones."""
+    upper, lower = axes
+    scale = scale_of(hht["signal"])
+    time = scale_for("s", float(hht["time"].values[-1]))
+    x = hht["time"].values * time.factor
+    upper.plot(x, hht["signal"].values * scale.factor, color="0.55", linewidth=0.7, label="recorded")
+    name = f"mode {mode}" + (", windowed" if hht.attrs["contact"] == "masked" else "")
+    upper.plot(x, hht["imf"].sel(mode=mode).values * scale.factor, color="C0", label=name)
+    label = scale.label(short_name(hht["signal"].rename(hht.attrs["signal"])))
+    upper.set_ylabel(fill(label, _LABEL_WIDTH))
+    upper.locator_params(axis="y", nbins=5)
+    low, high = upper.get_ylim()
+    upper.set_ylim(low, high + 0.2 * (high - low))  # room for the legend
+    upper.legend(loc="upper right", ncols=2)
+    _shade(hht, upper, time.factor)
+    mesh = _draw_energy(hht, lower, limit, natural or {}, mode)
+    upper.label_outer()
+    upper.figure.align_ylabels([upper, lower])
+    _add_bar(lower, [upper, lower], mesh)
+    return [upper, lower]
+
+
+def _draw_energy(
+    hht: xr.Dataset, ax: Axes, limit: float | None, natural: Mapping[str, float], mode: int
+) -> ScalarMappable:
+    import matplotlib
+    from scipy.ndimage import gaussian_filter1d
+
+    middle = float(median_frequency(hht, mode))
+    if not np.isfinite(middle):
+        raise InputError(
+            f"hht: {hht.attrs['signal']} has no mode {mode} in these spans: it does not oscillate between "
+            "contacts; take more samples a revolution, or another signal"
+        )
+    limit = limit or 2.0 * max(middle, *natural.values(), 0.0)
+    picture = energy_picture(hht, limit, n_frequency=200, mode=mode)
+    time = scale_for("s", float(hht["time"].values[-1]))
+    energy = gaussian_filter1d(picture.values, _BLUR * picture.sizes["frequency"], axis=0, mode="constant")
+    with np.errstate(divide="ignore"):
+        level = 10 * np.log10(energy / (energy.max() or 1.0))
+    _shade(hht, ax, time.factor)
+    cmap = matplotlib.colormaps["viridis_r"].copy()
+    mesh: ScalarMappable = ax.pcolormesh(
+        picture["time"].values * time.factor,
+        picture["frequency"].values,
+        np.ma.masked_less(level, -_DECIBELS),
+        cmap=cmap,
+        vmin=-_DECIBELS,
+        vmax=0.0,
+        rasterized=True,
+        zorder=2,
+    )
+    ax.set(xlim=(0, float(hht["time"].values[-1]) * time.factor), ylim=(0, limit))
+    ax.set(xlabel=time.label("Time"), ylabel=fill("Instantaneous frequency (Hz)", _LABEL_WIDTH))
+    for name, frequency in natural.items():
+        if 0 < frequency < limit:
+            label = f"{name} {frequency:.4g} Hz"
+            ax.axhline(frequency, color="C1", linewidth=0.7, linestyle="--", zorder=1, label=label)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc="upper right", handlelength=2.2)
+    return mesh
+
+
+def _shade(hht: xr.Dataset, ax: Axes, factor: float) -> None:
+    time = hht["time"].values
+    ends = np.diff(np.pad(hht["contact"].values.astype(np.int8), 1))
+    dt = time[1] - time[0]
+    for first, end in zip(np.flatnonzero(ends == 1), np.flatnonzero(ends == -1), strict=True):
+        ax.axvspan(first * dt * factor, end * dt * factor, color=_SHADE, linewidth=0, zorder=0)
+
+
+def _add_bar(ax: Axes, beside: list[Axes], mesh: ScalarMappable) -> None:
+    bar = ax.figure.colorbar(mesh, ax=beside, pad=0.02, aspect=30)
+    bar.set_label("Energy (dB of its peak)")

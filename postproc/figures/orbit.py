@@ -1,0 +1,93 @@
+"""Orbits of the disc: whirl in the plane of the bearings, with stator, keyphasor mark and Poincaré points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.figures.overlay import overlaid
+from postproc.signals.spectra import last_revolutions, samples_per_revolution
+from postproc.store.open import find_axis, need_results
+from postproc.store.rig import stator_places
+from postproc.store.select import narrow
+from postproc.store.units import scale_for
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+
+def orbit_data(store: xr.Dataset, revolutions: int | None = None, over: str | None = None) -> xr.Dataset:
+    """Return the last revolutions of vertical and horizontal motion, with the clearance; lazy.
+
+    Parameters
+    ----------
+    store : Dataset
+        One case, or cases along the axis `over`.
+    revolutions : int, optional
+        How many; all that were recorded by default.
+    """
+    names = ["vertical", "horizontal", "clearance"]
+    data = narrow(store, names, [find_axis(store, over)] if over else [])
+    if revolutions is not None:
+        kept = last_revolutions(data["vertical"], revolutions)
+        data = data.isel(sample=slice(-kept.sizes["sample"], None))
+    return data
+
+
+def orbit(data: xr.Dataset, ax: Axes) -> Axes:
+    """Draw an orbit, or those along one axis over one another; positive spin turns clockwise.
+
+    One case also shows the clearance circle, where its stators stand, the first sample (ring), one point a
+    revolution (dots) and the sense of whirl (arrow).
+    """
+    vertical, horizontal = data["vertical"].load(), data["horizontal"].load()
+    need_results(vertical, data)
+    size = float(np.nanmax(np.abs([vertical.values, horizontal.values])))
+    scale = scale_for("m", size)
+    if vertical.ndim == 1:
+        _draw_bench(data, ax, scale.factor, 1.15 * size * scale.factor)
+        _draw_one(vertical, horizontal, ax, scale.factor)
+    else:
+        curves = zip(overlaid(vertical, "sample"), overlaid(horizontal, "sample"), strict=True)
+        for (name, y), (_, z) in curves:
+            ax.plot(z.values * scale.factor, y.values * scale.factor, linewidth=0.5, label=name)
+        ax.legend(loc="upper right")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.locator_params(nbins=6)
+    ax.set(xlabel=scale.label("Horizontal displacement"), ylabel=scale.label("Vertical displacement"))
+    return ax
+
+
+def _draw_one(vertical: xr.DataArray, horizontal: xr.DataArray, ax: Axes, factor: float) -> None:
+    n = samples_per_revolution(vertical)
+    y, z = vertical.values * factor, horizontal.values * factor
+    # A closed orbit is drawn closed: the last sample stands one interval short of the first.
+    is_closed = np.hypot(y[-1] - y[0], z[-1] - z[0]) < 3 * np.hypot(y[1] - y[0], z[1] - z[0])
+    path = np.append(np.arange(y.size), 0) if is_closed else np.arange(y.size)
+    ax.plot(z[path], y[path], color="C0", linewidth=0.5, zorder=3)
+    ax.plot(z[::n], y[::n], ".", color="C1", markersize=3, zorder=5)
+    ax.plot(z[0], y[0], "o", color="C1", markerfacecolor="none", markersize=5, markeredgewidth=0.8, zorder=5)
+    start = n // 8  # an eighth of a turn past the mark, clear of it
+    arrow = {"arrowstyle": "-|>", "color": "C0", "mutation_scale": 8, "linewidth": 0}
+    ax.annotate("", (z[start + 2], y[start + 2]), xytext=(z[start], y[start]), arrowprops=arrow, zorder=4)
+
+
+def _draw_bench(data: xr.Dataset, ax: Axes, factor: float, reach: float) -> None:
+    """Add the clearance circle and a stub of each stator; `reach` bounds what is worth showing."""
+    from matplotlib.patches import Circle, Polygon
+
+    clearance = float(data["clearance"].values) * factor
+    if not 0 < clearance < 3 * reach:
+        return
+    edge = {"edgecolor": "0.6", "linestyle": ":", "linewidth": 0.7}
+    ax.add_patch(Circle((0, 0), clearance, fill=False, zorder=1, **edge))
+    for angle, offset in stator_places(data):
+        gap = clearance + offset * factor
+        # Normal from the disc to the stator and tangent along its face; the plane is (horizontal, vertical).
+        n, t = np.array([np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), -np.sin(angle)])
+        half, deep = 0.2 * reach * t, 0.12 * reach * n
+        face = np.array([gap * n - half, gap * n + half])
+        ax.add_patch(Polygon([*face, *(face[::-1] + deep)], facecolor="0.85", edgecolor="none", zorder=1))
+        ax.plot(face[:, 0], face[:, 1], color="0.35", linewidth=0.9, zorder=2)

@@ -1,0 +1,135 @@
+"""Maps of a sampled study: a point a case over two of the quantities that were drawn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postproc.cases.saltelli import is_log
+from postproc.figures.map_figure import (
+    CATEGORIES,
+    NOT_DONE,
+    WARNING,
+    color_bar,
+    coloured,
+    legend_below,
+    name_facets,
+    paint_of,
+    reasons_of,
+)
+from postproc.store.open import axes_of, drawn_axes, source
+from postproc.store.units import displayed
+from rubhpc.errors import InputError
+from rubhpc.schema import DONE
+from rubhpc.study.axes import SPEED_AXES, coordinate_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+_INK = 5000.0  # points squared of all marks together, about: they grow small as they become many
+_SMALLEST, _LARGEST = 3.0, 24.0  # points squared
+
+
+def scatter_axes(store: xr.Dataset, x: str | None = None, y: str | None = None) -> tuple[str, str]:
+    """Return the drawn quantities across and up: those named, else a speed and then the first others.
+
+    Raises
+    ------
+    InputError
+        One that is named was not drawn, or both are the same.
+    """
+    drawn = drawn_axes(store)
+    named = [coordinate_of(name) if name else None for name in (x, y)]
+    for name in named:
+        if name is not None and name not in drawn:
+            what = "is an axis: name it with --facet" if name in axes_of(store) else "was not drawn"
+            raise InputError(f"{source(store)}: {name}: {what}; the sample has {', '.join(drawn)}")
+    in_order = dict.fromkeys(name for name in (*SPEED_AXES, *drawn) if name in drawn)
+    free = [name for name in in_order if name not in named]
+    across, up = (name or free.pop(0) for name in named)
+    if across == up:
+        raise InputError(f"{source(store)}: {across} stands on both axes; name another one")
+    return across, up
+
+
+def scatter_maps(
+    data: xr.Dataset, value: str, x: str, y: str, axes: Sequence[Axes], log: bool = False
+) -> Sequence[Axes]:
+    """Draw the points of `postproc.cases.maps.map_data`, a panel for each value of its facets, in one scale.
+
+    Flags and periods have distinct colours, other scalars a continuous bar. A case without a result is a grey
+    cross, and a ring marks what is out of the model's range.
+
+    Parameters
+    ----------
+    data : Dataset over (row, column, case), (column, case) or (case,)
+    x, y : str
+        Coordinates over `case`.
+    axes : sequence of Axes
+        As many as there are facets, row by row.
+    """
+    *facets, case = map(str, data[value].dims)
+    across, x_label = displayed(data[x])
+    up, y_label = displayed(data[y])
+    shown, is_known = coloured(data, value)
+    paint = paint_of(shown, log)
+    size = float(np.clip(_INK / data.sizes[case], _SMALLEST, _LARGEST))
+    handles: dict[str, Artist] = {}
+    for ax, place in zip(axes, np.ndindex(*(data.sizes[f] for f in facets)), strict=True):
+        at = dict(zip(facets, place, strict=True))
+        colours = paint.cells(shown.isel(at).values)
+        has_colour = ~np.ma.getmaskarray(colours)
+        points = ax.scatter(
+            across[has_colour],
+            up[has_colour],
+            size,
+            colours[has_colour],
+            norm=paint.norm,
+            cmap=paint.cmap,
+            linewidths=0,
+            rasterized=data.sizes[case] > 5000,
+            zorder=2,
+        )
+        if not is_known:
+            for mark in _marks(ax, across, up, data.isel(at), value, size, reasons_of(data)):
+                handles[str(mark.get_label())] = mark
+        for name, set_scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
+            if is_log(data, name):
+                set_scale("log")
+    color_bar(axes, points, paint)
+    name_facets(axes, data, facets, x_label, y_label)
+    legend_below(axes[0], list(handles.values()))
+    return axes
+
+
+def _marks(
+    ax: Axes,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    data: xr.Dataset,
+    value: str,
+    size: float,
+    reasons: str,
+) -> list[Artist]:
+    """Cross what has no result or no value, ring what is out of the model's range; return what names them."""
+    status = data["status"].values
+    is_done = status == DONE
+    told: list[tuple[NDArray[np.bool_], dict[str, Any]]] = [
+        (status == code, {"label": name, "marker": "x", "color": str(float(grey) / 2), "linewidths": 0.8})
+        for code, (name, grey, _) in NOT_DONE.items()
+    ]
+    empty = is_done & np.isnan(np.asarray(data[value].values, dtype=float))
+    told.append((empty, {"label": "no value", "marker": "+", "color": "0.6", "linewidths": 0.6}))
+    ring = {"s": 2.5 * size, "marker": "o", "facecolors": "none", "linewidths": 0.5}
+    colour = "k" if value in CATEGORIES else WARNING
+    beyond = is_done & (data["validity"].values > 0)
+    told.append((beyond, ring | {"label": f"out of range: {reasons}", "edgecolors": colour}))
+    return [
+        ax.scatter(x[mask], y[mask], **{"s": size, "zorder": 3} | style) for mask, style in told if mask.any()
+    ]

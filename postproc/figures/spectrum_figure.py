@@ -1,0 +1,102 @@
+"""One spectrum as a figure: amplitudes over frequency or orders, the strongest lines named."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postproc.figures.overlay import overlaid
+from postproc.signals.lines import SPIKE, spikes, strongest_lines
+from postproc.store.open import need_results
+from postproc.store.units import scale_of, short_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+_FLOOR = 1e-5  # of the highest line, on a log scale
+_NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
+
+
+def spectrum(
+    amplitude: xr.DataArray,
+    ax: Axes,
+    lines: xr.Dataset | None = None,
+    abscissa: str = "frequency",
+    limit: float | None = None,
+    log: bool = False,
+) -> Axes:
+    """Draw a spectrum, or those of several cases over one another.
+
+    Parameters
+    ----------
+    amplitude : ([over,] order)
+        Single-sided, or the full spectrum of the whirl; with the coordinate `frequency` unless drawn over
+        orders.
+    lines : Dataset, optional
+        From `strongest_lines`; each is named at its peak.
+    abscissa : {"frequency", "order"}
+    limit : float, optional
+        End of the abscissa, Hz or orders.
+    """
+    amplitude = amplitude.load()
+    need_results(amplitude, amplitude.to_dataset())
+    is_line = np.abs(amplitude["order"]) > 1e-9  # the mean is no line
+    amplitude = amplitude.where(is_line)
+    scale = scale_of(amplitude)
+    end = float(np.nanmax(amplitude[abscissa].values)) if limit is None else limit
+    for name, curve in overlaid(amplitude, "order"):
+        ax.plot(
+            *spikes(curve[abscissa].values, curve.fillna(0.0).values * scale.factor, SPIKE * end),
+            label=name,
+            linewidth=0.6,
+        )
+    is_full = bool((amplitude["order"].values < 0).any())
+    ax.set_xlim(-end if is_full else 0.0, end)
+    top = float(amplitude.max()) * scale.factor or 1.0
+    if log:
+        ax.set_yscale("log")
+        ax.set_ylim(top * _FLOOR, top * 6)
+    else:
+        ax.set_ylim(0, top * 1.15)
+    if lines is not None:
+        _name_lines(ax, lines, scale.factor, abscissa)
+    if amplitude.ndim > 1:
+        ax.legend(loc="upper right")
+    ax.set_xlabel(_NAMES[abscissa])
+    ax.set_ylabel(scale.label(f"{short_name(amplitude)} amplitude"))
+    if is_full:
+        for side, x in (("backward", 0.02), ("forward", 0.98)):
+            ax.text(x, 0.96, side, ha="left" if x < 0.5 else "right", va="top", transform=ax.transAxes)
+    return ax
+
+
+def default_limit(amplitude: xr.DataArray, abscissa: str = "frequency") -> float:
+    """Return where the abscissa ends unless told: beyond the strongest lines, and not before 4X."""
+    ends: list[float] = []
+    for _, curve in overlaid(amplitude, "order"):
+        first = float(curve[abscissa].values[-1] / curve["order"].values[-1])  # 1X
+        lines = strongest_lines(curve)[abscissa].values
+        least = 2.2 if curve["order"].values[0] < 0 else 4.2
+        ends += [least * first, *(1.2 * np.abs(lines))]
+    return min(max(ends), float(np.nanmax(amplitude[abscissa].values)))
+
+
+def _name_lines(ax: Axes, lines: xr.Dataset, factor: float, abscissa: str) -> None:
+    """Name the lines, the strongest first; one too near to a named one for its text to fit goes unnamed."""
+    is_full = ax.get_xlim()[0] < 0
+    to_axes = ax.transData + ax.transAxes.inverted()
+    taken: list[tuple[float, float]] = []
+    for i in range(lines.sizes["line"]):
+        x, y = float(lines[abscissa].values[i]), float(lines["amplitude"].values[i]) * factor
+        across, up = to_axes.transform((x, y))
+        # Names of backward and forward lines stand on their outer sides, clear of one another.
+        across += 0.045 * np.sign(x) if is_full else 0.0
+        if not 0 <= across <= 1 or any(abs(across - a) < 0.09 and abs(up - b) < 0.08 for a, b in taken):
+            continue
+        taken.append((across, up))
+        side = ("right" if x < 0 else "left") if is_full else "center"
+        text = str(lines["name"].values[i])
+        style: dict[str, Any] = {"ha": side, "va": "bottom", "fontsize": 6.5}
+        ax.annotate(text, (x, y), xytext=(0, 1.5), textcoords="offset points", annotation_clip=True, **style)

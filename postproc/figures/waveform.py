@@ -1,0 +1,101 @@
+"""Waveforms: stacked panels of what was recorded, over time or revolutions."""
+
+from __future__ import annotations
+
+import math
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.figures.overlay import overlaid
+from postproc.signals.spectra import check_signal, last_revolutions
+from postproc.store.open import find_axis, need_results
+from postproc.store.select import narrow
+from postproc.store.units import displayed, scale_of, short_name
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+DEFAULT_SIGNALS = ("vertical", "horizontal", "torsion", "contact_force")
+_LABEL_WIDTH = 18  # characters that fit beside a low panel
+
+
+def waveform_data(
+    store: xr.Dataset,
+    signals: Sequence[str] = DEFAULT_SIGNALS,
+    revolutions: int | None = 4,
+    over: str | None = None,
+) -> xr.Dataset:
+    """Return the last revolutions of some signals; lazy.
+
+    Parameters
+    ----------
+    store : Dataset
+        One case (and one stator, for a stator's signals), or cases along the axis `over`.
+    revolutions : int, optional
+        How many; None for all that were recorded.
+
+    Returns
+    -------
+    Dataset
+        The signals over `sample`, with the coordinate `revolution` and, where all cases turn at one speed,
+        `time` (s) from the first sample kept.
+    """
+    for signal in signals:
+        check_signal(signal)
+    data = narrow(store, [*dict.fromkeys(signals), "spin_speed"], [find_axis(store, over)] if over else [])
+    if revolutions is not None:
+        kept = last_revolutions(data[signals[0]], revolutions)
+        data = data.isel(sample=slice(-kept.sizes["sample"], None))
+    spin = np.unique(data["spin_speed"].values)
+    if spin.size == 1 and spin[0] > 0:
+        time = (data["revolution"] - data["revolution"][0]) * (2 * math.pi / float(spin[0]))
+        data = data.assign_coords(time=time.assign_attrs(units="s", long_name="time"))
+    return data
+
+
+def waveform(signal: xr.DataArray, ax: Axes) -> Axes:
+    """Draw one signal, or that of several cases over one another, over time or else revolutions."""
+    signal = signal.load()
+    need_results(signal, signal.to_dataset())
+    scale = scale_of(signal)
+    x, x_label = displayed(_abscissa(signal))
+    for name, curve in overlaid(signal, "sample"):
+        ax.plot(x, curve.values * scale.factor, label=name)
+    ax.set(xlim=(x[0], x[-1]), xlabel=x_label, ylabel=scale.label(short_name(signal)))
+    return ax
+
+
+def panels(data: xr.Dataset, axes: Sequence[Axes]) -> list[Axes]:
+    """Draw every signal of `waveform_data` in its own panel; contact is shaded where it was recorded."""
+    signals = [str(n) for n, v in data.data_vars.items() if "sample" in v.dims]
+    for ax, name in zip(axes, signals, strict=True):
+        waveform(data[name], ax)
+        ax.set_ylabel(fill(ax.get_ylabel(), _LABEL_WIDTH), fontsize=7)
+        ax.label_outer()
+        ax.locator_params(axis="y", nbins=4)
+    axes[0].figure.align_ylabels(list(axes))
+    if "contact_force" in data and data["contact_force"].ndim == 1:
+        for ax in axes:
+            shade_contacts(data["contact_force"], ax)
+    handles, labels = axes[0].get_legend_handles_labels()
+    if handles:
+        axes[0].figure.legend(handles, labels, loc="outside lower center", ncols=min(len(handles), 4))
+    return list(axes)
+
+
+def shade_contacts(force: xr.DataArray, ax: Axes) -> None:
+    """Shade the spans of contact behind a waveform, by the force of one stator."""
+    x, _ = displayed(_abscissa(force))
+    touching = np.diff(np.pad((force.values > 0).astype(int), 1))
+    half = (x[1] - x[0]) / 2  # a sample is a mean over its interval
+    for first, last in zip(np.flatnonzero(touching == 1), np.flatnonzero(touching == -1) - 1, strict=True):
+        ax.axvspan(x[first] - half, x[last] + half, color="0.9", linewidth=0, zorder=0)
+
+
+def _abscissa(signal: xr.DataArray) -> xr.DataArray:
+    return signal["time"] if "time" in signal.coords else signal["revolution"]

@@ -1,0 +1,114 @@
+"""Figures over speed, on the stiff stator: orbits at the pseudo-critical speeds (5) and the cascade (20)."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from postproc.figures.cascade_figure import draw_frequencies, draw_orders, waterfall
+from postproc.mokhtar2017.claims.cases import STIFF, cases
+from postproc.mokhtar2017.claims.measures import strongest
+from postproc.mokhtar2017.claims.speed import (
+    crest,
+    largest_orbit,
+    pseudo_critical_frequency,
+    torsional_cascade,
+)
+from postproc.mokhtar2017.figures.page import page, title
+from postproc.mokhtar2017.figures.panels import orbits
+from postproc.store.rig import natural_frequencies
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_BESIDE = 0.2  # in r: the speeds shown on either side of a resonance
+_BANDS = ((1.2, 2.4), (2.8, 4.0), (4.6, 6.0))  # of r, that hold one resonance each
+_ORDERS = [Fraction(*f) for f in ((1, 3), (1, 2), (2, 3), (1, 1), (4, 3), (3, 2), (2, 1), (3, 1))]
+_LIMIT = 250.0  # Hz
+_HEIGHT = 0.16  # of the highest line, as a part of the ordinate
+
+
+def resonances(store: xr.Dataset) -> Figure:
+    """Fig. 5: orbits at and on either side of the largest one, for 1X, 1/2X and 1/3X."""
+    figure, ax = page("abc", 85)
+    for panel, band in zip(ax.values(), _BANDS, strict=True):
+        at = float(largest_orbit(store, *band)["speed_ratio"])
+        near = cases(store, speed_ratio=[at - _BESIDE, at, at + _BESIDE], stator_youngs_modulus=STIFF)
+        orbits(near, panel, "speed_ratio")
+        panel.legend(loc="lower right")
+        title(panel, f"about $r$ = {at:.1f}")
+    return figure
+
+
+def cascade(store: xr.Dataset) -> Figure:
+    """Fig. 20: torsional spectra over speed, with orders, natural and pseudo-critical frequencies."""
+    spectra = torsional_cascade(store)
+    figure, axes = page("a", 140, width=140)
+    ax = axes["a"]
+    torsional = float(natural_frequencies(cases(store, stator_youngs_modulus=STIFF))["torsional"])
+    bending = pseudo_critical_frequency(store)
+    waterfall(spectra, ax, _LIMIT, height=_HEIGHT)
+    draw_orders(ax, spectra, _ORDERS)
+    draw_frequencies(ax, spectra, {"torsional": torsional, "pseudo-critical": bending})
+    for letter, speed, frequency, amplitude in _markers(spectra, torsional, bending):
+        _mark(ax, letter, frequency, speed, amplitude / float(spectra.where(spectra["order"] > 0).max()))
+    ax.set_title("")
+    return figure
+
+
+def _markers(
+    spectra: xr.DataArray, torsional: float, bending: float
+) -> Iterator[tuple[str, float, float, float]]:
+    """Yield the paper's markers with speed ratio, frequency (Hz) and amplitude of the lines they stand at.
+
+    a, b, c: 1X, 1/2X and 1/3X crest at the pseudo-critical frequency; d, e, g: 2X, 3X and 1X crest at the
+    torsional one; h, i: multiples of 1/3X beside c; j, k: multiples of 1/2X beside b; f: r = 5.7. What does
+    not crest is not marked.
+    """
+    crests = {
+        letter: (Fraction(*order), crest(spectra, Fraction(*order), frequency))
+        for letter, order, frequency in (
+            ("a", (1, 1), bending),
+            ("b", (1, 2), bending),
+            ("c", (1, 3), bending),
+            ("d", (2, 1), torsional),
+            ("e", (3, 1), torsional),
+            ("g", (1, 1), torsional),
+        )
+    }
+    at = crests | {
+        "h": (Fraction(1), crests["c"][1]),
+        "i": (Fraction(4, 3), crests["c"][1]),
+        "j": (Fraction(3, 2), crests["b"][1]),
+        "k": (Fraction(2), crests["b"][1]),
+    }
+    for letter, (order, speed) in at.items():
+        if math.isnan(speed):
+            continue
+        line = spectra.sel(speed_ratio=speed, method="nearest")
+        line = line.sel(order=float(order), method="nearest")
+        yield letter, speed, float(line["frequency"]), float(line)
+    ((_, frequency, amplitude),) = strongest(spectra.sel(speed_ratio=5.7, method="nearest"))
+    yield "f", 5.7, frequency, amplitude
+
+
+def _mark(ax: Axes, letter: str, frequency: float, speed: float, share: float) -> None:
+    """Add a marker beside a line whose height is `share` of the highest."""
+    low, high = ax.get_ylim()
+    span = (high - low) / (1 + _HEIGHT + 0.06)  # that of the rows, of which `waterfall` takes heights
+    ax.annotate(
+        letter,
+        (frequency, speed + 0.5 * share * _HEIGHT * span),
+        xytext=(3, 0),
+        textcoords="offset points",
+        fontsize=8,
+        fontweight="bold",
+        color="C1",
+        va="center",
+        zorder=8,
+    )

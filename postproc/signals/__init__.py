@@ -1,0 +1,1 @@
+"""Analysis of recorded signals: spectra, contacts, decay, Hilbert-Huang."""

@@ -1,0 +1,292 @@
+"""Rub indicators: what a case's measured vibration says of contact, under noise.
+
+The paper proposes to tell rub from rotor and stator vibration together. Each indicator here is a level in dB
+that rises with rub and uses only what a test rig measures: both lateral motions of the disc, its torsion, the
+lateral vibration of a stator. The contact force is never looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from postproc.signals.spectra import samples_per_revolution
+from postproc.store.open import axes_of, need_results, source
+from postproc.store.rig import natural_frequencies, rig_axes, stator_frequencies
+from postproc.store.select import narrow
+from rubhpc.errors import InputError
+from rubhpc.schema import DONE, REGIME
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Lines = NDArray[np.complex128]
+
+INDICATORS = {
+    "torsion_harmonics": "power density of torsion at multiples of 1/2X and 1/3X near its natural frequency",
+    "lateral_subharmonics": "power density of whirl at 1/3X, 1/2X and 2/3X, forward and backward",
+    "stator_resonance": "power of the stator's lateral vibration around its natural frequency",
+    "contact_periodicity": "periodicity of the bursts of that vibration",
+}
+CHANNELS = ("vertical", "horizontal", "torsion", "stator_lateral")
+LEVELS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+_WHOLE = 6  # revolutions that hold whole periods of half and of third orders
+_SUBHARMONICS = (1 / 3, 1 / 2, 2 / 3)
+_BENIGN = (1, 2, 3)  # multiples of 1X that misalignment, a drive or the floor bring in without rub
+_BANDWIDTH = 1000.0  # Hz in which white noise has the rms that its level says
+_BAND = 0.3  # half width of the stator's band, over its natural frequency
+_BURSTS = (1 / 3, 1 / 2, 2 / 3, 1.0, 2.0)  # orders at which bursts repeat
+_SMALLEST = 1e-300  # power of a line that is exactly zero, of which there is no logarithm
+
+
+class Noise(NamedTuple):
+    """Measurement noise, added to every channel; see `indicator_scores`."""
+
+    levels: Floats  # (n_level,)
+    n_draw: int
+    seed: int
+
+
+def indicator_scores(
+    store: xr.Dataset, levels: Sequence[float] = LEVELS, n_draw: int = 3, seed: int = 1
+) -> xr.Dataset:
+    """Return the indicators of every case of a store under measurement noise; lazy.
+
+    Noise of level 1 is, in each channel, white Gaussian noise whose rms in 1 kHz is that channel's median
+    vibration over the cases that touch, and, as strong again, benign harmonics: random 1X, 2X and 3X such as
+    misalignment or a drive bring in. Both are drawn line by line of the spectrum, which for whole revolutions
+    is the same as in time. A case's draws depend on `seed` and its place in the study only, and are the same
+    at all levels.
+
+    Parameters
+    ----------
+    store : Dataset
+        Waveforms of many cases, some of which touch and some of which do not; one stator.
+    levels : sequence of float
+        Of the noise, above 0.
+    n_draw : int
+        Draws of the noise for each case.
+
+    Returns
+    -------
+    Dataset over (axes, level, draw)
+        The four indicators in dB of SI units squared, for densities a hertz (NaN where a case is not done); a
+        density lets white noise read the same however long a revolution takes. Over the axes `rub`, whether
+        the case touches; over `channel` `reference`, the rms that a level of 1 stands for.
+
+    Raises
+    ------
+    InputError
+        No waveforms, no case that touches or none that does not, or sampling too coarse for the stator.
+    """
+    noise = Noise(np.asarray(levels, dtype=float), n_draw, seed)
+    if noise.levels.size == 0 or not (noise.levels > 0).all() or n_draw < 1:
+        raise InputError(
+            f"levels: {list(levels)}, draws: {n_draw}: give levels above 0 and at least one draw"
+        )
+    axes = axes_of(store)
+    data = narrow(store, [*CHANNELS, "regime", "spin_speed", "status"], axes)
+    data = data.assign({n: data[n].compute() for n in ("regime", "spin_speed", "status")})
+    is_done = data["status"] == DONE
+    need_results(is_done.where(is_done), store)
+    is_free = data["regime"] == REGIME.index("no_contact")  # of all stators, whichever is looked at
+    rub, free = is_done & ~is_free, is_done & is_free
+    for mask, kind, mend in (
+        (rub, "touches", "take smaller clearances"),
+        (free, "stays free of contact", "take clearances above the contact-free amplitude"),
+    ):
+        if not mask.any():
+            raise InputError(f"{source(store)}: no case of this selection {kind}; {mend} into the study")
+    n = samples_per_revolution(data[CHANNELS[0]])
+    n_turn = data.sizes["sample"] // n
+    data = data.isel(sample=slice(-n * (n_turn // _WHOLE * _WHOLE or n_turn), None))
+    reference = [float(_rms(data[name]).where(rub).median()) for name in CHANNELS]
+    frequencies = _natural(data)
+    highest = (1 + _BAND) * frequencies["stator"] / (data["spin_speed"] / (2 * math.pi))
+    if float(highest.max()) >= n / 2:
+        least = math.ceil(2 * float(highest.max())) + 1
+        raise InputError(
+            f"{source(store)}: {n} samples a revolution do not resolve the stator's vibration at the lowest "
+            f"speed; take at least {least}, or select faster cases"
+        )
+    place = xr.DataArray(np.arange(rub.size).reshape(rub.shape), dims=rub.dims, coords=rub.coords)
+    if data[CHANNELS[0]].chunks is not None:  # blocks of cases as they lie on disk, each with whole records
+        place = place.chunk({d: data[CHANNELS[0]].chunksizes[d] for d in axes})
+    found: xr.DataArray = xr.apply_ufunc(
+        _block,
+        *(data[name] for name in CHANNELS),
+        place,
+        data["spin_speed"],
+        frequencies["torsion"],
+        frequencies["stator"],
+        input_core_dims=[["sample"]] * len(CHANNELS) + [[]] * 4,
+        output_core_dims=[["indicator", "level", "draw"]],
+        dask="parallelized",
+        output_dtypes=[float],
+        kwargs={"n": n, "reference": reference, "noise": noise},
+        dask_gufunc_kwargs={
+            "allow_rechunk": True,
+            "output_sizes": {"indicator": len(INDICATORS), "level": noise.levels.size, "draw": n_draw},
+        },
+    )
+    scores = xr.Dataset(
+        {
+            name: found.isel(indicator=i).assign_attrs(units="dB", long_name=text)
+            for i, (name, text) in enumerate(INDICATORS.items())
+        },
+        attrs=store.attrs,
+    ).assign(rub=rub.assign_attrs(units="1", long_name="touches"), reference=("channel", reference))
+    scores.encoding["source"] = source(store)
+    return scores.assign_coords(
+        level=("level", noise.levels, {"units": "1", "long_name": "noise level"}),
+        channel=("channel", list(CHANNELS)),
+    )
+
+
+def _natural(data: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Return the natural frequencies of torsion and of the stator, Hz, along what sets the rig, if any."""
+    keys = [data[key] for key in rig_axes(data) if key in data.coords]
+    along = list(dict.fromkeys(str(dim) for key in keys if key.size > 1 for dim in key.dims))
+    if len(along) > 1:
+        raise InputError(f"{source(data)}: select one value of {' or of '.join(along)}")
+    axis = along[0] if along else None
+    rotor, stator = natural_frequencies(data, axis), stator_frequencies(data, axis)
+    if "torsional" not in rotor or "lateral" not in stator:
+        raise InputError(f"{source(data)}: torsion or stator has no natural frequency to look at")
+    return {"torsion": rotor["torsional"], "stator": stator["lateral"]}
+
+
+def _rms(wave: xr.DataArray) -> xr.DataArray:
+    swing = wave.astype(float)
+    deviation: xr.DataArray = swing.std("sample").compute()
+    return deviation
+
+
+def _block(
+    vertical: NDArray[np.floating[Any]],
+    horizontal: NDArray[np.floating[Any]],
+    torsion: NDArray[np.floating[Any]],
+    lateral: NDArray[np.floating[Any]],
+    place: NDArray[np.int64],
+    spin: Floats,
+    torsion_frequency: Floats,
+    stator_frequency: Floats,
+    *,
+    n: int,
+    reference: Sequence[float],
+    noise: Noise,
+) -> Floats:
+    """(..., n_sample) x 4, (...) x 4 -> (..., n_indicator, n_level, n_draw): one block of cases."""
+    shape = np.broadcast_shapes(place.shape, spin.shape, torsion.shape[:-1])
+    n_sample = torsion.shape[-1]
+    n_turn = n_sample // n
+    whirl = np.fft.fft(vertical + 1j * horizontal.astype(float), axis=-1) / n_sample
+    twist = np.fft.rfft(torsion.astype(float), axis=-1) * (math.sqrt(2) / n_sample)
+    shake = np.fft.rfft(lateral.astype(float), axis=-1) * (math.sqrt(2) / n_sample)
+    rate = spin / (2 * math.pi)
+    orders = [np.broadcast_to(f / rate, shape) for f in (torsion_frequency, stator_frequency)]
+    places, rates = np.broadcast_to(place, shape), np.broadcast_to(rate, shape)
+    spectra = [np.broadcast_to(a, (*shape, a.shape[-1])) for a in (whirl, twist, shake)]
+    out = np.full((*shape, len(INDICATORS), noise.levels.size, noise.n_draw), math.nan)
+    sizes = math.hypot(*reference[:2]), reference[2], reference[3]
+    for i in np.ndindex(*shape):
+        if not np.isfinite(spectra[1][i][0]):
+            continue
+        rng = np.random.default_rng([noise.seed, int(places[i])])
+        spacing = float(rates[i]) / n_turn  # Hz from line to line
+        white = math.sqrt(spacing / _BANDWIDTH)  # rms of a line, of unit noise
+        twisting, whirling, shaking = (
+            _twist_lines(float(orders[0][i]), n_turn),
+            _whirl_lines(n_turn, n_sample),
+            _band_lines(float(orders[1][i]), n_turn),
+        )
+        noisy = [
+            _with_noise(lines[i], at, n_turn, size, gain * white, noise, rng)
+            for lines, at, size, gain in (
+                (spectra[0], whirling, sizes[0], math.sqrt(1 / 2)),  # half of it whirls backward
+                (spectra[1], twisting, sizes[1], 1.0),
+                (spectra[2], shaking, sizes[2], 1.0),
+            )
+        ]
+        out[i] = [
+            _decibels(_power(noisy[1]) / spacing),
+            _decibels(_power(noisy[0]) / spacing),
+            _decibels(_power(noisy[2])),
+            _burst_level(noisy[2], n_turn),
+        ]
+    return out
+
+
+def _with_noise(
+    lines: Lines,
+    at: NDArray[np.intp],
+    n_turn: int,
+    size: float,
+    white: float,
+    noise: Noise,
+    rng: np.random.Generator,
+) -> Lines:
+    """Return some lines of a spectrum under noise, (n_level, n_draw, n_line), rms amplitudes.
+
+    `white` is the rms of a line of white noise of unit rms. Benign harmonics of unit rms share it evenly on
+    the average; the draws are complex Gaussian, so that their amplitudes differ as well as their phases.
+    """
+    draws = rng.standard_normal((2, noise.n_draw, at.size)) / math.sqrt(2)
+    benign = rng.standard_normal((2, noise.n_draw, len(_BENIGN))) / math.sqrt(2 * len(_BENIGN))
+    added = white * (draws[0] + 1j * draws[1])
+    for j, order in enumerate(_BENIGN):
+        added[:, at == order * n_turn] += (benign[0] + 1j * benign[1])[:, j, None]
+    noisy: Lines = lines[at] + size * noise.levels[:, None, None] * added
+    return noisy
+
+
+def _twist_lines(natural: float, n_turn: int) -> NDArray[np.intp]:
+    """Return the lines at multiples of 1/2X and 1/3X within 1X of a natural frequency (in orders)."""
+    sixths = np.arange(1, math.ceil(6 * (natural + 1)))
+    sixths = sixths[(abs(sixths / 6 - natural) <= 1) & ((sixths % 2 == 0) | (sixths % 3 == 0))]
+    return np.unique(np.rint(sixths / 6 * n_turn).astype(np.intp))
+
+
+def _whirl_lines(n_turn: int, n_sample: int) -> NDArray[np.intp]:
+    """Return the lines of the whirl at 1/3X, 1/2X and 2/3X, forward, then backward."""
+    forward = np.rint(np.array(_SUBHARMONICS) * n_turn).astype(np.intp)
+    return np.concatenate((forward, n_sample - forward))
+
+
+def _band_lines(natural: float, n_turn: int) -> NDArray[np.intp]:
+    """Return the lines of the stator's band around its natural frequency (in orders)."""
+    low, high = ((1 + side * _BAND) * natural * n_turn for side in (-1, 1))
+    return np.arange(max(1, math.ceil(low)), math.floor(high) + 1)
+
+
+def _power(lines: Lines) -> Floats:
+    """(..., n_line) -> (...), the mean square of what they make up."""
+    power: Floats = np.sum(np.abs(lines) ** 2, axis=-1)
+    return power
+
+
+def _burst_level(band: Lines, n_turn: int) -> Floats:
+    """Return by how many dB the envelope's lines at the orders of bursts stand above its other lines.
+
+    The lines of a band, taken as those of a slow complex signal, are its envelope; its squared magnitude is
+    zero-padded so that it is not aliased.
+    """
+    n_fast = 2 * band.shape[-1]
+    envelope = np.abs(np.fft.ifft(band, n=n_fast, axis=-1)) ** 2
+    lines = np.abs(np.fft.rfft(envelope, axis=-1)) ** 2
+    wanted = np.rint(np.array(_BURSTS) * n_turn).astype(np.intp)
+    wanted = wanted[wanted < lines.shape[-1]]
+    floor = np.median(lines[..., 1 : min(int(2.5 * n_turn), lines.shape[-1])], axis=-1)
+    level: Floats = _decibels(lines[..., wanted].max(axis=-1)) - _decibels(floor)
+    return level
+
+
+def _decibels(power: Floats) -> Floats:
+    level: Floats = 10 * np.log10(np.maximum(power, _SMALLEST))
+    return level

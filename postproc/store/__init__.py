@@ -1,0 +1,1 @@
+"""Opening a store: selection, units, the rig of a case, export."""

@@ -1,0 +1,51 @@
+"""A store as it stands now, amid a run as well: measures from the journals where none are packed yet."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from postproc.store.open import open_store
+from rubhpc.storage.disk import disk_errors
+from rubhpc.storage.lock import is_alive, read_holder
+from rubhpc.storage.manifest import PRIVATE
+from rubhpc.storage.resume import is_store
+from rubhpc.storage.runs import read_runs
+from rubhpc.storage.store import Store
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+
+
+def latest(path: Path) -> xr.Dataset:
+    """Return the store as `open_store` does, with status and measures of every case that is journalled.
+
+    What only the journals know goes into the attributes: `reasons` (flat index of a case to why it failed
+    or diverged), `runs` (machine, ranks and times of each) and `running` (who computes now; "" for nobody).
+    A store without journals, such as a copy that xarray has made, comes as it is.
+
+    Raises
+    ------
+    StoreError
+        There is no store, or it is damaged.
+    """
+    dataset = open_store(path)
+    if not is_store(path):
+        return dataset
+    store = Store(path)
+    with disk_errors(path):
+        is_packed = store.is_packed()
+        ledger = store.replay(with_metrics=not is_packed)
+        lock = path / PRIVATE / "lock"
+        holder = read_holder(lock)
+        running = str(holder) if holder is not None and is_alive(holder, lock) else ""
+        runs = [asdict(run) for run in read_runs(path)]
+    if not is_packed:
+        packed = store.packed_values(ledger)
+        dataset = dataset.assign(
+            {name: (dataset[name].dims, values, dataset[name].attrs) for name, values in packed.items()}
+        )
+    told = {"reasons": dict(ledger.reasons), "runs": runs, "running": running}
+    return dataset.assign_attrs(told)

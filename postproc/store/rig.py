@@ -1,0 +1,113 @@
+"""The rig that a case ran on, as its store tells it: natural frequencies, and where the stators stand."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from postproc.store.open import source
+from rubhpc.errors import InputError
+from rubhpc.rig.rig import Rig, rig_from_dict, with_keys
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from rubhpc.fem.modes import Mode
+
+ROTOR_MODES = ("lateral", "torsional")
+
+
+def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
+    """Return the rig of one case: the store's, with the rig keys among its axes at their selected values.
+
+    Parameters
+    ----------
+    values : mapping of dimension to value, optional
+        Of axes that are not selected.
+
+    Raises
+    ------
+    InputError
+        The store tells no rig, or not one that this version reads.
+    """
+    table = case.attrs.get("rig")
+    if not isinstance(table, dict):
+        raise InputError(f"{source(case)}: tells no rig; only a store that rubhpc has written does")
+    rig = rig_from_dict(table, f"{source(case)}: rig")
+    chosen = {
+        str(n): float(c.values.item())
+        for n, c in case.coords.items()
+        if c.size == 1 and c.dtype.kind in "fiu"
+    }
+    chosen |= values or {}
+    return with_keys(rig, {key: chosen[dim] for dim, key in rig_axes(case).items() if dim in chosen})
+
+
+def natural_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str, xr.DataArray]:
+    """Return the first lateral and the first torsional natural frequency of the rotor at standstill, Hz.
+
+    Where keys of the rig lie on the dimension `along`, such as a bearing's stiffness on its own or all that
+    was drawn on that of a sample, each is an array over it.
+    """
+    from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.modes import modes
+
+    return _over_rig(case, along, lambda rig: _first_of_kinds(modes(assemble(rig).rotor), ROTOR_MODES))
+
+
+def stator_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str, xr.DataArray]:
+    """Return the first lateral natural frequency of the stator selected, or of the first, Hz; see above."""
+    from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.modes import modes
+
+    chosen = case.coords.get("stator")
+    i_stator = int(chosen) - 1 if chosen is not None and chosen.ndim == 0 else 0
+    return _over_rig(
+        case,
+        along,
+        lambda rig: _first_of_kinds(modes(assemble(rig).stators[i_stator].body), ("lateral",)),
+    )
+
+
+def _first_of_kinds(found: Sequence[Mode], kinds: Sequence[str]) -> dict[str, float]:
+    lowest = {k: [m.frequency for m in found if m.kind == k and m.frequency > 0] for k in kinds}
+    return {kind: min(frequencies) for kind, frequencies in lowest.items() if frequencies}
+
+
+def _over_rig(
+    case: xr.Dataset, along: str | None, frequencies_of: Callable[[Rig], dict[str, float]]
+) -> dict[str, xr.DataArray]:
+    """Return the frequencies of a case's rig, Hz, as arrays over `along` where keys of the rig lie on it."""
+    keys = [key for key in rig_axes(case) if key in case.coords and case[key].dims == (along,)]
+    points: list[dict[str, float]] = [
+        {key: float(v) for key, v in zip(keys, values, strict=True)}
+        for values in zip(*(case[key].values for key in keys), strict=True)
+    ] or [{}]
+    found: dict[str, list[float]] = {}
+    for point in points:
+        for name, frequency in frequencies_of(rig_of(case, point)).items():
+            found.setdefault(name, []).append(frequency)
+    dims = (along,) if keys else ()
+    return {
+        name: xr.DataArray(values if dims else values[0], dims=dims, attrs={"units": "Hz"})
+        for name, values in found.items()
+        if len(values) == len(points)
+    }
+
+
+def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
+    """Return angle (rad, from straight up with the spin) and clearance offset (m) of the stators at the disc.
+
+    The disc is the one whose motion is recorded, at the node of the first stator; others touch another disc.
+    """
+    if "rig" not in case.attrs:
+        return []
+    stators = rig_of(case).stator
+    return [(s.angle, s.clearance_offset) for s in stators if s.node == stators[0].node]
+
+
+def rig_axes(case: xr.Dataset) -> dict[str, str]:
+    """Return the axes of the study that are keys of the rig: coordinate to dotted key."""
+    study: dict[str, Any] = case.attrs.get("study", {})
+    return {name.replace(".", "_"): name for name in study.get("grid", {}) if "." in name}

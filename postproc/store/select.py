@@ -1,0 +1,187 @@
+"""Select cases of a store by the values of its axes."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postproc.store.open import axes_of, drawn_axes, find_axis, need, source
+from postproc.store.units import meanings, scale_for
+from rubhpc.errors import InputError
+from rubhpc.input.reading import parse_quantity
+from rubhpc.study.axes import coordinate_of
+from rubhpc.study.sampling import CASE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+# A value is on the grid when it is close to a grid value, relatively, and much closer than the next one is.
+_CLOSE = 5e-3
+_CLOSE_IN_SPACING = 0.1
+_MANY = 8  # values of an axis; of more than these, a message lists only some
+
+
+def select(store: xr.Dataset, choice: Mapping[str, Any]) -> xr.Dataset:
+    """Return the cases whose axes have the chosen values.
+
+    Parameters
+    ----------
+    choice : mapping of axis name to value
+        A number (SI) or a text such as ``"0.3"`` or ``"84 um"`` selects one grid value and drops the axis. A
+        list, or a text with commas, keeps several; a slice, or a text such as ``"1.2..2.4"``, keeps all
+        between, which is also how the cases of a sample are chosen by what was drawn. Dotted rig keys are
+        known by either spelling; stators count from 1.
+
+    Raises
+    ------
+    InputError
+        No such axis, or no such value on it; the message names what is near.
+    """
+    for name, wanted in choice.items():
+        if (drawn := coordinate_of(name)) in drawn_axes(store):
+            places = _positions(store, drawn, wanted, is_drawn=True)
+            store = store.isel({CASE: places})
+            continue
+        axis = find_axis(store, name)
+        store = store.isel({axis: _positions(store, axis, wanted)})
+    return store
+
+
+def narrow(store: xr.Dataset, names: Iterable[str], spread: Iterable[str] = ()) -> xr.Dataset:
+    """Return only the variables named, over the axes a figure spreads over and their own sample or order.
+
+    Axes of one value are dropped; any other that is left must have been selected.
+
+    Raises
+    ------
+    InputError
+        A variable is not kept, or axes of several values are left: one line says which values there are.
+    """
+    names = list(names)
+    need(store, names)
+    spread = set(spread)
+    data = store[names]
+    free = [a for a in (*axes_of(store), "stator") if a in data.dims and a not in spread]
+    several = [a for a in free if data.sizes[a] > 1]
+    if several:
+        which = "; ".join(f"{a} (one of {written_values(store[a])})" for a in several)
+        example = f"--select {several[0]}={_written(store[several[0]], 0)!r}".replace("'", '"')
+        raise InputError(f"{source(store)}: select one value of {which}, as in {example}")
+    data = data.isel(dict.fromkeys(free, 0))
+    return data.drop_vars(_of_stator(store), errors="ignore") if "stator" in free else data
+
+
+def first_of_rest(store: xr.Dataset, keep: Iterable[str], variable: str) -> tuple[xr.Dataset, list[str]]:
+    """Return the store at the first value of every axis not kept, and a line on each such axis of several.
+
+    The stators count as an axis where the variable tells them apart.
+    """
+    need(store, [variable])
+    keep = set(keep)
+    rest = [d for d in (*axes_of(store), *({"stator"} & set(store[variable].dims))) if d not in keep]
+    notes = [
+        f"{d} = {_written(store[d], 0)}: the first of {store.sizes[d]}; change with --select {d}=VALUE"
+        for d in rest
+        if store.sizes[d] > 1
+    ]
+    first = store.isel(dict.fromkeys(rest, 0))
+    is_only = "stator" in rest and store.sizes["stator"] == 1
+    return first.drop_vars(_of_stator(store)) if is_only else first, notes
+
+
+def _of_stator(store: xr.Dataset) -> list[str]:
+    """Return the coordinates of stators: the only one there is, and its place, need not stand in captions."""
+    return [str(name) for name, values in store.coords.items() if "stator" in values.dims]
+
+
+def written_values(axis: xr.DataArray, around: float | None = None) -> str:
+    """List the values of an axis as they may be typed; of a long axis, those near `around` or its ends."""
+    n = axis.size
+    if n <= _MANY:
+        return ", ".join(_written(axis, i) for i in range(n))
+    if around is not None:
+        near = np.sort(np.argsort(np.abs(axis.values - around), kind="stable")[:4])
+        return f"..., {', '.join(_written(axis, int(i)) for i in near)}, ..."
+    first = ", ".join(_written(axis, i) for i in range(3))
+    return f"{first}, ..., {_written(axis, n - 1)}, {n} values"
+
+
+def _written(axis: xr.DataArray, i: int) -> str:
+    return _typed(axis, float(axis.values[i]))
+
+
+def _typed(axis: xr.DataArray, value: float) -> str:
+    names = meanings(axis)
+    if 0 <= value < len(names) and value == int(value):
+        return names[int(value)]
+    scale = scale_for(str(axis.attrs.get("units", "1")), abs(value))
+    return f"{value * scale.factor:.6g} {scale.unit.replace('µ', 'u')}".rstrip()
+
+
+def _positions(
+    store: xr.Dataset, axis: str, wanted: Any, *, is_drawn: bool = False
+) -> int | NDArray[np.intp]:
+    """Return the index, or the indices, along `axis` of what is wanted."""
+    if isinstance(wanted, str) and ".." in wanted:
+        start, stop = wanted.split("..", 1)
+        wanted = slice(start.strip() or None, stop.strip() or None)
+    elif isinstance(wanted, str) and "," in wanted:
+        wanted = wanted.split(",")
+    if isinstance(wanted, slice):
+        return _between(store, axis, wanted)
+    if is_drawn:
+        low, high = (_typed(store[axis], float(end)) for end in (store[axis].min(), store[axis].max()))
+        raise InputError(
+            f"{source(store)}: {axis}: was drawn at random; select a range of it, such as {low}..{high}, or "
+            f"a case by its number, {CASE}={int(store[CASE][0])}"
+        )
+    if isinstance(wanted, (list, tuple, np.ndarray)):
+        return np.array([_nearest(store, axis, _number(store, axis, w)) for w in wanted])
+    return _nearest(store, axis, _number(store, axis, wanted))
+
+
+def _between(store: xr.Dataset, axis: str, wanted: slice) -> NDArray[np.intp]:
+    values = store[axis].values.astype(float)
+    low = -np.inf if wanted.start is None else _number(store, axis, wanted.start)
+    high = np.inf if wanted.stop is None else _number(store, axis, wanted.stop)
+    slack = 1e-6 * float(np.abs(values).max())
+    inside = np.flatnonzero((values >= low - slack) & (values <= high + slack))
+    if inside.size == 0:
+        known = written_values(store[axis])
+        raise InputError(f"{source(store)}: {axis}: no value in that range; there is {known}")
+    return inside
+
+
+def _number(store: xr.Dataset, axis: str, wanted: Any) -> float:
+    try:
+        return float(wanted)  # SI, whatever the axis
+    except (TypeError, ValueError):
+        if names := meanings(store[axis]):
+            if wanted in names:
+                return float(names.index(wanted))
+            told = ", ".join(names)
+            raise InputError(
+                f"{source(store)}: {axis} = {wanted}: not on the grid; there is {told}"
+            ) from None
+        unit = str(store[axis].attrs.get("units", "1"))
+        # "rad s-2" to "rad * s**-2": a store spells units as netCDF does, a study as pint does.
+        spelt = "" if unit == "1" else re.sub(r"(?<=[A-Za-z])(-?\d+)", r"**\1", unit).replace(" ", " * ")
+        return float(parse_quantity(wanted, spelt, f"{source(store)}: {axis}"))
+
+
+def _nearest(store: xr.Dataset, axis: str, wanted: float) -> int:
+    values = store[axis].values.astype(float)
+    i = int(np.argmin(np.abs(values - wanted)))
+    tolerance = _CLOSE * max(abs(wanted), abs(values[i]))
+    others = np.abs(np.delete(values, i) - values[i])
+    if others.size:
+        tolerance = min(tolerance, _CLOSE_IN_SPACING * float(others.min()))
+    if not abs(values[i] - wanted) <= tolerance:
+        text, near = _typed(store[axis], wanted), written_values(store[axis], around=wanted)
+        raise InputError(f"{source(store)}: {axis} = {text}: not on the grid; there is {near}")
+    return i

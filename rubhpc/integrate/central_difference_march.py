@@ -1,0 +1,164 @@
+"""A case by the paper's central difference."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.march import NO_FORCES, March
+from rubhpc.integrate.measures import empty_samples, empty_tally
+from rubhpc.integrate.packing import pairs_of
+from rubhpc.integrate.record import State
+from rubhpc.integrate.workspace import workspace
+from rubhpc.kernels import central_difference as kernel
+from rubhpc.kernels.contact_pairs import fill_directions, pair_normal_and_gap
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.setup import CentralDifferenceSetup
+    from rubhpc.kernels.accumulators import Samples, Tally
+    from rubhpc.kernels.contact_pairs import Pairs, Workspace
+
+    Floats = NDArray[np.float64]
+
+FIRST_STEPS = 20_000  # of the first kernel call
+N_START = 4  # passes for the normals of the first step; each gains five digits
+
+
+class CentralDifferenceMarch(March):
+    """The kernel's state, and how many steps it has taken."""
+
+    def __init__(
+        self,
+        setup: CentralDifferenceSetup,
+        clearance: float,
+        friction: float,
+        initial: State,
+        check: Callable[[], None] | None,
+    ) -> None:
+        """Start from `initial`, in a first kernel call of some 20 000 steps."""
+        super().__init__(check, FIRST_STEPS // setup.steps_per_sample)
+        self._setup = setup
+        self._pairs = pairs_of(
+            setup.model,
+            setup.packed,
+            clearance=clearance,
+            friction=friction,
+            spin=setup.spin,
+            is_updated=setup.is_updated,
+            law=setup.law,
+        )
+        self._work = workspace(self._pairs, setup.step)
+        self._state = _start(setup, initial, self._pairs, self._work)
+        self._scratch = np.zeros((3, self._state.shape[1]))
+        self._reached = np.zeros(1, dtype=np.int64)
+
+    def touching(self) -> NDArray[np.bool_]:
+        """Which pairs pressed in the last step, (q,)."""
+        return self._work.force > 0.0
+
+    def energy(self) -> float:
+        """Mechanical energy half a step before the state, J: the form that the scheme itself conserves."""
+        packed = self._setup.packed
+        displacement, velocity = self._state
+        before = displacement - self._setup.step * velocity
+        return float(0.5 * (velocity @ packed.mass @ velocity + before @ packed.stiffness @ displacement))
+
+    def final(self) -> State:
+        """State at the last sample; a trial step gives the centred velocity and the force there."""
+        setup, state = self._setup, self._state.copy()
+        q = self._pairs.radius.size
+        self._kernel(state, self.sample + 1, 1, empty_samples(q, 0), empty_tally(q), is_recorded=False)
+        velocity = 0.5 * (self._state[1] + state[1])
+        bodies = [setup.model.rotor, *(stator.body for stator in setup.model.stators)]
+        parts = np.split(setup.packed.row, np.cumsum([body.n_dof for body in bodies])[:-1])
+
+        def pick(values: Floats, row: NDArray[np.int64]) -> Floats:
+            return np.where(row >= 0, values[row], 0.0)
+
+        return State(
+            rotor_displacement=pick(self._state[0], parts[0]) + setup.model.sag,
+            rotor_velocity=pick(velocity, parts[0]),
+            stator_displacement=tuple(pick(self._state[0], part) for part in parts[1:]),
+            stator_velocity=tuple(pick(velocity, part) for part in parts[1:]),
+            contact_force=self._work.force.copy(),
+        )
+
+    def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
+        setup = self._setup
+        outcome = self._kernel(
+            self._state, stop, setup.steps_per_sample, samples, tally, is_recorded=is_recorded
+        )
+        if outcome != kernel.FINISHED:
+            self.n_step += (int(self._reached[0]) - self.sample) * setup.steps_per_sample
+            self.sample = int(self._reached[0])
+        if outcome == kernel.DIVERGED:
+            return f"a displacement passed {setup.displacement_limit:.3g} m"
+        if outcome == kernel.CONTACT_UNSOLVED:
+            return NO_FORCES
+        self.n_step += (stop - self.sample) * setup.steps_per_sample
+        return None
+
+    def _kernel(
+        self,
+        state: Floats,
+        stop: int,
+        steps_per_sample: int,
+        samples: Samples,
+        tally: Tally,
+        *,
+        is_recorded: bool,
+    ) -> int:
+        setup = self._setup
+        return kernel.advance(
+            setup.packed.linear,
+            self._pairs,
+            setup.spin,
+            setup.step,
+            steps_per_sample,
+            setup.samples_per_revolution,
+            self.sample,
+            stop,
+            is_recorded,
+            setup.displacement_limit,
+            setup.packed.output_row,
+            state,
+            self._work,
+            self._scratch,
+            samples,
+            tally,
+            self._reached,
+        )
+
+
+def _start(setup: CentralDifferenceSetup, initial: State, pairs: Pairs, work: Workspace) -> Floats:
+    """Kernel state (2, n_dof): displacement, and velocity half a step earlier."""
+    packed = setup.packed
+    is_seen = packed.row >= 0
+
+    def gather(rotor: Floats, stators: tuple[Floats, ...]) -> Floats:
+        values = np.zeros(packed.mass.shape[0])
+        values[packed.row[is_seen]] = np.concatenate([rotor, *stators])[is_seen]
+        return values
+
+    displacement = gather(initial.rotor_displacement - setup.model.sag, initial.stator_displacement)
+    velocity = gather(initial.rotor_velocity, initial.stator_velocity)
+    work.force[:] = initial.contact_force
+    is_free = packed.degree_row >= 0
+    free_force = packed.force[0] - packed.stiffness @ displacement - packed.damping @ velocity
+    # The step's forces act along the normals at its free update, and that depends, if little, on them.
+    for _ in range(N_START if setup.is_updated else 1):
+        force = free_force.copy()
+        np.add.at(force, packed.degree_row[is_free], (work.pull * work.force[:, np.newaxis])[is_free])
+        acceleration = np.linalg.solve(packed.mass, force)
+        end = displacement + setup.step * (velocity + 0.5 * setup.step * acceleration)
+        pressed = np.einsum("iajb,jb,j->ia", pairs.compliance, work.pull, work.force)
+        at = np.where(is_free, end[packed.degree_row], 0.0) - pressed
+        for i in range(len(at)):
+            ny, nz, _ = pair_normal_and_gap(pairs, i, at[i])
+            fill_directions(pairs, i, ny, nz, work.pull[i], work.push[i])
+    return np.array([displacement, velocity - 0.5 * setup.step * acceleration])

@@ -1,0 +1,145 @@
+"""A motion carried to another case: its contacts as that case's clearances and stators have them.
+
+What a wall that has moved in overlaps is pushed apart as by moving the wall slowly: by the static shapes of
+rotor and stators under the contact forces that it takes, with the least strain energy that does it. To let
+the first step close the gap instead would throw the bodies apart at micrometres a microsecond.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.fem.constraints import find_free
+from rubhpc.fem.model import state_size
+from rubhpc.integrate.packing import degrees_of
+from rubhpc.integrate.record import State
+from rubhpc.integrate.setup import ModalSetup
+from rubhpc.kernels.complementarity import solve_complementarity
+from rubhpc.kernels.contact_pairs import normal_and_gap
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.setup import Setup
+
+    Floats = NDArray[np.float64]
+
+TOLERANCE = 1e-12  # m, ten times what the integrators take for closed: a run that goes on is left as it is
+PARTED = 1e-9  # m, beyond which a closed contact has opened
+LEAST_FORCE = np.finfo(float).tiny  # N, of a contact that is closed, whatever presses it
+MOST_PASSES = 20  # for the curved gap of the updated normal; three or four are taken
+
+
+def carried(state: State, setup: Setup, clearance: float) -> State:
+    """Return a state as the start of a case: no gap overlapped further than it was, and none pulled shut.
+
+    Parameters
+    ----------
+    state : State
+        Where another case has ended; its `overlap` is what a penalty allows.
+    clearance : float, m
+        Radial clearance at rest; a stator's `clearance_offset` is added.
+
+    Raises
+    ------
+    InputError
+        The state is of a rig with other degrees of freedom.
+    """
+    if state.packed().size != state_size(setup.model):
+        raise InputError(
+            f"initial: a state of {state.packed().size} numbers for a rig of {state_size(setup.model)}; "
+            "carry it between cases with the same degrees of freedom"
+        )
+    allowed = np.zeros_like(state.contact_force) if state.overlap is None else state.overlap
+    displacement = _as_seen(state.displacement, setup)
+    gap, push = gaps(displacement, setup, clearance)
+    force = np.zeros_like(gap)
+    if np.any(gap + allowed < -TOLERANCE):
+        for _ in range(MOST_PASSES):
+            shape = _static_shapes(push.T, setup)
+            wanted = _least_forces(push @ shape, gap + allowed - push @ shape @ force)
+            displacement, force = displacement + shape @ (wanted - force), wanted
+            gap, push = gaps(displacement, setup, clearance)
+            excess = gap + allowed
+            if np.all(excess >= -TOLERANCE) and np.all(excess[force > 0.0] <= TOLERANCE):
+                break
+        sizes = [setup.model.rotor.n_dof, *(stator.body.n_dof for stator in setup.model.stators)]
+        rotor, *stators = np.split(displacement, np.cumsum(sizes)[:-1])
+        state = replace(state, rotor_displacement=rotor, stator_displacement=tuple(stators))
+    is_closed = (state.contact_force > 0.0) & (gap <= PARTED)
+    return replace(state, contact_force=np.where(is_closed, state.contact_force + force, 0.0))
+
+
+def at_rest(setup: Setup, clearance: float) -> State:
+    """Return the shaft at rest under its constant loads, on stators that the sag reaches, without friction.
+
+    Clearance in m; what the stators hold up presses them.
+    """
+    state = State.at_rest(setup.model)
+    if not setup.model.sag.any():
+        return state
+    gap, _ = gaps(state.displacement, setup, clearance)
+    return carried(replace(state, contact_force=np.where(gap < 0.0, LEAST_FORCE, 0.0)), setup, clearance)
+
+
+def with_overlap(state: State, setup: Setup, clearance: float) -> State:
+    """Return the state at the end of a case with what its gaps overlap."""
+    gap, _ = gaps(state.displacement, setup, clearance)
+    return replace(state, overlap=np.maximum(-gap, 0.0))
+
+
+def gaps(displacement: Floats, setup: Setup, clearance: float) -> tuple[Floats, Floats]:
+    """Gap of each pair (q,), m, and its change with each degree of the bodies (q, n_dof)."""
+    model = setup.model
+    degree = degrees_of(model)
+    gap, push = np.zeros(len(degree)), np.zeros((len(degree), displacement.size))
+    for i, (stator, rows) in enumerate(zip(model.stators, degree, strict=True)):
+        at = np.where(rows >= 0, displacement[rows], 0.0)
+        ey, ez = float(np.cos(stator.angle)), float(np.sin(stator.angle))
+        reach = clearance + stator.clearance_offset
+        ny, nz, gap[i] = normal_and_gap(ey, ez, stator.radius, reach, 0.0, setup.is_updated, at)
+        change = np.array([-ny, -nz, 0.0, ny * ey + nz * ez, ny * -ez + nz * ey])
+        push[i, rows[rows >= 0]] = change[rows >= 0]
+    return gap, push
+
+
+def _as_seen(displacement: Floats, setup: Setup) -> Floats:
+    """Displacement of all bodies as the integrator will have it: reduced coordinates hold no more."""
+    if not isinstance(setup, ModalSetup):
+        return displacement
+    n, sag = setup.model.rotor.n_dof, setup.model.sag
+    moved = displacement.copy()
+    moved[:n] -= sag
+    seen: Floats = setup.reduced.basis @ (setup.reduced.project @ moved)
+    seen[:n] += sag
+    return seen
+
+
+def _static_shapes(force: Floats, setup: Setup) -> Floats:
+    """Static displacements (n_dof, k) under forces (n_dof, k); what nothing holds follows by its inertia."""
+    if isinstance(setup, ModalSetup):
+        basis, stiffness = setup.reduced.basis, setup.reduced.stiffness
+        shapes: Floats = basis @ np.linalg.solve(0.5 * (stiffness + stiffness.T), basis.T @ force)
+        return shapes
+    packed = setup.packed
+    resisting = 0.5 * (packed.stiffness + packed.stiffness.T)
+    if find_free(setup.model):
+        resisting = resisting + setup.spin**2 * packed.mass
+    is_seen = packed.row >= 0
+    ordered = np.zeros((len(resisting), force.shape[1]))
+    ordered[packed.row[is_seen]] = force[is_seen]
+    shapes = np.zeros_like(force)
+    shapes[is_seen] = np.linalg.solve(resisting, ordered)[packed.row[is_seen]]
+    return shapes
+
+
+def _least_forces(compliance: Floats, gap: Floats) -> Floats:
+    """Forces (q,), N, none of them pulling, that leave no gap below zero."""
+    q = gap.size
+    force, active, work = np.zeros(q), gap < 0.0, np.zeros((q, q + 1))
+    solve_complementarity(np.ascontiguousarray(compliance), gap, TOLERANCE, force, active, work)
+    return force

@@ -1,0 +1,190 @@
+"""A phase as the kernel takes it: its tables, and the room in which those of many phases stand."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.kernels import contact_modes as kernel
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.contact_mode import Phase
+    from rubhpc.integrate.reduction import ReducedModel
+
+    Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
+
+MOST_PHASES = 256  # sets of closed contacts of one speed and friction
+MOST_BYTES = 2**30  # of their tables
+GONE = -40.0  # exponent of what has died away
+STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
+
+
+class Tables:
+    """Tables of phases of one width, one after the other.
+
+    Attributes
+    ----------
+    n_most : int
+        Phases that there is room for: those of every pair closed by itself, and of as many more sets as
+        `MOST_PHASES` and `MOST_BYTES` allow.
+    """
+
+    def __init__(self, n_least: int) -> None:
+        self.n_most = max(n_least, MOST_PHASES)
+        self._n_least, self._n_phase = n_least, 0
+        self._room: list[Any] = []
+        self._view: kernel.Phases | None = None
+
+    def add(self, row: kernel.Phases) -> None:
+        """Take in the tables of a phase, (1, ...) each."""
+        rows: list[Any] = list(row)
+        if not self._room:
+            n_bytes = sum(field.nbytes for field in rows)
+            self.n_most = max(self._n_least, min(MOST_PHASES, MOST_BYTES // n_bytes))
+            self._room = [np.empty((self._n_least, *field.shape[1:]), field.dtype) for field in rows]
+        elif self._n_phase == len(self._room[0]):  # twice the room: most books never need it
+            n_room = min(2 * self._n_phase, self.n_most)
+            self._room = [np.resize(field, (n_room, *field.shape[1:])) for field in self._room]
+        for field, new in zip(self._room, rows, strict=True):
+            field[self._n_phase] = new[0]
+        self._n_phase += 1
+        self._view = None
+
+    def clear(self) -> None:
+        """Give all room back to phases to come."""
+        self._n_phase, self._view = 0, None
+
+    def view(self) -> kernel.Phases:
+        """The tables of all phases."""
+        if self._view is None:
+            self._view = kernel.Phases(*(field[: self._n_phase] for field in self._room))
+        return self._view
+
+
+def tabulate(
+    phase: Phase,
+    reduced: ReducedModel,
+    slip: Floats,
+    *,
+    width: int,
+    tick: float,
+    sample_level: int,
+    n_level: int,
+) -> kernel.Phases:
+    """Tables of one phase, (1, ...) each, its coordinates padded to `width`.
+
+    Parameters
+    ----------
+    slip : (q, n)
+        Slip speed of each pair with the motion.
+    tick : float, s
+    sample_level, n_level : int
+        As in `phases.PhaseBook`.
+    """
+    n, q, m = reduced.stiffness.shape[0], len(slip), width
+    end = phase.exponent.size
+    n_mode = end - 1 - q
+    exponent, used = np.zeros(m, dtype=complex), np.zeros(m, dtype=bool)
+    motion, enter = np.zeros((2, 2 * n, m), dtype=complex)
+    switch, take_off = np.zeros((q, m), dtype=complex), np.zeros((2 + q, m), dtype=complex)
+    exponent[:end], used[:end] = phase.exponent, True
+    motion[:, :end], switch[:, :end] = phase.motion, phase.switch
+    enter[:, :n_mode], take_off[:, :n_mode] = phase.enter.T, phase.take_off
+    steps = tick * 2.0 ** np.arange(n_level)
+    growth = np.exp(np.maximum(exponent.real, 0.0) * steps[-1])
+    power = np.exp(exponent * steps[:, None]) * used
+    rate = switch * exponent
+    sliding = slip @ motion[n:]
+    loss, work, steady_power = _energies(reduced, exponent, motion, n_mode)
+    halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q, 2, m)
+    row = kernel.Phases(
+        mask=np.array(phase.mask),
+        n_mode=np.array(n_mode),
+        switch_re=switch.real,
+        switch_im=switch.imag,
+        rate_re=rate.real,
+        rate_im=rate.imag,
+        bound=np.abs(switch) * np.abs(exponent) ** 2 * growth,
+        pace=np.where(exponent.real * tick * 2**kernel.FORCED_LEVEL < GONE, kernel.DYING, np.abs(exponent)),
+        power_re=power.real,
+        power_im=power.imag,
+        output=_outputs(reduced, exponent, motion, tick * 2.0**sample_level),
+        slip_re=sliding.real,
+        slip_im=sliding.imag,
+        slip_rate_re=(sliding * exponent).real,
+        slip_rate_im=(sliding * exponent).imag,
+        slip_bound=np.abs(sliding) * np.abs(exponent) ** 2 * growth,
+        motion_re=motion.real,
+        motion_im=motion.imag,
+        enter_re=enter.real,
+        enter_im=enter.imag,
+        enter_cosine=halves[0],
+        enter_sine=halves[1],
+        enter_constant=halves[2:],
+        loss=loss,
+        work_re=work.real,
+        work_im=work.imag,
+        steady_power=steady_power,
+    )
+    fields: list[Any] = [np.array(field[None], order="C") for field in row]
+    return kernel.Phases(*fields)
+
+
+def _outputs(reduced: ReducedModel, exponent: Complexes, motion: Complexes, interval: float) -> Floats:
+    """Rows in the order of `kernels.phases`, at samples to come, `interval` (s) apart: (2 m, samples o)."""
+    n = reduced.stiffness.shape[0]
+    displacement, rate = reduced.output @ motion[:n], reduced.output @ motion[n:]
+    rows = [displacement, rate, rate[2:] * exponent]
+    for degree in reduced.degree:
+        rows += [degree[[AXIAL, LATERAL]] @ motion[:n], degree[[LATERAL]] @ motion[n:]]
+    later = interval * np.arange(kernel.SAMPLES_AT_ONCE)
+    ahead = np.concatenate(rows) * np.exp(exponent * later[:, None])[:, None]  # (sample, o, m)
+    table = ahead.reshape(-1, exponent.size).T
+    return np.concatenate([table.real, -table.imag])
+
+
+def _energies(
+    reduced: ReducedModel, exponent: Complexes, motion: Complexes, n_mode: int
+) -> tuple[Floats, Complexes, Floats]:
+    """Primitives of the powers of damping and unbalance: (2 m, 2 m), (2, m) and steady (2,), W.
+
+    Products of two coordinates go as exp((l_k + l_j) t) or exp((l_k + conj l_j) t). What has no primitive
+    among them is steady: that of the unbalance response with itself. Undamped modes have none either,
+    and nothing to lose.
+    """
+    n = reduced.stiffness.shape[0]
+    skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
+    shape, rate = motion[:n], motion[n:]
+    resisting = reduced.damping @ rate + skew @ shape
+    phasor = reduced.force[0] - 1j * reduced.force[1]
+    turning = np.full(exponent.shape, 1j * reduced.spin)
+    forms = []
+    for partner, other in ((resisting, exponent), (resisting.conj(), exponent.conj())):
+        forms.append(_primitive(rate.T @ partner, exponent[:, None] + other))
+    with_itself, with_conjugate = forms
+    loss = 0.5 * np.block(
+        [
+            [(with_itself + with_conjugate).real, (with_conjugate - with_itself).imag],
+            [-(with_itself + with_conjugate).imag, (with_conjugate - with_itself).real],
+        ]
+    )
+    work = 0.5 * np.stack(
+        [
+            _primitive(phasor @ rate, exponent + turning),
+            _primitive(phasor.conj() @ rate, exponent - turning),
+        ]
+    )
+    response = rate[:, n_mode]
+    steady = np.array([response @ resisting[:, n_mode].conj(), response @ phasor.conj()])
+    return 0.5 * (loss + loss.T), work, 0.5 * steady.real
+
+
+def _primitive(power: Complexes, exponent: Complexes) -> Complexes:
+    """Power over its exponent, 1/s; zero where that is zero."""
+    has_one = np.abs(exponent) > STEADY * np.abs(exponent).max()
+    return np.divide(power, exponent, out=np.zeros_like(power), where=has_one)

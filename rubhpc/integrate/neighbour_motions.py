@@ -1,0 +1,108 @@
+"""Two neighbouring motions of a case by the exact integrator, both in one kernel call."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.event_driven_march import NoClosedForm
+from rubhpc.integrate.lyapunov import N_ALIGNING
+from rubhpc.integrate.measures import empty_samples, empty_tally
+from rubhpc.integrate.regimes import N_MOST
+from rubhpc.kernels.contact_modes import (
+    CONTACT_UNSOLVED,
+    DIVERGED,
+    FINISHED,
+    N_PROGRESS,
+    PHASE,
+    PHASE_WANTED,
+    SLIP_TURNED,
+    SPAN,
+    WANTED,
+)
+from rubhpc.kernels.measuring import recorder
+from rubhpc.kernels.separation import Pair, part
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.event_driven_march import ModalMarch
+
+N_SPAN = 4  # passed by one kernel call
+
+
+class ModalNeighbours:
+    """The motion of a march from where it stands on, and one beside it."""
+
+    def __init__(self, march: ModalMarch) -> None:
+        """Start where `march` is, which itself stays there."""
+        self.most_spans = N_ALIGNING + N_MOST
+        self._march = march
+        n_coordinate, n_motion = march.phases.switch_re.shape[2], march.phases.motion_re.shape[1]
+        q = march.touching().size
+        self._pair = Pair(
+            progress=np.zeros((2, N_PROGRESS), dtype=np.int64),
+            z=np.zeros((2, 2, n_coordinate)),
+            z_next=np.zeros((2, n_coordinate)),
+            motion=np.zeros((2, n_motion)),
+            size=np.zeros(1),
+            ratio=np.zeros(N_SPAN),
+            n_done=np.full(1, N_SPAN),
+        )
+        self._n_read = N_SPAN
+        self._pair.progress[:, [WANTED, SPAN]] = -1
+        self._pair.progress[0, PHASE], self._pair.z[0] = march.place()
+        self._unrecorded = recorder(q), empty_samples(q, 0), empty_tally(q)
+
+    def part(self, n_revolution: int) -> float | None:
+        """Go on with both; see `lyapunov.Neighbours`. Several spans are passed ahead, all of one length.
+
+        Raises
+        ------
+        NoClosedForm
+            Only short steps can follow one of them.
+        """
+        if self._n_read == N_SPAN:
+            self._pass_spans(n_revolution)
+            self._n_read = 0
+        if self._n_read == self._pair.n_done[0]:
+            return None
+        ratio = float(self._pair.ratio[self._n_read])
+        self._n_read += 1
+        return ratio if math.isfinite(ratio) else None
+
+    def _pass_spans(self, n_revolution: int) -> None:
+        """Fill the ratios, as far as both motions go on."""
+        march, pair = self._march, self._pair
+        pair.n_done[0] = 0
+        n_tick = n_revolution * march.clock.samples_per_revolution << march.clock.sample_level
+        outcome = -1
+        while outcome != FINISHED:
+            if march.check is not None:
+                march.check()
+            outcome = part(march.phases, march.bodies, march.clock, n_tick, pair, *self._unrecorded)
+            if outcome in (CONTACT_UNSOLVED, SLIP_TURNED):
+                raise NoClosedForm
+            if outcome == DIVERGED:
+                return
+            if march.is_beyond(pair.motion[0]):
+                pair.n_done[0] = 0
+                return
+            if outcome == PHASE_WANTED:
+                self._tabulate()
+
+    def _tabulate(self) -> None:
+        """Have the phases tabulated that are wanted.
+
+        A motion that is in a phase by now enters it anew: making room for another may move the tables.
+        """
+        march, pair = self._march, self._pair
+        for k in range(2):
+            if pair.progress[k, WANTED] < 0:
+                p = pair.progress[k, PHASE]
+                pair.motion[k] = (
+                    march.phases.motion_re[p] @ pair.z[k, 0] - march.phases.motion_im[p] @ pair.z[k, 1]
+                )
+                pair.progress[k, WANTED] = march.phases.mask[p]
+        for wanted in pair.progress[:, WANTED].tolist():
+            self._march.find(wanted)

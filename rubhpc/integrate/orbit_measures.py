@@ -1,0 +1,86 @@
+"""Measures of recorded signals: spectra, period and sense of the whirl."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.fft
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+LONGEST_PERIOD = 16  # revolutions
+PERIOD_TOLERANCE = 1e-2  # rms distance of whole cycles over the orbit's size
+
+
+def amplitude_spectrum(signal: Floats) -> Floats:
+    """Single-sided amplitude (zero to peak) of signals that span whole revolutions.
+
+    Parameters
+    ----------
+    signal : (..., n_sample)
+        n_sample even; no window is needed where the samples are locked to the shaft.
+
+    Returns
+    -------
+    (..., n_sample // 2 + 1)
+        In the signal's unit; line k is order k over the revolutions recorded, line 0 the size of the mean.
+    """
+    n_sample = signal.shape[-1]
+    spectrum: Floats = np.abs(scipy.fft.rfft(signal, axis=-1)) * (2.0 / n_sample)
+    spectrum[..., 0] *= 0.5
+    if n_sample % 2 == 0:
+        spectrum[..., -1] *= 0.5
+    return spectrum
+
+
+def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) -> int:
+    """Period of the orbit in revolutions; 0 where it has none up to 16 (or the record is too short to tell).
+
+    Whole cycles are compared: the rms distance between revolutions k and k + n over the orbit's size stays
+    under 1e-2. A stroboscopic point alone would take a period-2 orbit for period 1.
+
+    Parameters
+    ----------
+    vertical, horizontal : (n_revolution * samples_per_revolution,), m
+    """
+    signals = vertical - vertical.mean(), horizontal - horizontal.mean()
+    n_revolution = vertical.size // samples_per_revolution
+    most = PERIOD_TOLERANCE**2 * sum(float(signal @ signal) for signal in signals) / vertical.size
+
+    def distance(shift: int, end: int) -> float:
+        """Sum of the square distances between the first samples, up to `end`, and those a shift later."""
+        changes = [signal[shift : shift + end] - signal[:end] for signal in signals]
+        return sum(float(change @ change) for change in changes)
+
+    for n in range(1, min(LONGEST_PERIOD, n_revolution - 1) + 1):
+        shift = n * samples_per_revolution
+        n_pair = vertical.size - shift
+        # The first revolution alone mostly tells that there is no such period.
+        if all(distance(shift, end) <= most * n_pair for end in (samples_per_revolution, n_pair)):
+            return n
+    return 0
+
+
+def whirl_ratio(vertical: Floats, horizontal: Floats, samples_per_revolution: int, spin: float) -> float:
+    """Sense of the whirl at the spin frequency: 1 on a forward circle, 0 on a line, -1 on a backward circle.
+
+    The amplitudes of the two-sided first order, (forward - backward) / (forward + backward); NaN without
+    motion at that frequency.
+
+    Parameters
+    ----------
+    vertical, horizontal : (n_revolution * samples_per_revolution,), m
+    spin : float, rad/s
+    """
+    cycle = [signal.reshape(-1, samples_per_revolution).mean(axis=0) for signal in (vertical, horizontal)]
+    whirl = cycle[0] + 1j * cycle[1]
+    turn = np.exp(2j * np.pi * np.arange(samples_per_revolution) / samples_per_revolution)
+    forward, backward = float(abs(np.vdot(turn, whirl))), float(abs(turn @ whirl))
+    if forward + backward == 0.0:
+        return math.nan
+    return math.copysign(1.0, spin) * (forward - backward) / (forward + backward)

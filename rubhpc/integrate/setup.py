@@ -1,0 +1,169 @@
+"""What the cases of one rig and speed share: assembled, checked and factorised once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, TypeAlias
+
+from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.response import step_limit
+from rubhpc.integrate.contact_mode import Phase, make_phase
+from rubhpc.integrate.mode_library import PhaseBook
+from rubhpc.integrate.packing import Packed, law_of, pack
+from rubhpc.integrate.reduction import ReducedModel, directions, reduce_model
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
+from rubhpc.kernels.contact_pairs import MULTIPLIER
+from rubhpc.study.tables import BLIND_STEP
+
+if TYPE_CHECKING:
+    from rubhpc.fem.model import Model
+    from rubhpc.kernels.contact_pairs import Law
+    from rubhpc.rig.rig import Rig
+    from rubhpc.study.study import Contact, Integrator
+
+FINEST_TICK = 1.5e-9  # s
+FEWEST_STEPS = 16  # a revolution: none is longer than the power of two below it
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CentralDifferenceSetup:
+    """All that the cases of one rig and speed share."""
+
+    model: Model
+    packed: Packed
+    spin: float  # rad/s
+    step: float  # s
+    steps_per_sample: int
+    samples_per_revolution: int
+    is_updated: bool  # normal
+    displacement_limit: float  # m
+    law: Law = MULTIPLIER
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModalSetup:
+    """All that the cases of one rig and speed share; phases are made as frictions and contacts come."""
+
+    model: Model
+    reduced: ReducedModel
+    spin: float  # rad/s
+    step: float  # s, up to which steps are taken without a bound
+    kick_step: float  # s, of contact where it has no closed form
+    samples_per_revolution: int
+    is_updated: bool  # normal
+    displacement_limit: float  # m
+    law: Law = MULTIPLIER
+    _books: dict[float, PhaseBook] = field(default_factory=dict)
+
+    @property
+    def is_stepped(self) -> bool:
+        """Whether closed contacts have no closed form, so that contact is taken in short steps.
+
+        Set-valued friction has one until the slip turns.
+        """
+        return self.is_updated or self.law.stiffness > 0.0
+
+    @cached_property
+    def interval(self) -> float:
+        """Time between samples, s."""
+        return 2.0 * math.pi / (abs(self.spin) * self.samples_per_revolution)
+
+    @cached_property
+    def sample_level(self) -> int:
+        """2^sample_level ticks are the interval of samples."""
+        return max(2, math.ceil(math.log2(self.interval / FINEST_TICK)))
+
+    @cached_property
+    def tick(self) -> float:
+        """Resolution of events, s."""
+        return self.interval / (1 << self.sample_level)
+
+    def level_within(self, step: float) -> int:
+        """Largest level at which 2^level ticks are no longer than a step, s, and than a sample's interval."""
+        return max(0, min(self.sample_level, math.floor(math.log2(step / self.tick))))
+
+    @cached_property
+    def _opened(self) -> Phase:
+        """Motion with every pair open, whatever the friction."""
+        push, pull, _ = directions(self.reduced, self.model, 0.0)
+        return make_phase(self.reduced, push, pull, 0)
+
+    def book(self, friction: float) -> PhaseBook:
+        """Phases of a friction, shared by its cases."""
+        if friction not in self._books:
+            past_sample = max(SAMPLES_AT_ONCE, self.samples_per_revolution // FEWEST_STEPS)
+            self._books[friction] = PhaseBook(
+                self.reduced,
+                self.model,
+                friction,
+                opened=self._opened,
+                tick=self.tick,
+                sample_level=self.sample_level,
+                n_level=self.sample_level + past_sample.bit_length(),
+            )
+        return self._books[friction]
+
+
+Setup: TypeAlias = CentralDifferenceSetup | ModalSetup
+
+
+def prepare(
+    rig: Rig,
+    speed: float,
+    *,
+    contact: Contact,
+    integrator: Integrator,
+    samples_per_revolution: int,
+    model: Model | None = None,
+) -> Setup:
+    """Assemble, check the step and factorise: once per rig and speed.
+
+    `model` is that of the rig, where it has been assembled already. The step is shortened so that a whole
+    number of steps fills a sample's interval.
+
+    Raises
+    ------
+    InputError
+        If the step asked for is above the stability limit of the assembled matrices, the rig has no stator,
+        or the speed is zero.
+    """
+    if not rig.stator:
+        raise InputError(f"rig {rig.name}: [[stator]]: none; a rub case needs at least one")
+    if speed == 0.0 or not math.isfinite(speed):
+        raise InputError(f"speed: {speed} rad/s; sampling is locked to the shaft, so it has to turn")
+    model = model or assemble(rig)
+    if integrator.method == "modal":
+        return ModalSetup(
+            model=model,
+            reduced=reduce_model(model, speed, integrator.accuracy),
+            spin=speed,
+            step=BLIND_STEP if integrator.step is None else integrator.step,
+            kick_step=integrator.contact_step(contact),
+            samples_per_revolution=samples_per_revolution,
+            is_updated=contact.normal == "updated",
+            law=law_of(contact),
+            displacement_limit=rig.rotor.displacement_limit,
+        )
+    limit = step_limit(model)
+    if integrator.step is not None and integrator.step >= limit:
+        raise InputError(
+            f"[integrator] step: {integrator.step:.4g} s is above the stability limit of rig {rig.name}; "
+            f"take less than {limit:.4g} s"
+        )
+    interval = 2.0 * math.pi / (abs(speed) * samples_per_revolution)
+    steps_per_sample = math.ceil(interval / integrator.step_within(limit) * (1.0 - 1e-12))
+    step = interval / steps_per_sample
+    return CentralDifferenceSetup(
+        model=model,
+        packed=pack(model, speed, step),
+        spin=speed,
+        step=step,
+        steps_per_sample=steps_per_sample,
+        samples_per_revolution=samples_per_revolution,
+        is_updated=contact.normal == "updated",
+        law=law_of(contact),
+        displacement_limit=rig.rotor.displacement_limit,
+    )

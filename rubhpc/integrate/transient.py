@@ -1,0 +1,74 @@
+"""The transient: a fixed number of revolutions, or until the motion repeats itself."""
+
+from __future__ import annotations
+
+from itertools import chain, cycle
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.measures import empty_samples, empty_tally
+from rubhpc.kernels.accumulators import HORIZONTAL, TWIST, VERTICAL
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.march import March
+    from rubhpc.study.study import Recording
+
+    Floats = NDArray[np.float64]
+
+# Revolutions between the cycles looked at: one is compared with those 8 and 12 later, which finds motions of
+# period 1, 2, 3, 4, 6, 8 and 12; the last is the first of the next three.
+PAUSES = (7, 3)
+
+
+def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]:
+    """March through the transient, until the motion has settled where `recording` says "auto".
+
+    It has settled when no displacement of output node or stator tips differs from that one cycle of 8 or 12
+    revolutions before by more than `settled_within` of the signal's largest value. At the latest it ends with
+    `longest_transient` revolutions.
+
+    Returns
+    -------
+    str or None
+        Why the case cannot go on.
+    int
+        Revolutions marched.
+    """
+    if not recording.is_transient_auto:
+        return pass_revolutions(march, recording, recording.longest_transient), recording.longest_transient
+
+    n_stator, done, limit = march.touching().size, 0, recording.longest_transient
+    samples, tally = empty_samples(n_stator, recording.samples_per_revolution), empty_tally(n_stator)
+    reference: Floats | None = None
+    for i, pause in enumerate(chain([0], cycle(PAUSES))):
+        if done + pause + 1 > limit:
+            return pass_revolutions(march, recording, limit - done), limit
+        reason = pass_revolutions(march, recording, pause)
+        done += pause
+        if reason is None:
+            reason = march.advance(0, recording.samples_per_revolution, samples, tally, is_recorded=True)
+        if reason is not None:
+            return reason, done
+        done += 1
+        latest = samples.whole[[VERTICAL, HORIZONTAL, TWIST, *range(4, 4 + 2 * n_stator)]]
+        if reference is not None and has_settled(latest, reference, recording.settled_within):
+            return None, done
+        if i % len(PAUSES) == 0:
+            reference = latest
+    raise AssertionError  # the pauses never end
+
+
+def has_settled(cycle: Floats, earlier: Floats, tolerance: float) -> bool:
+    """Whether two cycles (signals, samples) are one, to a share of each signal's largest value."""
+    change, size = np.abs(cycle - earlier).max(axis=1), np.abs(cycle).max(axis=1)
+    return bool(np.all(change <= tolerance * size))
+
+
+def pass_revolutions(march: March, recording: Recording, n_revolution: int) -> str | None:
+    """March some revolutions without a record; returns why the case cannot go on."""
+    samples, tally = empty_samples(march.touching().size, 0), empty_tally(march.touching().size)
+    first = -n_revolution * recording.samples_per_revolution
+    return march.advance(first, 0, samples, tally, is_recorded=False)

@@ -1,0 +1,44 @@
+"""Work space of the contact solution of one case."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_directions, fill_drag
+from rubhpc.kernels.contact_step import fill_compliances
+
+
+def workspace(pairs: Pairs, step: float) -> Workspace:
+    """Arrays for q pairs and a step (s), with directions and compliance along the stators' axes filled in."""
+    q = pairs.radius.size
+    work = Workspace(
+        at=np.zeros((q, N_DEGREE)),
+        now=np.zeros((q, N_DEGREE)),
+        rate=np.zeros((q, N_DEGREE)),
+        pull=np.zeros((q, N_DEGREE)),
+        push=np.zeros((q, N_DEGREE)),
+        drag=np.zeros((q, N_DEGREE)),
+        matrix=np.zeros((q, q)),
+        gap=np.zeros(q),
+        force=np.zeros(q),
+        traction=np.zeros(q),
+        active=np.zeros(q, dtype=np.bool_),
+        is_sticking=np.zeros(q, dtype=np.bool_),
+        elimination=np.zeros((q, q + 1)),
+        moved=np.zeros(N_DEGREE),
+        target=np.zeros(q),
+        delay=np.zeros(q),
+        slip=np.zeros(q),
+        cone=np.zeros(q),
+        coupling=np.zeros((q, q)),
+        tangential=np.zeros((2, q, q)),
+        tableau=np.zeros((3 * q, 6 * q + 2)),
+        basis=np.zeros(3 * q, dtype=np.int64),
+        members=np.zeros(q, dtype=np.int64),
+        solution=np.zeros(3),
+    )
+    for i in range(q):
+        fill_directions(pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.pull[i], work.push[i])
+        fill_drag(pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.drag[i])
+    fill_compliances(pairs, work, step)
+    return work

@@ -1,0 +1,157 @@
+"""What is gathered while a case runs: extrema, contact statistics and the energy balance, step by step."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, Pairs, V, W, Workspace
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Signals of the output node, in the order of their rows in `Samples.rotor`.
+VERTICAL, HORIZONTAL, TWIST, TWIST_ACCELERATION = range(4)
+
+
+class Samples(NamedTuple):
+    """Shaft-locked samples; the force is the mean over the interval that begins with the sample."""
+
+    rotor: Floats  # (4, n_sample), m, m, rad, rad/s2
+    axial: Floats  # (q, n_sample), m
+    lateral: Floats  # (q, n_sample), m
+    force: Floats  # (q, n_sample), N
+    whole: Floats  # (4 + 3 q, n_sample), of which the others are rows, in this order
+
+
+class Tally(NamedTuple):
+    """Running sums and extrema over the recorded revolutions."""
+
+    highest: Floats  # (3,), of vertical, horizontal and torsional displacement
+    lowest: Floats  # (3,)
+    is_touching: NDArray[np.bool_]  # (q,), at the last step
+    age: Ints  # (q,), steps that the contact under way has lasted
+    n_contact: Ints  # (q,), contacts begun
+    contact_time: Floats  # (q,), s
+    impulse: Floats  # (q,), N s
+    friction_work: Floats  # (q,), J
+    least_slip: Floats  # (q,), m/s
+    peak_force: Floats  # (q,), N
+    peak_lateral: Floats  # (q,), m
+    energy: Floats  # (5,), J: see the indices below
+    pivots: Ints  # (1,), most that one contact problem took
+    residual: Floats  # (3, 2), largest distance from the laws, and what forces moved: see the indices below
+
+
+# A stepping scheme spreads the impulse of an impact, by which the tip's own mass takes the rim's velocity,
+# over its first two steps. As a force it grows without bound with smaller steps: no peak is taken of it.
+IMPACT_STEPS = 2
+
+UNBALANCE_WORK, DRIVE_WORK, DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS = range(5)
+
+# Contact problems: gaps of a step, m; velocities of an impact, m/s; accelerations after it, m/s2.
+STEP, IMPACT, PRESSING = range(3)
+
+
+@jit_inline
+def take_sample(
+    displacement: Floats, output_row: Ints, pair_row: Ints, i_sample: int, samples: Samples
+) -> None:
+    """Record the displacements of output node and stator tips; held degrees stay zero."""
+    for k in range(3):
+        if output_row[k] >= 0:
+            samples.rotor[k, i_sample] = displacement[output_row[k]]
+    for i in range(pair_row.shape[0]):
+        if pair_row[i, AXIAL] >= 0:
+            samples.axial[i, i_sample] = displacement[pair_row[i, AXIAL]]
+        if pair_row[i, LATERAL] >= 0:
+            samples.lateral[i, i_sample] = displacement[pair_row[i, LATERAL]]
+
+
+@jit_inline
+def observe_motion(
+    displacement: Floats,
+    output_row: Ints,
+    pair_row: Ints,
+    highest: Floats,
+    lowest: Floats,
+    peak_lateral: Floats,
+) -> None:
+    """Widen the extrema of the output node's degrees (3,) and of the stator tips (q,); row -1 is held."""
+    for k in range(3):
+        value = displacement[output_row[k]] if output_row[k] >= 0 else 0.0
+        highest[k] = max(highest[k], value)
+        lowest[k] = min(lowest[k], value)
+    for i in range(peak_lateral.size):
+        row = pair_row[i, LATERAL]
+        if row >= 0:
+            peak_lateral[i] = max(peak_lateral[i], abs(displacement[row]))
+
+
+@jit_inline
+def observe_contact(
+    pairs: Pairs,
+    work: Workspace,
+    spin: float,
+    step: float,
+    velocity: Floats,
+    velocity_next: Floats,
+    tally: Tally,
+) -> None:
+    """Add one step's contact to the tally; velocities are half a step before and after the step's forces.
+
+    The slip speed is `r_d (spin + thx') + t . (vA - vB)`, signed so that steady sliding is positive. What the
+    normal force does not give back, `-N` times the rate of the gap, is the loss of the impacts.
+    """
+    for i in range(pairs.radius.size):
+        force = work.force[i]
+        if not force > 0.0:
+            tally.is_touching[i] = False
+            tally.age[i] = 0
+            continue
+        rate_v, rate_w = (
+            centred(pairs.row[i, V], velocity, velocity_next),
+            centred(pairs.row[i, W], velocity, velocity_next),
+        )
+        rate_twist = centred(pairs.row[i, TORSION], velocity, velocity_next)
+        rate_axial = centred(pairs.row[i, AXIAL], velocity, velocity_next)
+        rate_lateral = centred(pairs.row[i, LATERAL], velocity, velocity_next)
+        push = work.push[i]
+        ey, ez = pairs.axis_y[i], pairs.axis_z[i]
+        ny, nz = -push[V], -push[W]
+        tip_v = rate_axial * ey - rate_lateral * ez
+        tip_w = rate_axial * ez + rate_lateral * ey
+        opening = ny * (tip_v - rate_v) + nz * (tip_w - rate_w)
+        sense = 1.0 if spin >= 0.0 else -1.0
+        slip = sense * (pairs.radius[i] * (spin + rate_twist) - nz * (rate_v - tip_v) + ny * (rate_w - tip_w))
+        friction_force = sense * work.traction[i]
+        if not tally.is_touching[i]:
+            tally.n_contact[i] += 1
+            tally.is_touching[i] = True
+        tally.contact_time[i] += step
+        tally.impulse[i] += force * step
+        tally.friction_work[i] += friction_force * slip * step
+        tally.least_slip[i] = min(tally.least_slip[i], slip)
+        tally.age[i] += 1
+        if tally.age[i] > IMPACT_STEPS:
+            tally.peak_force[i] = max(tally.peak_force[i], force)
+        tally.energy[DRIVE_WORK] += friction_force * pairs.radius[i] * abs(spin) * step
+        tally.energy[FRICTION_LOSS] += friction_force * slip * step
+        tally.energy[IMPACT_LOSS] -= force * opening * step
+
+
+@jit_inline
+def observe_solution(problem: int, pivots: int, residual: float, moved: float, tally: Tally) -> None:
+    """Note what a contact problem has taken, and how far its solution is from the laws."""
+    tally.pivots[0] = max(tally.pivots[0], pivots)
+    tally.residual[problem, 0] = max(tally.residual[problem, 0], residual)
+    tally.residual[problem, 1] = max(tally.residual[problem, 1], moved)
+
+
+@jit_inline
+def centred(row: int, velocity: Floats, velocity_next: Floats) -> float:
+    """Velocity of a degree at the time of the step's forces; zero where it is held."""
+    return 0.5 * (velocity[row] + velocity_next[row]) if row >= 0 else 0.0

@@ -1,0 +1,272 @@
+"""The modal integrator in steps: closed-form motion between short contact steps, for every law and normal.
+
+With the updated normal the gap is no linear function of the motion, and with set-valued friction or a penalty
+a contact has more states than open and closed: closed contacts have no modes. The contact force of a step
+acts as a kick at its beginning, as in the central difference, and the motion drifts freely (exactly, in the
+modes of the open system) to its end, where the laws of contact hold. Far from contact, bounded long steps are
+taken: the gap along the stator's axis is never the larger one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_sum
+from rubhpc.kernels.accumulators import (
+    DAMPING_LOSS,
+    STEP,
+    TWIST_ACCELERATION,
+    UNBALANCE_WORK,
+    Samples,
+    Tally,
+    observe_contact,
+    observe_solution,
+)
+from rubhpc.kernels.complementarity import UNSOLVED
+from rubhpc.kernels.contact_modes import (
+    CONTACT_UNSOLVED,
+    FINISHED,
+    MOST_STEPS,
+    N_STEP,
+    NEXT_SAMPLE,
+    PAUSED,
+    SPAN,
+    TIME,
+    Clock,
+    Phases,
+    Reduced,
+    dot,
+    floor_log2,
+    propagate,
+    proved_time,
+)
+from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_start, is_any_closed
+from rubhpc.kernels.contact_step import is_plain, solve_contact
+from rubhpc.kernels.measuring import Recorder, begin_span, end_span, take_samples
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Kicks(NamedTuple):
+    """How contact forces act on the modes of the open system; q pairs of 5 degrees each, m modes."""
+
+    level: int  # steps in contact last 2^level ticks
+    degree_re: Floats  # (5 q, m), displacement of each degree
+    degree_im: Floats
+    rate_re: Floats  # (5 q, m), velocity of each degree
+    rate_im: Floats
+    drifted_re: Floats  # (5 q, m), modal coordinates a contact step after a unit impulse on each degree
+    drifted_im: Floats
+    shifted_re: Floats  # (5 q, m), those of the displacement that a unit impulse makes in a second
+    shifted_im: Floats
+    twist_answer: Floats  # (5 q,), torsional acceleration of the output node for a unit force
+
+
+@jit_sum
+def book_step(
+    reduced: Reduced, skew: Floats, step: float, angle: float, x: Floats, x_after: Floats, energy: Floats
+) -> None:
+    """Add what damping took and the unbalance gave in a step of contact (s), at its mean velocity.
+
+    `x` and `x_after` (n,) are the reduced displacements at its ends, `angle` is that of the shaft amid it;
+    `skew` is the skew part of the stiffness, without rows where there is none. A kick sets off a burst of the
+    fastest modes, which force spread over the step would not: the mean leaves it out.
+    """
+    n = x.size
+    cosine, sine = np.cos(angle), np.sin(angle)
+    loss, gain = 0.0, 0.0
+    for k in range(n):
+        moved = x_after[k] - x[k]
+        row = reduced.damping[k]
+        drawn = 0.0
+        for j in range(n):
+            drawn += row[j] * (x_after[j] - x[j])
+        loss += moved * drawn / step
+        gain += moved * (reduced.force_cosine[k] * cosine + reduced.force_sine[k] * sine)
+    for k in range(len(skew)):
+        row = skew[k]
+        drawn = 0.0
+        for j in range(n):
+            drawn += row[j] * 0.5 * (x_after[j] + x[j])
+        loss += (x_after[k] - x[k]) * drawn
+    energy[DAMPING_LOSS] += loss
+    energy[UNBALANCE_WORK] += gain
+
+
+@jit_sum
+def take_back(
+    kicks: Kicks, work: Workspace, step: float, z_re: Floats, z_im: Floats, before: Floats, now: Floats
+) -> None:
+    """Take back what a step's forces have moved before their impacts were due; velocities stay.
+
+    `z` are the coordinates at the end of the step (s); the ends `before` and `now` (5 q,) are moved alike.
+    """
+    for i in range(work.force.size):
+        for d in range(N_DEGREE):
+            late = work.delay[i] * step * work.force[i] * work.pull[i, d]
+            if late != 0.0:
+                for k in range(z_re.size):
+                    z_re[k] -= kicks.shifted_re[i * N_DEGREE + d, k] * late
+                    z_im[k] -= kicks.shifted_im[i * N_DEGREE + d, k] * late
+    for a in range(now.size):
+        moved = dot(kicks.degree_re[a], kicks.degree_im[a], z_re, z_im) - now[a]
+        before[a] += moved
+        now[a] += moved
+
+
+@jit_sum
+def advance_stepped(
+    phases: Phases,
+    reduced: Reduced,
+    clock: Clock,
+    kicks: Kicks,
+    pairs: Pairs,
+    work: Workspace,
+    first_tick: int,
+    last_tick: int,
+    is_recorded: bool,
+    progress: Ints,
+    z: Floats,
+    z_next: Floats,
+    ends: Floats,
+    recorder: Recorder,
+    samples: Samples,
+    tally: Tally,
+) -> int:
+    """Advance a case from `first_tick` to `last_tick`, as `modal.advance` does with the fixed normal.
+
+    `phases` holds the open phase alone; `pairs.row` numbers the 5 q degrees of `kicks`. `ends` (2, 5 q) keeps
+    the degrees at the beginning and the end of the step before, where that was as short; else NaN.
+    """
+    q = pairs.radius.size
+    z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
+    switch_re, switch_im = phases.switch_re, phases.switch_im
+    gap_rate_re, gap_rate_im, bound = phases.rate_re, phases.rate_im, phases.bound
+    power_re, power_im = phases.power_re, phases.power_im
+    degree_re, degree_im, rate_re, rate_im = kicks.degree_re, kicks.degree_im, kicks.rate_re, kicks.rate_im
+    motion_re, motion_im = phases.motion_re, phases.motion_im
+    n_degree = q * N_DEGREE
+    before, now, after, rate = ends[0], ends[1], np.zeros(n_degree), np.zeros(n_degree)
+    x, x_after = np.zeros(reduced.push.shape[1]), np.zeros(reduced.push.shape[1])
+    is_placed = False  # whether x is where the step begins
+    skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
+    if not np.any(skew):
+        skew = skew[:0]
+    step = clock.tick * (1 << kicks.level)
+    interval = clock.tick * (1 << clock.sample_level)
+    end_tick = clock.n_sample << clock.sample_level
+    highest_level = phases.power_re.shape[1] - 1
+    per_revolution = clock.samples_per_revolution << clock.sample_level
+    is_direct, is_springy = is_plain(pairs.law), pairs.law.stiffness > 0.0
+    is_bouncing = pairs.law.restitution > 0.0
+    is_followed = is_recorded or not is_direct  # the steps before and after a force are looked at
+    t, last_step = first_tick, progress[N_STEP] + MOST_STEPS
+    was_touching = bool(np.any(work.force > 0.0))
+    while True:
+        if progress[N_STEP] > last_step:
+            progress[TIME] = t
+            return PAUSED
+        is_sample = is_recorded and t == progress[NEXT_SAMPLE] << clock.sample_level
+        is_end = t >= last_tick
+        if is_sample and (not is_end or t == end_tick):
+            i_sample = t >> clock.sample_level
+            take_samples(phases, 0, z_re, z_im, i_sample, 1, interval, recorder, samples, tally)
+            progress[NEXT_SAMPLE] = i_sample + 1
+        if is_end:
+            if is_recorded and t == end_tick:
+                end_span(phases, 0, clock, t, z, progress, recorder, tally)
+            progress[TIME] = t
+            return FINISHED
+        limit = last_tick
+        if is_recorded:
+            limit = min(limit, ((t >> clock.sample_level) + 1) << clock.sample_level)
+        level = min(highest_level, floor_log2(limit - t))
+        proved = proved_time(switch_re, switch_im, gap_rate_re, gap_rate_im, bound, 0, z_re, z_im)
+        while level > kicks.level and (1 << level) * clock.tick > proved:
+            level -= 1
+        progress[N_STEP] += 1
+        propagate(power_re[0, level], power_im[0, level], z_re, z_im, next_re, next_im)
+        is_near, is_touching = level <= kicks.level, False
+        if is_near:
+            for a in range(n_degree):
+                after[a] = dot(degree_re[a], degree_im[a], next_re, next_im)
+            is_touching = is_any_closed(
+                pairs.row,
+                pairs.axis_y,
+                pairs.axis_z,
+                pairs.radius,
+                pairs.clearance,
+                pairs.aside,
+                pairs.is_updated,
+                after,
+                work.at,
+                work.gap,
+            )
+            if is_followed and np.isnan(before[0]):
+                for a in range(n_degree):
+                    now[a] = dot(degree_re[a], degree_im[a], z_re, z_im)
+                    before[a] = now[a] - step * dot(rate_re[a], rate_im[a], z_re, z_im)
+        if is_touching or (is_near and is_springy and was_touching):
+            if not is_direct:
+                for a in range(n_degree):
+                    rate[a] = (now[a] - before[a]) / step
+                fill_start(pairs.row, now, rate, work.now, work.rate)
+            n_touching = solve_contact(pairs, work, step, clock.spin)
+            if n_touching == UNSOLVED:
+                progress[TIME] = t
+                return CONTACT_UNSOLVED
+            is_touching = n_touching > 0
+            if is_recorded:
+                observe_solution(STEP, int(work.solution[0]), work.solution[1], work.solution[2], tally)
+            for i in range(q):
+                for d in range(N_DEGREE):
+                    b = i * N_DEGREE + d
+                    impulse = step * work.force[i] * work.pull[i, d]
+                    if impulse != 0.0:
+                        if is_sample:
+                            samples.rotor[TWIST_ACCELERATION, t >> clock.sample_level] += (
+                                kicks.twist_answer[b] * impulse / step
+                            )
+                        for k in range(z_re.size):
+                            next_re[k] += kicks.drifted_re[b, k] * impulse
+                            next_im[k] += kicks.drifted_im[b, k] * impulse
+            if is_followed:
+                for a in range(n_degree):
+                    after[a] = dot(degree_re[a], degree_im[a], next_re, next_im)
+        elif was_touching:
+            work.force[:] = 0.0
+            work.traction[:] = 0.0
+            work.is_sticking[:] = False
+        if is_recorded and is_touching:
+            if progress[SPAN] >= 0:
+                end_span(phases, 0, clock, t, z, progress, recorder, tally)
+            for k in range(x.size):
+                if not is_placed:
+                    x[k] = dot(motion_re[0, k], motion_im[0, k], z_re, z_im)
+                x_after[k] = dot(motion_re[0, k], motion_im[0, k], next_re, next_im)
+            angle = clock.spin * clock.tick * (t % per_revolution) + 0.5 * clock.spin * step
+            book_step(reduced, skew, step, angle, x, x_after, tally.energy)
+            x[:] = x_after
+        elif is_recorded and progress[SPAN] < 0:
+            begin_span(phases, 0, t, z, progress, recorder)
+        if is_recorded and (is_touching or was_touching):
+            for a in range(n_degree):
+                rate[a] = 0.5 * (after[a] - before[a]) / step
+            observe_contact(pairs, work, clock.spin, step, rate, rate, tally)
+            for i in range(q):
+                samples.force[i, t >> clock.sample_level] += work.force[i] * step / interval
+        was_touching = is_touching
+        is_placed = is_touching and not is_bouncing  # an impact is taken back from where it led
+        for a in range(n_degree):
+            before[a], now[a] = now[a], after[a]
+        if is_touching and is_bouncing:
+            take_back(kicks, work, step, next_re, next_im, before, now)
+        if not (is_near and is_followed):
+            before[0] = np.nan
+        for k in range(z_re.size):
+            z_re[k], z_im[k] = next_re[k], next_im[k]
+        t += 1 << level

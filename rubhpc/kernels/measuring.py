@@ -1,0 +1,293 @@
+"""What the exact integrator measures as it goes: samples and their extrema, contacts, energies."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels.accumulators import (
+    DAMPING_LOSS,
+    DRIVE_WORK,
+    FRICTION_LOSS,
+    HORIZONTAL,
+    TWIST,
+    TWIST_ACCELERATION,
+    UNBALANCE_WORK,
+    VERTICAL,
+    Samples,
+    Tally,
+)
+from rubhpc.kernels.contact_modes import (
+    DYING,
+    LATERAL_RATE,
+    LATERAL_ROW,
+    N_ROTOR_ROW,
+    SAMPLES_AT_ONCE,
+    SPAN,
+    TWIST_ACCELERATION_ROW,
+    Clock,
+    Phases,
+    Reduced,
+    dot,
+    resolved_time,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LANES = 8  # outputs are read in whole vectors
+FORCE, FORCE_RATE, SLIP, SLIP_RATE = range(4)  # rows of `Recorder.node`
+
+
+class Recorder(NamedTuple):
+    """Work space of a case's measures, o output rows and q pairs; make one with `recorder`."""
+
+    value: Floats  # (SAMPLES_AT_ONCE o,), outputs sample by sample
+    last: Floats  # (2, 3 + q), watched signals and their rates at the last sample; NaN before the first
+    node: Floats  # (4, q), force, slip speed (N, m/s) and their rates of closed pairs at the last step
+    entry: Floats  # (2,), J, forms of damping loss and unbalance work where the span began
+
+
+def recorder(q: int) -> Recorder:
+    """Work space for q pairs, before the first sample."""
+    n_row = N_ROTOR_ROW + 3 * q
+    return Recorder(
+        value=np.zeros(SAMPLES_AT_ONCE * n_row),
+        last=np.full((2, 3 + q), np.nan),
+        node=np.zeros((4, q)),
+        entry=np.zeros(2),
+    )
+
+
+@jit_inline_sum
+def read_outputs(output: Floats, p: int, z_re: Floats, z_im: Floats, n_value: int, value: Floats) -> None:
+    """Fill the first `n_value` outputs from the modal coordinates, whose number is a multiple of four."""
+    m = z_re.size
+    for r in range(n_value):
+        value[r] = 0.0
+    for part in range(2):
+        z = z_re if part == 0 else z_im
+        for k in range(0, m, 4):
+            a, b, c, d = z[k], z[k + 1], z[k + 2], z[k + 3]
+            j = part * m + k
+            for r in range(n_value):
+                value[r] += (
+                    output[p, j, r] * a
+                    + output[p, j + 1, r] * b
+                    + output[p, j + 2, r] * c
+                    + output[p, j + 3, r] * d
+                )
+
+
+@jit_inline_sum
+def turning_value(before: float, rate_before: float, after: float, rate_after: float, step: float) -> float:
+    """Extremum of Hermite's cubic through values and rates of opposite sign at a step's ends (step in s)."""
+    a, b = rate_before * step, rate_after * step
+    rise = after - before
+    quadratic, cubic = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
+    # The slope a + 2 quadratic s + 3 cubic s^2 has one root inside; this form of it does not cancel.
+    below = np.copysign(np.sqrt(quadratic * quadratic - 3.0 * cubic * a), a) - quadratic
+    s = a / below if below != 0.0 else 0.0  # zero only by underflow
+    return before + s * (a + s * (quadratic + s * cubic))
+
+
+@jit_inline_sum
+def take_samples(
+    phases: Phases,
+    p: int,
+    z_re: Floats,
+    z_im: Floats,
+    first: int,
+    count: int,
+    interval: float,
+    recorder: Recorder,
+    samples: Samples,
+    tally: Tally,
+) -> None:
+    """Record `count` samples from `first` on, all in phase p; the one past the record counts for extrema.
+
+    `interval` (s) is that between samples, `z` the coordinates at the first of them.
+    """
+    q = samples.axial.shape[0]
+    n_row, n_sample = N_ROTOR_ROW + 3 * q, samples.rotor.shape[1]
+    value, last, rotor, axial, lateral = (
+        recorder.value,
+        recorder.last,
+        samples.rotor,
+        samples.axial,
+        samples.lateral,
+    )
+    lowest, highest, peak_lateral = tally.lowest, tally.highest, tally.peak_lateral
+    read_outputs(phases.output, p, z_re, z_im, -(-count * n_row // LANES) * LANES, value)
+    for j in range(min(count, n_sample - first)):
+        start = j * n_row
+        rotor[VERTICAL, first + j] = value[start + VERTICAL]
+        rotor[HORIZONTAL, first + j] = value[start + HORIZONTAL]
+        rotor[TWIST, first + j] = value[start + TWIST]
+        rotor[TWIST_ACCELERATION, first + j] = value[start + TWIST_ACCELERATION_ROW]
+        for i in range(q):
+            tip = start + N_ROTOR_ROW + 3 * i
+            axial[i, first + j] = value[tip]
+            lateral[i, first + j] = value[tip + LATERAL_ROW]
+    for k in range(3 + q):
+        tip = N_ROTOR_ROW + 3 * (k - 3)
+        row, rate_row = (k, 3 + k) if k < 3 else (tip + LATERAL_ROW, tip + LATERAL_RATE)
+        before, rate_before = last[0, k], last[1, k]
+        low, high = np.inf, -np.inf
+        for j in range(count):
+            now, rate = value[j * n_row + row], value[j * n_row + rate_row]
+            if rate_before * rate < 0.0:
+                turning = turning_value(before, rate_before, now, rate, interval)
+                low = turning if turning < low else low
+                high = turning if turning > high else high
+            low = now if now < low else low
+            high = now if now > high else high
+            before, rate_before = now, rate
+        last[0, k], last[1, k] = before, rate_before
+        if k < 3:
+            lowest[k], highest[k] = min(lowest[k], low), max(highest[k], high)
+        else:
+            peak_lateral[k - 3] = max(peak_lateral[k - 3], high, -low)
+
+
+@jit_inline_sum
+def read_contact(
+    phases: Phases, reduced: Reduced, p: int, i: int, spin: float, z_re: Floats, z_im: Floats
+) -> tuple[float, float, float, float]:
+    """Force (N), its rate, slip speed (m/s) and its rate, of pair i, closed in phase p."""
+    return (
+        dot(phases.switch_re[p, i], phases.switch_im[p, i], z_re, z_im),
+        dot(phases.rate_re[p, i], phases.rate_im[p, i], z_re, z_im),
+        abs(spin) * reduced.radius[i] + dot(phases.slip_re[p, i], phases.slip_im[p, i], z_re, z_im),
+        dot(phases.slip_rate_re[p, i], phases.slip_rate_im[p, i], z_re, z_im),
+    )
+
+
+@jit_sum
+def resolved_contact(phases: Phases, p: int, z_re: Floats, z_im: Floats) -> float:
+    """Time, s, over which cubics follow force and slip of the pairs closed in phase p."""
+    time = np.inf
+    for i in range(phases.switch_re.shape[1]):
+        if (phases.mask[p] >> i) & 1:
+            pace = phases.pace[p]
+            time = min(
+                time,
+                resolved_time(phases.switch_re[p, i], phases.switch_im[p, i], pace, z_re, z_im),
+                resolved_time(phases.slip_re[p, i], phases.slip_im[p, i], pace, z_re, z_im),
+            )
+    return time
+
+
+@jit_sum
+def begin_contact(
+    phases: Phases, reduced: Reduced, p: int, spin: float, z: Floats, calm: Floats, recorder: Recorder
+) -> None:
+    """Read the pairs closed in phase p, at its beginning or where a record begins.
+
+    What dies before the first step ends is left out: no cubic follows it. `calm` (2, m) is work space.
+    """
+    for k in range(z.shape[1]):
+        dies = phases.pace[p, k] == DYING
+        calm[0, k], calm[1, k] = (0.0, 0.0) if dies else (z[0, k], z[1, k])
+    for i in range(reduced.radius.size):
+        if (phases.mask[p] >> i) & 1:
+            force, rate, slip, slip_rate = read_contact(phases, reduced, p, i, spin, calm[0], calm[1])
+            recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = force, rate
+            recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip, slip_rate
+
+
+@jit_inline_sum
+def observe_step(
+    phases: Phases,
+    reduced: Reduced,
+    p: int,
+    spin: float,
+    step: float,
+    z_re: Floats,
+    z_im: Floats,
+    i_sample: int,
+    share: float,
+    recorder: Recorder,
+    samples: Samples,
+    tally: Tally,
+) -> None:
+    """Add a step (s) to the pairs closed in phase p: force and slip as cubics, Simpson's rule for friction.
+
+    `z` are the coordinates at its end; `share` (1/s) takes an impulse to the mean force of sample `i_sample`.
+    """
+    for i in range(reduced.radius.size):
+        if not (phases.mask[p] >> i) & 1:
+            continue
+        before, rate_before = recorder.node[FORCE, i], recorder.node[FORCE_RATE, i]
+        slip_before, slip_rate_before = recorder.node[SLIP, i], recorder.node[SLIP_RATE, i]
+        after, rate_after, slip_after, slip_rate_after = read_contact(phases, reduced, p, i, spin, z_re, z_im)
+        recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = after, rate_after
+        recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip_after, slip_rate_after
+        bend = step * (rate_before - rate_after)
+        impulse = step * (0.5 * (before + after) + bend / 12.0)
+        middle = 0.5 * (before + after) + 0.125 * bend
+        slip_middle = 0.5 * (slip_before + slip_after) + 0.125 * step * (slip_rate_before - slip_rate_after)
+        work = before * slip_before + 4.0 * middle * slip_middle + after * slip_after
+        friction_work = reduced.friction[i] * work * step / 6.0
+        peak = max(before, after)
+        if rate_before * rate_after < 0.0:
+            peak = max(peak, turning_value(before, rate_before, after, rate_after, step))
+        samples.force[i, i_sample] += impulse * share
+        tally.contact_time[i] += step
+        tally.impulse[i] += impulse
+        tally.friction_work[i] += friction_work
+        tally.least_slip[i] = min(tally.least_slip[i], slip_before, slip_after)
+        tally.peak_force[i] = max(tally.peak_force[i], peak)
+        tally.energy[FRICTION_LOSS] += friction_work
+        tally.energy[DRIVE_WORK] += reduced.friction[i] * reduced.radius[i] * abs(spin) * impulse
+
+
+@jit_sum
+def energy_forms(phases: Phases, p: int, z: Floats, entry: Floats) -> None:
+    """Fill `entry` (2,), J, with what grows by damping loss and unbalance work as phase p goes on."""
+    m = z.shape[1]
+    loss = 0.0
+    for part in range(2):
+        for k in range(m):
+            if z[part, k] != 0.0:
+                row = phases.loss[p, part * m + k]
+                along = 0.0
+                for j in range(m):
+                    along += row[j] * z[0, j] + row[m + j] * z[1, j]
+                loss += along * z[part, k]
+    first = phases.n_mode[p]
+    cosine, sine = z[0, first], z[1, first]
+    work = 0.0
+    for part in range(2):  # exp(i angle), then its conjugate
+        real, imaginary = 0.0, 0.0
+        for k in range(m):
+            a, b = phases.work_re[p, part, k], phases.work_im[p, part, k]
+            real += a * z[0, k] - b * z[1, k]
+            imaginary += a * z[1, k] + b * z[0, k]
+        work += cosine * real - (sine if part == 0 else -sine) * imaginary
+    entry[0], entry[1] = loss, work
+
+
+@jit_sum
+def end_span(
+    phases: Phases, p: int, clock: Clock, t: int, z: Floats, progress: Ints, recorder: Recorder, tally: Tally
+) -> None:
+    """Add what damping took and the unbalance gave since the span began, in phase p all along."""
+    if progress[SPAN] < 0:
+        return
+    time = (t - progress[SPAN]) * clock.tick
+    loss, work = recorder.entry[0], recorder.entry[1]
+    energy_forms(phases, p, z, recorder.entry)
+    tally.energy[DAMPING_LOSS] += recorder.entry[0] - loss + phases.steady_power[p, 0] * time
+    tally.energy[UNBALANCE_WORK] += recorder.entry[1] - work + phases.steady_power[p, 1] * time
+    progress[SPAN] = -1
+
+
+@jit_sum
+def begin_span(phases: Phases, p: int, t: int, z: Floats, progress: Ints, recorder: Recorder) -> None:
+    """Begin to add up energies at tick t, in phase p."""
+    energy_forms(phases, p, z, recorder.entry)
+    progress[SPAN] = t

@@ -1,0 +1,127 @@
+"""Events of the exact integrator: impacts, and which contacts go on."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels.accumulators import (
+    DRIVE_WORK,
+    FRICTION_LOSS,
+    IMPACT,
+    IMPACT_LOSS,
+    PRESSING,
+    Tally,
+    observe_solution,
+)
+from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_complementarity
+from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
+
+Floats = NDArray[np.float64]
+
+OPENING = 1e-9  # m/s, above which a pair parts
+
+
+@jit_inline_sum
+def product(a: Floats, b: Floats) -> float:
+    """Inner product; `np.dot` would cost a call of the library for a dozen numbers."""
+    total = 0.0
+    for k in range(a.size):
+        total += a[k] * b[k]
+    return total
+
+
+@jit_sum
+def change_contacts(
+    reduced: Reduced,
+    closed: int,
+    crossing: int,
+    spin: float,
+    moment: float,
+    cosine: float,
+    sine: float,
+    motion: Floats,
+    is_recorded: bool,
+    force: Floats,
+    speed: Floats,
+    active: NDArray[np.bool_],
+    elimination: Floats,
+    tally: Tally,
+) -> int:
+    """Impact, then the set of closed pairs that goes on; -1 where there is none.
+
+    `closed` are the pairs closed before, `crossing` those whose gap closes or whose force vanishes now. The
+    impact sends every candidate that closes back at its restitution (0: inelastic); among those that do not
+    part for longer than `moment` (s), the accelerations decide.
+    """
+    q, n = reduced.push.shape
+    candidates = (closed & ~crossing) | (crossing & ~closed)
+    velocity = motion[n:]
+    for i in range(q):
+        speed[i] = product(reduced.push[i], velocity) if (candidates >> i) & 1 else np.inf
+        active[i] = speed[i] < 0.0
+        if active[i]:
+            speed[i] *= 1.0 + reduced.restitution
+    pivots = solve_complementarity(reduced.answer, speed, 1e-14, force, active, elimination)
+    if pivots == UNSOLVED:
+        return -1
+    if is_recorded:
+        residual, moved = residual_of(reduced.answer, speed, force)
+        observe_solution(IMPACT, pivots, residual, moved, tally)
+    for i in range(q):
+        if force[i] > 0.0:
+            if is_recorded:
+                observe_impact(reduced, i, spin, force[i], velocity, tally)
+            for k in range(n):
+                velocity[k] += reduced.pull[i, k] * force[i]
+    for i in range(q):
+        speed[i] = np.inf
+        if (candidates >> i) & 1:
+            acceleration = 0.0
+            for k in range(n):
+                acceleration += reduced.push[i, k] * (
+                    reduced.force_cosine[k] * cosine
+                    + reduced.force_sine[k] * sine
+                    - product(reduced.stiffness[k], motion[:n])
+                    - product(reduced.damping[k], velocity)
+                )
+            # A pair that parts so slowly that it is pressed together again at once has not parted.
+            if product(reduced.push[i], velocity) <= OPENING + max(-acceleration, 0.0) * moment:
+                speed[i] = acceleration
+        active[i] = speed[i] < 0.0
+    pivots = solve_complementarity(reduced.answer, speed, 1e-12, force, active, elimination)
+    if pivots == UNSOLVED:
+        return -1
+    if is_recorded:
+        residual, moved = residual_of(reduced.answer, speed, force)
+        observe_solution(PRESSING, pivots, residual, moved, tally)
+    remaining = 0
+    for i in range(q):
+        if force[i] > 0.0:
+            remaining |= 1 << i
+        elif is_recorded and reduced.restitution > 0.0 and (crossing & ~closed) >> i & 1:
+            tally.n_contact[i] += 1  # it has bounced off
+    return remaining
+
+
+@jit_sum
+def observe_impact(
+    reduced: Reduced, i: int, spin: float, impulse: float, velocity: Floats, tally: Tally
+) -> None:
+    """Add an impact's impulse (N s) and work to the tally; `velocity` (n,) is the one before it."""
+    friction = reduced.friction[i] * impulse
+    # An impulse works with the mean of the velocities before and after; pull is push and friction.
+    closing = product(reduced.push[i], velocity) + 0.5 * impulse * reduced.answer[i, i]
+    total = product(reduced.pull[i], velocity) + 0.5 * impulse * product(reduced.pull[i], reduced.pull[i])
+    drive = friction * reduced.radius[i] * abs(spin)
+    if reduced.friction[i] > 0.0:
+        change = impulse * (product(reduced.pull[i], reduced.pull[i]) - reduced.answer[i, i])
+        gain = (total - closing - 0.5 * change) / reduced.friction[i]  # of the slip on the rim's own speed
+        slip = reduced.radius[i] * abs(spin) - gain
+        tally.least_slip[i] = min(tally.least_slip[i], slip, slip - change / reduced.friction[i])
+    tally.impulse[i] += impulse
+    tally.friction_work[i] += drive - (total - closing) * impulse
+    tally.energy[DRIVE_WORK] += drive
+    tally.energy[FRICTION_LOSS] += drive - (total - closing) * impulse
+    tally.energy[IMPACT_LOSS] -= closing * impulse

@@ -1,0 +1,1 @@
+"""What a rig consists of, and how it is read."""

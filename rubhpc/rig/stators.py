@@ -1,0 +1,148 @@
+"""Stators: a cantilever beam, a mass on springs or a rigid wall, or any linear body by its matrices."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+import numpy as np  # noqa: TC002 - annotations are read when a rig is built
+from numpy.typing import NDArray  # noqa: TC002
+
+from rubhpc.input.fields import FieldError, check_fields, count, flag, quantity, words
+from rubhpc.input.matrix import MATRIX
+from rubhpc.rig.degrees import check_body, checked_matrices
+from rubhpc.rig.parts import UNDAMPED, Damping
+
+MOST_STATORS = 62  # sets of contacts are counted in the bits of a whole number
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Seat:
+    """Where a stator stands: at a node of the rotor, `angle` from straight up (+y) towards +z.
+
+    `count` of them make a ring, at `angle`, `angle` + 360 deg / count and so on; a rig holds them one by one.
+    """
+
+    node: int = count()
+    angle: float = quantity("rad", default=0.0)
+    radius: float | None = quantity("m", default=None, above=0)  # of contact; None: the disc's
+    clearance_offset: float = quantity("m", default=0.0)
+    count: int | None = count(default=None, at_most=MOST_STATORS, is_key=False)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stator(Seat):
+    """A cantilever that stands radially over the rotor; its free end faces the rim."""
+
+    length: float = quantity("m", above=0)
+    width: float = quantity("m", above=0)  # along the shaft
+    height: float = quantity("m", above=0)  # along the lateral (tangential) motion
+    elements: int = count(default=6, at_most=1000)
+    youngs_modulus: float = quantity("Pa", above=0)
+    poissons_ratio: float = quantity("", default=0.3, above=-1, below=0.5)
+    density: float = quantity("kg/m^3", above=0)
+    lateral: bool = flag(default=True)
+    damping: Damping = UNDAMPED
+
+    @property
+    def euler_load(self) -> float:
+        """Buckling load of the cantilever, pi^2 E I / (4 L^2), N."""
+        least = self.height * self.width * min(self.height, self.width) ** 2 / 12
+        return math.pi**2 * self.youngs_modulus * least / (4 * self.length**2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LumpedStator(Seat):
+    """A mass on a spring and a damper, radial and, where it has a lateral stiffness, tangential; or a wall.
+
+    The lateral mass is the same unless told. A wall (`rigid = true`) has no mass and does not move.
+    """
+
+    mass: float | None = quantity("kg", default=None, above=0)
+    stiffness: float | None = quantity("N/m", default=None, above=0)
+    damping: float = quantity("N s/m", default=0.0, at_least=0)
+    lateral_mass: float | None = quantity("kg", default=None, above=0)
+    lateral_stiffness: float | None = quantity("N/m", default=None, above=0)
+    lateral_damping: float = quantity("N s/m", default=0.0, at_least=0)
+    rigid: bool = flag(default=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        springs = ("mass", "stiffness", "lateral_mass", "lateral_stiffness")
+        for key in springs:
+            if self.rigid and getattr(self, key) is not None:
+                raise FieldError(key, "stands beside rigid = true, which does not move; leave one out")
+        for key in springs[:2]:
+            if not self.rigid and getattr(self, key) is None:
+                raise FieldError(key, "missing; a stator has mass and stiffness, or rigid = true")
+        if self.lateral_stiffness is None:
+            for key in ("lateral_mass", "lateral_damping"):
+                if getattr(self, key):
+                    raise FieldError(key, "without a lateral_stiffness the stator cannot move so; add it")
+        if self.rigid and self.damping:
+            raise FieldError("damping", "stands beside rigid = true, which does not move; leave one out")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MatrixStator(Seat):
+    """Any linear body, `M u'' + C u' + K u = f`, that meets the rotor with one of its points.
+
+    Attributes
+    ----------
+    mass, damping, stiffness : (n_dof, n_dof)
+        SI units; M symmetric and positive definite, K without a negative stiffness. No damping: zeros.
+    degrees : tuple of str
+        A name for each row: "axial" is the displacement of the point of contact away from the rotor (m,
+        positive when the stator is pressed), "lateral", if there is one, along the rim under positive spin.
+        The others are free: rotations, inner points, modal coordinates.
+    """
+
+    mass: NDArray[np.float64] = field(metadata=MATRIX)
+    damping: NDArray[np.float64] | None = field(default=None, metadata=MATRIX)
+    stiffness: NDArray[np.float64] = field(metadata=MATRIX)
+    degrees: tuple[str, ...] = words(default=("axial",))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        checked_matrices(self, ("mass", "damping", "stiffness"), [str(name) for name in self.degrees])
+        check_body(self, self.degrees)
+        if "axial" not in self.degrees:
+            raise FieldError("degrees", 'none is "axial", which the rotor presses; name that row so')
+
+
+AnyStator: TypeAlias = Stator | LumpedStator | MatrixStator
+
+
+def one_by_one(stators: tuple[AnyStator, ...]) -> tuple[AnyStator, ...]:
+    """Return stators with every ring taken apart, its first one where the ring stands.
+
+    Raises
+    ------
+    FieldError
+        When there are more than can be told apart, or one of a ring stands where another does.
+    """
+    if not any(stator.count for stator in stators):
+        n_stator = len(stators)
+        single = stators
+    else:
+        n_stator = sum(stator.count or 1 for stator in stators)
+        single = tuple(
+            replace(stator, count=None, angle=stator.angle + 2 * math.pi * i / (stator.count or 1))
+            for stator in stators
+            for i in range(stator.count or 1)
+        )
+        taken: dict[tuple[int, int], int] = {}
+        for i, stator in enumerate(single, 1):
+            place = (stator.node, round(stator.angle / (2 * math.pi) * 1e9) % 10**9)
+            if place in taken:
+                angle = math.degrees(stator.angle) % 360
+                problem = f"stands where stator.{taken[place]} does, at {angle:g} deg"
+                raise FieldError(f"stator.{i}.angle", f"{problem}; turn the ring, or leave one out")
+            taken[place] = i
+    if n_stator > MOST_STATORS:
+        raise FieldError("stator", f"{n_stator} of them; there may be {MOST_STATORS}, take fewer")
+    return single

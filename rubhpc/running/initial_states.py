@@ -1,0 +1,108 @@
+"""Where the cases of a chain start: the final state of the one before, from memory or the store, or rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.running.stopping import Stopped
+from rubhpc.schema import DONE, FINAL_STATE, MISSING, STATUS
+from rubhpc.storage.store import case_checksum
+from rubhpc.study.axes import written
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from rubhpc.storage.journal import Entry, Ledger
+    from rubhpc.storage.store import Store
+    from rubhpc.study.cases import Case, Sweep
+
+    Arrays = dict[str, NDArray[Any]]
+    Index = tuple[int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Where a case starts.
+
+    Attributes
+    ----------
+    state : (n_degree,) or None
+        Of the case before, packed; None at rest.
+    note : str
+        What the case's line says of it; "" where all is as the study has it.
+    """
+
+    state: NDArray[np.float64] | None = None
+    note: str = ""
+
+
+class Ends:
+    """The final states of the cases that others go on from.
+
+    Parameters
+    ----------
+    mend : callable
+        Computes again what is damaged of the block that begins at an index.
+    """
+
+    def __init__(self, sweep: Sweep, store: Store, ledger: Ledger, mend: Callable[[Index], None]) -> None:
+        self._sweep, self._store, self._ledger, self._mend = sweep, store, ledger, mend
+        self._held: dict[int, NDArray[np.float64]] = {}  # of one block, by flat index
+
+    def start_of(self, case: Case, flat: NDArray[np.int64], data: Arrays, entries: Sequence[Entry]) -> Start:
+        """Where a case of a block starts: `flat` and `data` are the block's, `entries` what it has computed.
+
+        Raises
+        ------
+        Stopped
+            The case before it has no outcome yet.
+        """
+        index = self._sweep.before(case.index)
+        if index is None:
+            return Start()
+        before = int(np.ravel_multi_index(index, self._sweep.shape))
+        entered = [entry.status for entry in entries if entry.flat == before]
+        if not entered and before not in flat and self._ledger.status[before] == DONE:
+            self._fetch(before)
+        status = entered[0] if entered else int(self._ledger.status[before])
+        if status == DONE and before in flat:
+            return Start(state=data[FINAL_STATE][np.searchsorted(flat, before)])
+        if status == DONE and before in self._held:
+            return Start(state=self._held[before])
+        if status in (DONE, MISSING):  # it could not be computed again before the run was stopped
+            raise Stopped
+        return Start(note=rest_note(self._sweep, index, status))
+
+    def remember(self, flat: NDArray[np.int64], data: Arrays) -> None:
+        """Keep where the cases of a block have ended, and forget those of the block before."""
+        if FINAL_STATE in data:
+            self._held = dict(zip(flat.tolist(), data[FINAL_STATE], strict=True))
+
+    def _fetch(self, flat: int) -> None:
+        """See that it is known where a case has ended that is done."""
+        if flat in self._held:
+            return
+        start = self._store.start_of(flat)
+        stored = self._store.read_block(start)
+        if stored is not None and is_sound(self._store, self._ledger, start, flat, stored):
+            self.remember(self._store.flat(start), stored)
+        else:
+            self._mend(start)
+
+
+def is_sound(store: Store, ledger: Ledger, start: Index, flat: int, stored: Arrays) -> bool:
+    """Whether what is stored of a case, in the block that begins at `start`, is what its line vouches for."""
+    return case_checksum(stored, int(np.searchsorted(store.flat(start), flat))) == int(ledger.checksum[flat])
+
+
+def rest_note(sweep: Sweep, before: Index, status: int) -> str:
+    """Why a case of a chain starts at rest: the one before it, at an index, has not been done."""
+    assert sweep.chain is not None
+    axis = sweep.study.axes[sweep.chain.axis]
+    value = axis.values[before[sweep.chain.axis]]
+    return f"it starts at rest, as {written(axis.name, value, axis.unit)} before it has {STATUS[status]}"

@@ -1,0 +1,195 @@
+"""Computes one case of a study again and holds it against the store, which it leaves as it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.errors import InputError, RubError, StoreError
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.record import State
+from rubhpc.running.initial_states import is_sound
+from rubhpc.running.worker import metrics_of, put, set_up
+from rubhpc.schema import DONE, FINAL_STATE, MISSING, STATUS
+from rubhpc.storage.journal import metrics_type
+from rubhpc.storage.manifest import Manifest
+from rubhpc.storage.resume import is_store, sweep_for
+from rubhpc.storage.store import Store, case_checksum
+from rubhpc.study.points import Points
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.record import Record
+    from rubhpc.study.cases import Case, Sweep
+    from rubhpc.study.study import Study
+
+SHORTEST = 6  # characters of an id that are enough, if no other case shares them
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduction:
+    """One case as it has just been computed.
+
+    Attributes
+    ----------
+    metrics : dict
+        Name -> value, or one a stator; empty where the case failed.
+    verdict : str
+        How it compares with the store.
+    """
+
+    id: str
+    case: str
+    status: str
+    metrics: dict[str, Any]
+    verdict: str
+
+    def text(self) -> str:
+        """All of it for people, a line each."""
+        told = {
+            "case": self.id,
+            "at": self.case,
+            "status": self.status,
+            **self.metrics,
+            "store": self.verdict,
+        }
+        width = max(map(len, told))
+        return "\n".join(f"{name:{width}}  {value}" for name, value in told.items())
+
+
+def reproduce(study: Study, name: str) -> Reproduction:
+    """Compute the case whose id begins with `name`, compare every bit with the store, write nothing.
+
+    Raises
+    ------
+    InputError
+        No case of the study has such an id, or several have.
+    StoreError
+        The store is of another study, or what it holds of this case differs from what was computed.
+    RubError
+        The case fails; the text is its reason.
+    """
+    sweep = sweep_for(study)
+    manifest = Manifest.of(sweep)
+    flat = _find(sweep, name.lower())
+    case = sweep.case([int(i) for i in np.unravel_index(flat, sweep.shape)])
+    told = manifest.name_case(flat)
+    try:
+        record = _compute(sweep, case)
+        data = {v.name: np.full((1, *manifest.extent(v)), np.nan, v.dtype) for v in manifest.variables}
+        put(record, data, 0)
+    except Exception as error:
+        text = " ".join(str(error).split())
+        raise RubError(f"case {case.id}, {told}: {type(error).__name__}: {text}") from error
+    row = metrics_of(record, metrics_type(sweep.n_stator))
+    status = STATUS[record.status] + (f": {record.remark}" if record.remark else "")
+    metrics = {n: row[n].tolist() for n in row.dtype.names or ()}
+    return Reproduction(
+        id=case.id,
+        case=told,
+        status=status,
+        metrics=metrics,
+        verdict=_compare(study, case, record.status, data, row),
+    )
+
+
+def _compute(sweep: Sweep, case: Case) -> Record:
+    """The record of a case; those before it in its chain are read from the store, or computed on the way."""
+    study, behind, state = sweep.study, [case], None
+    while (index := sweep.before(behind[-1].index)) is not None:
+        before = sweep.case(index)
+        status, state = _stored_end(study, before)
+        if status != MISSING:
+            break
+        behind.append(before)
+    for each in reversed(behind):
+        setup = set_up(study, each)
+        initial = None if state is None else State.unpacked(state, setup.model)
+        record = run_case(
+            setup,
+            clearance=each.clearance,
+            friction=each.friction,
+            recording=study.recording,
+            initial=initial,
+        )
+        state = record.final.packed() if record.status == DONE else None
+    return record
+
+
+def _stored_end(study: Study, case: Case) -> tuple[int, NDArray[np.float64] | None]:
+    """Status of a case in the study's store, missing where it is damaged, and its final state where done."""
+    if not is_store(study.output):
+        return MISSING, None
+    store = Store(study.output)
+    flat = _locate(store, study, case)
+    ledger = store.replay(with_metrics=False)
+    if flat is None or ledger.status[flat] != DONE:
+        return (MISSING if flat is None else int(ledger.status[flat])), None
+    start = store.start_of(flat)
+    stored = store.read_block(start)
+    if stored is None or not is_sound(store, ledger, start, flat, stored):
+        return MISSING, None
+    return DONE, stored[FINAL_STATE][np.searchsorted(store.flat(start), flat)]
+
+
+def _locate(store: Store, study: Study, case: Case) -> int | None:
+    """Flat index of a case in the store's grid; None where it is not there, or in another chain."""
+    mine, theirs = Points(study.axes), store.manifest.points
+    try:
+        index = [
+            theirs.along(dim).index(mine.along(dim)[i]) for dim, i in zip(mine.dims, case.index, strict=True)
+        ]
+    except ValueError:
+        return None
+    flat = int(np.ravel_multi_index(index, store.manifest.shape))
+    return flat if store.manifest.case_id(flat) == case.id else None
+
+
+def _find(sweep: Sweep, name: str) -> int:
+    """Flat index of the one case whose id begins so."""
+    if len(name) < SHORTEST:
+        raise InputError(f"--only {name}: too short; give {SHORTEST} characters of an id at least")
+    manifest = Manifest.of(sweep)
+    found = [flat for flat in range(sweep.n_case) if manifest.case_id(flat).startswith(name)]
+    if len(found) != 1:
+        what = f"{len(found)} cases have such an id; give more of it" if found else "no case has such an id"
+        raise InputError(f"--only {name}: {what}; rubhpc status names those that failed")
+    return found[0]
+
+
+def _compare(
+    study: Study, case: Case, status: int, data: dict[str, NDArray[Any]], row: NDArray[np.void]
+) -> str:
+    """How a case compares with the store, where there is one; raises where it differs."""
+    if not is_store(study.output):
+        return f"{study.output} is not there yet"
+    store = Store(study.output)
+    flat = _locate(store, study, case)
+    ledger = store.replay()
+    assert ledger.metrics is not None
+    if flat is None or ledger.status[flat] == MISSING:
+        return f"{study.output} does not hold it yet"
+    if ledger.status[flat] != status:
+        raise StoreError(
+            f"{study.output}: case {case.id} is {STATUS[status]} now, but stored as "
+            f"{STATUS[ledger.status[flat]]}: {ledger.reasons.get(flat, '')}"
+        )
+    start = store.start_of(flat)
+    stored = store.read_block(start)
+    i_case = int(np.searchsorted(store.flat(start), flat))
+    names = [n for n in row.dtype.names or () if n != "wall_time"]
+    differing = [n for n in names if ledger.metrics[flat][n].tobytes() != row[n].tobytes()]
+    if stored is None:
+        raise StoreError(f"{study.output}: case {case.id}: its files are damaged; rubhpc verify marks it")
+    differing += [n for n, values in data.items() if values[0].tobytes() != stored[n][i_case].tobytes()]
+    if differing:
+        raise StoreError(
+            f"{study.output}: case {case.id} differs from what is stored in {', '.join(differing)}; "
+            "rubhpc verify tells whether the store is damaged"
+        )
+    return f"{study.output} holds the same, bit for bit (checksum {case_checksum(data, 0):08x})"

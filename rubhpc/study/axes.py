@@ -1,0 +1,273 @@
+"""The axes of a study's grid: lists, ranges and scalars of a file become values in SI units."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import Field, dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+from rubhpc.errors import InputError
+from rubhpc.input.dotted import find_key
+from rubhpc.input.fields import check_value, nearest, parse_field, place, quantity
+from rubhpc.input.quantity import brief
+from rubhpc.input.ranges import MOST_VALUES, RANGE_KEYS, Range, read_ends, read_range
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rubhpc.rig.rig import Rig
+
+
+@dataclass(frozen=True, kw_only=True)
+class _OwnAxes:
+    """The axes that are no keys of the rig, declared as any other field is."""
+
+    speed_ratio: float = quantity("")
+    speed: float = quantity("rad/s")
+    clearance_ratio: float = quantity("", above=0)
+    clearance: float = quantity("m", above=0)
+    friction: float = quantity("", at_least=0)
+
+
+_OWN = {declared.name: declared for declared in fields(_OwnAxes)}
+_LONG_NAMES = {
+    "speed_ratio": "spin speed over the first lateral frequency of the rotor at standstill",
+    "speed": "spin speed",
+    "clearance_ratio": "radial clearance over the contact-free amplitude at the speed",
+    "clearance": "radial clearance at rest",
+    "friction": "coefficient of friction",
+}
+SPEED_AXES = ("speed_ratio", "speed")
+CLEARANCE_AXES = ("clearance_ratio", "clearance")
+_TABLE_KEYS = ("values", *RANGE_KEYS, "sweep")
+SWEEPS = ("from_rest", "up", "down", "both")
+FROM_REST, UP, DOWN, BOTH = SWEEPS
+DIRECTION = "direction"  # the axis that a sweep both ways adds
+DIRECTIONS = (UP, DOWN)  # meanings of 0 and 1 on it
+NO_NEIGHBOURS = "the cases of a sample have no neighbours to carry a motion to; leave out sweep or [sample]"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """One axis of the grid.
+
+    Attributes
+    ----------
+    name : str
+        Key in `[grid]`: "friction", "stator.youngs_modulus".
+    dimension : str
+        Name of the dimension of a store that it runs along: its own, as a rule.
+    unit : str
+        SI unit of the values, in the notation of the store ("rad s-1"; "1" without dimension).
+    values : tuple of float
+        In SI units, each once, in any order, but rising where the axis is swept; of drawn ones, one a case of
+        the sample.
+    long_name : str
+        What labels and attributes say.
+    drawn_from : Range or None
+        Where the values are a sample's. Such axes share a dimension.
+    sweep : {"from_rest", "up", "down", "both"}
+        Whether each case starts at rest, or where its neighbour on this axis has ended.
+    """
+
+    name: str
+    dimension: str
+    unit: str
+    values: tuple[float, ...]
+    long_name: str
+    drawn_from: Range | None = None
+    sweep: str = FROM_REST
+
+    def __post_init__(self) -> None:
+        if self.sweep not in SWEEPS:
+            raise InputError(f"{place('', 'grid', self.name)}: sweep: {_unknown_sweep(self.sweep)}")
+        if self.sweep != FROM_REST:
+            object.__setattr__(self, "values", tuple(sorted(self.values)))
+        if problem := _problem(self.name, self.values, is_drawn=self.drawn_from is not None):
+            raise InputError(f"{place('', 'grid', self.name)}: {problem}")
+
+    @property
+    def coordinate(self) -> str:
+        """Name of its values in a store: "stator_youngs_modulus"."""
+        return coordinate_of(self.name)
+
+    @property
+    def is_rig_key(self) -> bool:
+        """Whether the axis sets a key of the rig."""
+        return self.name not in _OWN and self.name != DIRECTION
+
+    @property
+    def tried(self) -> tuple[float, ...]:
+        """What to try out before a run: all values, or the ends of what they are drawn from."""
+        return self.values if self.drawn_from is None else (self.drawn_from.start, self.drawn_from.stop)
+
+
+def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
+    """Return an axis from what stands for it in a file: a list, a range or a single value.
+
+    Parameters
+    ----------
+    name : str
+        A dotted key of the rig, or one of speed_ratio, speed, clearance_ratio, clearance, friction.
+    values : list, dict or single value
+        A dict is a range, stop included: `{start, stop, step}`, or `{start, stop, num}` with the `scale`
+        "lin" or "log"; or it holds `values`. Either may say how the axis is swept: `{values, sweep}`.
+    rig : Rig
+        Whose keys the axis may name.
+    file : str
+        What errors name.
+
+    Raises
+    ------
+    InputError
+        When the name is unknown, or a value is not what the axis holds, or stands twice.
+    """
+    where = place(file, "grid", name)
+    declared = _declared(name, rig, where)
+    sweep = FROM_REST
+    if isinstance(values, dict):
+        values, sweep = _read_table(values, where)
+    return replace(_axis(name, declared, _read(declared, values, where), where), sweep=sweep)
+
+
+def direction_axis() -> Axis:
+    """Return the axis that tells the two runs of a sweep both ways apart."""
+    return Axis(
+        name=DIRECTION, dimension=DIRECTION, unit="1", values=(0.0, 1.0), long_name="direction of the sweep"
+    )
+
+
+def make_range(name: str, table: Mapping[str, object], rig: Rig, file: str = "") -> Axis:
+    """Return an axis whose values are yet to be drawn, from `{start, stop}` and the `scale` "lin" or "log".
+
+    Until then they are the two ends (`rubhpc.study.sampling.draw`).
+
+    Raises
+    ------
+    InputError
+        When the name is unknown, or nothing can be drawn from such a range.
+    """
+    where = place(file, "grid", name)
+    if "sweep" in table:
+        raise InputError(f"{where}: sweep: {NO_NEIGHBOURS}")
+    declared = _declared(name, rig, where)
+    if declared.metadata["kind"] != "quantity":
+        raise InputError(f"{where}: none but a quantity is drawn from a range; write a list of values")
+    ends = read_ends(table, declared.metadata["unit"], where)
+    if name in SPEED_AXES and ends.start * ends.stop < 0:
+        told = f"from {ends.start:g} to {ends.stop:g}"
+        raise InputError(f"{where}: the range {told} holds 0, which is no speed; take one side of it")
+    return replace(_axis(name, declared, (ends.start, ends.stop), where), drawn_from=ends)
+
+
+def coordinate_of(name: str) -> str:
+    """Return what an axis is called in a store."""
+    return name.replace(".", "_")
+
+
+def written(name: str, value: float, unit: str) -> str:
+    """Return a value on an axis for people, as in `friction=0.3`."""
+    if name == DIRECTION:
+        return f"{name}={DIRECTIONS[int(value)]}"
+    return f"{name}={value:.6g}" + (f" {unit}" if unit not in ("", "1") else "")
+
+
+def _axis(name: str, declared: Field[Any], values: tuple[float, ...], where: str) -> Axis:
+    if problem := _problem(name, values):
+        raise InputError(f"{where}: {problem}")
+    return Axis(
+        name=name,
+        dimension=coordinate_of(name),
+        unit=_store_unit(declared.metadata.get("unit", "")),
+        values=values,
+        long_name=_LONG_NAMES.get(name, name.replace("_", " ").replace(".", " ")),
+    )
+
+
+def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    """Return dotted keys and values of a table in which `stator.angle = 0` may stand without quotes."""
+    pairs: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        is_table = isinstance(value, dict) and value and not set(value) & set(_TABLE_KEYS)
+        is_table = is_table and prefix + key not in _OWN and prefix.count(".") < 8
+        pairs += flatten(value, f"{prefix}{key}.") if is_table else [(prefix + key, value)]
+    return pairs
+
+
+def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
+    if name in _OWN:
+        return _OWN[name]
+    try:
+        return find_key(rig, name)
+    except InputError as error:
+        mend = nearest(name, _OWN)
+        if "." not in name and "?" in mend:
+            raise InputError(f"{where}: unknown axis; {mend}") from None
+        if str(error).startswith("unknown key") and "?" not in str(error):
+            raise InputError(
+                f"{where}: unknown axis; there is {', '.join(_OWN)} and any key of the rig"
+            ) from None
+        raise InputError(f"{where}: {str(error).replace('unknown key', 'unknown axis')}") from None
+
+
+def _read_table(table: Mapping[str, object], where: str) -> tuple[object, str]:
+    """What stands for the values in `{values, sweep}` or a range with a sweep, and how they are swept."""
+    for key in table:
+        if key not in _TABLE_KEYS:
+            raise InputError(f"{where}: unknown key {brief(key)} in a range; {nearest(key, _TABLE_KEYS)}")
+    sweep = table.get("sweep", FROM_REST)
+    if sweep not in SWEEPS:
+        raise InputError(f"{where}: sweep: {_unknown_sweep(sweep)}")
+    rest = {key: value for key, value in table.items() if key != "sweep"}
+    if "values" not in rest:
+        return rest, str(sweep)
+    if len(rest) > 1:
+        other = next(key for key in rest if key != "values")
+        raise InputError(f"{where}: {other} stands beside values; give a range or values, one of the two")
+    if isinstance(rest["values"], dict):
+        raise InputError(f"{where}: values: {brief(rest['values'])} is no list; write values = [...]")
+    return rest["values"], str(sweep)
+
+
+def _unknown_sweep(sweep: object) -> str:
+    return f"{brief(sweep)} is unknown; {nearest(sweep if isinstance(sweep, str) else '', SWEEPS)}"
+
+
+def _read(declared: Field[Any], values: object, where: str) -> tuple[float, ...]:
+    if isinstance(values, dict):
+        if declared.metadata["kind"] == "flag":
+            raise InputError(f"{where}: a range between true and false; write [true, false]")
+        return tuple(read_range(values, declared.metadata.get("unit", ""), where))
+    if not isinstance(values, list | tuple):
+        values = [values]
+    if len(values) > MOST_VALUES:
+        raise InputError(f"{where}: {len(values)} values are too many; at most {MOST_VALUES}")
+    return tuple(float(parse_field(declared, value, where)) for value in values)
+
+
+def _problem(name: str, values: tuple[float, ...], *, is_drawn: bool = False) -> str:
+    """What is wrong with the values of an axis; "" when nothing is."""
+    if not values:
+        return "empty; give at least one value"
+    if name in _OWN:
+        for value in (min(values), max(values)):
+            if problem := check_value(_OWN[name], value):
+                return problem
+    if name in SPEED_AXES and 0.0 in values:
+        return "0 is no speed; leave it out, the rotor has to spin"
+    if not is_drawn and len(set(values)) < len(values):
+        ordered = sorted(values)
+        twice = next(v for v, following in itertools.pairwise(ordered) if v == following)
+        return f"{twice:.12g} stands twice; leave one out"
+    return ""
+
+
+def _store_unit(unit: str) -> str:
+    """Return a pint-readable unit in the notation of the store: "kg/m^3" becomes "kg m-3"."""
+    over, _, under = unit.partition("/")
+    factors = [f for f in over.replace("^", "").split() if f != "1"]
+    for factor in under.split():
+        symbol, power = re.fullmatch(r"(\D+?)\^?(\d*)", factor).groups()  # type: ignore[union-attr]
+        factors.append(f"{symbol}-{power or 1}")
+    return " ".join(factors) or "1"

@@ -1,0 +1,296 @@
+"""A study's grid as cases and blocks: who is who, what belongs together, what each block will cost.
+
+Nothing here holds an object a case: a million of them are planned as arrays.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.model import state_size
+from rubhpc.input.fields import place
+from rubhpc.rig.rig import with_keys
+from rubhpc.study.axes import FROM_REST
+from rubhpc.study.continuation import CaseIds, chain_of
+from rubhpc.study.operating_points import Settings
+from rubhpc.study.points import Points, boxed
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from rubhpc.rig.rig import Rig
+    from rubhpc.study.study import Study
+
+MOST_CASES = 50_000_000  # beyond, a slip of the pen fills the memory
+_BLOCK = 16  # cases of a block, unless told
+_MOST_RIGS = 64  # along an axis, assembled before the run, 1 ms each; of more, the ends
+PHYSICS = 4  # raised whenever the same study gives other numbers than before
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Case:
+    """One point of the grid, with all that it takes to compute it."""
+
+    index: tuple[int, ...]
+    id: str
+    rig: Rig
+    speed: float  # rad/s
+    clearance: float  # m
+    friction: float
+    contact_free_amplitude: float  # m
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Block:
+    """A box of the grid: the unit of work, and one chunk of every stored array."""
+
+    number: int
+    start: tuple[int, ...]
+    shape: tuple[int, ...]
+    cost: int  # predicted integration steps
+
+
+class Sweep:
+    """The cases of a study.
+
+    Parameters
+    ----------
+    study : Study
+    chunk : tuple of int, optional
+        Cases of a block along each dimension, where a store has them already. Default: at most `[run] block`
+        cases, taken first from the dimensions that leave speed and rig alone: a block then shares its setup.
+        Where an axis is swept, from that one before all.
+
+    Attributes
+    ----------
+    points : Points
+        Where the cases lie.
+    dims, shape : tuple
+        Names of the dimensions, and cases along each.
+    n_case, n_stator : int
+        Number of cases, and of stators.
+    chunk : tuple of int
+        Cases of a block along each dimension.
+    chain : Chain or None
+        How the motion is carried from case to case.
+    n_degree : int
+        Numbers of the final state that a case of a chain keeps; 0 where there are no chains.
+    identity, identity_parts : str, dict
+        SHA-256 of all that changes results but the values on the axes, and what went into it.
+
+    Raises
+    ------
+    InputError
+        When the step asked for is above the stability limit of a rig, or a sweep meets rigs of different
+        degrees of freedom.
+    """
+
+    def __init__(self, study: Study, chunk: tuple[int, ...] | None = None) -> None:
+        self.study = study
+        self.points = Points(study.axes)
+        self.dims, self.shape, self.n_case = self.points.dims, self.points.shape, self.points.n_case
+        if self.n_case > MOST_CASES:
+            with _named(study):
+                grid = " x ".join(map(str, self.shape))
+                raise InputError(f"[grid]: {grid} cases are too many; at most {MOST_CASES}, part the study")
+        self.n_stator = len(study.rig.stator)
+        with _named(study):
+            self._settings = Settings(study)
+            self.chain = chain_of(study.axes)
+            self.n_degree = count_state(study) if self.chain else 0
+        self.chunk = chunk if chunk is not None else self._default_chunk()
+        self.identity_parts = identity_parts(study)
+        text = json.dumps(self.identity_parts, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        self.identity = hashlib.sha256(text.encode()).hexdigest()
+        self._ids = CaseIds(self.identity, self.points.values, self.chain)
+
+    def chains(self) -> list[list[Block]]:
+        """Return the blocks that one rank has to compute in turn, the longest such chain first.
+
+        Without a sweep every block is a chain of its own.
+        """
+        blocks = self.blocks()
+        chain = self.chain
+        if chain is None:
+            return [[block] for block in blocks]
+        together: dict[tuple[int, ...], list[Block]] = {}
+        for block in sorted(blocks, key=lambda block: block.start):
+            at = block.start
+            together.setdefault((*at[: chain.axis], *at[chain.axis + 1 :]), []).append(block)
+        chains = [part[::-1] if chain.goes_down(part[0].start) else part for part in together.values()]
+        return sorted(chains, key=lambda part: -sum(block.cost for block in part))
+
+    def in_turn(self, cases: Sequence[Case]) -> list[int]:
+        """Positions of the cases of a block in the order in which they are to be computed."""
+        chain, order = self.chain, range(len(cases))
+        return sorted(order, key=lambda i: chain.turn(cases[i].index)) if chain is not None else list(order)
+
+    def before(self, index: Sequence[int]) -> tuple[int, ...] | None:
+        """Index of the case that this one goes on from; None where it starts at rest."""
+        return self.chain.before(index, self.shape[self.chain.axis]) if self.chain else None
+
+    def blocks(self) -> list[Block]:
+        """Return all blocks, the longest first."""
+        starts = [range(0, n, c) for n, c in zip(self.shape, self.chunk, strict=True)]
+        sizes = [[min(c, n - s) for s in at] for n, c, at in zip(self.shape, self.chunk, starts, strict=True)]
+        cost: NDArray[np.float64] = self._settings.steps
+        for i, at in enumerate(starts):
+            if cost.shape[i] == self.shape[i]:
+                cost = np.add.reduceat(cost, np.array(at), axis=i)
+            else:  # the same for every case along this dimension
+                cost = cost * np.array(sizes[i]).reshape([-1 if j == i else 1 for j in range(cost.ndim)])
+        steps = np.rint(cost.ravel()).astype(np.int64)
+        order = np.argsort(-steps, kind="stable")
+        corners, shapes = list(itertools.product(*starts)), list(itertools.product(*sizes))
+        return [
+            Block(number=n, start=corners[n], shape=shapes[n], cost=c)
+            for n, c in zip(order.tolist(), steps[order].tolist(), strict=True)
+        ]
+
+    def cases(self, block: Block) -> list[Case]:
+        """Return the cases of a block, the last axis running fastest."""
+        box = boxed(block.start, block.shape)
+        return [self._case(index, name) for index, name in zip(box, self.case_ids(block), strict=True)]
+
+    def case(self, index: Sequence[int]) -> Case:
+        """Return the case at an index of the grid."""
+        return self._case(tuple(index), self._ids(self.points.at(index)))
+
+    def case_ids(self, block: Block) -> list[str]:
+        """Return the ids of the cases of a block, in the order of `cases`."""
+        points = self.points.within(block.start, block.shape)
+        return [self._ids(point) for point in points]
+
+    def settings(self) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
+        """Return what the axes amount to: name -> (dimensions that set it, values in SI units).
+
+        `spin_speed` in rad/s, `clearance` and `contact_free_amplitude` in m.
+
+        Raises
+        ------
+        InputError
+            When a clearance leaves no gap at a stator.
+        """
+        with _named(self.study):
+            found = self._settings.arrays()
+        return {name: (tuple(self.dims[i] for i in dims), values) for name, (dims, values) in found.items()}
+
+    def _case(self, index: tuple[int, ...], name: str) -> Case:
+        speed, amplitude = self._settings.response(index)
+        return Case(
+            index=index,
+            id=name,
+            rig=self._settings.rig(index),
+            speed=speed,
+            clearance=self._settings.clearance(index),
+            friction=self._settings.friction(index),
+            contact_free_amplitude=amplitude,
+        )
+
+    def _default_chunk(self) -> tuple[int, ...]:
+        wanted = self.study.run.block or min(max(self.n_case // 64, 1), _BLOCK)
+        costly = self._settings.costly_dims
+        order = [*(i for i in reversed(range(len(self.shape))) if i not in costly), *costly]
+        chunk = [1] * len(self.shape)
+        if (chain := self.chain) is not None:
+            # One rank computes a chain anyway: an eighth of it is stored at once, and several only of many.
+            n = self.shape[chain.axis]
+            chunk[chain.axis] = _evenly(n, self.study.run.block or min(max(n // 8, 1), _BLOCK))
+            n_chain = self.n_case // n
+            wanted = (self.study.run.block or min(max(n_chain // 64, 1), _BLOCK)) // chunk[chain.axis]
+            order = [i for i in order if i not in (chain.axis, chain.direction)]  # a block has one direction
+        for i in order:
+            chunk[i] = _evenly(self.shape[i], wanted)
+            wanted = max(wanted // chunk[i], 1)
+        return tuple(chunk)
+
+
+def _evenly(n: int, most: int) -> int:
+    """Size of blocks of at most so many, all of one size rather than full ones and a rest."""
+    n_block = -(-n // max(min(n, most), 1))
+    return -(-n // n_block)
+
+
+@contextmanager
+def _named(study: Study) -> Iterator[None]:
+    """Put the study's file in front of what is wrong with its settings."""
+    try:
+        yield
+    except InputError as error:
+        if study.source is None:
+            raise
+        raise InputError(f"{place(str(study.source))}: {error}") from None
+
+
+def identity_parts(study: Study) -> dict[str, Any]:
+    """Return all that changes the results of a study but the values on its axes, for JSON.
+
+    What the rig says of a key that is an axis is no part of it: every case sets that key. Of a sample, all is
+    that has values drawn but how many.
+    """
+    keys = [axis.name for axis in study.axes if axis.is_rig_key]
+    rig = with_keys(
+        study.rig, {axis.name: axis.values[0] for axis in study.axes if axis.is_rig_key}
+    ).as_dict()
+    for key in keys:
+        _blank(rig, key.split("."))
+    del rig["name"]
+    swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
+    parts = {
+        "physics": PHYSICS,
+        "axes": [axis.name for axis in study.axes],
+        **({"sweep": swept} if swept else {}),  # older stores know none
+        "rig": rig,
+        "contact": asdict(study.contact),
+        "integrator": asdict(study.integrator),
+        "record": asdict(study.recording) | {"keep": sorted(study.recording.keep)},
+    }
+    if study.sample is not None:
+        ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
+        parts["sample"] = {"method": study.sample.method, "seed": study.sample.seed, "ranges": ranges}
+    return parts
+
+
+def count_state(study: Study) -> int:
+    """Numbers in the final state of a case: displacement and velocity of each degree, two for each stator.
+
+    Raises
+    ------
+    InputError
+        When it is not the same for all cases: a motion cannot be carried from one to another.
+    """
+    first = {axis.name: axis.values[0] for axis in study.axes if axis.is_rig_key}
+    n_state = state_size(assemble(with_keys(study.rig, first)))
+    for axis in study.axes:
+        values = axis.values if len(axis.values) <= _MOST_RIGS else axis.values[:: len(axis.values) - 1]
+        for value in values if axis.is_rig_key else ():
+            if state_size(assemble(with_keys(study.rig, {**first, axis.name: value}))) != n_state:
+                swept = next(a.name for a in study.axes if a.sweep != FROM_REST)
+                problem = "changes the degrees of freedom, so that no motion can be carried"
+                raise InputError(
+                    f"[grid] {axis.name}: {problem}; leave out this axis, or the sweep of {swept}"
+                )
+    return n_state
+
+
+def _blank(table: Any, key: list[str]) -> None:
+    """Put "axis" in place of the value that a dotted key names, in all items of a list or in one."""
+    if isinstance(table, list):
+        items, rest = ([table[int(key[0]) - 1]], key[1:]) if key[0].isdigit() else (table, key)
+        for item in items:
+            _blank(item, rest)
+    elif len(key) == 1:
+        table[key[0]] = "axis"
+    else:
+        _blank(table[key[0]], key[1:])

@@ -1,0 +1,253 @@
+"""What the axes of a study amount to, case by case: rig, spin speed, clearance, free amplitude, steps."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.constraints import find_free
+from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
+from rubhpc.rig.rig import with_keys
+from rubhpc.study.axes import CLEARANCE_AXES, SPEED_AXES
+from rubhpc.study.points import Points
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+    from rubhpc.rig.rig import Rig
+    from rubhpc.study.points import Index, Values
+    from rubhpc.study.study import Study
+
+_EVENT_STEPS = 60  # that the modal scheme takes a revolution, samples apart
+_TOUCHING = 0.15  # share of the time in contact, where it takes short steps there
+_MOST_RIGS = 256  # asked for their step, 1 ms each; of more, the first stands for all
+
+
+class Settings:
+    """Values on the axes, resolved: ratios to SI units, keys to rigs. What is costly is kept for reuse.
+
+    Parameters
+    ----------
+    study : Study
+
+    Attributes
+    ----------
+    points : Points
+        Where the cases lie; an index here is one along its dimensions.
+    costly_dims : list of int
+        The dimensions along which speed or rig change: cases apart on them share no setup.
+
+    Raises
+    ------
+    InputError
+        When the step asked for is above the stability limit of a rig, or nothing holds a rig that the modal
+        scheme is to solve.
+    """
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        self.points = Points(study.axes)
+        self._values = [axis.values for axis in study.axes]
+        names = [axis.name for axis in study.axes]
+        self._speed_axis, self._clearance_axis, self._friction_axis = (
+            next(i for i, name in enumerate(names) if name in ways)
+            for ways in (SPEED_AXES, CLEARANCE_AXES, ("friction",))
+        )
+        self._is_speed_ratio = names[self._speed_axis] == "speed_ratio"
+        self._is_clearance_ratio = names[self._clearance_axis] == "clearance_ratio"
+        self._rig_axes = [i for i, axis in enumerate(study.axes) if axis.is_rig_key]
+        rotor_axes = [i for i in self._rig_axes if names[i].startswith("rotor.")]
+        # The contact-free response knows the rotor, and of the stators the node at which it is read.
+        node_axes = [
+            i for i in self._rig_axes if names[i].startswith("stator.") and names[i].endswith(".node")
+        ]
+        self._response_axes = sorted(rotor_axes + node_axes)
+        self._speed_setters = [*(rotor_axes if self._is_speed_ratio else ()), self._speed_axis]
+        self.costly_dims = self._dims(self._speed_axis, *self._rig_axes)
+        # All are kept by values, not by places: where axes share a dimension, few of them may matter here.
+        self._rig_at = lru_cache(maxsize=256)(self._make_rig)
+        self._model_at = lru_cache(maxsize=4)(self._make_model)
+        self._unit_speed_at = lru_cache(maxsize=65536)(self._make_unit_speed)
+        self._response_at = lru_cache(maxsize=65536)(self._make_response)
+        self._limit_at = lru_cache(maxsize=4096)(self._make_limit)
+        if study.integrator.step is not None and study.integrator.method == "central-difference":
+            self._check_step(study.integrator.step)
+        if study.integrator.method == "modal":
+            self._check_held()
+
+    def rig(self, index: Index) -> Rig:
+        """Rig of a case."""
+        return self._rig_at(self._on(self._rig_axes, index))
+
+    def response(self, index: Index) -> tuple[float, float]:
+        """Spin speed (rad/s) and contact-free amplitude (m) of a case."""
+        return self._response_at(self._on(self._response_axes, index), self._on([self._speed_axis], index)[0])
+
+    def clearance(self, index: Index) -> float:
+        """Radial clearance at rest of a case, m."""
+        (value,) = self._on([self._clearance_axis], index)
+        return value * self.response(index)[1] if self._is_clearance_ratio else value
+
+    def friction(self, index: Index) -> float:
+        """Coefficient of friction of a case."""
+        return self._on([self._friction_axis], index)[0]
+
+    def arrays(self) -> dict[str, tuple[list[int], NDArray[np.float64]]]:
+        """Return name -> (dimensions that set it, values along them, SI units), for all cases.
+
+        `spin_speed` in rad/s, `clearance` and `contact_free_amplitude` in m.
+
+        Raises
+        ------
+        InputError
+            When a clearance leaves no gap at a stator.
+        """
+        along = sorted(self._dims(self._speed_axis, *self._response_axes))
+        pairs = np.array([self.response(index) for index in self._indices(along)])
+        table = pairs.reshape(*(self.points.shape[dim] for dim in along), 2)
+        amplitude = table[..., 1]
+        along_speed = sorted(self._dims(*self._speed_setters))
+        speed = table[tuple(slice(None) if dim in along_speed else 0 for dim in along)][..., 0]
+        along_clearance = self._dims(self._clearance_axis)
+        clearance = np.array(self._values[self._clearance_axis], dtype=np.float64)
+        if self._is_clearance_ratio:
+            whole = sorted({*along, *along_clearance})
+            clearance = self._laid(clearance, along_clearance, whole) * self._laid(amplitude, along, whole)
+            along_clearance = whole
+        self._check_gap(float(clearance.min()))
+        return {
+            "spin_speed": (along_speed, speed),
+            "clearance": (along_clearance, clearance),
+            "contact_free_amplitude": (along, amplitude),
+        }
+
+    @cached_property
+    def steps(self) -> NDArray[np.float64]:
+        """Predicted integration steps of a case, of length 1 along the dimensions that do not change them."""
+        rig_axes = self._rig_axes if self._is_few else []
+        along = self._dims(self._speed_axis, *rig_axes)
+        recording = self.study.recording
+        turns = recording.longest_transient + recording.revolutions
+
+        is_modal = self.study.integrator.method == "modal"
+        modal_steps = recording.longest_transient * _EVENT_STEPS + recording.revolutions * (
+            _EVENT_STEPS + recording.samples_per_revolution
+        )
+        first = (0,) * len(self.points.dims)
+
+        def predict(index: Index) -> float:
+            if is_modal and not self.study.contact.is_stepped:
+                return float(modal_steps)
+            unit = self._unit_speed_at(self._on(self._response_axes, index if self._is_few else first))
+            speed = abs(self._on([self._speed_axis], index)[0]) * unit
+            duration = turns * 2 * math.pi / speed
+            if is_modal:
+                return modal_steps + _TOUCHING * duration / self.study.integrator.contact_step(
+                    self.study.contact
+                )
+            return duration / self._step_at(self._on(self._rig_axes, index if self._is_few else first))
+
+        shape = [n if dim in along else 1 for dim, n in enumerate(self.points.shape)]
+        return self._tabulated(along, predict).reshape(shape)
+
+    @property
+    def _is_few(self) -> bool:
+        """Whether every rig of the study can be asked before the run."""
+        return math.prod(self.points.shape[dim] for dim in self._dims(*self._rig_axes)) <= _MOST_RIGS
+
+    def _dims(self, *axes: int) -> list[int]:
+        """Dimensions of some axes, each once."""
+        return list(dict.fromkeys(self.points.place[i] for i in axes))
+
+    def _on(self, axes: Iterable[int], index: Index) -> Values:
+        """Values of a case on some axes."""
+        return tuple([self._values[i][index[self.points.place[i]]] for i in axes])
+
+    def _indices(self, dims: Iterable[int]) -> Iterable[Index]:
+        """Every index along some dimensions, the first place of the others."""
+        along = set(dims)
+        return itertools.product(*(range(n if d in along else 1) for d, n in enumerate(self.points.shape)))
+
+    def _laid(self, table: NDArray[np.float64], dims: list[int], among: list[int]) -> NDArray[np.float64]:
+        """A table over some dimensions, of length 1 along the others among which it is to lie."""
+        return table.reshape([self.points.shape[dim] if dim in dims else 1 for dim in among])
+
+    def _tabulated(self, dims: list[int], value: Callable[[Index], float]) -> NDArray[np.float64]:
+        """Values along some dimensions, taken at the first place of the others."""
+        shape = [self.points.shape[dim] for dim in sorted(dims)]
+        table = np.fromiter(map(value, self._indices(dims)), dtype=np.float64, count=math.prod(shape))
+        return table.reshape(shape)
+
+    def _told(self, axes: Iterable[int], index: Index) -> str:
+        """Values of a case on some axes, for messages."""
+        names = (self.study.axes[i].name for i in axes)
+        pairs = zip(names, self._on(axes, index), strict=True)
+        return ", ".join(f"{name} = {value:g}" for name, value in pairs)
+
+    def _make_rig(self, values: Values) -> Rig:
+        """Rig with these values on the rig axes."""
+        keys = (self.study.axes[i].name for i in self._rig_axes)
+        return with_keys(self.study.rig, dict(zip(keys, values, strict=True)))
+
+    def _make_model(self, values: Values) -> Model:
+        """Model with these values on the response axes, and the first ones on the other rig axes."""
+        chosen = dict(zip(self._response_axes, values, strict=True))
+        return assemble(self._rig_at(tuple([chosen.get(i, self._values[i][0]) for i in self._rig_axes])))
+
+    def _make_unit_speed(self, values: Values) -> float:
+        """Speed, rad/s, of 1 on the speed axis."""
+        return first_lateral_frequency(self._model_at(values)) if self._is_speed_ratio else 1.0
+
+    def _make_response(self, values: Values, speed: float) -> tuple[float, float]:
+        speed = speed * self._unit_speed_at(values)
+        amplitude = contact_free_amplitude(self._model_at(values), speed)
+        if self._is_clearance_ratio and not amplitude > 0:
+            problem = f"no contact-free amplitude at {speed:.6g} rad/s to take it of"
+            raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead")
+        return speed, amplitude
+
+    def _step_at(self, values: Values) -> float:
+        """Time step, s, with these values on the rig axes."""
+        return self.study.integrator.step_within(self._limit_at(values))
+
+    def _make_limit(self, values: Values) -> float:
+        """Stability limit of the step, s, with these values on the rig axes."""
+        return step_limit(assemble(self._rig_at(values)))
+
+    def _check_step(self, step: float) -> None:
+        for index in self._indices(self._dims(*self._rig_axes) if self._is_few else ()):
+            limit = self._limit_at(self._on(self._rig_axes, index))
+            if step >= limit:
+                where = self._told(self._rig_axes, index)
+                problem = f"{step:g} s is above the stability limit{f' at {where}' if where else ''}"
+                raise InputError(f"[integrator] step: {problem}; take less than {limit:.3g} s")
+
+    def _check_held(self) -> None:
+        """Refuse the modal scheme for a body that nothing holds: it has no constant response."""
+        for index in self._indices(self._dims(*self._response_axes) if self._is_few else ()):
+            if free := find_free(self._model_at(self._on(self._response_axes, index))):
+                where = self._told(self._response_axes, index)
+                problem = f"modal needs bodies that are held, and {free}{f' at {where}' if where else ''}"
+                # Friction turns a free rotor back for ever: it has no steady twist.
+                hold = "give it a stiffness, however soft" if "torsion" in free else "hold it"
+                raise InputError(
+                    f'[integrator] method: {problem}; {hold}, or take method = "central-difference"'
+                )
+
+    def _check_gap(self, least: float) -> None:
+        """Refuse a least clearance that a stator's own offset closes."""
+        names = [axis.name for axis in self.study.axes]
+        varied = self._dims(*(i for i in self._rig_axes if names[i].endswith("offset")))
+        offset = min(s.clearance_offset for at in self._indices(varied) for s in self.rig(at).stator)
+        if least + offset <= 0:
+            problem = f"{least:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
+            raise InputError(f"[grid] {names[self._clearance_axis]}: {problem}; take a larger one")

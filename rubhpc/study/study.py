@@ -1,0 +1,295 @@
+"""A study: a rig, the axes of a grid, and how each case is computed, recorded and run."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rubhpc.errors import InputError
+from rubhpc.input.fields import place
+from rubhpc.input.quantity import brief
+from rubhpc.input.reading import build, read_toml, refuse_unknown
+from rubhpc.rig.rig import Rig, read_rig, with_keys
+from rubhpc.schema import VARIABLES
+from rubhpc.study.axes import (
+    BOTH,
+    CLEARANCE_AXES,
+    DIRECTION,
+    FROM_REST,
+    NO_NEIGHBOURS,
+    SPEED_AXES,
+    Axis,
+    direction_axis,
+    flatten,
+    make_axis,
+    make_range,
+)
+from rubhpc.study.sampling import draw
+from rubhpc.study.tables import Contact, Integrator, Recording, Run, Sample
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from os import PathLike
+
+__all__ = [
+    "Axis",
+    "Contact",
+    "Integrator",
+    "Recording",
+    "Run",
+    "Sample",
+    "Study",
+    "draw",
+    "make_axis",
+    "make_range",
+    "read_study",
+]
+
+_TABLES = ("title", "rig", "output", "grid", "sample", "override", "contact", "integrator", "record", "run")
+# Names that a store takes for itself; an axis `clearance` is the very setting of that name.
+_RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution", "degree"}) - {
+    "clearance"
+}
+_MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
+
+
+DEFAULT_CONTACT, DEFAULT_INTEGRATOR, DEFAULT_RECORDING, DEFAULT_RUN = (
+    Contact(),
+    Integrator(),
+    Recording(),
+    Run(),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A rig and a grid of cases.
+
+    Attributes
+    ----------
+    title : str
+        For people.
+    rig : Rig
+        With the study's overrides applied.
+    axes : tuple of Axis
+        The cases are the Cartesian product of their dimensions, the last one running fastest. An axis that is
+        swept both ways brings a last one, `direction`.
+    sample : Sample or None
+        How some of the axes have been drawn (`rubhpc.study.sampling.draw`).
+    output : Path
+        The store.
+    source : Path or None
+        The file that the study was read from.
+
+    Raises
+    ------
+    InputError
+        When the grid lacks an axis, has two for one thing, or holds values with which the rig cannot be.
+    """
+
+    title: str
+    rig: Rig
+    axes: tuple[Axis, ...]
+    sample: Sample | None = None
+    contact: Contact = DEFAULT_CONTACT
+    integrator: Integrator = DEFAULT_INTEGRATOR
+    recording: Recording = DEFAULT_RECORDING
+    run: Run = DEFAULT_RUN
+    output: Path
+    source: Path | None = None
+
+    def __post_init__(self) -> None:
+        if any(axis.sweep == BOTH for axis in self.axes) and self.axes[-1].name != DIRECTION:
+            object.__setattr__(self, "axes", (*self.axes, direction_axis()))
+        _check_axes(self.axes)
+        _check_rigs(self.rig, [axis for axis in self.axes if axis.is_rig_key], self.axes)
+
+    def axis(self, *names: str) -> Axis:
+        """Return the first axis that has one of these names."""
+        return next(axis for axis in self.axes if axis.name in names)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what the study computes as plain dicts, lists, numbers and text, for JSON.
+
+        Where and how it is run is left out: two runs of one study give the same.
+        """
+        return {
+            "title": self.title,
+            "rig": self.rig.name,
+            "grid": {
+                axis.name: {"unit": axis.unit}
+                | (asdict(axis.drawn_from) if axis.drawn_from else {"values": list(axis.values)})
+                | ({"sweep": axis.sweep} if axis.sweep != FROM_REST else {})
+                for axis in self.axes
+                if axis.name != DIRECTION
+            },
+            **({"sample": asdict(self.sample)} if self.sample else {}),
+            "contact": {key: value for key, value in asdict(self.contact).items() if value is not None},
+            "integrator": asdict(self.integrator),
+            "record": asdict(self.recording) | {"keep": list(self.recording.keep)},
+        }
+
+
+def read_study(
+    path: str | PathLike[str], output: str | PathLike[str] | None = None, *, trust_rig: bool = False
+) -> Study:
+    """Return the study of a TOML file.
+
+    Parameters
+    ----------
+    path : path
+        The study file; a relative path of a rig file in it counts from its folder.
+    output : path, optional
+        The store, in place of the one that the file names.
+    trust_rig : bool
+        Whether a rig that is Python code, `rig = "my_rig.py:build"`, may be run.
+
+    Raises
+    ------
+    InputError
+        When the file or its rig cannot be used as it stands; one line with file, table, key and mend.
+    """
+    source = Path(path)
+    file = str(source)
+    table = read_toml(source)
+    refuse_unknown(table, dict.fromkeys(_TABLES), file, "")
+    title = _text(table, "title", source.stem, file)
+    store = output if output is not None else _text(table, "output", f"{source.stem}.zarr", file)
+    if "rig" not in table:
+        raise InputError(
+            f'{place(file, "", "rig")}: missing; add rig = "mokhtar2017", or the path of a rig file'
+        )
+    rig = read_rig(_text(table, "rig", "", file), source.parent, place(file, "", "rig"), trust_rig=trust_rig)
+    rig = _overridden(rig, _table(table, "override", file), file)
+    sample = build(Sample, table["sample"], file, "sample") if "sample" in table else None
+    axes = _read_axes(_table(table, "grid", file), rig, sample, file)
+    for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
+        raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
+    contact = build(Contact, table.get("contact", {}), file, "contact")
+    integrator = build(Integrator, table.get("integrator", {}), file, "integrator")
+    recording = build(Recording, table.get("record", {}), file, "record")
+    run = build(Run, table.get("run", {}), file, "run")
+    try:
+        return Study(
+            title=title,
+            rig=rig,
+            axes=axes,
+            sample=sample,
+            contact=contact,
+            integrator=integrator,
+            recording=recording,
+            run=run,
+            output=Path(store),
+            source=source,
+        )
+    except InputError as error:
+        raise InputError(f"{place(file)}: {error}") from None
+
+
+def _text(table: dict[str, Any], key: str, default: str, file: str) -> str:
+    value = table.get(key, default)
+    if not isinstance(value, str) or not value.strip() or not value.isprintable():
+        raise InputError(f'{place(file, "", key)}: {brief(value)} is not a line of text; write {key} = "..."')
+    return value
+
+
+def _table(table: dict[str, Any], key: str, file: str) -> dict[str, Any]:
+    value = table.get(key, {})
+    if not isinstance(value, dict):
+        raise InputError(f"{place(file, key)}: {brief(value)} is no table; write [{key}] and its keys below")
+    return value
+
+
+def _overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
+    try:
+        return with_keys(rig, dict(flatten(table)))
+    except InputError as error:
+        raise InputError(f"{place(file, 'override')} {error}") from None
+
+
+def _read_axes(table: dict[str, Any], rig: Rig, sample: Sample | None, file: str) -> tuple[Axis, ...]:
+    pairs = flatten(table)
+    names = [name for name, _ in pairs]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{place(file, 'grid', name)}: stands twice; leave one out")
+    if sample is None:
+        return tuple(make_axis(name, values, rig, file) for name, values in pairs)
+    axes = [(make_range if isinstance(v, dict) else make_axis)(name, v, rig, file) for name, v in pairs]
+    try:
+        return draw(axes, sample)
+    except InputError as error:
+        raise InputError(f"{place(file)}: {error}") from None
+
+
+def _check_axes(axes: tuple[Axis, ...]) -> None:
+    names = [axis.name for axis in axes]
+    for ways, example in (
+        (SPEED_AXES, "speed_ratio = [0.75, 1.5]"),
+        (CLEARANCE_AXES, "clearance_ratio = 0.7"),
+        (("friction",), "friction = 0.3"),
+    ):
+        given = [name for name in names if name in ways]
+        if not given:
+            raise InputError(f"[grid] {ways[0]}: missing; add {' or '.join(ways)}, such as {example}")
+        if len(given) > 1:
+            raise InputError(f"[grid] {given[1]}: stands beside {given[0]}; give one of them")
+    swept = [axis.name for axis in axes if axis.sweep != FROM_REST]
+    if len(swept) > 1:
+        raise InputError(f"[grid] {swept[1]}: sweep: {swept[0]} is swept already; leave one of the two out")
+    if swept and any(axis.dimension != axis.coordinate for axis in axes):
+        raise InputError(f"[grid] {swept[0]}: sweep: {NO_NEIGHBOURS}")
+    taken: dict[str, str] = {}
+    for axis in axes:
+        if axis.coordinate in _RESERVED:
+            mend = "name one stator, such as stator.1.lateral" if axis.is_rig_key else "leave it out"
+            raise InputError(f"[grid] {axis.name}: a store has another {axis.coordinate}; {mend}")
+        if axis.coordinate in taken:
+            raise InputError(
+                f"[grid] {axis.name}: is the same dimension as {taken[axis.coordinate]}; leave one out"
+            )
+        taken[axis.coordinate] = axis.name
+        for other in axes:
+            without_numbers = ".".join(part for part in axis.name.split(".") if not part.isdigit())
+            if other.name == without_numbers != axis.name:
+                raise InputError(f"[grid] {axis.name}: is set by the axis {other.name} too; leave one out")
+
+
+def _check_rigs(rig: Rig, rig_axes: list[Axis], axes: tuple[Axis, ...]) -> None:
+    """Refuse a grid some of whose rigs cannot be, or cannot be studied."""
+    names = [axis.name for axis in rig_axes]
+    grid: Iterable[tuple[float, ...]]
+    if math.prod(len(axis.tried) for axis in rig_axes) <= _MOST_RIGS:
+        grid = itertools.product(*(axis.tried for axis in rig_axes))
+    else:
+        first = [axis.tried[0] for axis in rig_axes]
+        grid = itertools.chain.from_iterable(
+            ((*first[:i], value, *first[i + 1 :]) for value in axis.tried) for i, axis in enumerate(rig_axes)
+        )
+    for values in grid:
+        case = dict(zip(names, values, strict=True))
+        try:
+            _check_rig(with_keys(rig, case), axes)
+        except InputError as error:
+            if not case:
+                raise
+            told = ", ".join(f"{name} = {value:g}" for name, value in case.items())
+            raise InputError(f"[grid] {told}: the rig cannot be so: {error}") from None
+
+
+def _check_rig(rig: Rig, axes: tuple[Axis, ...]) -> None:
+    if not rig.stator:
+        raise InputError(f"rig: {rig.name} has no stator to touch; add a [[stator]] to it")
+    by_name = {axis.name: axis for axis in axes}
+    if "clearance_ratio" in by_name and not any(u.mass * u.radius for u in rig.rotor.unbalance):
+        problem = f"{rig.name} has no unbalance, so no contact-free amplitude"
+        raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead, or an unbalance")
+    if "clearance" in by_name:
+        least = min(by_name["clearance"].tried)
+        offset = min(stator.clearance_offset for stator in rig.stator)
+        if least + offset <= 0:
+            problem = f"{least:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
+            raise InputError(f"[grid] clearance: {problem}; give a larger clearance")

@@ -1,0 +1,126 @@
+"""Modes followed over speed, critical speeds, and the figure that shows them."""
+
+import math
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from scipy.linalg import eigvals
+
+from postproc.figures.campbell import campbell_diagram
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.campbell import campbell, critical_speeds
+from rubhpc.fem.modes import modes
+from rubhpc.fem.rotor import assemble_rotor
+from rubhpc.rig.rig import Bearing, Disc, Rotor, ShaftSection, Torsion, read_rig
+
+
+@pytest.fixture(scope="module")
+def overhung():
+    """A disc beside its bearings: strong gyroscopic splitting, and curves that cross torsion."""
+    shaft = ShaftSection(
+        length=0.5, outer_diameter=0.03, elements=5, youngs_modulus=2.1e11, shear_modulus=8e10, density=7800.0
+    )
+    disc = Disc(node=6, diameter=0.3, thickness=0.03, density=7800.0)
+    supports = (Bearing(node=1, stiffness=5e7), Bearing(node=4, stiffness=5e7))
+    return assemble_rotor(
+        Rotor(shaft=(shaft,), disc=(disc,), bearing=supports, torsion=Torsion(fixed_node=1))
+    )
+
+
+@pytest.fixture(scope="module")
+def curves(overhung):
+    return campbell(overhung, np.linspace(0.0, 3000.0, 16))
+
+
+def test_every_mode_has_one_curve(overhung, curves):
+    assert curves.sizes == {"mode": overhung.n_dof, "speed": 16}
+    for i_speed in (0, 7, 15):
+        alone = sorted(mode.frequency for mode in modes(overhung, float(curves["speed"][i_speed])))
+        assert np.sort(curves["frequency"][:, i_speed]) == pytest.approx(alone)
+
+
+def test_curves_keep_their_whirl_and_run_smoothly(curves):
+    spinning = curves.isel(speed=slice(1, None))
+    for whirl in spinning["whirl"].values:
+        assert len(set(whirl)) == 1
+    forward = spinning["whirl"].values[:, 0] == "forward"
+    backward = spinning["whirl"].values[:, 0] == "backward"
+    assert forward.sum() == backward.sum() == (curves["kind"].values == "lateral").sum() / 2
+    slopes = np.diff(curves["frequency"].values, axis=1)
+    # spin stiffens forward whirl and softens backward whirl; 1e-6 Hz is rounding of the highest modes
+    assert slopes[forward].min() > -1e-6
+    assert slopes[backward].max() < 1e-6
+
+
+def test_torsion_does_not_mind_the_spin(curves):
+    torsion = curves["frequency"].values[curves["kind"].values == "torsional"]
+    assert np.ptp(torsion, axis=1) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_critical_speeds_solve_the_synchronous_problem(overhung):
+    # whirl at the spin, forward: (K - W^2 (M - i G)) r = 0
+    rows = [row for row, (_, name) in enumerate(overhung.degrees) if name in ("v", "w", "thy", "thz")]
+    block = np.ix_(rows, rows)
+    K, M, G = (matrix[block] for matrix in (overhung.stiffness, overhung.mass, overhung.gyroscopic))
+    squares = eigvals(K, M - 1j * G)
+    exact = np.sqrt(np.sort(squares.real[squares.real > 0]))
+    exact = exact[exact < 3000.0]
+    found = critical_speeds(campbell(overhung, np.linspace(0.0, 3000.0, 201)))
+    # the curves are drawn through points 15 rad/s apart
+    assert [speed for _, speed in found] == pytest.approx(list(exact), rel=1e-4)
+
+
+def test_critical_speed_of_another_order_lies_at_its_fraction():
+    body = assemble(read_rig("mokhtar2017")).rotor
+    curves = campbell(body, np.linspace(0.0, 250.0, 26))
+    for order in (1, 2):
+        (_, backward), (_, forward) = critical_speeds(curves, order)[:2]
+        assert backward < forward
+        assert forward == pytest.approx(2 * math.pi * 31.56 / order, rel=1e-3)
+
+
+def test_diagram_draws_each_motion_in_its_own_style(overhung, curves):
+    shown = curves.isel(mode=curves["kind"].values != "axial").isel(mode=slice(5))
+    ax = Figure().subplots()
+    critical = critical_speeds(shown)
+    assert campbell_diagram(shown, ax, critical, limit=300.0) is ax
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert names == ["Forward", "Backward", "Torsional", "Critical (1X)"]
+    assert ax.get_xlabel() == "Spin speed (rpm)"
+    assert ax.get_ylabel() == "Natural frequency (Hz)"
+    assert ax.get_xlim() == pytest.approx((0.0, 3000 * 30 / math.pi))
+    assert ax.get_ylim() == (0.0, 300.0)
+    assert {text.get_text() for text in ax.texts} == {"1X", "2X"}
+    marks = next(line for line in ax.lines if line.get_marker() == "o")
+    # on the 1X line: as many turns a second as hertz
+    assert marks.get_xdata() / 60 == pytest.approx(marks.get_ydata())
+    assert len(marks.get_xdata()) == len(critical) > 0
+    whole = [line for line in ax.lines if len(line.get_xdata()) == 16]
+    assert len(whole) == 5
+    assert {mpl.colors.to_hex(line.get_color()) for line in whole} == {
+        mpl.colors.to_hex(color) for color in ("C0", "C1", "C2")
+    }
+
+
+def test_diagram_breaks_the_curve_where_a_mode_does_not_oscillate(curves):
+    shown = curves.isel(mode=[0]).copy(deep=True)
+    shown["damping_ratio"][0, 5:7] = 1.5
+    shown["frequency"][0, 7] = 0.0
+    ax = Figure().subplots()
+    campbell_diagram(shown, ax)
+    drawn = max(ax.lines, key=lambda line: len(line.get_xdata())).get_ydata()
+    assert np.isnan(drawn[5:8]).all()
+    assert np.isfinite(np.delete(drawn, [5, 6, 7])).all()
+
+
+def test_diagram_changes_style_where_a_mode_changes_its_whirl(curves):
+    shown = curves.isel(mode=[0]).copy(deep=True)
+    shown["whirl"] = (("mode", "speed"), [["planar"] + 6 * ["backward"] + ["planar"] + 8 * ["forward"]])
+    ax = Figure().subplots()
+    campbell_diagram(shown, ax)
+    parts = [line.get_xdata() for line in ax.lines if len(line.get_xdata()) > 2]
+    # lone planar points join what follows, and the parts meet
+    assert [len(part) for part in parts] == [8, 9]
+    assert parts[0][-1] == parts[1][0]

@@ -1,0 +1,121 @@
+"""Bifurcation diagrams of a synthetic store: which points, in which colours, along which axis."""
+
+import numpy as np
+import pytest
+import synthetic_store
+from click.testing import CliRunner
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+
+from postproc.figures.bifurcation import bifurcation, bifurcation_data, default_axis
+from postproc.figures.map_figure import REGIME_COLORS
+from postproc.store.open import open_store
+from postproc.store.select import select
+from rubhpc.commands.figures import bifurcation_diagram
+from rubhpc.errors import InputError
+from rubhpc.schema import DONE, REGIME
+
+CHOICE = {"clearance": "84 um", "friction": 0.3, "stator.youngs_modulus": "30 GPa"}
+SPEEDS = synthetic_store.AXES["speed_ratio"][2]
+POINTS = synthetic_store.REVOLUTIONS
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("stores") / "study.zarr"
+    synthetic_store.write(path, synthetic_store.make())
+    return path
+
+
+@pytest.fixture
+def ax():
+    return Figure(layout="constrained").subplots()
+
+
+def drawn(ax):
+    """Abscissas of the points in each colour, by its name."""
+    return {line.get_label(): np.unique(line.get_xdata()) for line in ax.lines}
+
+
+def test_points_have_the_colour_of_their_regime(path, ax):
+    data = bifurcation_data(select(open_store(path), CHOICE), "vertical", "speed_ratio")
+    assert bifurcation(data, "vertical", ax) is ax
+    expected = {name: [] for name in ("no contact", "periodic", "quasi-periodic", "chaotic")}
+    for speed, code in zip(SPEEDS, synthetic_store.REGIMES, strict=True):
+        expected[REGIME[code].replace("no_", "no ").replace("_", "-")].append(speed)
+    assert {name: list(at) for name, at in drawn(ax).items()} == expected
+    for line in ax.lines:
+        assert len(line.get_xdata()) == POINTS * len(drawn(ax)[line.get_label()])
+    assert to_rgba(ax.lines[-1].get_color()) == to_rgba(REGIME_COLORS[REGIME.index("chaotic")])
+    assert "once a revolution (µm)" in ax.get_ylabel()
+
+
+def test_points_have_the_colour_of_their_period(path, ax):
+    data = bifurcation_data(select(open_store(path), CHOICE), "vertical", "speed_ratio")
+    bifurcation(data, "vertical", ax, "period")
+    assert {name: list(at) for name, at in drawn(ax).items()} == {
+        "none": [1.5, 1.7],
+        "P1": [1.0, 1.25],
+        "P2": [0.75],
+    }
+
+
+def test_points_are_every_whole_revolution_of_the_waveform(path, ax):
+    store = select(open_store(path), CHOICE)
+    data = bifurcation_data(store, "vertical", "speed_ratio")
+    bifurcation(data, "vertical", ax, color=None)
+    whole = store["vertical"].values[:, :: synthetic_store.SAMPLES]
+    assert ax.lines[0].get_ydata() == pytest.approx(1e6 * whole.ravel(), rel=1e-6)
+
+
+def test_cases_that_are_not_done_leave_no_point(path, ax):
+    one = {"clearance": "70 um", "friction": 0.1, "stator.youngs_modulus": "3 GPa"}
+    bifurcation(bifurcation_data(select(open_store(path), one), "vertical", "speed_ratio"), "vertical", ax)
+    values = synthetic_store.make()["status"].values[:, 0, 0, 0]
+    there = np.concatenate(list(drawn(ax).values()))
+    assert sorted(there) == [s for s, status in zip(SPEEDS, values, strict=True) if status == DONE]
+
+
+def test_points_are_read_lazily(path):
+    store = select(open_store(path), CHOICE)
+    assert bifurcation_data(store, "vertical", "speed_ratio")["section_vertical"].chunks is not None
+
+
+def test_signal_without_section_is_taken_from_its_waveform(path):
+    store = select(open_store(path), CHOICE)
+    found = bifurcation_data(store, "contact_force", "speed_ratio")["section_contact_force"]
+    assert found.shape == (5, POINTS)
+
+
+def test_longest_axis_is_the_one(path):
+    store = open_store(path)
+    assert default_axis(store) == "speed_ratio"
+    assert default_axis(store, "stator.youngs_modulus") == "stator_youngs_modulus"
+    with pytest.raises(InputError, match="several values"):
+        default_axis(store.isel(dict.fromkeys(store["status"].dims, 0)))
+
+
+def test_command_takes_the_first_of_other_axes_and_writes_the_points(path, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    args = [str(path), "--along", "clearance", "--color", "period", "--data", "points.csv"]
+    args += ["--select", "speed_ratio=1.5", "--signal", "torsion"]
+    said = CliRunner().invoke(bifurcation_diagram, args, catch_exceptions=False).output.splitlines()
+    assert "friction = 0.1: the first of 2; change with --select friction=VALUE" in said
+    assert said[-2:] == ["study_bifurcation.png", "points.csv"]
+    table = np.genfromtxt("points.csv", delimiter=",", names=True, deletechars="")
+    assert len(table) == 3 * POINTS
+    assert set(np.unique(table["clearance_(m)"])) == {70e-6, 84e-6, 100e-6}
+
+
+def test_an_axis_of_even_ratios_is_drawn_on_a_log_scale(path, ax):
+    store = select(open_store(path), {"friction": 0.3, "stator.youngs_modulus": "30 GPa", "speed_ratio": 1.0})
+    store = store.assign_coords(clearance=store["clearance"].copy(data=[1e-5, 1e-4, 1e-3]))
+    bifurcation(bifurcation_data(store, "vertical", "clearance"), "vertical", ax)
+    assert ax.get_xscale() == "log"
+
+
+def test_points_that_differ_by_rounding_do_not_fill_the_axes(path, ax):
+    data = bifurcation_data(select(open_store(path), CHOICE), "vertical", "speed_ratio").load()
+    data["section_vertical"][...] = 1e-4 * (1 + 1e-9 * np.random.default_rng(1).random((5, POINTS)))
+    bifurcation(data, "vertical", ax)
+    assert np.ptp(ax.get_ylim()) == pytest.approx(2.0)  # um, of 100

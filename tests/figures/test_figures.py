@@ -1,0 +1,320 @@
+"""Maps, orbits, waveforms, sections, spectra: what they gather, and what they draw."""
+
+import numpy as np
+import pytest
+import synthetic_store
+from matplotlib.colors import to_rgba
+
+from postproc.cases.maps import default_axes, map_data
+from postproc.figures.cells import cell_edges, hatch_cells
+from postproc.figures.map_figure import value_maps
+from postproc.figures.orbit import orbit, orbit_data
+from postproc.figures.overlay import overlaid
+from postproc.figures.section import plane, section_data
+from postproc.figures.spectrum_figure import default_limit, spectrum
+from postproc.figures.style import check_figure_path, house_style, new_figure, save
+from postproc.figures.waveform import DEFAULT_SIGNALS, panels, waveform, waveform_data
+from postproc.signals.lines import strongest_lines
+from postproc.signals.spectra import spectrum_data
+from postproc.store.select import select
+from rubhpc.errors import InputError
+
+ONE = {"speed_ratio": 0.75, "clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
+
+
+def rest(*axes):
+    """The selection without some axes."""
+    return {name: value for name, value in ONE.items() if name not in axes}
+
+
+@pytest.fixture(scope="module")
+def store():
+    return synthetic_store.make()
+
+
+@pytest.fixture(scope="module")
+def case(store):
+    return select(store, ONE)
+
+
+@pytest.fixture
+def ax():
+    with house_style():
+        yield new_figure()[1][0]
+
+
+@pytest.fixture
+def plain_map(store):
+    chosen = select(store, {"friction": 0.1, "stator_youngs_modulus": 3e9})
+    return lambda value: map_data(chosen, value, ["speed_ratio", "clearance"])
+
+
+# maps
+
+
+def bar_names(ax):
+    """Names on the colour bar."""
+    return [text.get_text() for text in ax.figure.axes[-1].get_yticklabels()]
+
+
+def test_a_map_takes_the_longest_axes_or_those_named(store):
+    assert default_axes(store) == ("speed_ratio", "clearance")
+    assert default_axes(store, y="friction") == ("speed_ratio", "friction")
+    assert default_axes(store, x="stator.youngs_modulus") == ("stator_youngs_modulus", "speed_ratio")
+    with pytest.raises(InputError, match="two axes of several values; there is speed_ratio"):
+        default_axes(select(store, {"clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}))
+    with pytest.raises(InputError, match="two axes"):
+        default_axes(store, "friction", "friction")
+
+
+def test_a_map_holds_the_value_the_status_and_the_validity(plain_map):
+    data = plain_map("peak_contact_force")
+    assert data["peak_contact_force"].dims == ("clearance", "speed_ratio")
+    assert float(data["peak_contact_force"].sel(speed_ratio=1.5, clearance=84e-6)) == pytest.approx(150.0)
+    assert list(data["validity"].sel(clearance=84e-6).values) == [0, 0, 0, 1, 3]
+    assert np.isnan(data["peak_contact_force"].sel(speed_ratio=0.75, clearance=70e-6))
+
+
+def test_one_bad_stator_spoils_the_case():
+    store = synthetic_store.make(n_stator=2)
+    store["minimum_slip_speed"][..., 1] = -1.0
+    chosen = select(store, {"friction": 0.1, "stator_youngs_modulus": 3e9})
+    data = map_data(chosen, "peak_torsion", ["speed_ratio", "clearance"])
+    assert list(data["validity"].sel(clearance=84e-6).values) == [1, 1, 1, 1, 3]
+
+
+def test_no_map_of_what_is_no_scalar(plain_map):
+    with pytest.raises(InputError, match="vertical: no scalar of a case"):
+        plain_map("vertical")
+    with pytest.raises(InputError, match="did you mean peak_torsion"):
+        plain_map("peak_torsio")
+
+
+def test_a_map_is_drawn_with_units_and_hatching(plain_map, ax):
+    assert value_maps(plain_map("peak_contact_force"), "peak_contact_force", [ax]) == [ax]
+    assert ax.get_xlabel() == "Speed ratio $r$"
+    assert ax.get_ylabel() == "Clearance (µm)"
+    assert ax.figure.axes[1].get_ylabel() == "Peak contact force (N)"
+    labels = [text.get_text() for text in ax.figure.legends[0].get_texts()]
+    assert labels == ["missing", "failed", "diverged", "out of range: slip, Euler load"]
+    ax.figure.canvas.draw()
+
+
+def test_regimes_have_colours_of_their_own(plain_map, ax):
+    value_maps(plain_map("regime"), "regime", [ax])
+    assert bar_names(ax) == ["no contact", "periodic", "quasi-periodic", "chaotic"]
+    mesh = ax.collections[0]
+    colors = mesh.to_rgba(mesh.get_array()).reshape(3, 5, 4)  # (clearance, speed)
+    assert colors[1, 0] == pytest.approx(to_rgba("#009E73"))  # periodic
+    assert colors[1, 3] == pytest.approx(to_rgba("#D55E00"))  # chaotic
+    assert colors[0, 0][3] == 0  # diverged: nothing but its hatch
+
+
+def test_periods_are_named(plain_map, ax):
+    value_maps(plain_map("period"), "period", [ax])
+    assert bar_names(ax) == ["none", "P1", "P2"]
+
+
+def test_the_status_is_a_map_too(plain_map, ax):
+    value_maps(plain_map("status"), "status", [ax])
+    assert bar_names(ax) == ["missing", "done", "failed", "diverged"]
+    assert not ax.figure.legends
+
+
+def test_a_map_of_settings_needs_no_result(store, ax):
+    chosen = select(store, {"friction": 0.1, "stator_youngs_modulus": 3e9})
+    data = map_data(chosen, "spin_speed", ["speed_ratio", "clearance"])
+    value_maps(data, "spin_speed", [ax])
+    assert np.ma.count_masked(ax.collections[0].get_array()) == 0
+
+
+def test_a_finished_case_may_have_no_value(plain_map, ax):
+    data = plain_map("contact_duration")
+    data["contact_duration"][1, 2] = np.nan  # it never touched
+    value_maps(data, "contact_duration", [ax])
+    labels = [text.get_text() for text in ax.figure.legends[0].get_texts()]
+    assert "no value" in labels
+
+
+def test_a_logarithmic_map_needs_positive_values(plain_map, ax):
+    value_maps(plain_map("peak_contact_force"), "peak_contact_force", [ax], log=True)
+    data = plain_map("peak_contact_force")
+    data["peak_contact_force"] = 0 * data["peak_contact_force"]
+    with pytest.raises(InputError, match="nowhere positive"):
+        value_maps(data, "peak_contact_force", [ax], log=True)
+
+
+def test_cells_meet_half_way_also_on_a_log_scale():
+    assert cell_edges(np.array([1.0, 2.0, 4.5])) == pytest.approx([0.5, 1.5, 3.25, 5.75])
+    assert cell_edges(np.array([1.0, 10.0, 100.0])) == pytest.approx(10 ** np.array([-0.5, 0.5, 1.5, 2.5]))
+    assert cell_edges(np.array([0.3])) == pytest.approx([0.15, 0.45])
+
+
+def test_hatched_cells_are_one_patch_of_their_area(ax):
+    mask = np.array([[True, True, False], [False, False, False], [True, False, True]])
+    edges = np.arange(4.0), np.arange(4.0)
+    (patch,) = hatch_cells(ax, edges, mask, "gone", "//")
+    boxes = patch.get_path().to_polygons(closed_only=False)
+    assert len(boxes) == 3  # runs of a row are one box
+    assert sum(np.ptp(b[:, 0]) * np.ptp(b[:, 1]) for b in boxes) == pytest.approx(4.0)
+    assert hatch_cells(ax, edges, np.zeros((3, 3), bool), "none", "//") == []
+
+
+# orbits
+
+
+def test_an_orbit_is_drawn_in_micrometres_with_its_stator(case, ax):
+    data = orbit_data(case)
+    assert orbit(data, ax) is ax
+    assert ax.get_xlabel() == "Horizontal displacement (µm)"
+    assert ax.get_ylabel() == "Vertical displacement (µm)"
+    assert ax.get_aspect() == 1.0
+    circle = next(p for p in ax.patches if hasattr(p, "get_radius"))
+    assert circle.get_radius() == pytest.approx(84.0)
+    face = next(line for line in ax.lines if len(line.get_xdata()) == 2)
+    assert face.get_ydata() == pytest.approx([84.0, 84.0])  # straight above, across the gap
+    curve = max(ax.lines, key=lambda line: len(line.get_xdata()))
+    assert max(curve.get_xdata()) == pytest.approx(100.0, rel=1e-3)
+    ax.figure.canvas.draw()
+
+
+def test_poincare_points_are_one_a_revolution(case, ax):
+    orbit(orbit_data(case, revolutions=4), ax)
+    dots = next(line for line in ax.lines if line.get_marker() == ".")
+    assert len(dots.get_xdata()) == 4
+    # half orders: every second point coincides
+    assert dots.get_ydata()[:2] == pytest.approx(dots.get_ydata()[2:], rel=1e-5)
+    assert abs(dots.get_ydata()[0] - dots.get_ydata()[1]) > 10
+
+
+def test_orbits_along_an_axis_have_a_legend(store, ax):
+    orbit(orbit_data(select(store, rest("friction")), over="friction"), ax)
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert labels == [r"$\mu$ = 0.1", r"$\mu$ = 0.3"]
+
+
+def test_too_many_curves_are_refused(store):
+    wave = store["vertical"].isel(clearance=0, friction=0, stator_youngs_modulus=0)
+    many = wave.isel(speed_ratio=[0, 1, 2, 3, 4, 0, 1, 2])
+    with pytest.raises(InputError, match="speed_ratio: 8 curves"):
+        overlaid(many, "sample")
+
+
+def test_a_case_that_is_not_done_has_no_orbit(store, ax):
+    missing = {"speed_ratio": 0.75, "clearance": 70e-6, "friction": 0.1, "stator_youngs_modulus": 3e9}
+    with pytest.raises(InputError, match="no case of this selection is done"):
+        orbit(orbit_data(select(store, missing)), ax)
+
+
+# waveforms
+
+
+def test_waveforms_start_at_zero_and_last_their_revolutions(case):
+    data = waveform_data(case, revolutions=2)
+    turn = 1 / (0.75 * synthetic_store.FIRST_LATERAL)
+    assert float(data["time"][0]) == 0.0
+    assert float(data["time"][-1]) == pytest.approx(2 * turn * (1 - 1 / (2 * synthetic_store.SAMPLES)))
+
+
+def test_panels_have_units_and_shade_the_contact(case):
+    data = waveform_data(case)
+    with house_style():
+        _, axes = new_figure(len(DEFAULT_SIGNALS))
+        assert panels(data, axes) == axes
+    labels = [" ".join(ax.get_ylabel().split()) for ax in axes]
+    assert labels == [
+        "Vertical displacement (µm)",
+        "Horizontal displacement (µm)",
+        "Torsion (µrad)",
+        "Contact force (N)",
+    ]
+    assert axes[-1].get_xlabel() == "Time (ms)"
+    # 4 revolutions that begin and end within a contact: 5 shaded spans, with force inside and none between
+    assert [len(ax.patches) for ax in axes] == [5] * 4
+
+
+def test_waveforms_of_several_speeds_run_over_revolutions(store, ax):
+    data = waveform_data(select(store, rest("speed_ratio")), ["torsion"], over="speed_ratio")
+    waveform(data["torsion"].isel(speed_ratio=slice(0, 3)), ax)
+    assert ax.get_xlabel() == "Revolution"
+    assert len(ax.lines) == 3
+
+
+# sections
+
+
+def test_sections_are_stored_or_every_whole_revolution():
+    waves = select(synthetic_store.make(keep=("waveform",)), ONE)
+    stored = select(synthetic_store.make(keep=("section",)), ONE)
+    found = section_data(waves, ["vertical"])["section_vertical"]
+    assert found.values == pytest.approx(
+        section_data(stored, ["vertical"])["section_vertical"].values, rel=1e-6
+    )
+
+
+def test_a_section_that_is_not_kept_says_so():
+    with pytest.raises(InputError, match='"section" in'):
+        section_data(synthetic_store.make(keep=()), ["vertical"])
+
+
+def test_the_section_plane_has_a_point_a_revolution(case, ax):
+    assert plane(section_data(case, ["horizontal", "vertical"]), "horizontal", "vertical", ax) is ax
+    assert len(ax.collections[0].get_offsets()) == synthetic_store.REVOLUTIONS
+    assert ax.get_ylabel() == "Vertical displacement (µm)"
+
+
+# spectra
+
+
+@pytest.mark.parametrize(("abscissa", "label"), [("frequency", "Frequency (Hz)"), ("order", "Order")])
+def test_a_spectrum_names_its_lines(case, ax, abscissa, label):
+    amplitude = spectrum_data(case, "vertical")
+    assert (
+        spectrum(amplitude, ax, strongest_lines(amplitude), abscissa, default_limit(amplitude, abscissa))
+        is ax
+    )
+    assert ax.get_xlabel().startswith(label)
+    assert ax.get_ylabel() == "Vertical displacement amplitude (µm)"
+    assert {text.get_text() for text in ax.texts} == {"1/2X", "1X", "2X"}
+    assert max(ax.lines[0].get_ydata()) == pytest.approx(100.0, rel=1e-4)
+
+
+def test_the_whirl_spectrum_has_two_sides(case, ax):
+    amplitude = spectrum_data(case, "whirl")
+    spectrum(amplitude, ax, strongest_lines(amplitude), "order", 3.0)
+    assert ax.get_xlim() == (-3.0, 3.0)
+    assert {"forward", "backward", "1X"} <= {text.get_text() for text in ax.texts}
+
+
+def test_a_spectrum_on_a_log_scale_shows_five_decades(case, ax):
+    spectrum(spectrum_data(case, "vertical"), ax, log=True)
+    low, high = ax.get_ylim()
+    assert low == pytest.approx(100e-5, rel=1e-3)
+    assert high > 100
+
+
+# files
+
+
+def test_figures_are_saved_by_their_extension(tmp_path, case):
+    with house_style():
+        for suffix in (".png", ".pdf", ".svg"):
+            figure, (ax,) = new_figure()
+            orbit(orbit_data(case), ax)
+            path = save(figure, tmp_path / f"orbit{suffix}")
+            assert path.stat().st_size > 1000
+    assert (tmp_path / "orbit.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("orbit.jpeg2", "a figure is one of"), ("no/where.png", "no directory")]
+)
+def test_a_figure_that_cannot_be_saved_is_bad_input(tmp_path, name, said):
+    with pytest.raises(InputError, match=said):
+        check_figure_path(tmp_path / name)
+
+
+def test_figures_are_one_column_wide():
+    with house_style():
+        figure, _ = new_figure()
+    assert 85 <= figure.get_figwidth() * 25.4 <= 90

@@ -1,0 +1,142 @@
+"""A motion carried to another clearance: no gap is overlapped, none is pulled shut, no energy is made."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from trial_rig import trial_rig
+
+from rubhpc import simulate
+from rubhpc.errors import InputError
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.initial_state import carried, gaps
+from rubhpc.integrate.setup import prepare
+from rubhpc.study.study import Contact, Integrator, Recording
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.record import State
+
+SPIN = 220.0  # rad/s
+SHORT = Recording(transient=0, revolutions=2, samples_per_revolution=64)
+METHODS = {
+    "modal": (Integrator(), Contact()),
+    "updated": (Integrator(), Contact(normal="updated")),
+    "central": (Integrator(method="central-difference", step=1e-6), Contact()),
+    "bouncing": (Integrator(), Contact(restitution=0.6)),
+}
+
+
+def setup_of(method: str, n_stator: int = 2, **changed):
+    integrator, contact = METHODS[method]
+    return prepare(
+        trial_rig(n_stator, **changed),
+        SPIN,
+        contact=contact,
+        integrator=integrator,
+        samples_per_revolution=SHORT.samples_per_revolution,
+    )
+
+
+def settled(setup, clearance: float, initial: State | None = None) -> State:
+    """Where the case is after some revolutions."""
+    recording = replace(SHORT, transient=6)
+    return run_case(setup, clearance=clearance, friction=0.1, recording=recording, initial=initial).final
+
+
+def energy(setup, state: State) -> float:
+    """Of rotor and stators, J."""
+    total = 0.0
+    bodies = [setup.model.rotor, *(stator.body for stator in setup.model.stators)]
+    parts = zip(
+        (state.rotor_displacement, *state.stator_displacement),
+        (state.rotor_velocity, *state.stator_velocity),
+        strict=True,
+    )
+    for body, (u, v) in zip(bodies, parts, strict=True):
+        total += 0.5 * (v @ body.mass @ v + u @ body.stiffness @ u)
+    return float(total)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_motion_that_goes_on_in_its_own_case_is_left_as_it_is(method):
+    setup = setup_of(method)
+    state = settled(setup, 1e-4)
+    same = carried(state, setup, 1e-4)
+    assert np.array_equal(same.packed()[:-2], state.packed()[:-2])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_wall_that_moves_in_pushes_as_it_would_slowly(method):
+    """The strain energy it adds is what the forces do over the way, and no body is thrown."""
+    setup = setup_of(method)
+    state = settled(setup, 1e-4)
+    gap, push = gaps(state.displacement, setup, 1e-4)
+    clearance = 1e-4 - float(gap.max()) - 2e-5  # every gap would be overlapped by 20 um and more
+    start = carried(state, setup, clearance)
+    after, _ = gaps(start.displacement, setup, clearance)
+    assert np.all(after > -1e-12)
+    assert after.min() == pytest.approx(0.0, abs=1e-12)
+    assert np.array_equal(start.velocity, state.velocity)
+    # By the laws of statics: K du = push^T F, with forces that push, and none where the gap is open.
+    moved = start.displacement - state.displacement
+    bodies = [setup.model.rotor, *(stator.body for stator in setup.model.stators)]
+    stiffness = [0.5 * (body.stiffness + body.stiffness.T) for body in bodies]
+    parts = np.split(moved, np.cumsum([body.n_dof for body in bodies])[:-1])
+    load = np.concatenate([k @ u for k, u in zip(stiffness, parts, strict=True)])
+    force = np.linalg.lstsq(push.T, load, rcond=None)[0]
+    if method != "updated":  # there the normals turn on the way
+        assert np.linalg.norm(push.T @ force - load) < 1e-6 * np.linalg.norm(load)
+        assert np.all(force > -1e-6 * force.max())
+    # And what goes on from there is the motion of before, not a shock.
+    before = run_case(setup, clearance=1e-4, friction=0.1, recording=SHORT, initial=state)
+    beyond = run_case(setup, clearance=clearance, friction=0.1, recording=SHORT, initial=state)
+    assert beyond.status == before.status
+    assert np.abs(beyond.final.velocity).max() < 5 * np.abs(before.final.velocity).max()
+    assert energy(setup, start) < 3 * energy(setup, state)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_wall_that_moves_out_lets_go(method):
+    setup = setup_of(method, 1)
+    state = settled(setup, 1e-4)
+    state = replace(state, contact_force=np.array([50.0]))  # pressed at that instant
+    start = carried(state, setup, 1e-2)
+    assert start.contact_force.tolist() == [0.0]
+    assert np.array_equal(start.displacement, state.displacement)
+    free = run_case(setup, clearance=1e-2, friction=0.1, recording=SHORT, initial=state)
+    assert free.contact_fraction.tolist() == [0.0]
+
+
+def test_what_a_penalty_overlaps_stays_and_what_a_wall_adds_goes():
+    contact = Contact(law="penalty", stiffness=1e6, damping=10.0)
+    setup = prepare(trial_rig(1), SPIN, contact=contact, integrator=Integrator(), samples_per_revolution=64)
+    overlapped = None
+    for n in range(20):  # until a revolution ends in contact
+        state = settled(setup, (30 + n) * 1e-6, overlapped)
+        if state.overlap[0] > 1e-7:
+            break
+    clearance = (30 + n) * 1e-6
+    assert state.overlap[0] > 1e-7
+    assert np.array_equal(carried(state, setup, clearance).displacement, state.displacement)
+    start = carried(state, setup, clearance - 1e-5)
+    gap, _ = gaps(start.displacement, setup, clearance - 1e-5)
+    assert gap[0] == pytest.approx(-state.overlap[0], abs=1e-12)
+
+
+def test_a_rig_of_other_degrees_is_refused_in_a_line():
+    record = simulate("mokhtar2017", speed_ratio=0.75, clearance="100 um", transient=0, revolutions=1)
+    with pytest.raises(
+        InputError, match=r"initial: a state of \d+ numbers for a rig of \d+; carry it between"
+    ):
+        simulate(
+            "mokhtar2017",
+            speed_ratio=0.75,
+            clearance="100 um",
+            overrides={"stator.elements": 3},
+            transient=0,
+            revolutions=1,
+            initial=record.final,
+        )

@@ -1,0 +1,94 @@
+"""A record: variables by name, one line to print, a dataset with units; and the state it ends in."""
+
+import numpy as np
+import pytest
+
+from rubhpc import read_rig
+from rubhpc.fem.assemble import assemble
+from rubhpc.integrate.measures import diverged_record
+from rubhpc.integrate.record import Record, State
+from rubhpc.schema import DIVERGED, VARIABLES
+from rubhpc.study.study import Recording
+
+N_STATOR, REVOLUTIONS, PER_REVOLUTION = 2, 3, 8
+N_SAMPLE = REVOLUTIONS * PER_REVOLUTION
+MODEL = assemble(read_rig("mokhtar2017"))
+
+
+@pytest.fixture
+def record():
+    return Record(
+        samples_per_revolution=PER_REVOLUTION,
+        signals={"vertical": np.arange(float(N_SAMPLE)), "contact_force": np.ones((N_STATOR, N_SAMPLE))},
+        spectra={"spectrum_vertical": np.zeros(N_SAMPLE // 2 + 1)},
+        sections={"section_vertical": np.arange(3.0)},
+        scalars={"period": 2, "peak_contact_force": np.array([1.0, 2.0])},
+        settings={"spin_speed": 100.0, "clearance": 1e-4},
+        final=State.at_rest(MODEL),
+    )
+
+
+def test_state_at_rest_has_every_degree(record):
+    state = record.final
+    assert state.rotor_displacement.shape == state.rotor_velocity.shape == (MODEL.rotor.n_dof,)
+    assert [d.shape for d in state.stator_displacement] == [(s.body.n_dof,) for s in MODEL.stators]
+    assert [v.shape for v in state.stator_velocity] == [(s.body.n_dof,) for s in MODEL.stators]
+    assert not any(np.any(part) for part in (state.rotor_displacement, *state.stator_velocity))
+    assert state.contact_force.tolist() == [0.0]
+
+
+def test_variables_are_attributes(record):
+    assert record.period == 2
+    assert record.spin_speed == 100.0
+    assert record.vertical[5] == 5.0
+    assert record.section_vertical.size == 3
+    assert not hasattr(record, "horizontal")
+    with pytest.raises(AttributeError, match="holds no torsion"):
+        _ = record.torsion
+
+
+def test_one_line_says_what_it_holds(record):
+    assert repr(record) == "<Record: done; vertical, contact_force, spectrum_vertical, section_vertical>"
+
+
+def test_dataset_is_laid_out_like_a_store(record):
+    dataset = record.to_dataset()
+    for name, array in dataset.data_vars.items():
+        assert array.dims == VARIABLES[name].dims
+        assert array.attrs == {"units": VARIABLES[name].unit, "long_name": VARIABLES[name].long_name}
+    assert dataset.sizes == {"stator": 2, "sample": N_SAMPLE, "order": N_SAMPLE // 2 + 1, "section": 3}
+    assert dataset["revolution"].dims == ("sample",)
+    assert dataset["revolution"].values == pytest.approx(np.arange(N_SAMPLE) / PER_REVOLUTION)
+    # 3 revolutions: lines a third of an order apart, up to half the samples of a revolution
+    assert dataset["order"].values == pytest.approx(np.arange(N_SAMPLE // 2 + 1) / REVOLUTIONS)
+    assert dataset["section"].values.tolist() == [0, 1, 2]
+    assert dataset.attrs == {"status": "done", "reason": ""}
+    assert dataset["peak_contact_force"].values.tolist() == [1.0, 2.0]
+
+
+def test_dataset_of_scalars_alone_has_no_samples(record):
+    bare = Record(samples_per_revolution=PER_REVOLUTION, scalars=record.scalars, final=record.final)
+    assert bare.to_dataset().sizes == {"stator": 2}
+    assert repr(bare) == "<Record: done; scalars only>"
+
+
+@pytest.mark.parametrize("keep", [(), ("waveform",), ("spectrum", "section")])
+def test_diverged_record_is_not_a_number_of_the_usual_shape(record, keep):
+    recording = Recording(
+        transient=1, revolutions=REVOLUTIONS, samples_per_revolution=PER_REVOLUTION * 2, keep=keep
+    )
+    diverged = diverged_record("it left", N_STATOR, recording, {"clearance": 1e-4}, record.final)
+    assert diverged.status == DIVERGED
+    assert repr(diverged).startswith("<Record: diverged (it left); ")
+    length = {"stator": 2, "sample": 2 * N_SAMPLE, "order": N_SAMPLE + 1, "section": REVOLUTIONS}
+    dataset = diverged.to_dataset()
+    for variable in VARIABLES.values():
+        is_kept = variable.role == "scalar" or variable.role in keep
+        assert (variable.name in dataset) == (is_kept or variable.name in ("clearance", "regime"))
+        if is_kept:
+            array = dataset[variable.name]
+            assert array.shape == tuple(length[dim] for dim in variable.dims)
+            if variable.dtype.startswith("float"):
+                assert np.isnan(array).all()
+    assert dataset["regime"] == -1
+    assert dataset["period"] == -1

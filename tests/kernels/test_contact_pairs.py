@@ -1,0 +1,223 @@
+"""Contact pairs: forces, gaps and their directions in the complex plane, and the solution of a step."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import root
+
+from rubhpc.integrate.workspace import workspace
+from rubhpc.kernels.complementarity import UNSOLVED
+from rubhpc.kernels.contact_pairs import (
+    AXIAL,
+    LATERAL,
+    MULTIPLIER,
+    N_DEGREE,
+    TORSION,
+    Pairs,
+    V,
+    W,
+    fill_directions,
+    force_on_disc,
+    is_any_closed,
+    normal_and_gap,
+)
+from rubhpc.kernels.contact_step import solve_contact
+
+RADIUS, CLEARANCE = 0.06, 1e-4
+STEP, SPIN = 1e-6, 150.0  # s, rad/s
+angles = st.floats(0.0, 2 * math.pi)
+displacements = st.lists(st.floats(-5e-3, 5e-3), min_size=N_DEGREE, max_size=N_DEGREE).map(np.array)
+
+
+def make_pairs(angle, friction=0.3, *, is_updated=False, compliance=None, aside=0.0):
+    """Pairs at the angles (q,), their degrees in rows 0 to 5 q."""
+    axis = np.exp(1j * np.atleast_1d(angle))
+    q = axis.size
+    rows = np.arange(q * N_DEGREE).reshape(q, N_DEGREE)
+    return Pairs(
+        row=rows,
+        block=np.zeros_like(rows),
+        axis_y=axis.real.copy(),
+        axis_z=axis.imag.copy(),
+        radius=np.full(q, RADIUS),
+        clearance=np.full(q, CLEARANCE),
+        aside=np.full(q, aside),
+        friction=np.full(q, friction),
+        compliance=np.zeros((q, N_DEGREE, q, N_DEGREE)) if compliance is None else compliance,
+        is_updated=is_updated,
+        law=MULTIPLIER,
+    )
+
+
+def line_of_centres(axis, at, aside=0.0):
+    """From disc centre to tip, m, in the plane y + i z."""
+    tip = (RADIUS + CLEARANCE + at[AXIAL] + 1j * (at[LATERAL] + aside)) * axis
+    return tip - (at[V] + 1j * at[W])
+
+
+@pytest.mark.parametrize("whirl", np.linspace(0, 2 * np.pi, 13))
+@pytest.mark.parametrize("friction", [0.3, -0.3])  # the second when the spin is negative
+def test_friction_opposes_the_rim_at_every_whirl_angle(whirl, friction):
+    n = np.exp(1j * whirl)  # the plane as complex numbers: t = i n
+    fy, fz, mx = force_on_disc(n.real, n.imag, 100.0, friction, 0.06)
+    assert complex(fy, fz) == pytest.approx(-100.0 * n * (1 + 1j * friction))
+    assert mx == pytest.approx(-friction * 100.0 * 0.06)
+
+
+@given(angles, displacements, st.floats(-1e-3, 1e-3))
+def test_gap_is_the_distance_of_centre_and_tip_less_the_radius(angle, at, aside):
+    axis = np.exp(1j * angle)
+    line = line_of_centres(axis, at, aside)
+    ny, nz, gap = normal_and_gap(axis.real, axis.imag, RADIUS, CLEARANCE, aside, True, at)
+    assert complex(ny, nz) == pytest.approx(line / abs(line))
+    assert gap == pytest.approx(abs(line) - RADIUS, abs=1e-15)
+    ny, nz, gap = normal_and_gap(axis.real, axis.imag, RADIUS, CLEARANCE, aside, False, at)
+    assert complex(ny, nz) == axis
+    assert gap == pytest.approx((line * axis.conjugate()).real - RADIUS, abs=1e-15)
+
+
+@given(angles, displacements, st.booleans(), st.sampled_from([0.0, 5e-4]))
+def test_push_is_the_change_of_the_gap(angle, at, is_updated, aside):
+    pairs = make_pairs(angle, is_updated=is_updated, aside=aside)
+    axis = (pairs.axis_y[0], pairs.axis_z[0])
+
+    def gap(moved):
+        return normal_and_gap(*axis, RADIUS, CLEARANCE, aside, is_updated, moved)[2]
+
+    ny, nz, _ = normal_and_gap(*axis, RADIUS, CLEARANCE, aside, is_updated, at)
+    pull, push = np.zeros((2, N_DEGREE))
+    fill_directions(pairs, 0, ny, nz, pull, push)
+    delta = 1e-6
+    for a in range(N_DEGREE):
+        nudge = np.eye(N_DEGREE)[a] * delta
+        slope = (gap(at + nudge) - gap(at - nudge)) / (2 * delta)
+        assert push[a] == pytest.approx(slope, abs=1e-8)
+
+
+@given(angles, angles, st.floats(-0.6, 0.6))
+def test_pair_of_forces_is_in_balance(angle, whirl, friction):
+    """Action is reaction, normal force works on the gap alone, and friction on the slip alone."""
+    pairs = make_pairs(angle, friction)
+    pull, push = np.zeros((2, N_DEGREE))
+    n = np.exp(1j * whirl)
+    fill_directions(pairs, 0, n.real, n.imag, pull, push)
+    axis = complex(pairs.axis_y[0], pairs.axis_z[0])
+    on_disc, on_tip = complex(pull[V], pull[W]), complex(pull[AXIAL], pull[LATERAL]) * axis
+    assert on_disc + on_tip == pytest.approx(0.0, abs=1e-14)
+    velocity = np.array([0.3, -0.2, 5.0, 0.1, 0.7])
+    disc, tip = complex(*velocity[:2]), complex(*velocity[3:]) * axis
+    slip = RADIUS * velocity[TORSION] + ((disc - tip) * (1j * n).conjugate()).real
+    assert pull @ velocity == pytest.approx(push @ velocity - friction * slip, abs=1e-12)
+
+
+def test_held_degrees_stand_still():
+    pairs = make_pairs(0.4)
+    pairs.row[0, LATERAL] = pairs.row[0, W] = -1
+    work = workspace(pairs, STEP)
+    displacement = np.full(N_DEGREE, 2e-4)
+    is_closed = is_any_closed(
+        pairs.row,
+        pairs.axis_y,
+        pairs.axis_z,
+        pairs.radius,
+        pairs.clearance,
+        pairs.aside,
+        False,
+        displacement,
+        work.at,
+        work.gap,
+    )
+    assert work.at[0].tolist() == [2e-4, 0.0, 2e-4, 2e-4, 0.0]
+    gap = line_of_centres(np.exp(0.4j), work.at[0])
+    assert work.gap[0] == pytest.approx((gap * np.exp(-0.4j)).real - RADIUS)
+    assert is_closed == (work.gap[0] < 0)
+
+
+def closed(pairs, displacement):
+    """The workspace when the free update leads to `displacement` (5 q,)."""
+    work = workspace(pairs, STEP)
+    is_closed = is_any_closed(
+        pairs.row,
+        pairs.axis_y,
+        pairs.axis_z,
+        pairs.radius,
+        pairs.clearance,
+        pairs.aside,
+        pairs.is_updated,
+        displacement,
+        work.at,
+        work.gap,
+    )
+    return work, is_closed
+
+
+def flexible(rng, q):
+    """Compliance of q pairs over a step, (q, 5, q, 5), m/N: symmetric, positive, coupled."""
+    root_of = rng.normal(size=(5 * q, 5 * q))
+    return (1e-9 * (root_of @ root_of.T / (5 * q) + np.eye(5 * q))).reshape(q, 5, q, 5)
+
+
+@pytest.mark.parametrize("is_updated", [False, True])
+@pytest.mark.parametrize("seed", range(8))
+def test_forces_close_the_gaps_of_those_that_touch(seed, is_updated):
+    rng = np.random.default_rng(seed)
+    q = 1 + seed % 3
+    pairs = make_pairs(
+        rng.uniform(0, 2 * math.pi, q), 0.3, is_updated=is_updated, compliance=flexible(rng, q)
+    )
+    at = rng.normal(scale=2e-4, size=5 * q)
+    at[AXIAL] -= 5e-4  # the first penetrates
+    work, is_closed = closed(pairs, at)
+    assert is_closed
+    free = at.reshape(q, 5)
+    n_touching = solve_contact(pairs, work, STEP, SPIN)
+    assert n_touching == np.count_nonzero(work.force)
+    assert n_touching > 0
+    assert work.force.min() >= 0.0
+    moved = free + np.einsum("iajb,jb,j->ia", pairs.compliance, work.pull, work.force)
+    for i in range(q):
+        axis = complex(pairs.axis_y[i], pairs.axis_z[i])
+        line = line_of_centres(axis, moved[i])
+        gap = (abs(line) if is_updated else (line * axis.conjugate()).real) - RADIUS
+        assert gap >= -1e-12
+        assert work.force[i] * abs(gap) <= 1e-12 * work.force.max()
+        n = line_of_centres(axis, free[i])
+        n = n / abs(n) if is_updated else axis
+        assert complex(work.pull[i, V], work.pull[i, W]) == pytest.approx(-n * (1 + 0.3j))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_curved_gap_is_closed_as_by_a_general_solver(seed):
+    """Two pairs in contact, strongly bent sideways: the forces of scipy's root finder."""
+    rng = np.random.default_rng(seed)
+    pairs = make_pairs([0.2, 0.9], 0.2, is_updated=True, compliance=flexible(rng, 2))
+    at = rng.normal(scale=1e-5, size=(2, 5))
+    at[:, AXIAL] -= 4e-4
+    at[:, LATERAL] = [2e-3, -1e-3]
+    work, _ = closed(pairs, at.ravel())
+    assert solve_contact(pairs, work, STEP, SPIN) == 2
+    axis = pairs.axis_y + 1j * pairs.axis_z
+    normals = np.array([line_of_centres(axis[i], at[i]) for i in range(2)])
+    normals /= abs(normals)
+    on_disc = -normals * (1 + 0.2j)
+    on_tip = -on_disc * axis.conj()
+    twist = np.full(2, -0.2 * RADIUS)
+    unit = np.stack([on_disc.real, on_disc.imag, twist, on_tip.real, on_tip.imag], axis=1)
+
+    def gaps(force):
+        moved = at + np.einsum("iajb,jb,j->ia", pairs.compliance, unit, force)
+        return [1e6 * (abs(line_of_centres(axis[i], moved[i])) - RADIUS) for i in range(2)]
+
+    expected = root(gaps, [1e5, 1e5], tol=1e-13)
+    assert expected.success
+    assert work.force == pytest.approx(expected.x, rel=1e-6)
+
+
+def test_pair_that_no_force_can_part_is_reported():
+    pairs = make_pairs(0.0)  # nothing yields: compliance zero
+    work, is_closed = closed(pairs, np.array([5e-4, 0.0, 0.0, 0.0, 0.0]))
+    assert is_closed
+    assert solve_contact(pairs, work, STEP, SPIN) == UNSOLVED

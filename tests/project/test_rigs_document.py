@@ -1,0 +1,48 @@
+"""What docs/rigs.md shows is so."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from rubhpc import read_rig
+from rubhpc.rig.rig import rig_from_dict
+
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "rigs.md").read_text()
+SHOWN = {block for block in re.findall(r"```python\n(.*?)```", DOCUMENT, re.DOTALL) if "zarr" not in block}
+
+
+def shown(word):
+    (text,) = (block for block in SHOWN if word in block)
+    run = {}
+    exec(compile(text, "docs/rigs.md", "exec"), run)
+    return run
+
+
+def test_bodies_by_their_matrices_run(capsys):
+    record = shown("MatrixStator")["record"]
+    assert record.status == 1
+    assert record.contact_force.shape[0] == 2
+
+
+def test_mass_on_a_stop_prints_what_is_said(capsys):
+    shown("stop = ")
+    assert [float(word) for word in capsys.readouterr().out.split()] == pytest.approx(
+        [31.26e-3, 9950.36], rel=1e-5
+    )
+
+
+def test_oscillator_at_a_wall_prints_what_is_said(capsys):
+    shown("w = 2.2")
+    assert float(capsys.readouterr().out) == pytest.approx(1.86086, rel=1e-5)
+
+
+def test_tables_of_stators_are_read():
+    ring, lumped = (
+        tomllib.loads(text)["stator"] for text in re.findall(r"```toml\n(\[\[.*?)```", DOCUMENT, re.DOTALL)
+    )
+    packaged = read_rig("mokhtar2017").as_dict()
+    rig = rig_from_dict(packaged | {"stator": [packaged["stator"][0] | ring[0], *lumped]})
+    assert len(rig.stator) == 14
+    assert rig.stator[-1].rigid

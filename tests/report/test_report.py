@@ -1,0 +1,284 @@
+"""The report's words and what it carries, without a browser: what is said is so."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import re
+from html.parser import HTMLParser
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import synthetic_store
+from click.testing import CliRunner
+from unpacking import unpacked_floats, unpacked_record
+
+from postproc.cases.maps import validity
+from postproc.report import budget
+from postproc.report.budget import write_report
+from postproc.report.cases import Cases
+from postproc.report.grid import axes_told
+from postproc.report.page import Page, least_size
+from postproc.store.open import open_store
+from rubhpc.commands.report import report
+from rubhpc.errors import InputError
+from rubhpc.rig.rig import Rig, read_rig
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+MB = 1e6
+
+
+class Elements(HTMLParser):
+    """Elements of a page with their attributes, and the text of its scripts by their id."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: dict[str | None, str] = {}
+        self._script: str | bool | None = False
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+        if tag == "script":
+            self._script = dict(attrs).get("id")
+
+    def handle_data(self, data: str) -> None:
+        if self._script is not False:
+            self.scripts[self._script] = self.scripts.get(self._script, "") + data
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag == "script":
+            self._script = False
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("stores") / "study.zarr"
+    synthetic_store.write(path, synthetic_store.make(n_stator=2))
+    return path
+
+
+@pytest.fixture(scope="module")
+def written(store: Path) -> Elements:
+    path = store.with_suffix(".html")
+    write_report(open_store(store), path, 20 * MB)
+    return Elements(path.read_text())
+
+
+def test_all_that_is_shown_of_a_quantity_has_one_unit(store: Path) -> None:
+    told = json.loads(Elements(Page(open_store(store)).html(values={})).scripts["told"])
+    assert {n: s["unit"] for n, s in told["signals"].items()} == {
+        "vertical": "µm",
+        "horizontal": "µm",
+        "torsion": "µrad",
+        "torsion_acceleration": "rad/s²",
+        "stator_axial": "µm",
+        "stator_lateral": "µm",
+        "contact_force": "N",
+    }
+    stronger = Page(open_store(store).assign(peak_torsion=open_store(store)["peak_torsion"] * 1e3))
+    assert stronger.measures.scale("torsion") == stronger.measures.scale("peak_torsion")
+    assert stronger.measures.scale("torsion").unit == "mrad"
+
+
+def test_the_page_needs_nothing_else(written: Elements) -> None:
+    kinds = {tag for tag, _ in written.found}
+    assert not {"img", "iframe", "object", "audio"} & kinds
+    links = [
+        value for tag, a in written.found for name, value in a.items() if name in ("src", "href", "action")
+    ]
+    assert all(link.startswith(("#", "data:")) for link in links if link)
+
+
+def test_the_page_carries_every_case_that_is_done(written: Elements) -> None:
+    records = json.loads(written.scripts["records"])
+    status = synthetic_store.make()["status"].values.ravel()
+    assert sorted(map(int, records)) == np.flatnonzero(status == 1).tolist()
+    values = json.loads(written.scripts["values"])
+    assert np.array_equal(unpacked_floats(base64.b64decode(values["status"])), status)
+    told = json.loads(written.scripts["told"])
+    assert [axis["key"] for axis in told["axes"]][-1] == "stator.youngs_modulus"
+    assert [len(axis["values"]) for axis in told["axes"]] == [5, 3, 2, 2]
+    assert told["nStator"] == 2
+
+
+def test_every_control_and_drawing_has_a_name(written: Elements) -> None:
+    by_role = [(tag, a) for tag, a in written.found if a.get("role") in ("img", "application")]
+    assert len(by_role) >= 6
+    assert all(a.get("aria-label") or a.get("aria-labelledby") for _, a in by_role)
+    ids = [a["id"] for _, a in written.found if "id" in a]
+    assert len(ids) == len(set(ids))
+    named = {
+        word
+        for _, a in written.found
+        for k in ("aria-labelledby", "aria-describedby")
+        for word in (a.get(k) or "").split()
+    }
+    assert named <= set(ids)
+
+
+def test_failures_are_told_with_their_reasons(store: Path) -> None:
+    dataset = open_store(store).assign_attrs(reasons={0: "ran away <b>", 12: "worker died"})
+    text = Page(dataset).html(values={})
+    assert "1 case diverged" in text
+    assert "1 case failed" in text
+    assert "ran away &lt;b&gt;" in text
+    assert "worker died" in text
+    assert "speed ratio 1, clearance 70 µm, friction coefficient 0.1, stator modulus 3 GPa" in text
+
+
+def test_validity_counts_what_is_out_of_range(store: Path) -> None:
+    text = Page(open_store(store)).html(values={})
+    rows = re.findall(r'scope="row">([^<]+)</th><td>[^<]+</td>\D*?data-label="Cases">(\d+)<', text)
+    told = {name: int(n) for name, n in rows}
+    # Of 60 cases those at the speeds 1.5 and 1.7 slip back, and those at 1.7 are over the Euler load.
+    assert told["Lowest slip speed"] == 24
+    assert told["Contact force over Euler load"] == 12
+    assert told["Tip deflection over length"] == 0
+
+
+def test_slip_may_reverse_under_coulombs_law(store: Path) -> None:
+    dataset = open_store(store)
+    study = {**dataset.attrs["study"], "contact": {"friction_law": "coulomb"}}
+    text = Page(dataset.assign_attrs(study=study)).html(values={})
+    assert "Contact force over Euler load" in text
+    assert "steady sliding is wrong" not in text
+    assert "no limit of the model; below 0 the rim slips back" in text  # how many cases is still told
+    found, sliding = validity(dataset.assign_attrs(study=study)), validity(dataset)
+    assert int((found & 1).sum()) == 0
+    assert "slip" not in found.attrs["long_name"]
+    assert int((sliding & 1).sum()) == 24
+    assert "slip out of range" in sliding.attrs["long_name"]
+
+
+@pytest.mark.parametrize(("room", "is_cut"), [(20_000, True), (30_000, True), (300_000, False)])
+def test_the_size_is_kept_and_what_is_left_out_is_said(
+    store: Path, tmp_path: Path, room: int, is_cut: bool
+) -> None:
+    path = tmp_path / "small.html"
+    limit = least_size(Page(open_store(store))) + room
+    load = write_report(open_store(store), path, limit)
+    assert path.stat().st_size <= limit
+    text = path.read_text()
+    n_kept = len(json.loads(Elements(text).scripts["records"]))
+    assert n_kept == len(load.records)
+    assert (n_kept < 57) == is_cut
+    assert (f"sections of {57 - n_kept} cases" in text) == is_cut
+    assert all(note in html.unescape(text) for note in load.notes)
+
+
+def test_foreseeing_the_size_reads_no_case_but_the_pilots(
+    store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What lies around the pilots of 100 000 cases took longer to read than all that is on the page."""
+    asked: list[int] = []
+    records = Cases.records
+    monkeypatch.setattr(
+        Cases, "records", lambda self, flats, level: records(self, asked.append(1) or flats, level)
+    )
+    monkeypatch.setattr(budget, "_PILOTS", 3)
+    write_report(open_store(store), tmp_path / "page.html", 20e6)
+    assert len(asked) == 1  # for those that are on the page
+
+
+def test_a_limit_that_nothing_fits_is_refused(store: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"--limit: 0\.1 MB is too small for this store; give 0\.\d MB"):
+        write_report(open_store(store), tmp_path / "none.html", 0.1 * MB)
+    assert not (tmp_path / "none.html").exists()
+
+
+@pytest.mark.parametrize("keep", [(), ("spectrum",), ("section",), ("waveform",)])
+def test_a_store_that_keeps_less_has_a_page_too(tmp_path: Path, keep: tuple[str, ...]) -> None:
+    synthetic_store.write(tmp_path / "less.zarr", synthetic_store.make(keep=keep))
+    load = write_report(open_store(tmp_path / "less.zarr"), tmp_path / "less.html", 20 * MB)
+    if not keep:
+        assert load.records == {}
+        assert "neither waveforms nor spectra nor sections" in (tmp_path / "less.html").read_text()
+        return
+    record = unpacked_record(next(iter(load.records.values())))
+    kinds = {kind for kind in ("waves", "spectra", "section") if record[kind]}
+    assert (
+        kinds
+        == {"spectrum": {"spectra"}, "section": {"section"}, "waveform": {"waves", "spectra", "section"}}[
+            keep[0] if keep else ""
+        ]
+    )
+
+
+def test_an_unsorted_axis_has_its_cells_in_order() -> None:
+    dataset = synthetic_store.make(keep=()).isel(clearance=[2, 0, 1])
+    axis = axes_told(dataset)[1]
+    assert axis["values"] == pytest.approx([100, 70, 84])
+    assert axis["order"] == [1, 2, 0]
+    assert axis["edges"] == sorted(axis["edges"])
+    assert axis["unit"] == "µm"
+
+
+RINGS = {
+    "several": {"angle": 2.0, "count": 5},
+    "wall": {"angle": 0.5, "rigid": True},
+    "lumped": {"mass": 0.1, "stiffness": 1e6},
+}
+
+
+@pytest.mark.parametrize("kind", RINGS)
+def test_every_kind_of_stator_is_drawn(kind: str) -> None:
+    from postproc.report.end_view import end_view
+    from postproc.report.side_view import side_view
+    from rubhpc.rig.rig import LumpedStator
+
+    rig = read_rig("mokhtar2017")
+    told = RINGS[kind]
+    if kind == "several":
+        stator = type(rig.stator[0])(**{**vars(rig.stator[0]), **told})
+    else:
+        stator = LumpedStator(node=8, **told)
+    rig = Rig(name="ring", rotor=rig.rotor, stator=(stator,))
+    n_drawn = end_view(rig).count("rotate(") - 1  # the arrow of the spin is turned too
+    assert n_drawn == (5 if kind == "several" else 1)
+    assert "1 disc, 2 bearings" in side_view(rig)
+
+
+def test_a_rotor_of_matrices_is_told_in_words() -> None:
+    from postproc.report.end_view import end_view
+    from postproc.report.side_view import description, side_view
+    from rubhpc.rig.rig import LumpedStator
+
+    stop = LumpedStator(node=1, mass=1e-4, stiffness=1e6, radius=1.0)
+    rig = Rig.from_matrices([[100.0]], None, [[1e4]], degrees=[(1, "v")], stators=[stop])
+    assert side_view(rig) == ""
+    assert "<svg" in end_view(rig)
+    assert description(rig) == "rotor of 1 degree of freedom, by its matrices; 1 stator"
+
+
+def test_the_command_writes_the_page_and_says_what_is_on_it(store: Path, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = CliRunner().invoke(report, [str(store), "--limit", "3 MB"], catch_exceptions=False).output
+    assert said.startswith("study.html (")
+    assert "all cases with a result" in said
+    assert (tmp_path / "study.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("args", "told"),
+    [
+        (["--output", "page.pdf"], "name it page.html"),
+        (["--output", "no/page.html"], "no directory no"),
+        (["--limit", "20 kg"], "--limit"),
+        (["--limit", "much"], "--limit"),
+    ],
+)
+def test_wrong_input_is_one_line(
+    store: Path, tmp_path: Path, monkeypatch, args: list[str], told: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError) as refusal:
+        CliRunner().invoke(report, [str(store), *args], catch_exceptions=False)
+    assert told in str(refusal.value)
+    assert list(tmp_path.iterdir()) == []

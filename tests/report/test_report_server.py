@@ -1,0 +1,120 @@
+"""`rubhpc view`: what it gives, to whom, and how it ends."""
+
+from __future__ import annotations
+
+import http.client
+import signal
+import socket
+import threading
+import zlib
+from typing import TYPE_CHECKING
+
+import pytest
+import synthetic_store
+from running import start
+
+from postproc.report.server import Library, Server
+from postproc.store.open import open_store
+from rubhpc.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("stores") / "study.zarr"
+    synthetic_store.write(path, synthetic_store.make())
+    return path
+
+
+@pytest.fixture(scope="module")
+def server(store: Path) -> Iterator[Server]:
+    with Server(Library(lambda: open_store(store))) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield server
+        server.shutdown()
+
+
+def ask(server: Server, path: str, method: str = "GET", **headers: str) -> tuple[int, bytes]:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
+    connection.putrequest(method, path, skip_host="Host" in headers)
+    for name, value in headers.items():
+        connection.putheader(name, value)
+    connection.endheaders()
+    answer = connection.getresponse()
+    body = answer.read()
+    connection.close()
+    return answer.status, body
+
+
+def test_the_page_carries_no_cases(server: Server) -> None:
+    status, body = ask(server, "/")
+    assert status == 200
+    assert b'"isServed":true' in body
+    assert b'id="records">{}<' in body
+
+
+def test_measures_and_cases_come_when_asked_for(server: Server) -> None:
+    assert len(zlib.decompress(ask(server, "/values/status")[1])) == 4 * 60
+    status, body = ask(server, "/record/59")
+    assert status == 200
+    assert b'"waves"' in zlib.decompress(body)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/record/0",  # diverged: no record
+        "/record/60",
+        "/record/-1",
+        "/record/1e3",
+        "/record/" + "9" * 30,
+        "/record/%C2%B2",
+        "/record/",
+        "/values/",
+        "/values/vertical",
+        "/values/../../etc/passwd",
+        "/../../../../etc/passwd",
+        "/%2e%2e/%2e%2e/etc/passwd",
+        "//etc/passwd",
+        "/.rubhpc/manifest.json",
+        "/zarr.json",
+        "/assets/page.js",
+    ],
+)
+def test_nothing_else_is_to_be_had(server: Server, path: str) -> None:
+    status, body = ask(server, path)
+    assert status == 404
+    assert body == b"nothing here\n"
+
+
+def test_only_this_machine_is_answered(server: Server) -> None:
+    assert server.server_address[0] == "127.0.0.1"
+    assert ask(server, "/", Host="evil.example")[0] == 403
+    assert ask(server, "/", Host=f"localhost:{server.port}")[0] == 200
+
+
+def test_nothing_can_be_sent_to_it(server: Server) -> None:
+    assert ask(server, "/", method="POST")[0] == 501
+    status, body = ask(server, "/", method="HEAD")
+    assert (status, body) == (200, b"")
+
+
+def test_a_port_in_use_is_said(server: Server, store: Path) -> None:
+    with pytest.raises(InputError, match=f"--port: {server.port} cannot be had"):
+        Server(Library(lambda: open_store(store)), server.port)
+
+
+def test_the_command_says_where_it_is_and_ends_on_interrupt(store: Path) -> None:
+    process = start("view", store)
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    port = int(line.split("http://127.0.0.1:")[1].split("/")[0])
+    with socket.create_connection(("127.0.0.1", port), timeout=10):
+        process.send_signal(signal.SIGINT)
+        said, errors = process.communicate(timeout=30)
+    assert process.returncode == 0, errors
+    assert errors == ""
+    assert said == ""

@@ -1,0 +1,427 @@
+"""Runs with a stub in place of the physics: what becomes of each case, and of the run."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from running import journalled_cases, write_study
+
+from rubhpc.errors import InputError, StoppedEarly, StoreError
+from rubhpc.integrate.record import Record
+from rubhpc.running import driver, job, stopping, worker
+from rubhpc.running.driver import run
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
+from rubhpc.storage.journal import METRICS
+from rubhpc.storage.status import read_status
+from rubhpc.storage.store import Store
+from rubhpc.storage.verify import verify
+from rubhpc.study.study import Integrator, read_study
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from rubhpc.study.study import Recording, Study
+
+
+def signals(recording: Recording, value: float) -> dict[str, np.ndarray]:
+    n_sample = recording.revolutions * recording.samples_per_revolution
+    return {
+        name: np.full((1, n_sample) if VARIABLES[name].dims[0] == "stator" else n_sample, value)
+        for name in SIGNAL_NAMES
+    }
+
+
+def record(recording: Recording, friction: float, status: int = DONE, reason: str = "") -> Record:
+    """A record whose numbers tell the friction of its case."""
+    waveforms = signals(recording, friction)
+    n_order = recording.revolutions * recording.samples_per_revolution // 2 + 1
+    return Record(
+        status=status,
+        reason=reason,
+        samples_per_revolution=recording.samples_per_revolution,
+        signals=waveforms,
+        spectra={f"spectrum_{name}": values[..., :n_order] for name, values in waveforms.items()},
+        sections={f"section_{name}": np.full(recording.revolutions, friction) for name in SECTION_NAMES},
+        scalars={v.name: np.array([friction]) if "stator" in v.dims else 7 for v in METRICS}
+        | {"energy_residual": 1e-6},
+        final=None,  # type: ignore[arg-type]
+    )
+
+
+class Physics:
+    """Stands in for prepare and run_case; `poison` is what befalls cases of friction 0.3."""
+
+    def __init__(self) -> None:
+        self.frictions: list[float] = []
+        self.prepared: list[float] = []
+        self.poison: Callable[..., Record | None] = lambda **_: None
+        self.on_case: Callable[[], None] = lambda: None
+
+    def prepare(self, rig: Any, speed: float, **_: Any) -> SimpleNamespace:
+        self.prepared.append(speed)
+        return SimpleNamespace(model=None, spin=speed)
+
+    def run_case(
+        self,
+        setup: SimpleNamespace,
+        *,
+        clearance: float,
+        friction: float,
+        recording: Recording,
+        initial: None,
+        check: Callable[[], None],
+    ) -> Record:
+        self.on_case()
+        check()
+        self.frictions.append(friction)
+        poisoned = (
+            self.poison(friction=friction, recording=recording, check=check) if friction == 0.3 else None
+        )
+        return poisoned or record(recording, friction)
+
+
+@pytest.fixture
+def physics(monkeypatch: pytest.MonkeyPatch) -> Physics:
+    stub = Physics()
+    monkeypatch.setattr(worker, "prepare", stub.prepare)
+    monkeypatch.setattr(worker, "run_case", stub.run_case)
+    monkeypatch.setattr(job, "_warm_up", lambda *_: None)
+    return stub
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Study:
+    return read_study(write_study(tmp_path, block=3))
+
+
+def raise_error(**_: Any) -> Record:
+    raise ZeroDivisionError("by\nzero")
+
+
+def return_nan(*, recording: Recording, **_: Any) -> Record:
+    return record(recording, float("nan"))
+
+
+def never_end(*, check: Callable[[], None], **_: Any) -> Record:
+    while True:
+        time.sleep(0.01)
+        check()
+
+
+def diverge(*, recording: Recording, **_: Any) -> Record:
+    return record(recording, float("nan"), DIVERGED, "grew past 1 m")
+
+
+def test_every_case_gets_its_own_numbers(physics, study):
+    summary = run(study, quiet=True)
+    assert summary.counts == (0, 12, 0, 0)
+    assert summary.exit_code == 0
+    ds = xr.open_zarr(study.output)
+    assert (ds.status == DONE).all()
+    for name in ("vertical", "spectrum_contact_force", "section_torsion", "contact_fraction"):
+        array, friction = xr.broadcast(ds[name], ds.friction)
+        np.testing.assert_array_equal(array, friction.astype(array.dtype))
+    assert (ds.period == 7).all()
+    assert not verify(study.output)
+
+
+def test_cases_of_one_speed_share_a_setup(physics, study):
+    run(study, quiet=True)
+    assert len(physics.prepared) == 2
+
+
+def test_a_finished_study_computes_nothing(physics, study):
+    run(study, quiet=True)
+    before = len(physics.frictions)
+    assert run(study, quiet=True).computed == 0
+    assert len(physics.frictions) == before
+
+
+@pytest.mark.parametrize(
+    ("poison", "reason"),
+    [
+        (raise_error, "ZeroDivisionError: by zero"),
+        (return_nan, "FloatingPointError: vertical is not finite"),
+        (never_end, "over its time limit of 0.05 s"),
+    ],
+    ids=["raises", "nan", "never ends"],
+)
+def test_a_poisoned_case_fails_with_its_reason_and_the_others_finish(physics, study, poison, reason):
+    physics.poison = poison
+    summary = run(replace(study, run=replace(study.run, case_time_limit=0.05)), quiet=True)
+    assert summary.counts == (0, 8, 4, 0)
+    assert summary.exit_code == 1
+    assert {told for _, told in summary.reasons} == {reason}
+    assert summary.reasons[0][0] == "speed_ratio=0.9, clearance_ratio=0.7, friction=0.3"
+    assert "\n" not in summary.complaint()
+    ds = xr.open_zarr(study.output)
+    assert (ds.status.sel(friction=0.3) == FAILED).all()
+    assert np.isnan(ds.vertical.sel(friction=0.3)).all()
+    assert (ds.status.sel(friction=[0.1, 0.5]) == DONE).all()
+
+
+def test_failed_cases_are_computed_anew_on_request_only(physics, study):
+    physics.poison = raise_error
+    run(study, quiet=True)
+    physics.poison = lambda **_: None
+    physics.frictions.clear()
+    assert run(study, quiet=True).counts[FAILED] == 4
+    assert physics.frictions == []
+    summary = run(study, quiet=True, retry_failed=True)
+    assert summary.counts == (0, 12, 0, 0)
+    assert physics.frictions == [0.3] * 4
+    assert not verify(study.output)
+    ds = xr.open_zarr(study.output)
+    assert np.array_equal(ds.vertical.isel(sample=0).values[0, 0], np.array([0.1, 0.3, 0.5], "f4"))
+
+
+def test_a_diverged_case_is_a_result(physics, study):
+    physics.poison = diverge
+    summary = run(study, quiet=True)
+    assert summary.counts == (0, 8, 0, 4)
+    assert summary.exit_code == 0
+    assert run(study, quiet=True, retry_failed=True).computed == 0
+    ledger = Store(study.output).replay()
+    assert set(ledger.reasons.values()) == {"grew past 1 m"}
+    assert not verify(study.output)
+
+
+def test_a_balance_that_is_off_is_named(physics, study):
+    """The result stands, and both the run's end and `rubhpc status` tell what is wrong with it."""
+
+    def lose_energy(*, recording: Recording, **_: Any) -> Record:
+        case = record(recording, 0.3)
+        case.scalars["energy_residual"] = 0.25
+        return case
+
+    assert "energy balance" not in run(study, quiet=True).text()
+    physics.poison = lose_energy
+    other = replace(study, output=study.output.with_name("other.zarr"))
+    summary = run(other, quiet=True)
+    assert summary.counts == (0, 12, 0, 0)
+    assert summary.exit_code == 0
+    assert "4 done with a remark" in summary.text()
+    failures = read_status(other.output).failures
+    assert len(failures) == 4
+    assert {told for _, told in failures} == {"its energy balance is off by 25 %; take a shorter step"}
+    assert "friction=0.3: done" in failures[0][0]
+
+
+def test_a_run_with_too_many_failures_stops(physics, study):
+    physics.poison = raise_error
+    summary = run(study, quiet=True, max_failures=0)
+    assert summary.counts[FAILED] == 1
+    assert summary.counts[MISSING] > 0
+    assert summary.exit_code == 1
+    assert "--max-failures" in summary.complaint()
+
+
+def after(n_case: int, action: Callable[[], None], physics: Physics) -> None:
+    """Do something when the case after the first `n_case` begins."""
+
+    def on_case() -> None:
+        if len(physics.frictions) == n_case:
+            action()
+
+    physics.on_case = on_case
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGUSR1])
+def test_a_signal_drops_the_case_in_hand_and_keeps_the_finished_ones(physics, study, number):
+    after(5, lambda: os.kill(os.getpid(), number), physics)
+    handler = signal.getsignal(number)
+    with pytest.raises(StoppedEarly, match=f"stopped by {number.name} with 7 of 12 cases missing"):
+        run(study, quiet=True)
+    assert signal.getsignal(number) == handler
+    assert journalled_cases(study.output) == 5
+    assert (xr.open_zarr(study.output).status == DONE).sum() == 5
+    physics.on_case = lambda: None
+    assert run(study, quiet=True).computed == 7
+    assert not verify(study.output)
+
+
+def test_the_file_stop_stops_one_run(physics, study):
+    run(replace(study, axes=(replace(study.axes[0], values=(0.9,)), *study.axes[1:])), quiet=True)
+    (study.output / "STOP").touch()
+    with pytest.raises(StoppedEarly, match="the file STOP"):
+        run(study, quiet=True)
+    assert run(study, quiet=True).counts == (0, 12, 0, 0)
+
+
+class Clock:
+    """A time that passes when it is told to."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 1000.0
+        tell = SimpleNamespace(monotonic=lambda: self.now, perf_counter=lambda: self.now, time=time.time)
+        for module in (worker, stopping):
+            monkeypatch.setattr(module, "time", tell)
+
+    def passes(self, seconds: float) -> None:
+        self.now += seconds
+
+
+def test_the_time_limit_drops_the_case_in_hand(physics, study, monkeypatch):
+    clock = Clock(monkeypatch)
+    after(4, lambda: clock.passes(61), physics)
+    with pytest.raises(StoppedEarly, match="the time limit with 8 of 12"):
+        run(study, quiet=True, time_limit=60)
+    assert journalled_cases(study.output) == 4
+
+
+def test_nothing_is_begun_that_will_not_fit(physics, study, monkeypatch):
+    """Cases of one speed take 10 s each and 35 s are given: the fourth would not end in time."""
+    study = replace(study, axes=(replace(study.axes[0], values=(0.9,)), *study.axes[1:]))
+    clock = Clock(monkeypatch)
+    slow = run_slowly(physics, clock, 10)
+    monkeypatch.setattr(worker, "run_case", slow)
+    with pytest.raises(StoppedEarly, match="the time limit"):
+        run(study, quiet=True, time_limit=35)
+    assert clock.now == 1030
+    assert journalled_cases(study.output) == 3
+
+
+def test_a_short_case_still_fits_where_a_long_one_does_not(physics, study, monkeypatch):
+    """At 20 times the speed the central difference takes a twentieth of the steps, and so of the time."""
+    axes = (replace(study.axes[0], values=(0.2, 4.0)), *study.axes[1:])
+    study = replace(study, integrator=Integrator(method="central-difference"))
+    clock = Clock(monkeypatch)
+    slow = run_slowly(physics, clock, 10)
+    fast = run_slowly(physics, clock, 0.5)
+    monkeypatch.setattr(
+        worker, "run_case", lambda setup, **rest: (slow if setup.spin < 100 else fast)(setup, **rest)
+    )
+    with pytest.raises(StoppedEarly, match="the time limit"):
+        run(replace(study, axes=axes), quiet=True, time_limit=35)
+    status = xr.open_zarr(study.output).status
+    assert (status[0] == DONE).sum() == 3
+    assert (status[1] == DONE).all()
+
+
+def run_slowly(physics: Physics, clock: Clock, seconds: float) -> Callable[..., Record]:
+    def slow(*arguments: Any, **named: Any) -> Record:
+        result = physics.run_case(*arguments, **named)
+        clock.passes(seconds)
+        return result
+
+    return slow
+
+
+def test_the_end_of_the_slurm_job_stops_a_run(physics, study, monkeypatch):
+    monkeypatch.setenv("SLURM_JOB_END_TIME", str(int(time.time()) + 29))
+    with pytest.raises(StoppedEarly, match="the time limit"):
+        run(study, quiet=True)
+    monkeypatch.setenv("SLURM_JOB_END_TIME", str(int(time.time()) + 3600))
+    assert run(study, quiet=True).counts == (0, 12, 0, 0)
+
+
+def test_a_disk_that_fills_up_keeps_what_is_there(physics, study, monkeypatch):
+    write_block = Store.write_block
+    n_block = 0
+
+    def fill_up(self: Store, *arguments: Any) -> None:
+        nonlocal n_block
+        n_block += 1
+        if n_block == 3:
+            with worker.disk_errors(self.path):
+                raise OSError(28, "No space left on device")
+        write_block(self, *arguments)
+
+    monkeypatch.setattr(Store, "write_block", fill_up)
+    with pytest.raises(StoreError, match="the disk is full"):
+        run(study, quiet=True)
+    n_before = journalled_cases(study.output)
+    assert n_before > 0
+    assert run(study, quiet=True).computed == 12 - n_before
+    assert not verify(study.output)
+
+
+def test_the_store_is_free_again_after_any_end(physics, study):
+    after(1, lambda: os.kill(os.getpid(), signal.SIGTERM), physics)
+    with pytest.raises(StoppedEarly):
+        run(study, quiet=True)
+    with Store(study.output).lock():
+        pass
+
+
+def test_a_block_found_damaged_on_the_way_is_computed_whole(physics, study):
+    """Its kept case no longer matches its checksum, so it is not carried over into the new chunk."""
+    physics.poison = raise_error
+    run(study, quiet=True)
+    physics.poison = lambda **_: None
+    store = Store(study.output)
+    store.arrays["torsion"][0, 0, 0, 5] = 99.0
+    physics.frictions.clear()
+    summary = run(study, quiet=True, retry_failed=True)
+    assert summary.counts == (0, 12, 0, 0)
+    assert sorted(physics.frictions) == [0.1, 0.3, 0.3, 0.3, 0.3]
+    assert not verify(study.output)
+
+
+def test_an_error_of_the_programs_own_leaves_its_traceback_in_a_log(physics, study, monkeypatch):
+    def burst(*_: Any) -> None:
+        raise LookupError("a slip")
+
+    monkeypatch.setattr(worker.Worker, "work", burst)
+    with pytest.raises(driver.RubError, match="LookupError: a slip") as told:
+        run(study, quiet=True)
+    assert told.value.exit_code == 70
+    (log,) = (study.output / ".rubhpc" / "logs").iterdir()
+    assert str(log) in str(told.value)
+    assert "burst" in log.read_text()
+
+
+def test_an_unknown_file_is_bad_input(tmp_path):
+    with pytest.raises(InputError, match=r"nowhere.toml"):
+        run(tmp_path / "nowhere.toml")
+
+
+def test_progress_goes_to_the_output_and_quiet_says_nothing(physics, study, capsys):
+    run(study, quiet=True)
+    assert capsys.readouterr() == ("", "")
+    run(replace(study, output=study.output.with_name("b.zarr")))
+    assert "0/12 cases" in capsys.readouterr().out
+
+
+def test_what_a_killed_run_left_is_packed_when_the_next_begins(physics, study, monkeypatch):
+    monkeypatch.setattr(Store, "pack", lambda *_: None)  # killed before it could
+    after(6, lambda: os.kill(os.getpid(), signal.SIGTERM), physics)
+    with pytest.raises(StoppedEarly):
+        run(study, quiet=True)
+    assert (xr.open_zarr(study.output).status == MISSING).all()
+    monkeypatch.undo()
+    seen: list[int] = []
+    physics.on_case = lambda: seen.append(int((xr.open_zarr(study.output).status == DONE).sum()))
+    monkeypatch.setattr(worker, "prepare", physics.prepare)
+    monkeypatch.setattr(worker, "run_case", physics.run_case)
+    run(study, quiet=True)
+    assert set(seen) == {6}
+
+
+def test_results_are_packed_now_and_then_for_those_who_look_on(physics, study, monkeypatch):
+    monkeypatch.setattr(driver, "_PACKING_GAP", 0.0)
+    seen: list[int] = []
+    physics.on_case = lambda: seen.append(int((xr.open_zarr(study.output).status == DONE).sum()))
+    run(study, quiet=True)
+    assert seen == [0, 0, 0, 3, 3, 3, 6, 6, 6, 9, 9, 9]
+
+
+def test_a_second_interrupt_does_not_wait(physics, study):
+    def twice() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    after(2, twice, physics)
+    with pytest.raises(KeyboardInterrupt):
+        run(study, quiet=True)
+    with Store(study.output).lock():  # released all the same
+        pass

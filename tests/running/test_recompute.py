@@ -1,0 +1,83 @@
+"""One case again, held against the store bit for bit, and the store left alone."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from running import write_study
+
+from rubhpc.errors import InputError, RubError, StoreError
+from rubhpc.running import recompute as only
+from rubhpc.running.driver import run
+from rubhpc.running.recompute import reproduce
+from rubhpc.storage.store import Store
+from rubhpc.study.cases import Sweep
+from rubhpc.study.study import Study, read_study
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    folder = tmp_path_factory.mktemp("finished")
+    study = read_study(write_study(folder))
+    run(study, quiet=True)
+    return study
+
+
+def files(store: Path) -> dict[str, tuple[int, bytes]]:
+    return {str(p): (p.stat().st_mtime_ns, p.read_bytes()) for p in store.rglob("*") if p.is_file()}
+
+
+def test_a_case_comes_out_again_to_the_last_bit_and_the_store_is_not_touched(finished):
+    before = files(finished.output)
+    for flat in (0, 5, 11):
+        name = Store(finished.output).manifest.case_id(flat)
+        told = reproduce(finished, name[:10].upper())
+        assert told.id == name
+        assert told.case == Store(finished.output).manifest.name_case(flat)
+        assert told.status == "done"
+        assert "holds the same, bit for bit" in told.verdict
+        assert f"case{' ' * 21}" in told.text()
+    assert files(finished.output) == before
+
+
+@pytest.mark.parametrize("name", ["torsion", "section_vertical"])
+def test_what_differs_is_named(finished, tmp_path, name):
+    study = replace(finished, output=Path(shutil.copytree(finished.output, tmp_path / "copy.zarr")))
+    store = Store(study.output)
+    array = store.arrays[name]
+    array[1, 0, 2, 0] = array[1, 0, 2, 0] + 1e-7
+    with pytest.raises(StoreError, match=rf"differs from what is stored in {name}; rubhpc verify"):
+        reproduce(study, store.manifest.case_id(8))
+    store.chunk_files((1, 0, 2))[0].unlink()
+    with pytest.raises(StoreError, match="its files are damaged"):
+        reproduce(study, store.manifest.case_id(8))
+
+
+def test_a_case_that_is_not_stored_is_computed_all_the_same(finished, tmp_path):
+    grown = replace(
+        finished, axes=(*finished.axes[:2], replace(finished.axes[2], values=(0.1, 0.2, 0.3, 0.5)))
+    )
+    name = Sweep(grown).case((0, 0, 1)).id
+    assert "does not hold it yet" in reproduce(grown, name).verdict
+    elsewhere = replace(finished, output=tmp_path / "none.zarr")
+    assert "is not there yet" in reproduce(elsewhere, Sweep(finished).case((0, 0, 0)).id).verdict
+    assert list(tmp_path.iterdir()) == []
+    assert "bit for bit" in reproduce(grown, Sweep(finished).case((1, 1, 2)).id).verdict  # it has moved
+
+
+@pytest.mark.parametrize(("name", "told"), [("12345", "too short"), ("zzzzzz", "no case has such an id")])
+def test_an_id_that_names_no_case_is_refused(finished, name, told):
+    with pytest.raises(InputError, match=told):
+        reproduce(finished, name)
+
+
+def test_a_case_that_fails_tells_why(finished, monkeypatch):
+    def burst(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("by\nzero")
+
+    monkeypatch.setattr(only, "run_case", burst)
+    with pytest.raises(RubError, match=r"friction=0.1: ZeroDivisionError: by zero"):
+        reproduce(finished, Store(finished.output).manifest.case_id(0))

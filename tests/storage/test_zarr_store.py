@@ -1,0 +1,384 @@
+from __future__ import annotations
+
+import errno
+import warnings
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import xarray as xr
+from running import write_study
+
+from rubhpc import __version__
+from rubhpc.errors import StoreError
+from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING, STATE, VARIABLES
+from rubhpc.storage import layout
+from rubhpc.storage.disk import disk_errors, write_whole
+from rubhpc.storage.journal import Entry, metrics_type
+from rubhpc.storage.manifest import Manifest
+from rubhpc.storage.resume import bring_up_to_date, find_gone, open_store, sweep_for
+from rubhpc.storage.store import Store, case_checksum
+from rubhpc.study.cases import Sweep
+from rubhpc.study.study import read_study
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rubhpc.study.study import Study
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Study:
+    return read_study(write_study(tmp_path))
+
+
+@pytest.fixture
+def store(study: Study) -> Store:
+    return Store.create(study.output, Sweep(study))
+
+
+def fill(store: Store, start: tuple[int, ...], seed: int = 0) -> dict[str, np.ndarray]:
+    """Write a block of random numbers."""
+    rng = np.random.default_rng(seed)
+    data = {
+        name: rng.normal(size=values.shape).astype(values.dtype)
+        for name, values in store.empty_block(start).items()
+    }
+    store.write_block(start, data)
+    return data
+
+
+def journal(store: Store, start: tuple[int, ...], data: dict[str, np.ndarray], run: int = 1) -> None:
+    """Journal a block as done, its metrics counting up."""
+    row = np.zeros((), metrics_type(store.manifest.sizes["stator"]))
+    with store.journal(run, f"rank{sum(start):05d}") as lines:
+        for i_case, flat in enumerate(store.flat(start).tolist()):
+            for name in row.dtype.names:
+                row[name] = flat
+            lines.write([Entry(flat, f"id{flat}", DONE, case_checksum(data, i_case), row.tobytes())])
+
+
+def test_a_new_store_opens_in_xarray_without_a_warning(store, study):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ds = xr.open_zarr(store.path)
+    assert set(VARIABLES) - {FINAL_STATE} <= set(ds.variables)  # that one is kept in sweeps
+    for name, variable in VARIABLES.items():
+        if name in ds.coords or variable.role in ("setting", STATE):
+            continue
+        array = ds[name]
+        assert array.dims == ("speed_ratio", "clearance_ratio", "friction", *variable.dims)
+        assert array.dtype == variable.dtype
+        assert (array.attrs["units"], array.attrs["long_name"]) == (variable.unit, variable.long_name)
+        if variable.flags:
+            assert array.attrs["flag_meanings"].split() == list(variable.flags)
+            assert list(array.attrs["flag_values"]) == list(range(len(variable.flags)))
+    assert (ds.status == MISSING).all()
+    assert ds.attrs["versions"]["rubhpc"] == __version__
+    assert np.isnan(ds.vertical).all()
+    for axis in study.axes:
+        assert tuple(ds[axis.dimension].values) == axis.values
+        assert ds[axis.dimension].attrs["units"] == axis.unit
+    assert ds.revolution.dims == ("sample",)
+    assert ds.revolution.values[33] == pytest.approx(33 / 32)
+    assert ds.order.values[:3].tolist() == [0, 0.5, 1]
+    assert ds.spin_speed.dims == ("speed_ratio",)
+    assert ds.attrs["identity"] == Sweep(study).identity
+    assert ds.attrs["rig"]["name"] == "mokhtar2017"
+    assert ds.attrs["study"]["record"]["revolutions"] == 2
+
+
+def test_only_what_is_kept_has_arrays(tmp_path):
+    study = read_study(write_study(tmp_path, keep='["section"]'))
+    ds = xr.open_zarr(Store.create(study.output, Sweep(study)).path)
+    roles = {VARIABLES[str(name)].role for name in ds.data_vars if name in VARIABLES}
+    assert roles == {"section", "scalar", "setting", "flag"}
+    assert "revolution" in ds.coords  # though nothing here lies along it
+
+
+def test_a_block_is_one_chunk_of_every_array_and_comes_back(store):
+    start = (1, 0, 2)  # at the edge: the last block along friction is half empty
+    assert store.manifest.chunk == (1, 1, 2)
+    data = fill(store, start)
+    assert data["vertical"].shape == (1, 64)
+    assert all(path.stat().st_size for path in store.chunk_files(start))
+    ds = xr.open_zarr(store.path)
+    for name, values in data.items():
+        np.testing.assert_array_equal(ds[name].values[1, 0, 2], values[0])
+        assert np.isnan(ds[name].values[1, 0, :2]).all()
+    read = store.read_block(start)
+    assert all(read[name].tobytes() == values.tobytes() for name, values in data.items())
+
+
+def test_a_chunk_is_written_as_zarr_writes_it(store):
+    """Blocks are encoded without zarr, which takes three times as long; the files have to be the same."""
+    for start in ((0, 1, 0), (1, 0, 2)):  # the latter at the edge
+        data = fill(store, start)
+        ours = [path.read_bytes() for path in store.chunk_files(start)]
+        for path in store.chunk_files(start):
+            path.unlink()
+        for name, values in data.items():
+            window = store.window(start)
+            store.arrays[name][window] = values.reshape(1, 1, -1, *values.shape[1:])
+        assert [path.read_bytes() for path in store.chunk_files(start)] == ours
+
+
+def test_blocks_cover_the_grid_once(store):
+    flats = np.concatenate([store.flat(start) for start in store.blocks()])
+    assert sorted(flats.tolist()) == list(range(store.manifest.n_case))
+
+
+def test_blocks_and_flat_indices_are_those_of_the_sweep(study, store):
+    sweep = Sweep(study)
+    for block in sweep.blocks():
+        shape = store.manifest.shape
+        expected = [np.ravel_multi_index(case.index, shape) for case in sweep.cases(block)]
+        assert store.flat(block.start).tolist() == expected
+
+
+def test_metrics_are_packed_from_the_journals(store):
+    for start in ((0, 0, 0), (1, 1, 2)):
+        journal(store, start, fill(store, start))
+    with store.journal(2, "rank00000") as lines:
+        lines.write([Entry(3, "x", FAILED, reason="why")])
+    store.pack(store.replay())
+    ds = xr.open_zarr(store.path)
+    assert ds.status.values.ravel()[[0, 1, 2, 3, 11]].tolist() == [DONE, DONE, MISSING, FAILED, DONE]
+    assert ds.period.values.ravel()[[1, 2, 3, 11]].tolist() == [1, -1, -1, 11]
+    assert ds.contact_fraction.values[1, 1, 2, 0] == 11
+    assert np.isnan(ds.peak_torsion.values.ravel()[3])
+
+
+def test_a_store_is_packed_again_only_when_there_is_news(store):
+    journal(store, (0, 0, 0), fill(store, (0, 0, 0)))
+    store.pack(store.replay())
+    store.arrays["steps"][0, 0, 0] = 77
+    store.pack(store.replay())
+    assert store.arrays["steps"][0, 0, 0] == 77
+    journal(store, (1, 0, 0), fill(store, (1, 0, 0)))
+    store.pack(store.replay())
+    assert store.arrays["steps"][0, 0, 0] == 0
+
+
+def test_lengthened_axes_keep_what_is_there(tmp_path, study, store):
+    start = (1, 1, 2)
+    data = fill(store, start)
+    journal(store, start, data)
+    longer = read_study(write_study(tmp_path, "longer.toml", speed_ratio=[0.9, 2.0, 3.0]))
+    axes = (*longer.axes[:2], replace(longer.axes[2], values=(0.1, 0.3, 0.5, 0.7)))
+    sweep = sweep_for(replace(longer, axes=axes))
+    bring_up_to_date(store, sweep)
+    again = Store(study.output)
+    assert again.manifest.shape == (3, 2, 4)
+    ledger = again.replay()
+    at = np.ravel_multi_index(start, (3, 2, 4))
+    assert np.flatnonzero(ledger.status).tolist() == [at]
+    assert case_checksum(again.read_block(start), 0) == ledger.checksum[at]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ds = xr.open_zarr(study.output)
+    assert dict(ds.sizes) | {"speed_ratio": 3, "friction": 4} == dict(ds.sizes)
+    assert ds.friction.values.tolist() == [0.1, 0.3, 0.5, 0.7]
+    assert ds.spin_speed.shape == (3,)
+    np.testing.assert_array_equal(ds.vertical.values[1, 1, 2], data["vertical"][0])
+    assert ds.attrs["study"]["grid"]["speed_ratio"]["values"] == [0.9, 2.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"transient": 5}, "record.transient was 1, is 5"),
+        ({"speed_ratio": [0.9]}, "axis speed_ratio lacks 2, which is stored"),
+        ({"keep": '["waveform"]'}, "record.keep"),
+        ({"run": '[contact]\nnormal = "updated"'}, 'contact.normal was "fixed", is "updated"'),
+        ({"run": '[override]\n"stator.length" = "50 mm"'}, "rig.stator.1.length was 0.04, is 0.05"),
+        ({"run": '[override]\n"rotor.damping.alpha" = 30'}, "rig.rotor.damping.alpha was 31.7, is 30"),
+    ],
+)
+def test_another_study_is_refused_with_the_differences(tmp_path, store, changes, told):
+    with pytest.raises(StoreError) as refused:
+        sweep_for(read_study(write_study(tmp_path, "other.toml", **changes)))
+    assert told in str(refused.value)
+    assert "\n" not in str(refused.value)
+    assert "--output" in str(refused.value)
+
+
+def test_what_changes_no_result_is_no_difference(tmp_path, store):
+    other = read_study(write_study(tmp_path, "other.toml", block=5, run='time_limit = "1 h"'))
+    assert sweep_for(other).chunk == store.manifest.chunk
+
+
+def test_a_directory_of_something_else_is_left_alone(study):
+    study.output.mkdir()
+    (study.output / "thesis.tex").write_text("x")
+    with pytest.raises(StoreError, match="no rubhpc store"):
+        open_store(Sweep(study))
+    assert [path.name for path in study.output.iterdir()] == ["thesis.tex"]
+    with pytest.raises(StoreError, match="not a rubhpc store"):
+        Store(study.output)
+
+
+def test_a_file_in_the_way_is_left_alone(study):
+    study.output.write_text("x")
+    with pytest.raises(StoreError, match="no rubhpc store"):
+        open_store(Sweep(study))
+    assert study.output.read_text() == "x"
+
+
+def test_an_empty_directory_may_become_the_store(study):
+    study.output.mkdir()
+    assert open_store(Sweep(study)).manifest.n_case == 12
+
+
+def test_a_creation_that_fails_leaves_nothing(study, monkeypatch):
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(layout, "write_whole", fail)
+    before = set(study.output.parent.iterdir())
+    with pytest.raises(StoreError, match="the disk is full"):
+        open_store(Sweep(study))
+    assert set(study.output.parent.iterdir()) == before
+
+
+def test_the_draft_of_a_killed_creation_is_removed(study):
+    import socket
+
+    draft = study.output.with_name(f".tiny.zarr.{socket.gethostname()}.{2**22 + 1}.draft")  # past any pid
+    draft.mkdir()
+    open_store(Sweep(study))
+    assert not draft.exists()
+
+
+def test_gone_and_empty_files_are_found(store):
+    for start in ((0, 0, 0), (0, 1, 0), (1, 1, 0)):
+        journal(store, start, fill(store, start))
+    store.chunk_files((0, 1, 0))[3].unlink()
+    store.chunk_files((1, 1, 0))[0].write_bytes(b"")
+    expected = [*store.flat((0, 1, 0)).tolist(), *store.flat((1, 1, 0)).tolist()]
+    assert find_gone(store, store.replay()) == expected
+
+
+def test_a_garbled_chunk_reads_as_none(store):
+    fill(store, (0, 0, 0))
+    store.chunk_files((0, 0, 0))[0].write_bytes(b"garbage")
+    assert store.read_block((0, 0, 0)) is None
+
+
+def test_damaged_coordinates_are_written_anew(study, store):
+    chunk = store.path / "spin_speed" / "c" / "0"
+    whole = chunk.read_bytes()
+    chunk.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
+    damaged = Store(study.output)
+    assert damaged.damaged_files() == ["spin_speed/c/0"]
+    bring_up_to_date(damaged, Sweep(study))
+    assert Store(study.output).damaged_files() == []
+    assert chunk.read_bytes() == whole
+
+
+def test_partial_files_are_removed_on_the_way(study, store):
+    stray = store.path / "vertical" / "c" / "0.12ab.partial"
+    stray.parent.mkdir(parents=True, exist_ok=True)
+    stray.write_bytes(b"half")
+    bring_up_to_date(store, Sweep(study))
+    assert not stray.exists()
+
+
+def change_byte(path: Path, at: int) -> None:
+    data = bytearray(path.read_bytes())
+    data[at % len(data)] ^= 0x20
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("at", [0, 8, 12, 30, 400, -2])
+def test_one_damaged_manifest_costs_nothing(study, store, at):
+    whole = {name: (store.private / name).read_bytes() for name in ("manifest.json", "manifest.copy.json")}
+    for name in whole:
+        change_byte(store.private / name, at)
+        again = Store(store.path)
+        assert again.manifest == store.manifest
+        assert again.manifest.damaged_copies(store.path) == [name]
+        bring_up_to_date(again, Sweep(study))
+        assert {name: (store.private / name).read_bytes() for name in whole} == whole
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"format": 99}', "rubhpc 99 00000000\n{}"])
+def test_a_manifest_that_is_damaged_twice_is_told_in_a_line(store, text):
+    for name in ("manifest.json", "manifest.copy.json"):
+        (store.private / name).write_text(text)
+    with pytest.raises(StoreError) as told:
+        Store(store.path)
+    assert "\n" not in str(told.value)
+    assert "--output" in str(told.value)
+
+
+@pytest.mark.parametrize(
+    "name", ["zarr.json", "vertical/zarr.json", "status/zarr.json", "friction/zarr.json"]
+)
+@pytest.mark.parametrize("text", ["", "{", None])
+def test_damaged_metadata_are_written_anew(study, store, name, text):
+    data = fill(store, (0, 0, 0))
+    whole = (store.path / name).read_bytes()
+    if text is None:
+        (store.path / name).unlink()
+    else:
+        (store.path / name).write_text(text)
+    damaged = Store(store.path)
+    assert damaged.damaged_files() == [name]
+    bring_up_to_date(damaged, Sweep(study))
+    assert (store.path / name).read_bytes() == whole
+    np.testing.assert_array_equal(xr.open_zarr(store.path).vertical.values[0, 0, :2], data["vertical"])
+
+
+def test_cases_are_named_by_their_coordinates(store):
+    assert store.manifest.name_case(11) == "speed_ratio=2, clearance_ratio=0.85, friction=0.5"
+    assert Manifest.read(store.path) == store.manifest
+
+
+@pytest.mark.parametrize(
+    ("number", "mend"),
+    [
+        (errno.ENOSPC, "free some space"),
+        (errno.EROFS, "--output"),
+        (errno.EACCES, "--output"),
+        (errno.EDQUOT, "quota"),
+    ],
+)
+def test_errors_of_the_disk_name_the_mend(tmp_path, number, mend):
+    with pytest.raises(StoreError, match=mend) as told, disk_errors(tmp_path):
+        raise OSError(number, "whatever")
+    assert told.value.exit_code == 3
+
+
+def test_a_file_written_whole_replaces_the_old_one_or_leaves_it(tmp_path, monkeypatch):
+    path = tmp_path / "file"
+    write_whole(path, b"old")
+
+    def fail(handle: int) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr("rubhpc.storage.disk.os.fsync", fail)
+    with pytest.raises(OSError, match="Input/output"):
+        write_whole(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_diverged_case_keeps_its_metrics(store):
+    row = np.zeros((), metrics_type(1))
+    row["steps"] = 1234
+    with store.journal(1, "rank00000") as lines:
+        lines.write([Entry(0, "a", DIVERGED, 0, row.tobytes(), "grew")])
+    packed = store.packed_values(store.replay())
+    assert packed["steps"].ravel()[:2].tolist() == [1234, -1]
+
+
+def test_a_file_on_the_way_to_a_store_is_told_with_the_mend(tmp_path):
+    (tmp_path / "taken").write_text("mine")
+    store = tmp_path / "taken" / "study.zarr"
+    with pytest.raises(StoreError, match="--output"), disk_errors(store):
+        store.mkdir(parents=True)
+    with pytest.raises(StoreError, match="a file stands in its way"), disk_errors(store):
+        store.parent.mkdir(parents=True)
+    assert (tmp_path / "taken").read_text() == "mine"

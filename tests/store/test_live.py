@@ -1,0 +1,79 @@
+"""A store looked at while its run is on, and what is told of the runs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import synthetic_store
+import xarray as xr
+from running import write_study
+
+import rubhpc
+from postproc.store.live import latest
+from rubhpc.errors import StoreError
+from rubhpc.schema import DONE
+from rubhpc.storage.runs import read_runs
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    study = replace(rubhpc.read_study(write_study(tmp_path)), output=tmp_path / "tiny.zarr")
+    rubhpc.run(study, quiet=True)
+    return study.output
+
+
+def test_measures_come_from_the_journals_before_they_are_packed(store: Path) -> None:
+    packed = latest(store).load()
+    for name in ("status", "peak_torsion", "contact_fraction"):
+        chunks = store / name / "c"
+        for path in sorted(chunks.rglob("*"), reverse=True):
+            path.rmdir() if path.is_dir() else path.unlink()
+    assert np.isnan(rubhpc.open(store)["peak_torsion"]).all()
+    (store / ".rubhpc" / "packed.json").unlink()
+    now = latest(store).load()
+    assert (now["status"] == DONE).all()
+    xr.testing.assert_equal(now, packed)
+    assert now.encoding["source"] == str(store)
+
+
+def test_what_only_the_journals_know_is_told(store: Path) -> None:
+    told = latest(store).attrs
+    assert told["reasons"] == {}
+    assert told["running"] == ""
+    (run,) = told["runs"]
+    assert run["n_rank"] == 1
+    assert run["host"]
+    assert run["processor"]
+    assert 0 <= run["wrote"] - run["began"] < 120
+
+
+def test_a_second_run_that_computes_nothing_leaves_no_trace(store: Path, tmp_path: Path) -> None:
+    rubhpc.run(tmp_path / "tiny.toml", quiet=True)
+    assert [run.number for run in read_runs(store)] == [1]
+
+
+def test_a_damaged_record_of_a_run_is_passed_over(store: Path) -> None:
+    (path,) = (store / ".rubhpc" / "runs").iterdir()
+    told = json.loads(path.read_text())
+    path.with_name("run000002.json").write_text("{")
+    path.with_name("run000003.json").write_text(json.dumps(told | {"number": 3, "unheard": 1}))
+    assert [run.number for run in read_runs(store)] == [1]
+
+
+def test_a_store_without_journals_comes_as_it_is(tmp_path: Path) -> None:
+    synthetic_store.write(tmp_path / "copy.zarr", synthetic_store.make(keep=()))
+    now = latest(tmp_path / "copy.zarr")
+    assert "reasons" not in now.attrs
+    assert float(now["peak_contact_force"].max()) > 0
+
+
+def test_no_store_is_said(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="no such store"):
+        latest(tmp_path / "none.zarr")

@@ -1,0 +1,68 @@
+import numpy as np
+import pytest
+import xarray as xr
+
+from postproc.store.units import caption, displayed, scale_for
+
+
+@pytest.mark.parametrize(
+    ("unit", "size", "factor", "written"),
+    [
+        ("m", 84e-6, 1e6, "µm"),
+        ("m", 1.8e-3, 1e6, "µm"),  # an orbit of 1800 µm is still read in µm
+        ("m", 12e-3, 1e3, "mm"),
+        ("rad", 4e-4, 1e6, "µrad"),
+        ("rad", 6e-3, 1e3, "mrad"),
+        ("N", 241.0, 1.0, "N"),
+        ("N", 2700.0, 1e-3, "kN"),
+        ("Pa", 30e9, 1e-9, "GPa"),
+        ("s", 3e-3, 1e3, "ms"),
+        ("rad s-2", 5e3, 1.0, "rad/s²"),
+        ("1", 0.7, 1.0, ""),
+        ("m", 0.0, 1.0, "m"),
+        ("cd", 5e-7, 1.0, "cd"),  # an unknown unit stays as it is
+    ],
+)
+def test_quantities_are_shown_in_the_unit_that_suits_their_size(unit, size, factor, written):
+    scale = scale_for(unit, size)
+    assert (scale.factor, scale.unit) == (pytest.approx(factor), written)
+
+
+def test_labels_name_the_quantity_and_its_unit():
+    wave = xr.DataArray([-1e-4, 5e-5, np.nan], dims="sample", name="vertical", attrs={"units": "m"})
+    values, label = displayed(wave)
+    assert label == "Vertical displacement (µm)"
+    assert values[:2] == pytest.approx([-100, 50])
+
+
+def test_a_spectrum_is_named_as_its_signal():
+    line = xr.DataArray([4e-4], dims="order", name="spectrum_torsion", attrs={"units": "rad"})
+    assert displayed(line)[1] == "Torsion (µrad)"
+
+
+def test_speeds_are_read_in_revolutions_per_minute():
+    speed = xr.DataArray([np.pi, 2 * np.pi], dims="speed", name="speed", attrs={"units": "rad/s"})
+    values, label = displayed(speed)
+    assert values == pytest.approx([30, 60])
+    assert label == "Spin speed (rpm)"
+
+
+def test_a_caption_tells_what_was_selected():
+    data = xr.Dataset(
+        coords={
+            "clearance": ((), 84e-6, {"units": "m"}),
+            "speed_ratio": ((), 0.75, {"units": "1"}),
+            "sample": ("sample", [0, 1]),
+        }
+    )
+    assert caption(data) == r"$r$ = 0.75, $g$ = 84 µm"
+
+
+def test_a_long_caption_takes_as_many_lines_as_it_needs():
+    names = ("speed_ratio", "clearance_ratio", "friction", "rotor_disc_1_mass", "stator_1_angle", "stator")
+    data = xr.Dataset(coords={name: ((), 0.75, {"units": "1"}) for name in names})
+    lines = caption(data).split("\n")
+    assert lines == [
+        r"$r$ = 0.75, $c_g$ = 0.75, $\mu$ = 0.75, rotor disc 1 mass = 0.75,",
+        "stator = 0.75, stator 1 angle = 0.75",
+    ]

