@@ -1,7 +1,8 @@
 """Sobol indices from a sample: those of a scalar over the ranges that a study has drawn its cases from.
 
 Estimated with SALib from Saltelli's design (`rubhpc.study.sampling`): total indices after Jansen, first-order
-ones after Saltelli (A. Saltelli et al., Comput. Phys. Commun. 181, 2010), intervals from base points drawn again.
+ones after Saltelli (A. Saltelli et al., Comput. Phys. Commun. 181, 2010), intervals from base points
+drawn again.
 """
 
 from __future__ import annotations
