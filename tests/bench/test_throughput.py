@@ -12,7 +12,7 @@ from rivals import run as run_rival
 
 import rubhpc
 from rubhpc.integrate import case as case_module
-from rubhpc.integrate import modal, modal_neighbours
+from rubhpc.integrate import event_driven_march, neighbour_motions
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.rig import read_rig, with_keys
@@ -139,8 +139,8 @@ def test_whole_study_with_little_around_the_kernel(benchmark, capsys, tmp_path, 
     study = rubhpc.read_study(MAP, output=tmp_path / "map.zarr")
     small = replace(study, recording=Recording(transient=1, revolutions=1, keep=()))
     rubhpc.run(replace(small, output=tmp_path / "warm.zarr"), quiet=True)  # imports and compiles
-    monkeypatch.setattr(modal, "advance", watched(modal.advance, "kernel"))
-    monkeypatch.setattr(modal_neighbours, "part", watched(modal_neighbours.part, "kernel"))
+    monkeypatch.setattr(event_driven_march, "advance", watched(event_driven_march.advance, "kernel"))
+    monkeypatch.setattr(neighbour_motions, "part", watched(neighbour_motions.part, "kernel"))
     monkeypatch.setattr(case_module, "amplitude_spectrum", watched(case_module.amplitude_spectrum, "FFT"))
     began = time.process_time()
     summary = benchmark.pedantic(lambda: rubhpc.run(study, quiet=True), rounds=1)

@@ -25,8 +25,8 @@ from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import bring_up_to_date, open_store, sweep_for
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.storage.verify import verify
+from rubhpc.study import cases as sweep_module
 from rubhpc.study.study import Run, Study, make_axis, read_study
-from rubhpc.study.study import cases as sweep_module
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
