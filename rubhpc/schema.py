@@ -10,7 +10,7 @@ class Variable:
     """One stored array; `dims` are those that follow the study's axes."""
 
     name: str
-    role: str  # "waveform", "spectrum", "section", "state", "scalar", "setting" or "flag"
+    role: str  # "waveform", "spectrum", "section", "state", "measure", "setting" or "flag"
     dims: tuple[str, ...] = ()
     dtype: str = "float64"
     unit: str = "1"
@@ -73,8 +73,8 @@ _STATE = Variable(
 )
 
 
-def _scalar(name: str, unit: str, long_name: str, *dims: str, dtype: str = "float64") -> Variable:
-    return Variable(name=name, role="scalar", dims=dims, dtype=dtype, unit=unit, long_name=long_name)
+def _measure(name: str, unit: str, long_name: str, *dims: str, dtype: str = "float64") -> Variable:
+    return Variable(name=name, role="measure", dims=dims, dtype=dtype, unit=unit, long_name=long_name)
 
 
 _SETTINGS = tuple(
@@ -89,32 +89,32 @@ _FLAGS = (
     Variable(name="status", role="flag", dtype="int8", long_name="state of the case", flags=STATUS),
     Variable(name="regime", role="flag", dtype="int8", long_name="regime of the motion", flags=REGIME),
 )
-_SCALARS = (
-    _scalar("period", "1", "period in revolutions (0: none up to 16)", dtype="int16"),
-    _scalar("lyapunov_exponent", "1", "largest Lyapunov exponent per revolution (NaN: not measured)"),
-    _scalar("whirl_ratio", "1", "whirl at the spin frequency (1: forward circle, -1: backward circle)"),
-    _scalar("contact_fraction", "1", "fraction of the time in contact", "stator"),
-    _scalar("contacts_per_revolution", "1", "contacts per revolution", "stator"),
-    _scalar("contact_duration", "s", "mean duration of a contact", "stator"),
-    _scalar("peak_contact_force", "N", "peak contact force", "stator"),
-    _scalar("contact_impulse", "N s", "contact impulse per revolution", "stator"),
-    _scalar("friction_work", "J", "work of friction per revolution", "stator"),
-    _scalar("minimum_slip_speed", "m s-1", "lowest slip speed in contact", "stator"),
-    _scalar("force_over_euler_load", "1", "peak contact force over the stator's Euler load", "stator"),
-    _scalar("tip_deflection_ratio", "1", "peak lateral tip deflection over the stator's length", "stator"),
-    _scalar("peak_torsion", "rad", "peak torsional displacement"),
-    _scalar("peak_to_peak_vertical", "m", "peak-to-peak vertical displacement"),
-    _scalar("peak_to_peak_horizontal", "m", "peak-to-peak horizontal displacement"),
-    _scalar("energy_residual", "1", "residual of the energy balance over the recorded revolutions"),
-    _scalar("contact_iterations", "1", "most iterations that a contact problem took", dtype="int64"),
-    _scalar("contact_residual", "1", "largest residual of the contact problems, relative"),
-    _scalar("transient_revolutions", "1", "revolutions thrown away", dtype="int64"),
-    _scalar("steps", "1", "integration steps", dtype="int64"),
-    _scalar("wall_time", "s", "wall time of the case"),
+_MEASURES = (
+    _measure("period", "1", "period in revolutions (0: none up to 16)", dtype="int16"),
+    _measure("lyapunov_exponent", "1", "largest Lyapunov exponent per revolution (NaN: not measured)"),
+    _measure("whirl_ratio", "1", "whirl at the spin frequency (1: forward circle, -1: backward circle)"),
+    _measure("contact_fraction", "1", "fraction of the time in contact", "stator"),
+    _measure("contacts_per_revolution", "1", "contacts per revolution", "stator"),
+    _measure("contact_duration", "s", "mean duration of a contact", "stator"),
+    _measure("peak_contact_force", "N", "peak contact force", "stator"),
+    _measure("contact_impulse", "N s", "contact impulse per revolution", "stator"),
+    _measure("friction_work", "J", "work of friction per revolution", "stator"),
+    _measure("minimum_slip_speed", "m s-1", "lowest slip speed in contact", "stator"),
+    _measure("force_over_euler_load", "1", "peak contact force over the stator's Euler load", "stator"),
+    _measure("tip_deflection_ratio", "1", "peak lateral tip deflection over the stator's length", "stator"),
+    _measure("peak_torsion", "rad", "peak torsional displacement"),
+    _measure("peak_to_peak_vertical", "m", "peak-to-peak vertical displacement"),
+    _measure("peak_to_peak_horizontal", "m", "peak-to-peak horizontal displacement"),
+    _measure("energy_residual", "1", "residual of the energy balance over the recorded revolutions"),
+    _measure("contact_iterations", "1", "most iterations that a contact problem took", dtype="int64"),
+    _measure("contact_residual", "1", "largest residual of the contact problems, relative"),
+    _measure("transient_revolutions", "1", "revolutions thrown away", dtype="int64"),
+    _measure("steps", "1", "integration steps", dtype="int64"),
+    _measure("wall_time", "s", "wall time of the case"),
 )
 
 VARIABLES: dict[str, Variable] = {
-    v.name: v for v in (*_WAVEFORMS, *_SPECTRA, *_SECTIONS, _STATE, *_SETTINGS, *_FLAGS, *_SCALARS)
+    v.name: v for v in (*_WAVEFORMS, *_SPECTRA, *_SECTIONS, _STATE, *_SETTINGS, *_FLAGS, *_MEASURES)
 }
 KEEPABLE = ("waveform", "spectrum", "section")  # what [record] keep may name; the rest is always stored
 STATE = "state"  # kept where a sweep carries it to the next case

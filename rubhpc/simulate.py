@@ -83,7 +83,7 @@ def simulate(
         With `transient="auto"`, revolutions are thrown away until displacements repeat themselves after 8 or
         12 revolutions to this share of their largest value (1e-4), but no more than the limit (240).
     keep : tuple of {"waveform", "spectrum", "section"}
-        What the record holds besides its scalars.
+        What the record holds besides its measures.
     initial : State, optional
         Where to start; default at rest.
 

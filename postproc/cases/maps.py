@@ -15,7 +15,7 @@ from rubhpc.schema import VARIABLES
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in ("scalar", "flag", "setting"))
+MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in ("measure", "flag", "setting"))
 MOST_FACETS, MOST_PANELS = 2, 6
 # Where the model leaves its range, by variable: the flag, what is out of range, and the test.
 VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {

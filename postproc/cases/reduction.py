@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-SCALARS = tuple(n for n, v in VARIABLES.items() if v.role in ("scalar", "setting"))
+SCALARS = tuple(n for n, v in VARIABLES.items() if v.role in ("measure", "setting"))
 # Chunks decoded in Rust, where zarrs is installed, checksums included: a mean takes 0.65 of the time.
 _FAST = {"codec_pipeline.path": "zarrs.ZarrsCodecPipeline"}
 _MEMORY = 1e9  # bytes that pieces may take together, each some four times: as stored, as read, and on the way

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-SCALARS = tuple(n for n, v in VARIABLES.items() if v.role in ("scalar", "setting"))
+SCALARS = tuple(n for n, v in VARIABLES.items() if v.role in ("measure", "setting"))
 MOST_FILLED = 0.1  # of the cases: a tenth, filled, moves an index of the Ishigami function by up to 0.04
 MOST_DROPPED = 0.5  # of the base points of a sample: one goes with each of its cases that has no value
 _CLOSE = 1e-10  # of the largest value: less is no spread

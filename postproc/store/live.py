@@ -37,7 +37,7 @@ def latest(path: Path) -> xr.Dataset:
     store = Store(path)
     with disk_errors(path):
         is_packed = store.is_packed()
-        ledger = store.replay(with_metrics=not is_packed)
+        ledger = store.replay(with_measures=not is_packed)
         lock = path / PRIVATE / "lock"
         holder = read_holder(lock)
         running = str(holder) if holder is not None and is_alive(holder, lock) else ""

@@ -18,7 +18,7 @@ from rubhpc.integrate.measures import (
     diverged_record,
     empty_samples,
     empty_tally,
-    scalars_of,
+    measures_of,
 )
 from rubhpc.integrate.neighbour_motions import ModalNeighbours
 from rubhpc.integrate.orbit_measures import amplitude_spectrum
@@ -82,7 +82,7 @@ def run_case(
         # Contacts that chatter, or too many sets of them, or slip that turns: short steps need no events.
         record = _integrate(start_stepped, initial, setup, clearance, recording)
     record = replace(record, final=with_overlap(record.final, setup, clearance))
-    record.scalars["wall_time"] = time.perf_counter() - began
+    record.measures["wall_time"] = time.perf_counter() - began
     return record
 
 
@@ -142,7 +142,7 @@ def _integrate(
             sections={f"section_{name}": signals[name][::per_revolution].copy() for name in SECTION_NAMES}
             if "section" in recording.keep
             else {},
-            scalars=scalars_of(
+            measures=measures_of(
                 tally,
                 signals,
                 energy=(energy_before, march.energy()),
@@ -156,7 +156,7 @@ def _integrate(
         )
         if "waveform" not in recording.keep:
             record.signals.clear()
-    record.scalars.update(transient_revolutions=n_transient, steps=march.n_step)
+    record.measures.update(transient_revolutions=n_transient, steps=march.n_step)
     return record
 
 

@@ -1,4 +1,4 @@
-"""From the kernels' sums and samples to named signals and scalars of the schema."""
+"""From the kernels' sums and samples to named signals and measures of the schema."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def by_name(whole: Floats) -> dict[str, Floats]:
     }
 
 
-def scalars_of(
+def measures_of(
     tally: Tally,
     signals: dict[str, Floats],
     *,
@@ -165,13 +165,13 @@ def diverged_record(
         "order": n_sample // 2 + 1,
         "section": recording.revolutions,
     }
-    groups: dict[str, dict[str, Any]] = {"waveform": {}, "spectrum": {}, "section": {}, "scalar": {}}
+    groups: dict[str, dict[str, Any]] = {"waveform": {}, "spectrum": {}, "section": {}, "measure": {}}
     for name, variable in VARIABLES.items():
-        if variable.role == "scalar" and not variable.dims:
-            groups["scalar"][name] = -1 if variable.dtype.startswith("int") else np.nan
-        elif variable.role == "scalar" or variable.role in recording.keep:
+        if variable.role == "measure" and not variable.dims:
+            groups["measure"][name] = -1 if variable.dtype.startswith("int") else np.nan
+        elif variable.role == "measure" or variable.role in recording.keep:
             groups[variable.role][name] = np.full([length[dim] for dim in variable.dims], np.nan)
-    groups["scalar"]["regime"] = -1
+    groups["measure"]["regime"] = -1
     return Record(
         status=DIVERGED,
         reason=reason,
@@ -179,7 +179,7 @@ def diverged_record(
         signals=groups["waveform"],
         spectra=groups["spectrum"],
         sections=groups["section"],
-        scalars=groups["scalar"],
+        measures=groups["measure"],
         settings=settings,
         final=final,
     )

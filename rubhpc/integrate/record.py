@@ -1,4 +1,4 @@
-"""What one case yields: its state before and after, its signals, spectra and scalars."""
+"""What one case yields: its state before and after, its signals, spectra and measures."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Record:
         Single-sided amplitudes, zero to peak, named `spectrum_*`.
     sections : dict of (n_revolution,)
         Poincaré sections (one point a revolution), named `section_*`.
-    scalars : dict of float, int or (n_stator,)
+    measures : dict of float, int or (n_stator,)
         Everything else of the schema.
     settings : dict of float
         `spin_speed` (rad/s) and `clearance` (m).
@@ -117,14 +117,14 @@ class Record:
     signals: dict[str, Floats] = field(default_factory=dict)
     spectra: dict[str, Floats] = field(default_factory=dict)
     sections: dict[str, Floats] = field(default_factory=dict)
-    scalars: dict[str, Any] = field(default_factory=dict)
+    measures: dict[str, Any] = field(default_factory=dict)
     settings: dict[str, float] = field(default_factory=dict)
     final: State
 
     def __getattr__(self, name: str) -> Any:
         """Return a variable by its name in the schema."""
         if not name.startswith("_"):
-            for group in (self.signals, self.spectra, self.sections, self.scalars, self.settings):
+            for group in (self.signals, self.spectra, self.sections, self.measures, self.settings):
                 if name in group:
                     return group[name]
         raise AttributeError(f"this record holds no {name}")
@@ -132,7 +132,7 @@ class Record:
     @property
     def remark(self) -> str:
         """Why the case diverged, or what is wrong with its result; "" where nothing is."""
-        residual = self.scalars.get("energy_residual", 0.0)
+        residual = self.measures.get("energy_residual", 0.0)
         if self.reason or not residual > MOST_RESIDUAL:
             return self.reason
         return f"its energy balance is off by {100 * residual:.2g} %; take a shorter step"
@@ -141,13 +141,13 @@ class Record:
         """One line: status and what it holds."""
         reason = f" ({self.remark})" if self.remark else ""
         held = ", ".join((*self.signals, *self.spectra, *self.sections))
-        return f"<Record: {STATUS[self.status]}{reason}; {held or 'scalars only'}>"
+        return f"<Record: {STATUS[self.status]}{reason}; {held or 'measures only'}>"
 
     def to_dataset(self) -> xr.Dataset:
         """Return the record as a dataset with units, laid out like a store of one case."""
         import xarray as xr
 
-        arrays = {**self.signals, **self.spectra, **self.sections, **self.scalars, **self.settings}
+        arrays = {**self.signals, **self.spectra, **self.sections, **self.measures, **self.settings}
         dataset = xr.Dataset(
             {
                 name: (

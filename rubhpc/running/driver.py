@@ -208,7 +208,7 @@ def _try_doubtful(job: Job, pool: Pool, stopping: Stopping) -> None:
     """
     sweep = Sweep(job.study, chunk=job.chunk)
     store = Store(job.study.output)
-    job = replace(job, ledger=store.replay(with_metrics=False))
+    job = replace(job, ledger=store.replay(with_measures=False))
     blocks = {block.start: (n, block) for n, chain in enumerate(sweep.chains()) for block in chain}
     with _desk(job, pool, sweep, store, stopping, "tail") as worker:
         for flat in sorted(job.doubtful, key=lambda i: job.doubtful[i]):

@@ -85,9 +85,9 @@ def prepare_job(order: Order, n_rank: int) -> Job:
                 store.lock(on_loss=lambda: stopping.ask("the loss of its lock"), heir_of=order.token)
             )
         bring_up_to_date(store, sweep, accept_version=order.accept_version)
-        ledger = store.replay(with_metrics=not store.is_packed())
+        ledger = store.replay(with_measures=not store.is_packed())
         store.pack(ledger)  # readers see what a killed run has left, from now on
-        ledger.metrics = None  # the other ranks need none
+        ledger.measures = None  # the other ranks need none
         run = next_run(store.journal_directory)
         record_run(store.path, run, n_rank)
         store.take_back(ledger, find_gone(store, ledger), run, "gone")

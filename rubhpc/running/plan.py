@@ -111,7 +111,7 @@ def make_plan(study: Study) -> Plan:
     status = np.zeros(sweep.n_case, np.int8)
     if is_store(study.output):
         store = Store(study.output)
-        ledger = store.replay(with_metrics=False)
+        ledger = store.replay(with_measures=False)
         ledger.status[find_gone(store, ledger)] = MISSING
         origin = origins(store.manifest, manifest)
         status = np.where(origin < 0, MISSING, ledger.status[origin])
@@ -175,7 +175,7 @@ def _pilot(sweep: Sweep, index: tuple[int, ...], steps: float) -> float:
 
     def seconds(recording: Recording) -> float:
         record = run_case(setup, clearance=case.clearance, friction=case.friction, recording=recording)
-        return float(record.scalars["wall_time"])
+        return float(record.measures["wall_time"])
 
     def shortened(transient: int, revolutions: int) -> Recording:
         return replace(

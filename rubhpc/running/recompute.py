@@ -11,9 +11,9 @@ from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
 from rubhpc.running.initial_states import is_sound
-from rubhpc.running.worker import metrics_of, put, set_up
+from rubhpc.running.worker import packed_measures, put, set_up
 from rubhpc.schema import DONE, FINAL_STATE, MISSING, STATUS
-from rubhpc.storage.journal import metrics_type
+from rubhpc.storage.journal import measures_type
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import is_store, sweep_for
 from rubhpc.storage.store import Store, case_checksum
@@ -37,7 +37,7 @@ class Reproduction:
 
     Attributes
     ----------
-    metrics : dict
+    measures : dict
         Name -> value, or one a stator; empty where the case failed.
     verdict : str
         How it compares with the store.
@@ -46,7 +46,7 @@ class Reproduction:
     id: str
     case: str
     status: str
-    metrics: dict[str, Any]
+    measures: dict[str, Any]
     verdict: str
 
     def text(self) -> str:
@@ -55,7 +55,7 @@ class Reproduction:
             "case": self.id,
             "at": self.case,
             "status": self.status,
-            **self.metrics,
+            **self.measures,
             "store": self.verdict,
         }
         width = max(map(len, told))
@@ -86,14 +86,14 @@ def reproduce(study: Study, name: str) -> Reproduction:
     except Exception as error:
         text = " ".join(str(error).split())
         raise RubError(f"case {case.id}, {told}: {type(error).__name__}: {text}") from error
-    row = metrics_of(record, metrics_type(sweep.n_stator))
+    row = packed_measures(record, measures_type(sweep.n_stator))
     status = STATUS[record.status] + (f": {record.remark}" if record.remark else "")
-    metrics = {n: row[n].tolist() for n in row.dtype.names or ()}
+    measures = {n: row[n].tolist() for n in row.dtype.names or ()}
     return Reproduction(
         id=case.id,
         case=told,
         status=status,
-        metrics=metrics,
+        measures=measures,
         verdict=_compare(study, case, record.status, data, row),
     )
 
@@ -127,7 +127,7 @@ def _stored_end(study: Study, case: Case) -> tuple[int, NDArray[np.float64] | No
         return MISSING, None
     store = Store(study.output)
     flat = _locate(store, study, case)
-    ledger = store.replay(with_metrics=False)
+    ledger = store.replay(with_measures=False)
     if flat is None or ledger.status[flat] != DONE:
         return (MISSING if flat is None else int(ledger.status[flat])), None
     start = store.start_of(flat)
@@ -171,7 +171,7 @@ def _compare(
     store = Store(study.output)
     flat = _locate(store, study, case)
     ledger = store.replay()
-    assert ledger.metrics is not None
+    assert ledger.measures is not None
     if flat is None or ledger.status[flat] == MISSING:
         return f"{study.output} does not hold it yet"
     if ledger.status[flat] != status:
@@ -183,7 +183,7 @@ def _compare(
     stored = store.read_block(start)
     i_case = int(np.searchsorted(store.flat(start), flat))
     names = [n for n in row.dtype.names or () if n != "wall_time"]
-    differing = [n for n in names if ledger.metrics[flat][n].tobytes() != row[n].tobytes()]
+    differing = [n for n in names if ledger.measures[flat][n].tobytes() != row[n].tobytes()]
     if stored is None:
         raise StoreError(f"{study.output}: case {case.id}: its files are damaged; rubhpc verify marks it")
     differing += [n for n, values in data.items() if values[0].tobytes() != stored[n][i_case].tobytes()]

@@ -17,7 +17,7 @@ from rubhpc.running.pool import Tally
 from rubhpc.running.stopping import Stopped
 from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING
 from rubhpc.storage.disk import disk_errors, flush_to_disk
-from rubhpc.storage.journal import Entry, metrics_type
+from rubhpc.storage.journal import Entry, measures_type
 from rubhpc.storage.store import case_checksum
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Worker:
     attend: Callable[[], None]
 
     def __post_init__(self) -> None:
-        self._record_type = metrics_type(self.sweep.n_stator)
+        self._record_type = measures_type(self.sweep.n_stator)
         self._setups: OrderedDict[tuple[int, float], tuple[Rig, Setup]] = OrderedDict()
         self._ends = Ends(self.sweep, self.store, self.ledger, self._mend)
         self._unsynced: list[Path] = []
@@ -201,7 +201,7 @@ class Worker:
         try:
             record = self._compute(case, start)
             put(record, data, i_case)
-            metrics = metrics_of(record, self._record_type).tobytes()
+            measures = packed_measures(record, self._record_type).tobytes()
         except Stopped:
             raise
         except Exception as error:
@@ -211,7 +211,7 @@ class Worker:
         finally:
             self.watch.end()
         remark = "; ".join(text for text in (start.note, record.remark) if text)
-        return Entry(flat, case.id, record.status, case_checksum(data, i_case), metrics, remark)
+        return Entry(flat, case.id, record.status, case_checksum(data, i_case), measures, remark)
 
     def _compute(self, case: Case, start: Start) -> Record:
         study = self.sweep.study
@@ -266,11 +266,11 @@ def put(record: Record, data: Arrays, i_case: int) -> None:
         values[i_case] = told[name]
 
 
-def metrics_of(record: Record, kind: np.dtype[np.void]) -> NDArray[np.void]:
-    """The metrics of a record, packed."""
+def packed_measures(record: Record, kind: np.dtype[np.void]) -> NDArray[np.void]:
+    """The measures of a record, packed."""
     row = np.zeros((), kind)
     for name in kind.names or ():
-        row[name] = record.scalars[name]
+        row[name] = record.measures[name]
     return row
 
 

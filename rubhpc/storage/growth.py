@@ -133,10 +133,10 @@ def _carried(ledger: Ledger, origin: int, flat: int, name: str, *, is_lost: bool
     status = int(ledger.status[origin])
     if is_lost or status == MISSING:
         return Entry(flat, name, MISSING)
-    assert ledger.metrics is not None
-    metrics = ledger.metrics[origin].tobytes() if status in (DONE, DIVERGED) else b""
+    assert ledger.measures is not None
+    measures = ledger.measures[origin].tobytes() if status in (DONE, DIVERGED) else b""
     reason = ledger.reasons.get(origin, "")
-    return Entry(flat, name, status, int(ledger.checksum[origin]), metrics, reason)
+    return Entry(flat, name, status, int(ledger.checksum[origin]), measures, reason)
 
 
 def _stage_blocks(new: Store, old: Store, ledger: Ledger, origin: NDArray[np.int64]) -> set[int]:

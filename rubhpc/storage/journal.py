@@ -1,7 +1,7 @@
 """What has been computed: append-only journals, one a run and rank, one line a case.
 
-A line is `crc flat id status checksum metrics reason`: the CRC-32 of the rest of the line, the case's flat
-index in the grid of the file's header, its id, its status, the CRC-32 of its stored arrays, its metrics
+A line is `crc flat id status checksum measures reason`: the CRC-32 of the rest of the line, the case's flat
+index in the grid of the file's header, its id, its status, the CRC-32 of its stored arrays, its measures
 (base64 of one packed record, so that floats keep every bit; `-` where there are none) and the reason of a
 failure (JSON, `-` where none). The header is `crc {json}`. A later run's line overrides an earlier one's; a
 line with status 0 takes a case back.
@@ -35,15 +35,15 @@ if TYPE_CHECKING:
 
 _FORMAT = 1
 _NAME = re.compile(r"run(\d{6})-(\w+)\.journal")
-METRICS = tuple(v for v in VARIABLES.values() if v.role == "scalar" or v.name == "regime")
+MEASURES = tuple(v for v in VARIABLES.values() if v.role == "measure" or v.name == "regime")
 
 
-def metrics_type(n_stator: int) -> np.dtype[np.void]:
-    """Packed record of a case's metrics, in the order of the schema; per stator where the schema says so."""
+def measures_type(n_stator: int) -> np.dtype[np.void]:
+    """Packed record of a case's measures, in the order of the schema; per stator where the schema says so."""
     return np.dtype(
         [
             (v.name, np.dtype(v.dtype).newbyteorder("<"), (n_stator,) if "stator" in v.dims else ())
-            for v in METRICS
+            for v in MEASURES
         ]
     )
 
@@ -56,19 +56,19 @@ class Entry:
     id: str
     status: int
     checksum: int = 0
-    metrics: bytes = b""
+    measures: bytes = b""
     reason: str = ""
 
     def line(self) -> bytes:
         """The entry as a line of the journal, its own checksum first."""
-        metrics = binascii.b2a_base64(self.metrics, newline=False) if self.metrics else b"-"
+        measures = binascii.b2a_base64(self.measures, newline=False) if self.measures else b"-"
         reason = json.dumps(self.reason).encode() if self.reason else b"-"
         text = b"%d %s %d %08x %s %s" % (
             self.flat,
             self.id.encode(),
             self.status,
             self.checksum,
-            metrics,
+            measures,
             reason,
         )
         return b"%08x %s\n" % (crc32(text), text)
@@ -76,7 +76,7 @@ class Entry:
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What a journal's lines refer to: the study's identity, its cases and chains, the type of metrics."""
+    """What a journal's lines refer to: the study's identity, its cases and chains, the type of measures."""
 
     identity: str
     points: Points
@@ -91,7 +91,7 @@ class Header:
             "identity": self.identity,
             "shape": list(self.points.shape),
             "axes": [crc32(np.array(values).tobytes()) for values in self.points.values],
-            "metrics": [[v.name, v.dtype, self.n_stator if "stator" in v.dims else 0] for v in METRICS],
+            "metrics": [[v.name, v.dtype, self.n_stator if "stator" in v.dims else 0] for v in MEASURES],
         }
 
     def id_at(self, flat: int) -> str:
@@ -158,7 +158,7 @@ class Ledger:
         CRC-32 of the stored arrays of each case.
     is_known : (n_case,) bool
         Whether any valid line tells of the case, be it that it is missing.
-    metrics : (n_case,) record or None
+    measures : (n_case,) record or None
         Metrics of the cases that have any; None where the replay was asked to leave them out.
     reasons : dict
         Flat index -> why a case failed or diverged.
@@ -173,7 +173,7 @@ class Ledger:
     status: NDArray[np.int8]
     checksum: NDArray[np.uint32]
     is_known: NDArray[np.bool_]
-    metrics: NDArray[np.void] | None
+    measures: NDArray[np.void] | None
     reasons: dict[int, str] = field(default_factory=dict)
     torn: int = 0
     torn_cases: set[int] = field(default_factory=set)
@@ -196,16 +196,16 @@ def next_run(directory: Path) -> int:
     return max(numbers, default=0) + 1
 
 
-def replay(directory: Path, header: Header, *, with_metrics: bool = True) -> Ledger:
+def replay(directory: Path, header: Header, *, with_measures: bool = True) -> Ledger:
     """Read every journal in turn; damaged lines and journals of other identities or grids are passed over."""
     n_case = header.points.n_case
-    dtype = metrics_type(header.n_stator)
-    metrics = np.zeros(n_case, dtype) if with_metrics else None
+    dtype = measures_type(header.n_stator)
+    measures = np.zeros(n_case, dtype) if with_measures else None
     ledger = Ledger(
         status=np.zeros(n_case, np.int8),
         checksum=np.zeros(n_case, np.uint32),
         is_known=np.zeros(n_case, bool),
-        metrics=metrics,
+        measures=measures,
     )
     paths = journals(directory)
     for path in paths:
@@ -219,9 +219,9 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
     """Take a journal's lines over into the ledger; how many there were."""
     n_case = len(ledger.status)
     status, checksum, is_known, reasons = ledger.status, ledger.checksum, ledger.is_known, ledger.reasons
-    size = ledger.metrics.dtype.itemsize if ledger.metrics is not None else 0
-    store = ledger.metrics.view(np.uint8).data if ledger.metrics is not None and n_case else None
-    packed_size = metrics_type(header.n_stator).itemsize
+    size = ledger.measures.dtype.itemsize if ledger.measures is not None else 0
+    store = ledger.measures.view(np.uint8).data if ledger.measures is not None and n_case else None
+    packed_size = measures_type(header.n_stator).itemsize
     with path.open("rb") as file:
         first = file.readline()
         is_sound = first[:8] == b"%08x" % crc32(first[9:-1])
@@ -238,15 +238,17 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
             number, name, state, check, packed, reason = text.split(b" ", 5)
             flat = int(number)
             is_wanted = packed != b"-" and (store is not None or not is_sound)
-            metrics = binascii.a2b_base64(packed) if is_wanted else b""
-            if not is_sound and (name.decode() != header.id_at(flat) or len(metrics) not in (0, packed_size)):
+            measures = binascii.a2b_base64(packed) if is_wanted else b""
+            if not is_sound and (
+                name.decode() != header.id_at(flat) or len(measures) not in (0, packed_size)
+            ):
                 continue  # without its header a line counts only if its case is where it says
             n_line += 1
             status[flat] = int(state)
             checksum[flat] = int(check, 16)
             is_known[flat] = True
-            if store is not None and metrics:
-                store[flat * size : (flat + 1) * size] = metrics
+            if store is not None and measures:
+                store[flat * size : (flat + 1) * size] = measures
             if reason != b"-":
                 reasons[flat] = json.loads(reason)
             elif reasons:

@@ -19,7 +19,7 @@ from zarr.storage import MemoryStore
 
 from rubhpc.schema import VARIABLES
 from rubhpc.storage.disk import write_whole
-from rubhpc.storage.journal import METRICS
+from rubhpc.storage.journal import MEASURES
 from rubhpc.storage.manifest import PRIVATE, Manifest
 from rubhpc.study.axes import DIRECTION, DIRECTIONS
 from rubhpc.version import __version__
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 PACKED = (
     VARIABLES["status"],
-    *METRICS,
+    *MEASURES,
 )  # what is packed from the journals, in the order of the schema's roles
 _PACKED_CHUNK = 2**20  # values in a chunk of a packed array, at most
 # Where the stators stand: coordinate, key of the stator, unit, long name.

@@ -91,7 +91,7 @@ def read_status(path: Path) -> StoreStatus:
         holder = read_holder(lock)
         if holder is not None and not is_alive(holder, lock):
             holder = None
-        ledger = replay(path / PRIVATE / "journal", manifest.header, with_metrics=False)
+        ledger = replay(path / PRIVATE / "journal", manifest.header, with_measures=False)
     troubled = {*np.flatnonzero((ledger.status == FAILED) | (ledger.status == DIVERGED)).tolist()}
     return StoreStatus(
         title=manifest.title,

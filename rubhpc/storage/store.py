@@ -24,7 +24,7 @@ from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.storage import layout
 from rubhpc.storage.disk import disk_errors, write_whole
-from rubhpc.storage.journal import METRICS, Entry, Journal, Ledger, journals, replay
+from rubhpc.storage.journal import MEASURES, Entry, Journal, Ledger, journals, replay
 from rubhpc.storage.lock import Lock, process_state
 from rubhpc.storage.manifest import PRIVATE, Manifest
 
@@ -103,10 +103,10 @@ class Store:
         """A new journal of this store."""
         return Journal(self.journal_directory, run, writer, self.manifest.header)
 
-    def replay(self, *, with_metrics: bool = True) -> Ledger:
+    def replay(self, *, with_measures: bool = True) -> Ledger:
         """What the journals say."""
         with disk_errors(self.journal_directory):
-            return replay(self.journal_directory, self.manifest.header, with_metrics=with_metrics)
+            return replay(self.journal_directory, self.manifest.header, with_measures=with_measures)
 
     def take_back(self, ledger: Ledger, flat: Sequence[int], run: int, writer: str) -> None:
         """Declare cases missing, in the ledger and by a journal of their own."""
@@ -236,7 +236,7 @@ class Store:
                     Path(directory, name).unlink(missing_ok=True)
 
     def pack(self, ledger: Ledger) -> None:
-        """Write status and metrics of every case as arrays, unless the journals tell nothing new."""
+        """Write status and measures of every case as arrays, unless the journals tell nothing new."""
         with disk_errors(self.path):
             if not self.is_packed():
                 state = self._journal_state()
@@ -245,14 +245,14 @@ class Store:
                 write_whole(self.private / "packed.json", state.encode())
 
     def packed_values(self, ledger: Ledger) -> dict[str, NDArray[Any]]:
-        """Status and metrics as the packed arrays are to hold them."""
-        if ledger.metrics is None:
-            raise ValueError("a ledger replayed without metrics has none to pack")
+        """Status and measures as the packed arrays are to hold them."""
+        if ledger.measures is None:
+            raise ValueError("a ledger replayed without measures has none to pack")
         void = ~np.isin(ledger.status, (DONE, DIVERGED))
         shape = self.manifest.shape
         packed: dict[str, NDArray[Any]] = {"status": ledger.status.reshape(shape)}
-        for variable in METRICS:
-            values = ledger.metrics[variable.name].copy()
+        for variable in MEASURES:
+            values = ledger.measures[variable.name].copy()
             values[void] = layout.fill_value(variable)
             packed[variable.name] = values.reshape(*shape, *self.manifest.extent(variable))
         return packed

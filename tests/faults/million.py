@@ -18,7 +18,7 @@ import numpy as np
 from rubhpc.rig.rig import read_rig
 from rubhpc.running import driver, job, plan, worker
 from rubhpc.schema import DONE
-from rubhpc.storage.journal import METRICS
+from rubhpc.storage.journal import MEASURES
 from rubhpc.storage.status import read_status
 from rubhpc.study.axes import Axis
 from rubhpc.study.study import Recording, Study
@@ -26,9 +26,9 @@ from rubhpc.study.study import Recording, Study
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-scalars = {v.name: np.ones(1) if "stator" in v.dims else 1 for v in METRICS}
+measures = {v.name: np.ones(1) if "stator" in v.dims else 1 for v in MEASURES}
 record = SimpleNamespace(
-    status=DONE, reason="", remark="", signals={}, spectra={}, sections={}, scalars=scalars
+    status=DONE, reason="", remark="", signals={}, spectra={}, sections={}, measures=measures
 )
 stub = {
     "compile_kernels": lambda *_, **__: None,

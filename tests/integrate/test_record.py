@@ -22,7 +22,7 @@ def record():
         signals={"vertical": np.arange(float(N_SAMPLE)), "contact_force": np.ones((N_STATOR, N_SAMPLE))},
         spectra={"spectrum_vertical": np.zeros(N_SAMPLE // 2 + 1)},
         sections={"section_vertical": np.arange(3.0)},
-        scalars={"period": 2, "peak_contact_force": np.array([1.0, 2.0])},
+        measures={"period": 2, "peak_contact_force": np.array([1.0, 2.0])},
         settings={"spin_speed": 100.0, "clearance": 1e-4},
         final=State.at_rest(MODEL),
     )
@@ -67,9 +67,9 @@ def test_dataset_is_laid_out_like_a_store(record):
 
 
 def test_dataset_of_scalars_alone_has_no_samples(record):
-    bare = Record(samples_per_revolution=PER_REVOLUTION, scalars=record.scalars, final=record.final)
+    bare = Record(samples_per_revolution=PER_REVOLUTION, measures=record.measures, final=record.final)
     assert bare.to_dataset().sizes == {"stator": 2}
-    assert repr(bare) == "<Record: done; scalars only>"
+    assert repr(bare) == "<Record: done; measures only>"
 
 
 @pytest.mark.parametrize("keep", [(), ("waveform",), ("spectrum", "section")])
@@ -83,7 +83,7 @@ def test_diverged_record_is_not_a_number_of_the_usual_shape(record, keep):
     length = {"stator": 2, "sample": 2 * N_SAMPLE, "order": N_SAMPLE + 1, "section": REVOLUTIONS}
     dataset = diverged.to_dataset()
     for variable in VARIABLES.values():
-        is_kept = variable.role == "scalar" or variable.role in keep
+        is_kept = variable.role == "measure" or variable.role in keep
         assert (variable.name in dataset) == (is_kept or variable.name in ("clearance", "regime"))
         if is_kept:
             array = dataset[variable.name]

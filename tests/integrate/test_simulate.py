@@ -35,7 +35,7 @@ THREE = tuple(replace(RIG.stator[0], angle=angle) for angle in (0.0, 0.4, -1.5))
 
 def same(one, other):
     """Whether two records hold the same to the last bit, wall time apart."""
-    groups = ("signals", "spectra", "sections", "scalars")
+    groups = ("signals", "spectra", "sections", "measures")
     held = [{k: v for group in groups for k, v in getattr(r, group).items()} for r in (one, other)]
     assert held[0].keys() == held[1].keys()
     return all(
@@ -134,8 +134,8 @@ def test_step_left_open_is_the_papers_or_a_share_of_the_limit(modulus, expected)
 
 def test_record_holds_what_the_schema_names():
     record = simulate(RIG, **RUB)
-    roles = {variable.name for variable in VARIABLES.values() if variable.role == "scalar"}
-    assert set(record.scalars) == roles | {"regime"}
+    roles = {variable.name for variable in VARIABLES.values() if variable.role == "measure"}
+    assert set(record.measures) == roles | {"regime"}
     assert set(record.signals) == set(SIGNAL_NAMES)
     assert record.status == DONE
     assert record.steps == 2 * 256 * math.ceil(2 * math.pi / SPEED / 256 / 2e-6)

@@ -76,7 +76,7 @@ def in_store_document(variable: Variable) -> list[str]:
         ("Signals", {"waveform"}),
         ("Spectra", {"spectrum"}),
         ("Poincaré sections", {"section"}),
-        ("State and measures", {"flag", "scalar"}),
+        ("State and measures", {"flag", "measure"}),
         ("Final state", {"state"}),
         ("Settings", {"setting"}),
     ],

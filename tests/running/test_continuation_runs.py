@@ -280,7 +280,7 @@ def test_one_case_is_computed_again_from_the_store_or_from_the_beginning(finishe
     assert "direction=down" in told.case
     assert "holds the same, bit for bit" in told.verdict
     elsewhere = reproduce(replace(finished, output=tmp_path / "none.zarr"), name)
-    assert elsewhere.metrics["peak_torsion"] == told.metrics["peak_torsion"]
+    assert elsewhere.measures["peak_torsion"] == told.measures["peak_torsion"]
     grown = swept(tmp_path, speeds=(*SPEEDS, 2.4))
     with pytest.raises(InputError, match="no case has such an id"):  # another comes before it
         reproduce(replace(grown, output=finished.output), name)

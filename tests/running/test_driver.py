@@ -19,7 +19,7 @@ from rubhpc.integrate.record import Record
 from rubhpc.running import driver, job, stopping, worker
 from rubhpc.running.driver import run
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
-from rubhpc.storage.journal import METRICS
+from rubhpc.storage.journal import MEASURES
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
@@ -51,7 +51,7 @@ def record(recording: Recording, friction: float, status: int = DONE, reason: st
         signals=waveforms,
         spectra={f"spectrum_{name}": values[..., :n_order] for name, values in waveforms.items()},
         sections={f"section_{name}": np.full(recording.revolutions, friction) for name in SECTION_NAMES},
-        scalars={v.name: np.array([friction]) if "stator" in v.dims else 7 for v in METRICS}
+        measures={v.name: np.array([friction]) if "stator" in v.dims else 7 for v in MEASURES}
         | {"energy_residual": 1e-6},
         final=None,  # type: ignore[arg-type]
     )
@@ -200,7 +200,7 @@ def test_a_balance_that_is_off_is_named(physics, study):
 
     def lose_energy(*, recording: Recording, **_: Any) -> Record:
         case = record(recording, 0.3)
-        case.scalars["energy_residual"] = 0.25
+        case.measures["energy_residual"] = 0.25
         return case
 
     assert "energy balance" not in run(study, quiet=True).text()

@@ -20,7 +20,7 @@ from running import write_study
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
 from rubhpc.storage.growth import origins
-from rubhpc.storage.journal import Entry, metrics_type, next_run
+from rubhpc.storage.journal import Entry, measures_type, next_run
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import bring_up_to_date, open_store, sweep_for
 from rubhpc.storage.store import Store, case_checksum
@@ -74,7 +74,7 @@ def compute(store: Store, *, all_of_it: bool = False) -> int:
                 status = DONE if all_of_it else outcome(point)
                 if status == MISSING:
                     continue
-                row = np.zeros((), metrics_type(1))
+                row = np.zeros((), measures_type(1))
                 row["steps"] = round(1000 * math.fsum(point))
                 if status == DONE:
                     for name, values in data.items():
@@ -100,7 +100,7 @@ def known(store: Store) -> dict[tuple[float, ...], tuple[Any, ...]]:
         tuple(store.manifest.points.at_flat(flat)): (
             int(ledger.status[flat]),
             int(ledger.checksum[flat]),
-            ledger.metrics[flat].tobytes(),
+            ledger.measures[flat].tobytes(),
             ledger.reasons.get(flat),
         )
         for flat in np.flatnonzero(ledger.is_known & (ledger.status != MISSING)).tolist()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, VARIABLES
-from rubhpc.storage.journal import Entry, Header, Journal, journals, metrics_type, next_run, replay
+from rubhpc.storage.journal import Entry, Header, Journal, journals, measures_type, next_run, replay
 from rubhpc.study.points import Points
 
 if TYPE_CHECKING:
@@ -36,10 +36,10 @@ def write(
     return journal.path
 
 
-def metrics(seed: int, n_stator: int = 2) -> np.ndarray:
+def measures(seed: int, n_stator: int = 2) -> np.ndarray:
     """Every bit pattern a float may have, near enough: signs, subnormals, infinities, NaN."""
     rng = np.random.default_rng(seed)
-    row = np.zeros((), metrics_type(n_stator))
+    row = np.zeros((), measures_type(n_stator))
     for name in row.dtype.names:
         kind = row[name].dtype
         if kind.kind == "f":
@@ -53,18 +53,18 @@ def metrics(seed: int, n_stator: int = 2) -> np.ndarray:
 
 
 def test_what_is_written_is_read_back_bit_by_bit(tmp_path):
-    rows = {flat: metrics(flat) for flat in range(5)}
+    rows = {flat: measures(flat) for flat in range(5)}
     write(tmp_path, *(Entry(i, f"id{i}", DONE, 0xDEADBEEF - i, row.tobytes()) for i, row in rows.items()))
     ledger = replay(tmp_path, HEADER)
     assert ledger.status.tolist() == [DONE] * 5 + [MISSING]
     assert ledger.checksum[:5].tolist() == [0xDEADBEEF - i for i in range(5)]
     for i, row in rows.items():
-        assert ledger.metrics[i].tobytes() == row.tobytes()
+        assert ledger.measures[i].tobytes() == row.tobytes()
 
 
 def test_metrics_are_those_of_the_schema():
-    names = {v.name for v in VARIABLES.values() if v.role == "scalar"} | {"regime"}
-    assert set(metrics_type(1).names) == names
+    names = {v.name for v in VARIABLES.values() if v.role == "measure"} | {"regime"}
+    assert set(measures_type(1).names) == names
 
 
 def test_a_reason_of_any_text_stays_on_its_line(tmp_path):
@@ -72,7 +72,7 @@ def test_a_reason_of_any_text_stays_on_its_line(tmp_path):
     write(
         tmp_path,
         Entry(0, "a", FAILED, reason=reason),
-        Entry(1, "b", DIVERGED, 1, metrics(1).tobytes(), "grew"),
+        Entry(1, "b", DIVERGED, 1, measures(1).tobytes(), "grew"),
     )
     ledger = replay(tmp_path, HEADER)
     assert ledger.reasons == {0: reason, 1: "grew"}
@@ -81,7 +81,7 @@ def test_a_reason_of_any_text_stays_on_its_line(tmp_path):
 
 @pytest.mark.parametrize("cut", [1, 2, 10, 60])
 def test_a_line_cut_short_is_passed_over_and_the_rest_kept(tmp_path, cut):
-    path = write(tmp_path, *(Entry(i, f"id{i}", DONE, i, metrics(i).tobytes()) for i in range(3)))
+    path = write(tmp_path, *(Entry(i, f"id{i}", DONE, i, measures(i).tobytes()) for i in range(3)))
     path.write_bytes(path.read_bytes()[:-cut])
     ledger = replay(tmp_path, HEADER)
     assert ledger.status[:3].tolist() == [DONE, DONE, MISSING]
@@ -90,7 +90,7 @@ def test_a_line_cut_short_is_passed_over_and_the_rest_kept(tmp_path, cut):
 
 
 def test_no_flipped_bit_goes_unseen(tmp_path):
-    path = write(tmp_path, Entry(4, "id", DONE, 7, metrics(0).tobytes()))
+    path = write(tmp_path, Entry(4, "id", DONE, 7, measures(0).tobytes()))
     whole = path.read_bytes()
     begin = whole.index(b"\n") + 1
     for at in range(begin, len(whole), 7):
@@ -103,17 +103,17 @@ def test_no_flipped_bit_goes_unseen(tmp_path):
 
 
 def test_without_its_header_a_line_counts_if_its_id_is_that_of_its_place(tmp_path):
-    """A damaged header costs nothing; lines of another grid, or of metrics of another size, stay out."""
-    lines = [Entry(i, HEADER.id_at(i), DONE, i, metrics(i).tobytes()) for i in range(3)]
-    path = write(tmp_path, *lines, Entry(4, HEADER.id_at(5), DONE, 4, metrics(4).tobytes()))
-    write(tmp_path, Entry(5, HEADER.id_at(5), DONE, 1, metrics(0, 1).tobytes()), writer="rank00001")
+    """A damaged header costs nothing; lines of another grid, or of measures of another size, stay out."""
+    lines = [Entry(i, HEADER.id_at(i), DONE, i, measures(i).tobytes()) for i in range(3)]
+    path = write(tmp_path, *lines, Entry(4, HEADER.id_at(5), DONE, 4, measures(4).tobytes()))
+    write(tmp_path, Entry(5, HEADER.id_at(5), DONE, 1, measures(0, 1).tobytes()), writer="rank00001")
     for torn in tmp_path.iterdir():
         data = bytearray(torn.read_bytes())
         data[20] ^= 1
         torn.write_bytes(data)
     ledger = replay(tmp_path, HEADER)
     assert ledger.status.tolist() == [DONE] * 3 + [MISSING] * 3
-    assert ledger.metrics[2].tobytes() == metrics(2).tobytes()
+    assert ledger.measures[2].tobytes() == measures(2).tobytes()
     assert ledger.torn == 2
     path.write_bytes(path.read_bytes()[:20])
     assert not replay(tmp_path, HEADER).is_known.any()
@@ -133,15 +133,15 @@ def test_without_its_header_a_line_counts_if_its_id_is_that_of_its_place(tmp_pat
     ids=["identity", "stators", "values", "larger grid", "smaller grid", "order", "fewer axes"],
 )
 def test_journals_of_another_study_do_not_count(tmp_path, foreign):
-    write(tmp_path, Entry(0, "a", DONE, 1, metrics(0, foreign.n_stator).tobytes()), header=foreign)
+    write(tmp_path, Entry(0, "a", DONE, 1, measures(0, foreign.n_stator).tobytes()), header=foreign)
     ledger = replay(tmp_path, HEADER)
     assert not ledger.is_known.any()
     assert ledger.torn == 0
 
 
 def test_the_later_run_has_the_last_word(tmp_path):
-    write(tmp_path, Entry(0, "a", FAILED, reason="old"), Entry(1, "b", DONE, 1, metrics(0).tobytes()))
-    write(tmp_path, Entry(0, "a", DONE, 5, metrics(1).tobytes()), run=2)
+    write(tmp_path, Entry(0, "a", FAILED, reason="old"), Entry(1, "b", DONE, 1, measures(0).tobytes()))
+    write(tmp_path, Entry(0, "a", DONE, 5, measures(1).tobytes()), run=2)
     write(tmp_path, Entry(1, "-", MISSING), run=10, writer="verify")
     ledger = replay(tmp_path, HEADER)
     assert ledger.status[:2].tolist() == [DONE, MISSING]
@@ -151,7 +151,7 @@ def test_the_later_run_has_the_last_word(tmp_path):
 
 
 def test_what_a_run_takes_back_comes_before_what_it_computes(tmp_path):
-    write(tmp_path, Entry(0, "a", DONE, 5, metrics(1).tobytes()), run=3)
+    write(tmp_path, Entry(0, "a", DONE, 5, measures(1).tobytes()), run=3)
     write(tmp_path, Entry(0, "-", MISSING), run=3, writer="gone")
     assert replay(tmp_path, HEADER).status[0] == DONE
     assert [path.name for path in journals(tmp_path)] == [

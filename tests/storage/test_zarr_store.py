@@ -15,7 +15,7 @@ from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING, STATE, VARIABLES
 from rubhpc.storage import layout
 from rubhpc.storage.disk import disk_errors, write_whole
-from rubhpc.storage.journal import Entry, metrics_type
+from rubhpc.storage.journal import Entry, measures_type
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import bring_up_to_date, find_gone, open_store, sweep_for
 from rubhpc.storage.store import Store, case_checksum
@@ -51,7 +51,7 @@ def fill(store: Store, start: tuple[int, ...], seed: int = 0) -> dict[str, np.nd
 
 def journal(store: Store, start: tuple[int, ...], data: dict[str, np.ndarray], run: int = 1) -> None:
     """Journal a block as done, its metrics counting up."""
-    row = np.zeros((), metrics_type(store.manifest.sizes["stator"]))
+    row = np.zeros((), measures_type(store.manifest.sizes["stator"]))
     with store.journal(run, f"rank{sum(start):05d}") as lines:
         for i_case, flat in enumerate(store.flat(start).tolist()):
             for name in row.dtype.names:
@@ -93,7 +93,7 @@ def test_only_what_is_kept_has_arrays(tmp_path):
     study = read_study(write_study(tmp_path, keep='["section"]'))
     ds = xr.open_zarr(Store.create(study.output, Sweep(study)).path)
     roles = {VARIABLES[str(name)].role for name in ds.data_vars if name in VARIABLES}
-    assert roles == {"section", "scalar", "setting", "flag"}
+    assert roles == {"section", "measure", "setting", "flag"}
     assert "revolution" in ds.coords  # though nothing here lies along it
 
 
@@ -366,7 +366,7 @@ def test_a_file_written_whole_replaces_the_old_one_or_leaves_it(tmp_path, monkey
 
 
 def test_a_diverged_case_keeps_its_metrics(store):
-    row = np.zeros((), metrics_type(1))
+    row = np.zeros((), measures_type(1))
     row["steps"] = 1234
     with store.journal(1, "rank00000") as lines:
         lines.write([Entry(0, "a", DIVERGED, 0, row.tobytes(), "grew")])
