@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import pytest
+import synthetic_store
 from browsers import find_browser
-from unit import synthetic_store
 
 from postproc.report.budget import write_report
 from postproc.report.page import Page as ReportPage
