@@ -1,7 +1,7 @@
 """Synchronous full annular rub of a ring of stators in closed form: what dense rings come to.
 
 H. F. Black, Interaction of a whirling rotor with a vibrating stator across a clearance annulus, J. Mech. Eng.
-Sci. 10 (1968) 1-12, for a ring of many stators, each on its own; docs/theory.md, section 17.
+Sci. 10 (1968) 1-12, for a ring of many stators, each on its own; docs/theory/annular.md.
 """
 
 from __future__ import annotations

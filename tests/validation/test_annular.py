@@ -2,7 +2,7 @@
 
 H. F. Black, J. Mech. Eng. Sci. 10 (1968) 1-12, balances unbalance, the rotor's receptance and the force of
 a ring that the rotor touches all around. Here the ring is of many springs, of which the rotor presses those
-under an arc that goes round with it; docs/theory.md has the derivation.
+under an arc that goes round with it; docs/theory/annular.md has the derivation.
 """
 
 import cmath
