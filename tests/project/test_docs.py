@@ -26,7 +26,7 @@ from rubhpc.study.study import Recording, read_study
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
-STORE = (ROOT / "docs" / "store.md").read_text()
+STORE = (ROOT / "docs" / "guide" / "store.md").read_text()
 STUDIES = "Studies that come along"
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "jobs").glob("*.md")])
 

@@ -1,4 +1,4 @@
-"""What docs/rigs.md shows is so."""
+"""What docs/guide/rigs.md shows is so."""
 
 import re
 import tomllib
@@ -9,14 +9,14 @@ import pytest
 from rubhpc import read_rig
 from rubhpc.rig.rig import rig_from_dict
 
-DOCUMENT = (Path(__file__).parents[2] / "docs" / "rigs.md").read_text()
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "guide" / "rigs.md").read_text()
 SHOWN = {block for block in re.findall(r"```python\n(.*?)```", DOCUMENT, re.DOTALL) if "zarr" not in block}
 
 
 def shown(word):
     (text,) = (block for block in SHOWN if word in block)
     run = {}
-    exec(compile(text, "docs/rigs.md", "exec"), run)
+    exec(compile(text, "docs/guide/rigs.md", "exec"), run)
     return run
 
 
