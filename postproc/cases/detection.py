@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.signals.indicators import INDICATORS
-from postproc.store.open import source
+from postproc.store.axes import source
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:

@@ -94,7 +94,7 @@ def half_widths(
         case[is_filled] += random.choice(residuals, int(is_filled.sum()))
         weights = [_level_weights(random, n) for n in values.shape]
         with np.errstate(divide="ignore", invalid="ignore"):
-            # A draw may by chance take levels among which the scalar does not change: it tells nothing.
+            # A draw may by chance take levels among which the measure does not change: it tells nothing.
             drawn[i] = grid_indices(case, weights)
     width: Floats = norm.ppf(0.5 + confidence / 2) * np.nanstd(drawn, axis=0, ddof=1)
     return width

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from postproc.store.open import axes_of, find_axis, need, source
+from postproc.store.axes import axes_of, find_axis, source
 from postproc.store.select import narrow
+from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
 from rubhpc.schema import VARIABLES
 
@@ -84,7 +85,7 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
         length).
     """
     if value not in MAPPABLE:
-        need(store, [value])
+        require_variables(store, [value])
         raise InputError(f"{source(store)}: {value}: no scalar of a case; choose {', '.join(MAPPABLE)}")
     store = store.assign(validity=validity(store))
     data = narrow(store, dict.fromkeys([value, "status", "validity"]), spread=[*spread, *facets])

@@ -2,7 +2,7 @@
 
 Spectra are read in pieces of whole chunks, reduced piece by piece and put together in a tree, so that memory
 holds some pieces and the result. They stay lazy, on whatever dask runs: threads, or the processes of a
-`distributed` client here or on a cluster; `computed` waits for them with a progress bar. Of scalars, 8 bytes
+`distributed` client here or on a cluster; `computed` waits for them with a progress bar. Of measures, 8 bytes
 a case, one is held at a time.
 """
 
@@ -21,7 +21,9 @@ import xarray as xr
 import zarr
 
 from postproc.signals.spectra import spectrum_of, with_frequency
-from postproc.store.open import LONG_ROLES, axes_of, find_axis, need, open_store, source
+from postproc.store.axes import axes_of, find_axis, source
+from postproc.store.open import open_store
+from postproc.store.variables import LONG_ROLES, require_measure
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE, VARIABLES
 
@@ -30,7 +32,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-SCALARS = tuple(n for n, v in VARIABLES.items() if v.role in ("measure", "setting"))
 # Chunks decoded in Rust, where zarrs is installed, checksums included: a mean takes 0.65 of the time.
 _FAST = {"codec_pipeline.path": "zarrs.ZarrsCodecPipeline"}
 _MEMORY = 1e9  # bytes that pieces may take together, each some four times: as stored, as read, and on the way
@@ -90,9 +91,9 @@ def envelope(store: xr.Dataset, signal: str, over: Iterable[str] = ()) -> xr.Dat
 
 
 def quantiles(
-    store: xr.Dataset, scalar: str, levels: Sequence[float], over: Iterable[str] = ()
+    store: xr.Dataset, measure: str, levels: Sequence[float], over: Iterable[str] = ()
 ) -> xr.Dataset:
-    """Return quantiles of a scalar over cases that are done, exact and loaded.
+    """Return quantiles of a measure over cases that are done, exact and loaded.
 
     Parameters
     ----------
@@ -104,19 +105,19 @@ def quantiles(
     Returns
     -------
     Dataset over `quantile` and the other axes
-        The scalar, and `cases`.
+        The measure, and `cases`.
     """
-    values, axes = _done(store, scalar, over)
+    values, axes = _done(store, measure, over)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "All-NaN", RuntimeWarning)  # `cases` is 0 there
         found = values.quantile(list(levels), axes, keep_attrs=True)
-    return found.to_dataset(name=scalar).assign(cases=_count(values.notnull(), axes))
+    return found.to_dataset(name=measure).assign(cases=_count(values.notnull(), axes))
 
 
 def histogram(
-    store: xr.Dataset, scalar: str, bins: int | Sequence[float] = 50, over: Iterable[str] = ()
+    store: xr.Dataset, measure: str, bins: int | Sequence[float] = 50, over: Iterable[str] = ()
 ) -> xr.Dataset:
-    """Return how many cases that are done have a scalar in each bin, loaded.
+    """Return how many cases that are done have a measure in each bin, loaded.
 
     Parameters
     ----------
@@ -132,10 +133,10 @@ def histogram(
         `count`, and `cases`, inside the edges or not; `bin` is the middle of a bin, `lower` and `upper` are
         its edges.
     """
-    values, axes = _done(store, scalar, over)
+    values, axes = _done(store, measure, over)
     known = values.values[np.isfinite(values.values)]
     if not known.size:
-        raise InputError(f"{source(store)}: {scalar}: no case of this selection is done; select others")
+        raise InputError(f"{source(store)}: {measure}: no case of this selection is done; select others")
     edges = np.histogram_bin_edges(known, bins)
     others = [d for d in values.dims if d not in axes]
     rows = values.transpose(*others, *axes)
@@ -146,7 +147,7 @@ def histogram(
     at[table == edges[-1]] = n - 1
     at = np.where((at >= 0) & (at < n), at, n) + (n + 1) * np.arange(len(table))[:, None]
     counts = np.bincount(at.ravel(), minlength=len(table) * (n + 1)).reshape(len(table), n + 1)[:, :n]
-    about = {"units": values.attrs.get("units", "1"), "long_name": values.attrs.get("long_name", scalar)}
+    about = {"units": values.attrs.get("units", "1"), "long_name": values.attrs.get("long_name", measure)}
     shape = [rows.sizes[d] for d in others]
     kept = {str(d): rows[d] for d in others}
     count = (*others, "bin"), counts.reshape(*shape, n), {"units": "1", "long_name": "cases in the bin"}
@@ -206,13 +207,11 @@ def _axes(store: xr.Dataset, values: xr.DataArray, over: Iterable[str]) -> list[
     return axes
 
 
-def _done(store: xr.Dataset, scalar: str, over: Iterable[str]) -> tuple[xr.DataArray, list[str]]:
-    """Return a scalar of the cases that are done, loaded, NaN for others, and the dimensions to reduce."""
-    if scalar not in SCALARS:
-        need(store, [scalar])
-        raise InputError(f"{source(store)}: {scalar}: no scalar of a case; choose {', '.join(SCALARS)}")
-    values = store[scalar].astype(float).where(store["status"] == DONE).assign_attrs(store[scalar].attrs)
-    return values.rename(scalar).compute(), _axes(store, values.rename(scalar), over)
+def _done(store: xr.Dataset, measure: str, over: Iterable[str]) -> tuple[xr.DataArray, list[str]]:
+    """Return a measure of the cases that are done, loaded, NaN for others, and the dimensions to reduce."""
+    require_measure(store, measure)
+    values = store[measure].astype(float).where(store["status"] == DONE).assign_attrs(store[measure].attrs)
+    return values.rename(measure).compute(), _axes(store, values.rename(measure), over)
 
 
 def _count(is_there: xr.DataArray, axes: list[str]) -> xr.DataArray:

@@ -1,4 +1,4 @@
-"""Sobol indices from a sample: those of a scalar over the ranges that a study has drawn its cases from.
+"""Sobol indices from a sample: those of a measure over the ranges that a study has drawn its cases from.
 
 Estimated with SALib from Saltelli's design (`rubhpc.study.sampling`): total indices after Jansen, first-order
 ones after Saltelli (A. Saltelli et al., Comput. Phys. Commun. 181, 2010), intervals from base points
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from postproc.store.open import drawn_axes, source
+from postproc.store.axes import drawn_axes, source
 from postproc.store.units import displayed
 from rubhpc.errors import InputError
 from rubhpc.study.axes import coordinate_of
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def by_point(values: xr.DataArray, store: xr.Dataset) -> Floats:
-    """Return a scalar over the cases of a sample by base point, (n_point, n_range + 2).
+    """Return a measure over the cases of a sample by base point, (n_point, n_range + 2).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Sobol indices of a scalar over the axes of a study: which of them it depends on, and which act together.
+"""Sobol indices of a measure over the axes of a study: which of them it depends on, and which act together.
 
 A grid is a full factorial, so nothing is estimated where all cases are done (`postproc.cases.factorial`):
 with every level of an axis weighing the same and axes independent, the decomposition of the variance (I. M.
@@ -16,10 +16,11 @@ import xarray as xr
 
 from postproc.cases.factorial import filled_in, grid_indices, half_widths
 from postproc.cases.saltelli import by_point, estimate, ranges_told
-from postproc.store.open import axes_of, drawn_axes, need, source
+from postproc.store.axes import axes_of, drawn_axes, source
 from postproc.store.select import narrow, written_values
+from postproc.store.variables import require_measure
 from rubhpc.errors import InputError
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, VARIABLES
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
 from rubhpc.study.sampling import CASE
 
 if TYPE_CHECKING:
@@ -27,16 +28,15 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-SCALARS = tuple(n for n, v in VARIABLES.items() if v.role in ("measure", "setting"))
 MOST_FILLED = 0.1  # of the cases: a tenth, filled, moves an index of the Ishigami function by up to 0.04
 MOST_DROPPED = 0.5  # of the base points of a sample: one goes with each of its cases that has no value
 _CLOSE = 1e-10  # of the largest value: less is no spread
 
 
 def sensitivity(
-    store: xr.Dataset, scalar: str, *, n_draw: int = 500, confidence: float = 0.95, seed: int = 1
+    store: xr.Dataset, measure: str, *, n_draw: int = 500, confidence: float = 0.95, seed: int = 1
 ) -> xr.Dataset:
-    """Return first-order and total Sobol indices of a scalar over the axes of several values, or of a sample.
+    """Return first-order and total Sobol indices of a measure over the axes of a grid or of a sample.
 
     Of a grid, levels without any usable case are left out; other cases without a value (missing, failed,
     diverged, or done with a value that is not finite) are filled with the sum of main effects that fits the
@@ -52,7 +52,7 @@ def sensitivity(
     store : Dataset
         All stators but one must have been left out by selection, and of a sampled study all but one value of
         each other axis; axes of one value are dropped.
-    scalar : str
+    measure : str
         A measure or setting of a case.
     confidence : float
         Of the intervals, 0 to 1.
@@ -62,34 +62,32 @@ def sensitivity(
     Dataset over `axis`, the largest total index first
         `first_order`, `total`: shares of the variance; `first_order_low`, `_high`, `total_low`, `_high`: ends
         of the intervals, within 0 to 1 on a grid, while estimates may lie beyond; `levels`: how many were
-        used, or `drawn_from`: which range. Attributes `scalar`, `mean`, `standard_deviation`, `interactions`
+        used, or `drawn_from`: which range. Attributes `measure`, `mean`, `standard_deviation`, `interactions`
         (share of the variance that no axis has for itself), `cases` and how many of them were `filled` or
         `dropped`, `notes` (text, one a line).
 
     Raises
     ------
     InputError
-        No such scalar, fewer than one axis of two levels, too many cases without a value, or no variance.
+        No such measure, fewer than one axis of two levels, too many cases without a value, or no variance.
     """
-    if scalar not in SCALARS:
-        need(store, [scalar])
-        raise InputError(f"{source(store)}: {scalar}: no scalar of a case; choose {', '.join(SCALARS)}")
+    require_measure(store, measure)
     if drawn_axes(store):
-        found = _sampled(store, scalar, n_draw, confidence, seed)
+        found = _sampled(store, measure, n_draw, confidence, seed)
     else:
-        found = _gridded(store, scalar, n_draw, confidence, seed)
+        found = _gridded(store, measure, n_draw, confidence, seed)
     return found.isel(axis=np.argsort(-found["total"].values, kind="stable"))
 
 
-def _gridded(store: xr.Dataset, scalar: str, n_draw: int, confidence: float, seed: int) -> xr.Dataset:
-    values, notes = _levels(store, scalar)
+def _gridded(store: xr.Dataset, measure: str, n_draw: int, confidence: float, seed: int) -> xr.Dataset:
+    values, notes = _levels(store, measure)
     usable = np.isfinite(values.values)
     n_fill = usable.size - int(usable.sum())
-    _refuse_gaps(store, scalar, usable, notes, "filled")
+    _refuse_gaps(store, measure, usable, notes, "filled")
     filled, residuals = filled_in(values.values, usable)
     if n_fill:
         notes.append(f"{n_fill} of {usable.size} cases filled with the main effects of the others")
-    _need_variance(store, scalar, filled)
+    _need_variance(store, measure, filled)
     half = half_widths(filled, ~usable, residuals, n_draw, confidence, seed)
     shares = grid_indices(filled)
     found = _described(store, values, filled, [str(d) for d in values.dims], shares, half, confidence)
@@ -100,23 +98,23 @@ def _gridded(store: xr.Dataset, scalar: str, n_draw: int, confidence: float, see
     return found.assign_attrs(filled=n_fill, notes="\n".join(notes))
 
 
-def _sampled(store: xr.Dataset, scalar: str, n_draw: int, confidence: float, seed: int) -> xr.Dataset:
-    values, notes = _usable_values(store, scalar, [CASE])
+def _sampled(store: xr.Dataset, measure: str, n_draw: int, confidence: float, seed: int) -> xr.Dataset:
+    values, notes = _usable_values(store, measure, [CASE])
     rows = by_point(values, store)
     usable = np.isfinite(rows)
     whole = np.array([row.all() for row in usable])
-    _refuse_gaps(store, scalar, usable, notes, "left out")
+    _refuse_gaps(store, measure, usable, notes, "left out")
     n_drop = int((~whole).sum())
     if n_drop > MOST_DROPPED * whole.size:
         raise InputError(
-            f"{source(store)}: {scalar}: {n_drop} of {whole.size} base points of the sample have a case "
+            f"{source(store)}: {measure}: {n_drop} of {whole.size} base points of the sample have a case "
             f"without a value ({'; '.join(notes)}); at most {MOST_DROPPED:.0%} can be left out: run the "
             "study to its end"
         )
     if n_drop:
         notes.append(f"{n_drop} of {whole.size} base points left out, since one of their cases has no value")
     kept = rows[whole]
-    _need_variance(store, scalar, kept)
+    _need_variance(store, measure, kept)
     shares, half = estimate(kept, n_draw, confidence, seed)
     # Of one base point the first and the last case are independent; the others repeat their values.
     found = _described(store, values, kept[:, [0, -1]], drawn_axes(store), shares, half, confidence)
@@ -125,37 +123,37 @@ def _sampled(store: xr.Dataset, scalar: str, n_draw: int, confidence: float, see
 
 
 def _refuse_gaps(
-    store: xr.Dataset, scalar: str, usable: NDArray[np.bool_], notes: list[str], fate: str
+    store: xr.Dataset, measure: str, usable: NDArray[np.bool_], notes: list[str], fate: str
 ) -> None:
     n_gap = usable.size - int(usable.sum())
     if n_gap > MOST_FILLED * usable.size:
         raise InputError(
-            f"{source(store)}: {scalar}: {n_gap} of {usable.size} cases have no value ({'; '.join(notes)}); "
+            f"{source(store)}: {measure}: {n_gap} of {usable.size} cases have no value ({'; '.join(notes)}); "
             f"at most {MOST_FILLED:.0%} can be {fate}: run the study to its end, or select axis values with "
             "fewer of them"
         )
 
 
-def _need_variance(store: xr.Dataset, scalar: str, values: Floats) -> None:
+def _need_variance(store: xr.Dataset, measure: str, values: Floats) -> None:
     if not values.std() > _CLOSE * np.abs(values).max():
-        raise InputError(f"{source(store)}: {scalar}: the same in all cases; there is no variance to share")
+        raise InputError(f"{source(store)}: {measure}: the same in all cases; there is no variance to share")
 
 
-def _usable_values(store: xr.Dataset, scalar: str, spread: list[str]) -> tuple[xr.DataArray, list[str]]:
-    """Return the scalar over some axes, NaN where a case has no value, and what to tell of those."""
-    data = narrow(store, [scalar, "status"], spread).load()
+def _usable_values(store: xr.Dataset, measure: str, spread: list[str]) -> tuple[xr.DataArray, list[str]]:
+    """Return the measure over some axes, NaN where a case has no value, and what to tell of those."""
+    data = narrow(store, [measure, "status"], spread).load()
     status = data["status"]
-    values = data[scalar].astype(float).broadcast_like(status).transpose(*status.dims)
-    values.attrs = data[scalar].attrs
+    values = data[measure].astype(float).broadcast_like(status).transpose(*status.dims)
+    values.attrs = data[measure].attrs
     is_done = status == DONE
     usable = is_done & np.isfinite(values)
     return values.where(usable), _cases_told(status.values, (is_done & ~usable).values)
 
 
-def _levels(store: xr.Dataset, scalar: str) -> tuple[xr.DataArray, list[str]]:
-    """Return the scalar over axes and levels with cases, NaN where one has no value, and what to tell."""
+def _levels(store: xr.Dataset, measure: str) -> tuple[xr.DataArray, list[str]]:
+    """Return the measure over axes and levels with cases, NaN where one has no value, and what to tell."""
     spread = [a for a in axes_of(store) if store.sizes[a] > 1]
-    values, notes = _usable_values(store, scalar, spread)
+    values, notes = _usable_values(store, measure, spread)
     usable = values.notnull()
     for axis in spread:
         is_level = usable.any([d for d in usable.dims if d != axis])
@@ -166,7 +164,7 @@ def _levels(store: xr.Dataset, scalar: str) -> tuple[xr.DataArray, list[str]]:
     values = values.squeeze()
     if not values.ndim or not usable.any():
         raise InputError(
-            f"{source(store)}: {scalar}: no axis has two values with cases that are done; "
+            f"{source(store)}: {measure}: no axis has two values with cases that are done; "
             "run the study to its end, or select others"
         )
     return values, notes
@@ -201,8 +199,8 @@ def _described(
     names = [str(store[a].attrs.get("long_name", a)) for a in axes]
     selected = {str(name): at for name, at in values.coords.items() if at.ndim == 0}
     about_all: dict[str, Any] = {
-        "scalar": str(values.name),
-        "scalar_name": str(values.attrs.get("long_name", values.name)),
+        "measure": str(values.name),
+        "measure_name": str(values.attrs.get("long_name", values.name)),
         "units": str(values.attrs.get("units", "1")),
         "mean": float(used.mean()),
         "standard_deviation": float(used.std()),

@@ -9,9 +9,10 @@ import numpy as np
 from postproc.figures.cells import is_geometric
 from postproc.figures.map_figure import categories
 from postproc.figures.section import section_of
-from postproc.store.open import find_axis, need_results, ordered_axes, source
+from postproc.store.axes import find_axis, ordered_axes, source
 from postproc.store.select import narrow
 from postproc.store.units import displayed, meanings, scale_of, short_name
+from postproc.store.variables import require_results
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE
 from rubhpc.study.axes import DIRECTION
@@ -80,7 +81,7 @@ def bifurcation_data(store: xr.Dataset, signal: str, along: str, over: str | Non
 def bifurcation(data: xr.Dataset, signal: str, ax: Axes, color: str | None = "regime") -> Axes:
     """Draw the points of `bifurcation_data` over its axis, by regime, period, direction or in one colour."""
     section = data[f"section_{signal}"].load()
-    need_results(section, data)
+    require_results(section, data)
     along = str(section.dims[-2])
     x, x_label = displayed(data[along])
     scale = scale_of(section)

@@ -11,8 +11,8 @@ import numpy as np
 from postproc.figures.cells import cell_edges, is_geometric
 from postproc.signals.cascade import below, hold_peaks, hold_rows
 from postproc.signals.lines import SPIKE, spikes
-from postproc.store.open import need_results
 from postproc.store.units import displayed, scale_of, short_name
+from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -45,7 +45,7 @@ def waterfall(
         Of the highest line, as a part of the ordinate.
     """
     spectra = hold_rows(below(spectra, limit, abscissa), _ROWS).compute()
-    need_results(spectra, spectra.to_dataset(name="spectra"))
+    require_results(spectra, spectra.to_dataset(name="spectra"))
     rows, label = _ordinate(spectra)
     spectra = spectra.where(np.abs(spectra["order"]) > 1e-9)  # the mean is no line
     peak = float(spectra.max())
@@ -80,7 +80,7 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
         spectra.notnull()
     )  # the mean is no line
     held = hold_rows(hold_peaks(lines, limit, _PIXELS[0], abscissa), _PIXELS[1]).compute()
-    need_results(held, held.to_dataset(name="spectra"))
+    require_results(held, held.to_dataset(name="spectra"))
     rows, label = _ordinate(held)
     scale = scale_of(held)
     values = held.values * scale.factor

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from postproc.store.open import drawn_axes, find_axis, source
+from postproc.store.axes import drawn_axes, find_axis, source
 from rubhpc.errors import InputError
 from rubhpc.study.axes import DIRECTION
 from rubhpc.study.sampling import CASE
@@ -72,7 +72,7 @@ def cascade(
     from postproc.signals.cascade import below
     from postproc.signals.cascade import cascade as gather
     from postproc.signals.lines import parse_orders
-    from postproc.store.rig import natural_frequencies
+    from postproc.store.rig_of_case import natural_frequencies
 
     _choose(form, FORMS, "form")
     lines = parse_orders(order_lines, "--order-lines")
@@ -259,7 +259,7 @@ def hht(
     """Hilbert-Huang analysis of a signal: its energy over time and frequency, contact shaded."""
     from postproc.figures.hilbert_huang_figure import panels
     from postproc.signals.hilbert_huang import hilbert_huang
-    from postproc.store.rig import natural_frequencies, stator_frequencies
+    from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
 
     if contact is not None:
         _choose(contact, CONTACT, "contact")

@@ -8,10 +8,11 @@ import numpy as np
 
 from postproc.figures.overlay import overlaid
 from postproc.signals.spectra import last_revolutions, samples_per_revolution
-from postproc.store.open import find_axis, need_results
-from postproc.store.rig import stator_places
+from postproc.store.axes import find_axis
+from postproc.store.rig_of_case import stator_places
 from postproc.store.select import narrow
 from postproc.store.units import scale_for
+from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,7 +44,7 @@ def orbit(data: xr.Dataset, ax: Axes) -> Axes:
     revolution (dots) and the sense of whirl (arrow).
     """
     vertical, horizontal = data["vertical"].load(), data["horizontal"].load()
-    need_results(vertical, data)
+    require_results(vertical, data)
     size = float(np.nanmax(np.abs([vertical.values, horizontal.values])))
     scale = scale_for("m", size)
     if vertical.ndim == 1:

@@ -18,7 +18,7 @@ from postproc.figures.map_figure import (
     paint_of,
     reasons_of,
 )
-from postproc.store.open import axes_of, drawn_axes, source
+from postproc.store.axes import axes_of, drawn_axes, source
 from postproc.store.units import displayed
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE

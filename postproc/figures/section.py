@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.signals.spectra import check_signal, samples_per_revolution
-from postproc.store.open import need, need_results
 from postproc.store.select import narrow
 from postproc.store.units import displayed
+from postproc.store.variables import require_results, require_variables
 from rubhpc.schema import SECTION_NAMES
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def section_of(store: xr.Dataset, signal: str) -> xr.DataArray:
     if f"section_{signal}" in store:
         return store[f"section_{signal}"]
     if signal not in store:
-        need(store, [f"section_{signal}" if signal in SECTION_NAMES else signal])
+        require_variables(store, [f"section_{signal}" if signal in SECTION_NAMES else signal])
     waveform = store[signal]
     points = waveform.isel(sample=slice(None, None, samples_per_revolution(waveform)))
     points = points.rename(sample="section").drop_vars("revolution", errors="ignore")
@@ -49,7 +49,7 @@ def section_data(store: xr.Dataset, signals: Sequence[str]) -> xr.Dataset:
 def plane(data: xr.Dataset, x: str, y: str, ax: Axes) -> Axes:
     """Draw the section of one case in the plane of two signals, its points darkening as revolutions pass."""
     across, up = data[f"section_{x}"].load(), data[f"section_{y}"].load()
-    need_results(across, data)
+    require_results(across, data)
     xs, x_label = displayed(across)
     ys, y_label = displayed(up)
     dots = ax.scatter(xs, ys, c=np.arange(xs.size), cmap="viridis_r", s=9, linewidths=0, zorder=3)

@@ -34,7 +34,7 @@ def bars(indices: xr.Dataset, ax: Axes) -> Axes:
     ax.set_yticks(at, [short_name(xr.DataArray(name=n, attrs={"long_name": text})) for n, text in named])
     ax.tick_params(axis="y", length=0)
     about = indices.attrs
-    scalar = xr.DataArray(name=about["scalar"], attrs={"long_name": about["scalar_name"]})
+    scalar = xr.DataArray(name=about["measure"], attrs={"long_name": about["measure_name"]})
     told = f"{about['interactions']:.0%} interactions, {about['confidence']:.0%} intervals"
     # To the left of the panel there is room that long names of axes take.
     ax.set_title(f"{short_name(scalar)} ({told})", fontsize=7, loc="right")

@@ -8,8 +8,8 @@ import numpy as np
 
 from postproc.figures.overlay import overlaid
 from postproc.signals.lines import SPIKE, spikes, strongest_lines
-from postproc.store.open import need_results
 from postproc.store.units import scale_of, short_name
+from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +41,7 @@ def spectrum(
         End of the abscissa, Hz or orders.
     """
     amplitude = amplitude.load()
-    need_results(amplitude, amplitude.to_dataset())
+    require_results(amplitude, amplitude.to_dataset())
     is_line = np.abs(amplitude["order"]) > 1e-9  # the mean is no line
     amplitude = amplitude.where(is_line)
     scale = scale_of(amplitude)

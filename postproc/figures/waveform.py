@@ -10,9 +10,10 @@ import numpy as np
 
 from postproc.figures.overlay import overlaid
 from postproc.signals.spectra import check_signal, last_revolutions
-from postproc.store.open import find_axis, need_results
+from postproc.store.axes import find_axis
 from postproc.store.select import narrow
 from postproc.store.units import displayed, scale_of, short_name
+from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +62,7 @@ def waveform_data(
 def waveform(signal: xr.DataArray, ax: Axes) -> Axes:
     """Draw one signal, or that of several cases over one another, over time or else revolutions."""
     signal = signal.load()
-    need_results(signal, signal.to_dataset())
+    require_results(signal, signal.to_dataset())
     scale = scale_of(signal)
     x, x_label = displayed(_abscissa(signal))
     for name, curve in overlaid(signal, "sample"):

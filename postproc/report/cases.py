@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.report.detail import pack_case
-from postproc.store.open import LONG_ROLES, axes_of
-from postproc.store.rig import stator_places
+from postproc.store.axes import axes_of
+from postproc.store.rig_of_case import stator_places
+from postproc.store.variables import LONG_ROLES
 from rubhpc.schema import DONE, VARIABLES
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import xarray as xr
 from postproc.cases.maps import VALIDITY, monitors
 from postproc.cases.saltelli import ranges_told
 from postproc.report.grid import plain
-from postproc.store.open import axes_of, drawn_axes
+from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.units import Scale, scale_for, short_name
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 

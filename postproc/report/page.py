@@ -26,8 +26,8 @@ from postproc.report.facts import (
 from postproc.report.grid import Measures, axes_told, validity_text
 from postproc.report.packing import as_text
 from postproc.report.side_view import description, side_view
-from postproc.store.open import source
-from postproc.store.rig import natural_frequencies, rig_axes, rig_of, stator_places
+from postproc.store.axes import source
+from postproc.store.rig_of_case import natural_frequencies, rig_axes, rig_of, stator_places
 from rubhpc.errors import RubError
 from rubhpc.version import __version__
 

@@ -9,12 +9,11 @@ import numpy as np
 import xarray as xr
 
 from postproc.signals.spectra import periodic_spectrum, with_frequency
-from postproc.store.open import find_axis, ordered_axes
+from postproc.store.axes import find_axis, ordered_axes
+from rubhpc.study.axes import SPEED_AXES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-SPEED_AXES = ("speed_ratio", "speed")
 
 
 def cascade(store: xr.Dataset, signal: str = "torsion", along: str | None = None) -> xr.DataArray:

@@ -10,8 +10,9 @@ import xarray as xr
 
 from postproc.signals.decay import decaying_sine
 from postproc.signals.spectra import check_signal, samples_per_revolution
-from postproc.store.open import need_results, source
+from postproc.store.axes import source
 from postproc.store.select import narrow
+from postproc.store.variables import require_results
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def signal_of(case: xr.Dataset, signal: str, stator: int | None = None) -> xr.Da
     if stator is not None and "stator" in case.dims:
         case = case.isel(stator=[_place(case, stator)])
     wave: xr.DataArray = narrow(case, [signal])[signal].astype(float).load()
-    need_results(wave.values, case)
+    require_results(wave.values, case)
     return wave
 
 

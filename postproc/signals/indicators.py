@@ -14,9 +14,10 @@ import numpy as np
 import xarray as xr
 
 from postproc.signals.spectra import samples_per_revolution
-from postproc.store.open import axes_of, need_results, source
-from postproc.store.rig import natural_frequencies, rig_axes, stator_frequencies
+from postproc.store.axes import axes_of, source
+from postproc.store.rig_of_case import natural_frequencies, rig_axes, stator_frequencies
 from postproc.store.select import narrow
+from postproc.store.variables import require_results
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE, REGIME
 
@@ -94,7 +95,7 @@ def indicator_scores(
     data = narrow(store, [*CHANNELS, "regime", "spin_speed", "status"], axes)
     data = data.assign({n: data[n].compute() for n in ("regime", "spin_speed", "status")})
     is_done = data["status"] == DONE
-    need_results(is_done.where(is_done), store)
+    require_results(is_done.where(is_done), store)
     is_free = data["regime"] == REGIME.index("no_contact")  # of all stators, whichever is looked at
     rub, free = is_done & ~is_free, is_done & is_free
     for mask, kind, mend in (

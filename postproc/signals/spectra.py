@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from postproc.store.open import find_axis, source
+from postproc.store.axes import find_axis, source
 from postproc.store.select import narrow
 from rubhpc.errors import InputError
 from rubhpc.schema import SIGNAL_NAMES

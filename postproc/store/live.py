@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def latest(path: Path) -> xr.Dataset:
+def open_live(path: Path) -> xr.Dataset:
     """Return the store as `open_store` does, with status and measures of every case that is journalled.
 
     What only the journals know goes into the attributes: `reasons` (flat index of a case to why it failed

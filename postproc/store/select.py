@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.store.open import axes_of, drawn_axes, find_axis, need, source
+from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.units import meanings, scale_for
+from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
 from rubhpc.input.reading import parse_quantity
 from rubhpc.study.axes import coordinate_of
@@ -63,7 +64,7 @@ def narrow(store: xr.Dataset, names: Iterable[str], spread: Iterable[str] = ()) 
         A variable is not kept, or axes of several values are left: one line says which values there are.
     """
     names = list(names)
-    need(store, names)
+    require_variables(store, names)
     spread = set(spread)
     data = store[names]
     free = [a for a in (*axes_of(store), "stator") if a in data.dims and a not in spread]
@@ -81,7 +82,7 @@ def first_of_rest(store: xr.Dataset, keep: Iterable[str], variable: str) -> tupl
 
     The stators count as an axis where the variable tells them apart.
     """
-    need(store, [variable])
+    require_variables(store, [variable])
     keep = set(keep)
     rest = [d for d in (*axes_of(store), *({"stator"} & set(store[variable].dims))) if d not in keep]
     notes = [

@@ -22,7 +22,7 @@ def report(store: Path, output: Path | None, limit: str) -> None:
     case shows its orbit, spectrum, waveform and Poincaré section. Works while a run is on.
     """
     from postproc.report.budget import write_report
-    from postproc.store.live import latest
+    from postproc.store.live import open_live
     from rubhpc.errors import InputError
     from rubhpc.input.quantity import parse_quantity
 
@@ -32,7 +32,7 @@ def report(store: Path, output: Path | None, limit: str) -> None:
         raise InputError(f"{path}: a report is an HTML page; name it {path.stem}.html")
     if not path.parent.is_dir():
         raise InputError(f"{path}: no directory {path.parent}; make it first")
-    load = write_report(latest(store), path, size)
+    load = write_report(open_live(store), path, size)
     click.echo(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")
     for note in load.notes:
         click.echo(note)
@@ -51,9 +51,9 @@ def view(store: Path, port: int) -> None:
     import contextlib
 
     from postproc.report.server import Library, Server
-    from postproc.store.live import latest
+    from postproc.store.live import open_live
 
-    with Server(Library(lambda: latest(store)), port) as server, contextlib.suppress(KeyboardInterrupt):
+    with Server(Library(lambda: open_live(store)), port) as server, contextlib.suppress(KeyboardInterrupt):
         click.echo(f"{store} is at {server.url} until Ctrl-C")
         server.serve_forever()
 

@@ -46,7 +46,7 @@ def _table(found: xr.Dataset) -> Iterator[str]:
     about = found.attrs
     unit = "" if about["units"] == "1" else f" {about['units']}"
     yield (
-        f"{about['scalar']}: mean {about['mean']:.6g}{unit}, standard deviation "
+        f"{about['measure']}: mean {about['mean']:.6g}{unit}, standard deviation "
         f"{about['standard_deviation']:.6g}{unit}, {about['cases']} cases"
     )
     yield from about["notes"].splitlines()

@@ -149,7 +149,7 @@ def test_damaged_chunk_is_noticed(tmp_path: Path) -> None:
         (lambda store: mean_spectrum(store, "torsion", ["frction"]), "did you mean friction?"),
         (lambda store: mean_spectrum(store, "torsion", ["stator"]), "does not depend on stator"),
         (lambda store: mean_spectrum(store.drop_vars(SPECTRUM), "torsion"), "keeps neither"),
-        (lambda store: quantiles(store, "status", [0.5]), "status: no scalar of a case; choose"),
+        (lambda store: quantiles(store, "status", [0.5]), "status: is not a measure; choose"),
         (
             lambda store: histogram(store.assign(status=store["status"] * 0), "peak_torsion"),
             "no case of this",

@@ -13,7 +13,7 @@ from SALib.test_functions import Ishigami
 
 from postproc.cases.sensitivity import sensitivity
 from postproc.figures.sensitivity_figure import bars
-from postproc.store.open import drawn_axes
+from postproc.store.axes import drawn_axes
 from rubhpc.commands.sensitivity import sensitivity as command
 from rubhpc.errors import InputError
 from rubhpc.rig.rig import read_rig

@@ -189,7 +189,7 @@ def test_level_without_cases_is_left_out_and_told() -> None:
         (lambda store: store.assign(status=store["status"] * 0), "no axis has two values with cases"),
         (lambda store: store.isel(speed_ratio=[0], friction=[0], clearance_ratio=[0]), "no axis has two"),
         (lambda store: store.assign(peak_torsion=store["peak_torsion"] * 0 + 3), "the same in all cases"),
-        (lambda store: store.drop_vars("peak_torsion"), "has no variable peak_torsion; "),
+        (lambda store: store.drop_vars("peak_torsion"), "no variable peak_torsion; "),
     ],
 )
 def test_what_has_no_indices_is_refused(spoil: Callable[[xr.Dataset], xr.Dataset], said: str) -> None:
@@ -202,7 +202,7 @@ def test_what_has_no_indices_is_refused(spoil: Callable[[xr.Dataset], xr.Dataset
 @pytest.mark.parametrize(
     ("scalar", "said"),
     [
-        ("status", "status: no scalar of a case; choose"),
+        ("status", "status: is not a measure; choose"),
         ("peak_torson", "did you mean peak_torsion?"),
         ("peak_contact_force", "select one value of stator (one of 1, 2)"),
     ],

@@ -13,7 +13,7 @@ import xarray as xr
 from postproc.figures.cascade_figure import default_limit, draw_frequencies, draw_orders, intensity, waterfall
 from postproc.figures.style import house_style, new_figure
 from postproc.signals.cascade import below, cascade, hold_peaks, hold_rows
-from postproc.store.rig import natural_frequencies, stator_places
+from postproc.store.rig_of_case import natural_frequencies, stator_places
 from postproc.store.select import select
 from rubhpc.errors import InputError
 from rubhpc.rig.rig import read_rig
@@ -232,7 +232,7 @@ def test_the_waterfall_has_a_curve_for_each_finished_case(ax):
 
 def test_an_unfinished_cascade_says_so(spectra, ax):
     for draw in (waterfall, intensity):
-        with pytest.raises(InputError, match="no case of this selection is done"):
+        with pytest.raises(InputError, match="no selected case is done"):
             draw(spectra * np.nan, ax, 100.0)
 
 

@@ -202,7 +202,7 @@ def test_too_many_curves_are_refused(store):
 
 def test_a_case_that_is_not_done_has_no_orbit(store, ax):
     missing = {"speed_ratio": 0.75, "clearance": 70e-6, "friction": 0.1, "stator_youngs_modulus": 3e9}
-    with pytest.raises(InputError, match="no case of this selection is done"):
+    with pytest.raises(InputError, match="no selected case is done"):
         orbit(orbit_data(select(store, missing)), ax)
 
 

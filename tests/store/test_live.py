@@ -13,7 +13,7 @@ import xarray as xr
 from running import write_study
 
 import rubhpc
-from postproc.store.live import latest
+from postproc.store.live import open_live
 from rubhpc.errors import StoreError
 from rubhpc.schema import DONE
 from rubhpc.storage.runs import read_runs
@@ -30,21 +30,21 @@ def store(tmp_path: Path) -> Path:
 
 
 def test_measures_come_from_the_journals_before_they_are_packed(store: Path) -> None:
-    packed = latest(store).load()
+    packed = open_live(store).load()
     for name in ("status", "peak_torsion", "contact_fraction"):
         chunks = store / name / "c"
         for path in sorted(chunks.rglob("*"), reverse=True):
             path.rmdir() if path.is_dir() else path.unlink()
     assert np.isnan(rubhpc.open(store)["peak_torsion"]).all()
     (store / ".rubhpc" / "packed.json").unlink()
-    now = latest(store).load()
+    now = open_live(store).load()
     assert (now["status"] == DONE).all()
     xr.testing.assert_equal(now, packed)
     assert now.encoding["source"] == str(store)
 
 
 def test_what_only_the_journals_know_is_told(store: Path) -> None:
-    told = latest(store).attrs
+    told = open_live(store).attrs
     assert told["reasons"] == {}
     assert told["running"] == ""
     (run,) = told["runs"]
@@ -69,11 +69,11 @@ def test_a_damaged_record_of_a_run_is_passed_over(store: Path) -> None:
 
 def test_a_store_without_journals_comes_as_it_is(tmp_path: Path) -> None:
     synthetic_store.write(tmp_path / "copy.zarr", synthetic_store.make(keep=()))
-    now = latest(tmp_path / "copy.zarr")
+    now = open_live(tmp_path / "copy.zarr")
     assert "reasons" not in now.attrs
     assert float(now["peak_contact_force"].max()) > 0
 
 
 def test_no_store_is_said(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="no such store"):
-        latest(tmp_path / "none.zarr")
+        open_live(tmp_path / "none.zarr")

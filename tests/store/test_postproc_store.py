@@ -138,7 +138,7 @@ def test_a_stator_is_asked_for_only_by_its_own_signals(tmp_path):
 
 def test_what_is_not_kept_says_how_to_keep_it(tmp_path):
     synthetic_store.write(tmp_path / "bare.zarr", synthetic_store.make(keep=()))
-    with pytest.raises(InputError, match=r'keeps no vertical; run the study with "waveform" in \[record\]'):
+    with pytest.raises(InputError, match=r'does not contain vertical; run the study with "waveform"'):
         narrow(open_store(tmp_path / "bare.zarr"), ["vertical"])
 
 

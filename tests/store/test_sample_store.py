@@ -12,8 +12,9 @@ from running import write_sample
 from postproc.figures import catalogue as figures
 from postproc.figures.map_figure import REGIME_COLORS
 from postproc.figures.scatter import scatter_axes
-from postproc.store.open import drawn_axes, open_store
-from postproc.store.rig import natural_frequencies, rig_of
+from postproc.store.axes import drawn_axes
+from postproc.store.open import open_store
+from postproc.store.rig_of_case import natural_frequencies, rig_of
 from postproc.store.select import select
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from postproc.store.open import source
+from postproc.store.axes import source
 from postproc.store.select import select
 from rubhpc.errors import StoreError
 from rubhpc.schema import DONE, MISSING, STATUS

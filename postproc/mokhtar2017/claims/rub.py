@@ -21,7 +21,7 @@ from postproc.mokhtar2017.claims.measures import (
 )
 from postproc.signals.contacts import contact_spans, event_jumps, free_decay, peak_after_contact
 from postproc.signals.spectra import samples_per_revolution
-from postproc.store.rig import stator_frequencies
+from postproc.store.rig_of_case import stator_frequencies
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from postproc.mokhtar2017.claims.cases import LARGE_GAP_CASE, cases
 from postproc.mokhtar2017.claims.claim import Claim, Finding, claim
-from postproc.store.rig import natural_frequencies, stator_frequencies
+from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,7 +8,7 @@ from postproc.figures.hilbert_huang_figure import energy_time_frequency
 from postproc.figures.waveform import shade_contacts
 from postproc.mokhtar2017.figures.panels import legend, tidy
 from postproc.signals.hilbert_huang import hilbert_huang
-from postproc.store.rig import natural_frequencies, stator_frequencies
+from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
 from postproc.store.units import scale_for, scale_of, short_name
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from postproc.mokhtar2017.claims.speed import (
 )
 from postproc.mokhtar2017.figures.page import page, title
 from postproc.mokhtar2017.figures.panels import orbits
-from postproc.store.rig import natural_frequencies
+from postproc.store.rig_of_case import natural_frequencies
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

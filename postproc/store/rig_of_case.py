@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from postproc.store.open import source
+from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.rig.rig import Rig, rig_from_dict, with_keys
 

@@ -1,0 +1,58 @@
+"""The variables of an opened store: which are large arrays, which are measures, which are there."""
+
+from __future__ import annotations
+
+import difflib
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.store.axes import source
+from rubhpc.errors import InputError
+from rubhpc.schema import VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+LONG_ROLES = ("waveform", "spectrum", "section")
+# One number a case, or one a stator of it.
+MEASURES = tuple(n for n, v in VARIABLES.items() if v.role in ("measure", "setting"))
+
+
+def require_variables(store: xr.Dataset, names: Iterable[str]) -> None:
+    """Check that the store has the variables.
+
+    Raises
+    ------
+    InputError
+        One is missing; the message names the `[record] keep` that stores it, or the nearest name.
+    """
+    for name in names:
+        if name in store:
+            continue
+        variable = VARIABLES.get(name)
+        if variable is not None and variable.role in LONG_ROLES:
+            fix = f'run the study with "{variable.role}" in [record] keep'
+            raise InputError(f"{source(store)}: does not contain {name}; {fix}")
+        known = [str(n) for n in store.data_vars]
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"the variables are {', '.join(known)}"
+        raise InputError(f"{source(store)}: no variable {name}; {hint}")
+
+
+def require_measure(store: xr.Dataset, name: str) -> None:
+    """Check that a name is that of a measure, and that the store has it; InputError where not."""
+    if name not in MEASURES:
+        require_variables(store, [name])
+        raise InputError(f"{source(store)}: {name}: is not a measure; choose one of {', '.join(MEASURES)}")
+    require_variables(store, [name])
+
+
+def require_results(values: ArrayLike, store: xr.Dataset) -> None:
+    """Check that at least one value is finite; InputError where no selected case is done."""
+    if not np.isfinite(np.asarray(values, dtype=float)).any():
+        fix = "run the study to its end, or select other cases"
+        raise InputError(f"{source(store)}: no selected case is done; {fix}")
