@@ -34,55 +34,87 @@ class FieldError(InputError):
 def quantity(
     unit: str,
     *,
+    doc: str,
+    example: str,
     default: Any = MISSING,
     above: float | None = None,
     at_least: float | None = None,
     below: float | None = None,
 ) -> Any:
-    """Declare a field that holds a finite number in `unit` (SI, readable by pint), within its bounds."""
+    """Declare a field that holds a finite number in `unit` (SI, readable by pint), within its bounds.
+
+    Parameters
+    ----------
+    doc, example : str
+        Meaning in one line; a value as in a TOML file, `'"0.8 m"'`; for messages and the reference of keys,
+        as in all declarations below.
+    """
     bounds = {"above": above, "at_least": at_least, "below": below}
-    return field(default=default, metadata={"kind": "quantity", "unit": unit, **bounds})
+    return _declare("quantity", doc, example, default, unit=unit, **bounds)
 
 
 def count(
     *,
+    doc: str,
+    example: str,
     default: Any = MISSING,
     at_least: int = 1,
     at_most: int | None = None,
     is_key: bool = True,
     or_word: str = "",
 ) -> Any:
-    """Declare a field that holds a whole number within its bounds; `is_key`: that a study may set.
-
-    It may hold `or_word` instead.
-    """
+    """Declare a field that holds a bounded whole number, or `or_word`; `is_key`: a study may set it."""
     bounds = {"at_least": at_least, "at_most": at_most, "or_word": or_word}
-    return field(default=default, metadata={"kind": "count", "is_key": is_key, **bounds})
+    return _declare("count", doc, example, default, is_key=is_key, **bounds)
 
 
-def flag(*, default: bool) -> Any:
+def flag(*, doc: str, example: str, default: bool) -> Any:
     """Declare a field that is true or false."""
-    return field(default=default, metadata={"kind": "flag"})
+    return _declare("flag", doc, example, default)
 
 
-def text(*, default: Any = MISSING) -> Any:
+def text(*, doc: str, example: str, default: Any = MISSING) -> Any:
     """Declare a field that holds one line of text."""
-    return field(default=default, metadata={"kind": "text"})
+    return _declare("text", doc, example, default)
 
 
-def choice(*, of: tuple[str, ...], default: str) -> Any:
+def choice(*, of: tuple[str, ...], doc: str, example: str, default: str) -> Any:
     """Declare a field that holds one word of a list."""
-    return field(default=default, metadata={"kind": "choice", "of": of})
+    return _declare("choice", doc, example, default, of=of)
 
 
-def choices(*, of: tuple[str, ...], default: tuple[str, ...]) -> Any:
+def choices(*, of: tuple[str, ...], doc: str, example: str, default: tuple[str, ...]) -> Any:
     """Declare a field that holds some words of a list, each at most once."""
-    return field(default=default, metadata={"kind": "choices", "of": of})
+    return _declare("choices", doc, example, default, of=of)
 
 
-def words(*, default: tuple[str, ...]) -> Any:
+def words(*, doc: str, example: str, default: tuple[str, ...]) -> Any:
     """Declare a field that holds a list of words."""
-    return field(default=default, metadata={"kind": "words"})
+    return _declare("words", doc, example, default)
+
+
+def pairs(units: tuple[str, str], *, doc: str, example: str) -> Any:
+    """Declare a field that holds pairs of numbers, written as a table `{ 31.56 = 0.09 }`; none by default."""
+    return _declare("pairs", doc, example, (), units=units)
+
+
+def matrix(*, doc: str, example: str, default: Any = MISSING) -> Any:
+    """Declare a field that holds a square matrix, (n_dof, n_dof), SI units."""
+    return _declare("matrix", doc, example, default)
+
+
+def degrees(*, doc: str, example: str) -> Any:
+    """Declare a field that holds a node and a name for every row of a matrix."""
+    return _declare("degrees", doc, example, MISSING)
+
+
+def table(*, doc: str, default: Any = MISSING) -> Any:
+    """Declare a field that holds another dataclass, or a tuple of them: a table of its own in the file."""
+    return field(default=default, metadata={"doc": doc})
+
+
+def _declare(kind: str, doc: str, example: str, default: Any, **limits: Any) -> Any:
+    return field(default=default, metadata={"kind": kind, "doc": doc, "example": example, **limits})
 
 
 def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> Any:

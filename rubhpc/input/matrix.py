@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-MATRIX = {"kind": "matrix"}  # metadata of the field that holds one
 ROUNDING = 1e-9  # of the greatest entry: what a matrix may depart from symmetry by
 _ENTRY = np.dtype([("row", "<i4"), ("column", "<i4"), ("value", "<f8")])
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_h
 from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, check_value, nearest, parse_field, place
 from rubhpc.input.matrix import encode_matrix
-from rubhpc.input.quantity import brief, example, parse_quantity
+from rubhpc.input.quantity import brief, parse_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -164,17 +164,8 @@ def _number(text: str) -> object:
 
 
 def _mend(declared: dataclasses.Field[Any], hint: Any, name: str) -> str:
-    kind = declared.metadata.get("kind")
-    if kind == "quantity":
-        return f"{declared.name} = {example(declared.metadata['unit'])}"
-    if kind == "count":
-        return f"{declared.name} = {declared.metadata['at_least']}"
-    if kind == "matrix":
-        return f"{declared.name} = [[1.0]], a row for every degree"
-    if kind == "degrees":
-        return f'{declared.name} = [[1, "v"], [1, "w"]], a node and a name for every row'
-    if kind:
-        return f'{declared.name} = "..."'
+    if example := declared.metadata.get("example"):
+        return f"{declared.name} = {example}"
     inner = f"{name}.{declared.name}" if name else declared.name
     return f"[{inner}]" if dataclasses.is_dataclass(hint) else f"[[{inner}]]"
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray  # noqa: TC002 - read when a rig is built
 
-from rubhpc.input.fields import FieldError, check_fields, count, nearest, quantity
-from rubhpc.input.matrix import MATRIX, is_symmetric
+from rubhpc.input.fields import FieldError, check_fields, count, degrees, matrix, nearest, quantity, table
+from rubhpc.input.matrix import is_symmetric
 from rubhpc.rig.degrees import check_body, checked_matrices
 from rubhpc.rig.parts import Load, Unbalance  # noqa: TC001 - likewise
 
@@ -41,16 +41,42 @@ class MatrixRotor:
         Beyond which a case has diverged, m.
     """
 
-    mass: NDArray[np.float64] = field(metadata=MATRIX)
-    damping: NDArray[np.float64] | None = field(default=None, metadata=MATRIX)
-    stiffness: NDArray[np.float64] = field(metadata=MATRIX)
-    gyroscopic: NDArray[np.float64] | None = field(default=None, metadata=MATRIX)
-    degrees: tuple[tuple[int, str], ...] = field(metadata={"kind": "degrees"})
-    unbalance: tuple[Unbalance, ...] = ()
-    load: tuple[Load, ...] = ()
-    gravity: float = quantity("m/s^2", default=0.0, at_least=0)
-    output_node: int | None = count(default=None, is_key=False)
-    displacement_limit: float = quantity("m", default=100.0, above=0)
+    mass: NDArray[np.float64] = matrix(
+        doc="Mass matrix, symmetric and positive definite, SI units.", example="[[2.65, 0.0], [0.0, 2.65]]"
+    )
+    damping: NDArray[np.float64] | None = matrix(
+        doc="Damping matrix, SI units; by default zero.", example="[[84.0, 0.0], [0.0, 84.0]]", default=None
+    )
+    stiffness: NDArray[np.float64] = matrix(
+        doc="Stiffness matrix, SI units; may be unsymmetric.", example="[[1.43e5, 0.0], [0.0, 1.43e5]]"
+    )
+    gyroscopic: NDArray[np.float64] | None = matrix(
+        doc="Gyroscopic matrix for a spin of 1 rad/s, skew-symmetric; by default zero.",
+        example="[[0.0, 0.1], [-0.1, 0.0]]",
+        default=None,
+    )
+    degrees: tuple[tuple[int, str], ...] = degrees(
+        doc="Node and name of each row: u, v, w, thx, thy, thz, or q... for other coordinates.",
+        example='[[1, "v"], [1, "w"]]',
+    )
+    unbalance: tuple[Unbalance, ...] = table(doc="Unbalance masses.", default=())
+    load: tuple[Load, ...] = table(doc="Constant forces.", default=())
+    gravity: float = quantity(
+        "m/s^2",
+        doc="Gravitational acceleration, towards -y.",
+        example='"9.81 m/s^2"',
+        default=0.0,
+        at_least=0,
+    )
+    output_node: int | None = count(
+        doc="Node whose motion is recorded; by default that of the first stator.",
+        example="1",
+        default=None,
+        is_key=False,
+    )
+    displacement_limit: float = quantity(
+        "m", doc="Displacement beyond which a case has diverged.", example='"1 m"', default=100.0, above=0
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -7,21 +7,26 @@ that can say one thing in two ways has a method `displaced`: what becomes of oth
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-from rubhpc.input.fields import FieldError, check_fields, count, flag, quantity
+from rubhpc.input.fields import FieldError, check_fields, count, flag, pairs, quantity
 
 
 @dataclass(frozen=True, kw_only=True)
 class Damping:
     """Rayleigh damping `alpha M + beta K`, by coefficients or by ratios at given frequencies."""
 
-    alpha: float = quantity("1/s", default=0.0, at_least=0)
-    beta: float = quantity("s", default=0.0, at_least=0)
-    # (frequency, Hz; fraction of critical)
-    ratios: tuple[tuple[float, float], ...] = field(
-        default=(), metadata={"kind": "pairs", "units": ("Hz", "")}
+    alpha: float = quantity(
+        "1/s", doc="Mass-proportional coefficient.", example="31.7", default=0.0, at_least=0
+    )
+    beta: float = quantity(
+        "s", doc="Stiffness-proportional coefficient.", example='"20 us"', default=0.0, at_least=0
+    )
+    ratios: tuple[tuple[float, float], ...] = pairs(
+        ("Hz", ""),
+        doc="Damping ratios at given frequencies (Hz = fraction of critical), in place of alpha and beta.",
+        example="{ 31.56 = 0.09, 128.05 = 0.022 }",
     )
 
     def __post_init__(self) -> None:
@@ -46,14 +51,20 @@ UNDAMPED = Damping()
 class ShaftSection:
     """A cylindrical length of shaft, divided into equal Timoshenko elements."""
 
-    length: float = quantity("m", above=0)
-    outer_diameter: float = quantity("m", above=0)
-    inner_diameter: float = quantity("m", default=0.0, at_least=0)
-    elements: int = count(at_most=1000)
-    youngs_modulus: float = quantity("Pa", above=0)
-    shear_modulus: float = quantity("Pa", above=0)
-    density: float = quantity("kg/m^3", above=0)
-    shear: bool = flag(default=True)  # False: Rayleigh beam
+    length: float = quantity("m", doc="Length of the section.", example='"0.8 m"', above=0)
+    outer_diameter: float = quantity("m", doc="Outer diameter.", example='"20 mm"', above=0)
+    inner_diameter: float = quantity(
+        "m", doc="Diameter of the bore.", example='"8 mm"', default=0.0, at_least=0
+    )
+    elements: int = count(doc="Number of equal finite elements.", example="14", at_most=1000)
+    youngs_modulus: float = quantity("Pa", doc="Young's modulus.", example='"210 GPa"', above=0)
+    shear_modulus: float = quantity("Pa", doc="Shear modulus.", example='"79.6 GPa"', above=0)
+    density: float = quantity("kg/m^3", doc="Density.", example="7800.0", above=0)
+    shear: bool = flag(
+        doc="Whether the section deforms in shear (Timoshenko beam); false for a Rayleigh beam.",
+        example="true",
+        default=True,
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -71,13 +82,31 @@ class Disc:
     Beside a mass, a diameter counts as that of the rim which a stator may touch.
     """
 
-    node: int = count()
-    diameter: float | None = quantity("m", default=None, above=0)
-    thickness: float | None = quantity("m", default=None, above=0)
-    density: float | None = quantity("kg/m^3", default=None, above=0)
-    mass: float | None = quantity("kg", default=None, at_least=0)
-    diametral_inertia: float | None = quantity("kg m^2", default=None, at_least=0)
-    polar_inertia: float | None = quantity("kg m^2", default=None, at_least=0)
+    node: int = count(doc="Node of the shaft, from 1.", example="8")
+    diameter: float | None = quantity(
+        "m",
+        doc="Diameter, also of the rim that a stator may touch.",
+        example='"0.12 m"',
+        default=None,
+        above=0,
+    )
+    thickness: float | None = quantity(
+        "m", doc="Thickness along the shaft.", example='"0.03 m"', default=None, above=0
+    )
+    density: float | None = quantity("kg/m^3", doc="Density.", example="7800.0", default=None, above=0)
+    mass: float | None = quantity(
+        "kg",
+        doc="Mass, given with both inertias in place of thickness and density.",
+        example='"2.65 kg"',
+        default=None,
+        at_least=0,
+    )
+    diametral_inertia: float | None = quantity(
+        "kg m^2", doc="Moment of inertia about a diameter.", example="2.58e-3", default=None, at_least=0
+    )
+    polar_inertia: float | None = quantity(
+        "kg m^2", doc="Moment of inertia about the shaft axis.", example="4.76e-3", default=None, at_least=0
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -121,17 +150,45 @@ class Disc:
 class Bearing:
     """A linear support: `stiffness` and `damping` in both directions, or full 2x2 matrices."""
 
-    node: int = count()
-    stiffness: float | None = quantity("N/m", default=None, at_least=0)
-    kyy: float | None = quantity("N/m", default=None, at_least=0)
-    kzz: float | None = quantity("N/m", default=None, at_least=0)
-    kyz: float = quantity("N/m", default=0.0)
-    kzy: float = quantity("N/m", default=0.0)
-    damping: float | None = quantity("N s/m", default=None, at_least=0)
-    cyy: float | None = quantity("N s/m", default=None, at_least=0)
-    czz: float | None = quantity("N s/m", default=None, at_least=0)
-    cyz: float = quantity("N s/m", default=0.0)
-    czy: float = quantity("N s/m", default=0.0)
+    node: int = count(doc="Node of the shaft, from 1.", example="1")
+    stiffness: float | None = quantity(
+        "N/m",
+        doc="Stiffness in both lateral directions, in place of kyy, kzz, kyz and kzy.",
+        example='"1e6 N/m"',
+        default=None,
+        at_least=0,
+    )
+    kyy: float | None = quantity(
+        "N/m", doc="Vertical stiffness.", example='"1e6 N/m"', default=None, at_least=0
+    )
+    kzz: float | None = quantity(
+        "N/m", doc="Horizontal stiffness.", example='"1e6 N/m"', default=None, at_least=0
+    )
+    kyz: float = quantity(
+        "N/m", doc="Vertical force per horizontal displacement.", example='"2e5 N/m"', default=0.0
+    )
+    kzy: float = quantity(
+        "N/m", doc="Horizontal force per vertical displacement.", example='"-2e5 N/m"', default=0.0
+    )
+    damping: float | None = quantity(
+        "N s/m",
+        doc="Damping in both lateral directions, in place of cyy, czz, cyz and czy.",
+        example='"100 N s/m"',
+        default=None,
+        at_least=0,
+    )
+    cyy: float | None = quantity(
+        "N s/m", doc="Vertical damping.", example='"100 N s/m"', default=None, at_least=0
+    )
+    czz: float | None = quantity(
+        "N s/m", doc="Horizontal damping.", example='"100 N s/m"', default=None, at_least=0
+    )
+    cyz: float = quantity(
+        "N s/m", doc="Vertical force per horizontal velocity.", example='"20 N s/m"', default=0.0
+    )
+    czy: float = quantity(
+        "N s/m", doc="Horizontal force per vertical velocity.", example='"20 N s/m"', default=0.0
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -173,10 +230,12 @@ class Bearing:
 class Unbalance:
     """A mass at a radius; `phase` is its angle from +y towards +z at time zero."""
 
-    node: int = count()
-    mass: float = quantity("kg", at_least=0)
-    radius: float = quantity("m", at_least=0)
-    phase: float = quantity("rad", default=0.0)
+    node: int = count(doc="Node of the rotor, from 1.", example="8")
+    mass: float = quantity("kg", doc="Unbalance mass.", example='"8 g"', at_least=0)
+    radius: float = quantity("m", doc="Distance of the mass from the axis.", example='"4.5 cm"', at_least=0)
+    phase: float = quantity(
+        "rad", doc="Angle from +y towards +z at time zero.", example='"90 deg"', default=0.0
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -186,9 +245,13 @@ class Unbalance:
 class Load:
     """A constant force, such as the pull of a belt: up and, at a right angle, along +z."""
 
-    node: int = count()
-    vertical: float = quantity("N", default=0.0)
-    horizontal: float = quantity("N", default=0.0)
+    node: int = count(doc="Node of the rotor, from 1.", example="12")
+    vertical: float = quantity(
+        "N", doc="Vertical component, positive upwards (+y).", example='"-120 N"', default=0.0
+    )
+    horizontal: float = quantity(
+        "N", doc="Horizontal component, positive along +z.", example='"30 N"', default=0.0
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -198,11 +261,19 @@ class Load:
 class Torsion:
     """Torsional boundary: one node held by the drive, or a spring (and damper) to ground, or neither."""
 
-    fixed_node: int | None = count(default=None)
-    node: int = count(default=1)  # of the spring
-    stiffness: float | None = quantity("N m/rad", default=None, above=0)
-    damping: float = quantity("N m s/rad", default=0.0, at_least=0)
-    free: bool = flag(default=False)
+    fixed_node: int | None = count(doc="Node whose torsion the drive constrains.", example="1", default=None)
+    node: int = count(doc="Node of the spring to ground.", example="1", default=1)
+    stiffness: float | None = quantity(
+        "N m/rad",
+        doc="Torsional spring to ground, in place of fixed_node.",
+        example="5e3",
+        default=None,
+        above=0,
+    )
+    damping: float = quantity(
+        "N m s/rad", doc="Torsional damper parallel to the spring.", example="0.1", default=0.0, at_least=0
+    )
+    free: bool = flag(doc="Whether the shaft is unconstrained in torsion.", example="true", default=False)
 
     def __post_init__(self) -> None:
         check_fields(self)

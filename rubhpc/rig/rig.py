@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
 from rubhpc.input.dotted import replace_keys
-from rubhpc.input.fields import FieldError, check_fields, nearest, parse_field, place, quantity, text
+from rubhpc.input.fields import FieldError, check_fields, nearest, parse_field, place, quantity, table, text
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build, plain, read_toml
 from rubhpc.rig.matrices import MatrixRotor
@@ -63,14 +63,20 @@ DIVERGED_SHARE = 0.1  # of the shaft's length: lateral motion that no rotor surv
 class Rotor:
     """Shaft sections from node 1 on, with what sits on them."""
 
-    shaft: tuple[ShaftSection, ...]
-    disc: tuple[Disc, ...] = ()
-    bearing: tuple[Bearing, ...] = ()
-    unbalance: tuple[Unbalance, ...] = ()
-    load: tuple[Load, ...] = ()
-    gravity: float = quantity("m/s^2", default=0.0, at_least=0)  # of a horizontal shaft, against +y
-    torsion: Torsion = HELD_BY_DRIVE
-    damping: Damping = UNDAMPED
+    shaft: tuple[ShaftSection, ...] = table(doc="Shaft sections, from node 1.")
+    disc: tuple[Disc, ...] = table(doc="Rigid discs.", default=())
+    bearing: tuple[Bearing, ...] = table(doc="Linear bearings.", default=())
+    unbalance: tuple[Unbalance, ...] = table(doc="Unbalance masses.", default=())
+    load: tuple[Load, ...] = table(doc="Constant forces.", default=())
+    gravity: float = quantity(
+        "m/s^2",
+        doc="Gravitational acceleration, towards -y.",
+        example='"9.81 m/s^2"',
+        default=0.0,
+        at_least=0,
+    )
+    torsion: Torsion = table(doc="Torsional boundary condition at the drive.", default=HELD_BY_DRIVE)
+    damping: Damping = table(doc="Rayleigh damping.", default=UNDAMPED)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -103,9 +109,9 @@ class Rotor:
 class Rig:
     """Everything that stands on the bench; rings of stators are held one by one."""
 
-    name: str = text()
-    rotor: Rotor | MatrixRotor
-    stator: tuple[AnyStator, ...] = ()
+    name: str = text(doc="Name of the rig.", example='"mokhtar2017"')
+    rotor: Rotor | MatrixRotor = table(doc="The rotor: a shaft with discs and bearings, or matrices.")
+    stator: tuple[AnyStator, ...] = table(doc="Stators around the rotor.", default=())
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np  # noqa: TC002 - annotations are read when a rig is built
 from numpy.typing import NDArray  # noqa: TC002
 
-from rubhpc.input.fields import FieldError, check_fields, count, flag, quantity, words
-from rubhpc.input.matrix import MATRIX
+from rubhpc.input.fields import FieldError, check_fields, count, flag, matrix, quantity, table, words
 from rubhpc.rig.degrees import check_body, checked_matrices
 from rubhpc.rig.parts import UNDAMPED, Damping
 
@@ -24,11 +23,27 @@ class Seat:
     `count` of them make a ring, at `angle`, `angle` + 360 deg / count and so on; a rig holds them one by one.
     """
 
-    node: int = count()
-    angle: float = quantity("rad", default=0.0)
-    radius: float | None = quantity("m", default=None, above=0)  # of contact; None: the disc's
-    clearance_offset: float = quantity("m", default=0.0)
-    count: int | None = count(default=None, at_most=MOST_STATORS, is_key=False)
+    node: int = count(doc="Node of the rotor that the stator faces, from 1.", example="8")
+    angle: float = quantity(
+        "rad", doc="Angle from straight up (+y) towards +z.", example='"90 deg"', default=0.0
+    )
+    radius: float | None = quantity(
+        "m",
+        doc="Contact radius; by default that of the largest disc at the node.",
+        example='"60 mm"',
+        default=None,
+        above=0,
+    )
+    clearance_offset: float = quantity(
+        "m", doc="Added to the clearance of the case for this stator.", example='"10 um"', default=0.0
+    )
+    count: int | None = count(
+        doc="Number of equal stators in a ring, evenly spaced from `angle`.",
+        example="12",
+        default=None,
+        at_most=MOST_STATORS,
+        is_key=False,
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -38,15 +53,23 @@ class Seat:
 class Stator(Seat):
     """A cantilever that stands radially over the rotor; its free end faces the rim."""
 
-    length: float = quantity("m", above=0)
-    width: float = quantity("m", above=0)  # along the shaft
-    height: float = quantity("m", above=0)  # along the lateral (tangential) motion
-    elements: int = count(default=6, at_most=1000)
-    youngs_modulus: float = quantity("Pa", above=0)
-    poissons_ratio: float = quantity("", default=0.3, above=-1, below=0.5)
-    density: float = quantity("kg/m^3", above=0)
-    lateral: bool = flag(default=True)
-    damping: Damping = UNDAMPED
+    length: float = quantity(
+        "m", doc="Length of the cantilever, in the radial direction.", example='"40 mm"', above=0
+    )
+    width: float = quantity("m", doc="Width along the shaft.", example='"5 mm"', above=0)
+    height: float = quantity(
+        "m", doc="Height along the lateral (tangential) motion.", example='"5 mm"', above=0
+    )
+    elements: int = count(doc="Number of equal finite elements.", example="6", default=6, at_most=1000)
+    youngs_modulus: float = quantity("Pa", doc="Young's modulus.", example='"3 GPa"', above=0)
+    poissons_ratio: float = quantity(
+        "", doc="Poisson's ratio.", example="0.3", default=0.3, above=-1, below=0.5
+    )
+    density: float = quantity("kg/m^3", doc="Density.", example="1157.0", above=0)
+    lateral: bool = flag(
+        doc="Whether the stator bends in the tangential direction.", example="true", default=True
+    )
+    damping: Damping = table(doc="Rayleigh damping.", default=UNDAMPED)
 
     @property
     def euler_load(self) -> float:
@@ -62,13 +85,33 @@ class LumpedStator(Seat):
     The lateral mass is the same unless told. A wall (`rigid = true`) has no mass and does not move.
     """
 
-    mass: float | None = quantity("kg", default=None, above=0)
-    stiffness: float | None = quantity("N/m", default=None, above=0)
-    damping: float = quantity("N s/m", default=0.0, at_least=0)
-    lateral_mass: float | None = quantity("kg", default=None, above=0)
-    lateral_stiffness: float | None = quantity("N/m", default=None, above=0)
-    lateral_damping: float = quantity("N s/m", default=0.0, at_least=0)
-    rigid: bool = flag(default=False)
+    mass: float | None = quantity(
+        "kg", doc="Mass in the radial direction.", example='"0.5 g"', default=None, above=0
+    )
+    stiffness: float | None = quantity(
+        "N/m", doc="Radial stiffness.", example='"1.9e6 N/m"', default=None, above=0
+    )
+    damping: float = quantity("N s/m", doc="Radial damping.", example='"2 N s/m"', default=0.0, at_least=0)
+    lateral_mass: float | None = quantity(
+        "kg",
+        doc="Mass in the tangential direction; by default `mass`.",
+        example='"0.5 g"',
+        default=None,
+        above=0,
+    )
+    lateral_stiffness: float | None = quantity(
+        "N/m",
+        doc="Tangential stiffness; without it the stator moves only radially.",
+        example='"1e4 N/m"',
+        default=None,
+        above=0,
+    )
+    lateral_damping: float = quantity(
+        "N s/m", doc="Tangential damping.", example='"0.1 N s/m"', default=0.0, at_least=0
+    )
+    rigid: bool = flag(
+        doc="Whether the stator is a rigid wall, without mass and stiffness.", example="true", default=False
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -101,10 +144,20 @@ class MatrixStator(Seat):
         The others are free: rotations, inner points, modal coordinates.
     """
 
-    mass: NDArray[np.float64] = field(metadata=MATRIX)
-    damping: NDArray[np.float64] | None = field(default=None, metadata=MATRIX)
-    stiffness: NDArray[np.float64] = field(metadata=MATRIX)
-    degrees: tuple[str, ...] = words(default=("axial",))
+    mass: NDArray[np.float64] = matrix(
+        doc="Mass matrix, symmetric and positive definite, SI units.", example="[[5e-4, 0.0], [0.0, 5e-4]]"
+    )
+    damping: NDArray[np.float64] | None = matrix(
+        doc="Damping matrix, SI units; by default zero.", example="[[2.0, 0.0], [0.0, 0.1]]", default=None
+    )
+    stiffness: NDArray[np.float64] = matrix(
+        doc="Stiffness matrix, SI units.", example="[[1.9e6, 0.0], [0.0, 1e4]]"
+    )
+    degrees: tuple[str, ...] = words(
+        doc="Name of each row: axial (away from the rotor), lateral (along the rim) or any other.",
+        example='["axial", "lateral"]',
+        default=("axial",),
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

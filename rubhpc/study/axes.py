@@ -23,21 +23,23 @@ if TYPE_CHECKING:
 class _OwnAxes:
     """The axes that are no keys of the rig, declared as any other field is."""
 
-    speed_ratio: float = quantity("")
-    speed: float = quantity("rad/s")
-    clearance_ratio: float = quantity("", above=0)
-    clearance: float = quantity("m", above=0)
-    friction: float = quantity("", at_least=0)
+    speed_ratio: float = quantity(
+        "",
+        doc="Spin speed over the first lateral frequency of the rotor at standstill.",
+        example="{ start = 0.9, stop = 6.1, step = 0.2 }",
+    )
+    speed: float = quantity("rad/s", doc="Spin speed.", example='["1800 rpm", "3600 rpm"]')
+    clearance_ratio: float = quantity(
+        "",
+        doc="Radial clearance over the contact-free amplitude at the speed.",
+        example="[0.70, 0.85]",
+        above=0,
+    )
+    clearance: float = quantity("m", doc="Radial clearance at rest.", example='["84 um", "100 um"]', above=0)
+    friction: float = quantity("", doc="Coefficient of friction.", example="[0.1, 0.3, 0.5]", at_least=0)
 
 
 _OWN = {declared.name: declared for declared in fields(_OwnAxes)}
-_LONG_NAMES = {
-    "speed_ratio": "spin speed over the first lateral frequency of the rotor at standstill",
-    "speed": "spin speed",
-    "clearance_ratio": "radial clearance over the contact-free amplitude at the speed",
-    "clearance": "radial clearance at rest",
-    "friction": "coefficient of friction",
-}
 SPEED_AXES = ("speed_ratio", "speed")
 CLEARANCE_AXES = ("clearance_ratio", "clearance")
 _TABLE_KEYS = ("values", *RANGE_KEYS, "sweep")
@@ -181,8 +183,15 @@ def _axis(name: str, declared: Field[Any], values: tuple[float, ...], where: str
         dimension=coordinate_of(name),
         unit=_store_unit(declared.metadata.get("unit", "")),
         values=values,
-        long_name=_LONG_NAMES.get(name, name.replace("_", " ").replace(".", " ")),
+        long_name=_long_name(name),
     )
+
+
+def _long_name(name: str) -> str:
+    if name not in _OWN:
+        return name.replace("_", " ").replace(".", " ")
+    doc: str = _OWN[name].metadata["doc"].rstrip(".")
+    return doc[0].lower() + doc[1:]
 
 
 def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:

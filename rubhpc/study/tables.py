@@ -17,31 +17,46 @@ TURNING_STEP = 0.25e-6  # s, with the updated one, set-valued friction or a pena
 
 @dataclass(frozen=True, kw_only=True)
 class Contact:
-    """Laws of contact and friction, and which way the normal points.
+    """Laws of contact and friction, and the direction of the normal."""
 
-    Attributes
-    ----------
-    law : {"lagrange", "penalty"}
-        Gaps closed exactly, by multipliers; or the conventional spring and damper in the closed gap.
-    stiffness, damping : float, N/m and N s/m
-        Of the penalty.
-    restitution : float
-        Normal velocity after an impact over that before it, 0 to 1. Default: none, the gap is closed at once.
-    friction_law : {"sliding", "coulomb"}
-        Steady sliding, in the sense of the spin; or set-valued, with stick and reversal of the slip.
-    static_friction_ratio : float
-        Coefficient of friction at rest over that in sliding, 1 or more. Default 1.
-    normal : {"fixed", "updated"}
-        Along the stator's axis, or along the line of centres.
-    """
-
-    law: str = choice(of=("lagrange", "penalty"), default="lagrange")
-    stiffness: float | None = quantity("N/m", default=None, above=0)
-    damping: float | None = quantity("N*s/m", default=None, at_least=0)
-    restitution: float | None = quantity("", default=None, at_least=0)
-    friction_law: str = choice(of=("sliding", "coulomb"), default="sliding")
-    static_friction_ratio: float | None = quantity("", default=None, at_least=1)
-    normal: str = choice(of=("fixed", "updated"), default="fixed")
+    law: str = choice(
+        doc="Contact law: multipliers that close gaps exactly, or a spring and damper (penalty).",
+        example='"penalty"',
+        of=("lagrange", "penalty"),
+        default="lagrange",
+    )
+    stiffness: float | None = quantity(
+        "N/m", doc="Stiffness of the penalty.", example='"1e8 N/m"', default=None, above=0
+    )
+    damping: float | None = quantity(
+        "N*s/m", doc="Damping of the penalty.", example='"100 N*s/m"', default=None, at_least=0
+    )
+    restitution: float | None = quantity(
+        "",
+        doc="Normal velocity after an impact over that before it, 0 to 1; by default none.",
+        example="0.7",
+        default=None,
+        at_least=0,
+    )
+    friction_law: str = choice(
+        doc="Friction law: steady sliding in the sense of the spin, or set-valued Coulomb with stick.",
+        example='"coulomb"',
+        of=("sliding", "coulomb"),
+        default="sliding",
+    )
+    static_friction_ratio: float | None = quantity(
+        "",
+        doc="Static over sliding coefficient of friction; by default 1.",
+        example="1.2",
+        default=None,
+        at_least=1,
+    )
+    normal: str = choice(
+        doc="Contact normal: along the axis of the stator, or along the line of centres.",
+        example='"updated"',
+        of=("fixed", "updated"),
+        default="fixed",
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -75,9 +90,27 @@ class Integrator:
     The accuracy (relative) sets how many modes the modal scheme keeps.
     """
 
-    method: str = choice(of=("modal", "central-difference"), default="modal")
-    step: float | None = quantity("s", default=None, above=0)
-    accuracy: float = quantity("", default=1e-3, above=0, below=1)
+    method: str = choice(
+        doc="Time integration scheme.",
+        example='"central-difference"',
+        of=("modal", "central-difference"),
+        default="modal",
+    )
+    step: float | None = quantity(
+        "s",
+        doc="Time step: in contact (modal), or everywhere (central-difference).",
+        example='"0.5 us"',
+        default=None,
+        above=0,
+    )
+    accuracy: float = quantity(
+        "",
+        doc="Relative accuracy that sets how many modes the modal scheme keeps.",
+        example="1e-3",
+        default=1e-3,
+        above=0,
+        below=1,
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -97,12 +130,35 @@ class Integrator:
 class Recording:
     """How long a case runs, in revolutions, and what is kept of it."""
 
-    transient: int | str = count(default=120, at_least=0, at_most=1_000_000, or_word=AUTO)
-    transient_limit: int | None = count(default=None, at_most=1_000_000)  # with "auto": 240
-    transient_tolerance: float | None = quantity("", default=None, above=0, below=1)  # with "auto": 1e-4
-    revolutions: int = count(default=64, at_most=100_000)
-    samples_per_revolution: int = count(default=256, at_least=16, at_most=65_536)
-    keep: tuple[str, ...] = choices(of=KEEPABLE, default=KEEPABLE)
+    transient: int | str = count(
+        doc='Revolutions discarded; "auto" until the motion has settled.',
+        example='"auto"',
+        default=120,
+        at_least=0,
+        at_most=1_000_000,
+        or_word=AUTO,
+    )
+    transient_limit: int | None = count(
+        doc='Most revolutions discarded with transient = "auto"; by default 240.',
+        example="480",
+        default=None,
+        at_most=1_000_000,
+    )
+    transient_tolerance: float | None = quantity(
+        "",
+        doc='Relative difference between settled cycles with transient = "auto"; by default 1e-4.',
+        example="1e-5",
+        default=None,
+        above=0,
+        below=1,
+    )
+    revolutions: int = count(doc="Revolutions recorded.", example="64", default=64, at_most=100_000)
+    samples_per_revolution: int = count(
+        doc="Samples per revolution, an even number.", example="256", default=256, at_least=16, at_most=65_536
+    )
+    keep: tuple[str, ...] = choices(
+        doc="Signals kept for each case.", example='["spectrum", "section"]', of=KEEPABLE, default=KEEPABLE
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -133,21 +189,26 @@ class Recording:
 
 @dataclass(frozen=True, kw_only=True)
 class Sample:
-    """How the cases of a sampled study are drawn from the ranges of its grid.
+    """How the cases of a sampled study are drawn from the ranges of its grid."""
 
-    Attributes
-    ----------
-    method : {"sobol"}
-        Saltelli's design of Sobol' points, for Sobol indices of the first and total order.
-    n : int
-        Base points, a power of two; with d ranges they make n (d + 2) cases.
-    seed : int
-        Of the scrambling; with the same seed a larger n goes on where a smaller one ended.
-    """
-
-    method: str = choice(of=("sobol",), default="sobol")
-    n: int = count(at_least=8, at_most=2**20)
-    seed: int = count(default=1, at_least=0)
+    method: str = choice(
+        doc="Sampling method: Saltelli's design of Sobol' points.",
+        example='"sobol"',
+        of=("sobol",),
+        default="sobol",
+    )
+    n: int = count(
+        doc="Number of base points, a power of two; d ranges make n (d + 2) cases.",
+        example="1024",
+        at_least=8,
+        at_most=2**20,
+    )
+    seed: int = count(
+        doc="Seed of the scrambling; a larger n with the same seed continues the sample.",
+        example="1",
+        default=1,
+        at_least=0,
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -161,10 +222,21 @@ class Sample:
 class Run:
     """How the study is run; nothing here changes results."""
 
-    block: int | None = count(default=None, at_most=1_000_000)  # cases per work unit and stored chunk
-    time_limit: float | None = quantity("s", default=None, above=0)
-    case_time_limit: float | None = quantity("s", default=None, above=0)
-    max_failures: int | None = count(default=None, at_least=0)
+    block: int | None = count(
+        doc="Cases per work unit and per stored chunk; by default chosen from the number of cases.",
+        example="16",
+        default=None,
+        at_most=1_000_000,
+    )
+    time_limit: float | None = quantity(
+        "s", doc="Time after which the run stops and can be resumed.", example='"2 h"', default=None, above=0
+    )
+    case_time_limit: float | None = quantity(
+        "s", doc="Time after which a case fails.", example='"10 min"', default=None, above=0
+    )
+    max_failures: int | None = count(
+        doc="Failed cases after which the run stops.", example="100", default=None, at_least=0
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -139,7 +139,7 @@ def test_a_store_tells_its_sample(tmp_path):
         ("n = 8", "n = 12", "[sample] n: 12 is no power of two"),
         ("n = 8", "n = 4", "[sample] n: 4 is out of range; it must be at least 8"),
         ("n = 8", "n = 1048576", "4194304 cases, too many; at most 2000000, take a smaller n"),
-        ("n = 8", "", "[sample] n: missing; add n = 8"),
+        ("n = 8", "", "[sample] n: missing; add n = 1024"),
         ("n = 8", 'n = 8\nmethod = "sobal"', '[sample] method: "sobal" is not available; there is "sobol"'),
         ("n = 8", "n = 8\nsead = 1", "[sample] sead: unknown key; did you mean seed?"),
         (", stop = 2.4", "", "[grid] speed_ratio: a range without stop"),

@@ -1,0 +1,47 @@
+"""Every key of the study and rig files is declared with its meaning and an example that its field takes."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+
+import pytest
+
+from rubhpc.input.fields import check_value, parse_field
+from rubhpc.input.reading import build
+from rubhpc.rig import matrices, parts, rig, stators
+from rubhpc.study import axes, tables
+
+TABLES = {
+    cls
+    for module in (rig, matrices, parts, stators, tables)
+    for cls in vars(module).values()
+    if isinstance(cls, type) and dataclasses.is_dataclass(cls) and cls.__module__.startswith("rubhpc.")
+}
+FIELDS = [
+    pytest.param(cls, field, id=f"{cls.__name__}.{field.name}")
+    for cls in sorted(TABLES, key=lambda cls: cls.__name__)
+    for field in dataclasses.fields(cls)
+]
+
+
+@pytest.mark.parametrize(("cls", "field"), FIELDS)
+def test_a_key_has_a_meaning_and_an_example(cls, field):
+    assert field.metadata["doc"].endswith(".")
+    assert "\n" not in field.metadata["doc"]
+    kind = field.metadata.get("kind")
+    if kind is None:
+        return  # a table, whose keys have examples
+    table = tomllib.loads(f"{field.name} = {field.metadata['example']}")
+    if kind == "pairs":
+        assert build(cls, table, "a.toml")
+    else:
+        assert check_value(field, parse_field(field, table[field.name], "a.toml")) == ""
+
+
+@pytest.mark.parametrize("field", [pytest.param(f, id=f.name) for f in dataclasses.fields(axes._OwnAxes)])
+def test_an_axis_has_a_meaning_and_an_example(field):
+    assert field.metadata["doc"].endswith(".")
+    example = tomllib.loads(f"axis = {field.metadata['example']}")["axis"]
+    axis = axes.make_axis(field.name, example, rig.read_rig("mokhtar2017"))
+    assert len(axis.values) > 1
