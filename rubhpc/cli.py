@@ -57,6 +57,7 @@ COMMANDS = {
         "rubhpc.commands.sensitivity:sensitivity",
         "Which axes a scalar depends on: Sobol indices.",
     ),
+    "reduce": ("rubhpc.commands.reduce:reduce", "Mean, envelope, quantiles or histogram over many cases."),
     "report": ("rubhpc.commands.report:report", "One HTML page: maps, and every case behind them."),
     "view": ("rubhpc.commands.report:view", "The same over a big store, served to this machine alone."),
     "export": ("rubhpc.commands.export:export", "Cases as one HDF5 file."),

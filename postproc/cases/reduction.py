@@ -1,18 +1,15 @@
 """Reductions of stores too big to be loaded: mean spectra, worst-case envelopes, quantiles, histograms.
 
-Spectra are read in pieces of whole chunks, reduced piece by piece and put together in a tree, so that memory
-holds some pieces and the result. They stay lazy, on whatever dask runs: threads, or the processes of a
-`distributed` client here or on a cluster; `computed` waits for them with a progress bar. Of measures, 8 bytes
-a case, one is held at a time.
+Spectra are read in pieces of whole chunks, reduced piece by piece and combined in a tree, so that memory
+holds a few pieces and the result. Reductions of spectra are lazy; `computed` computes them on the workers of
+`postproc.cases.workers`, with a progress bar. Of the measures, 8 bytes a case, one is loaded at a time.
 """
 
 from __future__ import annotations
 
 import math
 import os
-import sys
 import warnings
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import dask.array as da
@@ -20,36 +17,37 @@ import numpy as np
 import xarray as xr
 import zarr
 
+from postproc.cases.workers import FAST_DECODING
+from postproc.cases.workers import computed as computed
 from postproc.signals.spectra import spectrum_of, with_frequency
 from postproc.store.axes import axes_of, find_axis, source
 from postproc.store.open import open_store
+from postproc.store.select import select
 from postproc.store.variables import LONG_ROLES, require_measure
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE, VARIABLES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
 
-# Chunks decoded in Rust, where zarrs is installed, checksums included: a mean takes 0.65 of the time.
-_FAST = {"codec_pipeline.path": "zarrs.ZarrsCodecPipeline"}
-_MEMORY = 1e9  # bytes that pieces may take together, each some four times: as stored, as read, and on the way
+_MEMORY = 1e9  # bytes of all pieces together, each counted four times: as stored, as read, in between
 _SMALLEST, _LARGEST = 4e6, 64e6  # bytes of a piece: below, the scheduler's 1 ms a piece counts
 
 
 def open_in_pieces(path: str | Path, n_byte: float | None = None) -> xr.Dataset:
-    """Return the store as `open_store` does, with waveforms, spectra and sections in bigger pieces.
+    """Return the store as `open_store` does, with waveforms, spectra and sections in larger pieces.
 
     Parameters
     ----------
     n_byte : float, optional
-        Of a piece, about; it holds whole chunks, one at least. Default: what lets all cores work within 1 GB.
+        Approximate size of a piece, which is at least one whole chunk. Default: all cores work within 1 GB.
     """
     if n_byte is None:
         n_byte = min(max(_MEMORY / (4 * (os.cpu_count() or 1)), _SMALLEST), _LARGEST)
     store = open_store(path)
-    with warnings.catch_warnings(), zarr.config.set(_FAST if find_spec("zarrs") else {}):
+    with warnings.catch_warnings(), zarr.config.set(FAST_DECODING):
         warnings.simplefilter("ignore", RuntimeWarning)  # as in `open_store`
         bare = xr.open_zarr(path, chunks=None, decode_times=False, decode_timedelta=False)
     pieces: dict[str, xr.DataArray] = {}
@@ -59,6 +57,42 @@ def open_in_pieces(path: str | Path, n_byte: float | None = None) -> xr.Dataset:
     found: xr.Dataset = store.assign(pieces)
     found.encoding = store.encoding
     return found
+
+
+def reduce_store(
+    path: str | Path,
+    what: str,
+    of: str,
+    over: Iterable[str] = (),
+    choice: Mapping[str, Any] | None = None,
+    *,
+    levels: Sequence[float] = (0.05, 0.5, 0.95),
+    bins: int | Sequence[float] = 50,
+) -> xr.Dataset:
+    """Return one reduction of a store, loaded; it runs on the current workers (`postproc.cases.workers`).
+
+    Parameters
+    ----------
+    what : str
+        "mean" or "envelope" of the spectra of a signal, "quantiles" or "histogram" of a measure.
+    of : str
+        The signal, or the measure.
+    over : iterable of axes
+        Axes to reduce; none: all of them.
+    choice : mapping of axis to value, optional
+        The cases to take, as in `postproc.store.select.select`.
+    levels, bins
+        Of `quantiles` and `histogram`.
+    """
+    store = select(open_in_pieces(path), choice or {})
+    if of_spectra(what):
+        return computed(_OF_SPECTRA[what](store, of, over))
+    return quantiles(store, of, levels, over) if what == "quantiles" else histogram(store, of, bins, over)
+
+
+def of_spectra(what: str) -> bool:
+    """Return whether a reduction is one of spectra; the others are of measures."""
+    return what in _OF_SPECTRA
 
 
 def mean_spectrum(store: xr.Dataset, signal: str, over: Iterable[str] = ()) -> xr.Dataset:
@@ -88,6 +122,9 @@ def envelope(store: xr.Dataset, signal: str, over: Iterable[str] = ()) -> xr.Dat
     Arguments and result as of `mean_spectrum`.
     """
     return _spectrum(store, signal, over, _largest, "largest over cases of the ")
+
+
+_OF_SPECTRA = {"mean": mean_spectrum, "envelope": envelope}
 
 
 def quantiles(
@@ -160,32 +197,6 @@ def histogram(
             "upper": ("bin", edges[1:], about),
         },
     )
-
-
-def computed(lazy: xr.Dataset, *, is_told: bool = True) -> xr.Dataset:
-    """Return the loaded dataset, with a progress bar; a `distributed` client is used if there is one."""
-    client = _client()
-    if client is not None:
-        if find_spec("zarrs"):
-            client.run(zarr.config.set, _FAST)  # processes go by their own settings
-        lazy = lazy.persist()
-        if is_told:
-            sys.modules["distributed"].progress(lazy, notebook=False)
-    elif is_told:
-        from dask.diagnostics.progress import ProgressBar
-
-        with ProgressBar():  # type: ignore[no-untyped-call]  # dask leaves it untyped
-            return lazy.compute()
-    return lazy.compute()
-
-
-def _client() -> Any:
-    """Return the current `distributed` client; None where there is none, or the package is not loaded."""
-    distributed = sys.modules.get("distributed")
-    try:
-        return distributed.default_client() if distributed else None
-    except ValueError:
-        return None
 
 
 def _spectrum(store: xr.Dataset, signal: str, over: Iterable[str], reduction: Any, before: str) -> xr.Dataset:

@@ -74,7 +74,7 @@ def loop(path: Path) -> NDArray[np.float64]:
 
 def reduced(path: Path, reduction: Callable[..., Any] = mean_spectrum) -> NDArray[np.float64]:
     """Return the mean, or another reduction, as the product takes it."""
-    found = computed(reduction(open_in_pieces(path), "torsion"), is_told=False)
+    found = computed(reduction(open_in_pieces(path), "torsion"), show_progress=False)
     values: NDArray[np.float64] = found[many_cases.NAME].values
     return values
 

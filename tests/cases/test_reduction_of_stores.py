@@ -18,6 +18,7 @@ import xarray as xr
 from postproc.cases.reduction import computed, envelope, histogram, mean_spectrum, open_in_pieces, quantiles
 from postproc.store.open import open_store
 from postproc.store.select import select
+from rubhpc.cli import main
 from rubhpc.errors import InputError, StoreError
 from rubhpc.schema import DONE
 
@@ -54,8 +55,8 @@ def test_spectra_are_reduced_as_in_memory(
 ) -> None:
     store = open_in_pieces(path, n_byte)
     axes = over or list(many_cases.sweep_of((4, 10, 6), 2, path).dims)
-    mean = computed(mean_spectrum(store, "torsion", over), is_told=False)
-    worst = computed(envelope(store, "torsion", over), is_told=False)
+    mean = computed(mean_spectrum(store, "torsion", over), show_progress=False)
+    worst = computed(envelope(store, "torsion", over), show_progress=False)
     expected = loaded[SPECTRUM].astype(float)
     done = (loaded["status"] == DONE).sum(axes)
     total = expected.fillna(0).sum(axes)
@@ -201,16 +202,25 @@ def slurm(tmp_path: Path) -> Iterator[dict[str, str]]:
         subprocess.run(["kill", pid], capture_output=True, check=False)
 
 
+COMMAND = [sys.executable, "-m", "rubhpc", "reduce"]
+
+
 @pytest.mark.parametrize("on", ["threads", "slurm", "mpi"])
-def test_cluster_script_reduces_and_draws(
+def test_command_reduces_and_draws(
     on: str, path: Path, loaded: xr.Dataset, slurm: dict[str, str], tmp_path: Path
 ) -> None:
-    script = [sys.executable, ROOT / "jobs" / "cluster" / "reduce.py", path, "--what", "envelope", "--on", on]
+    command = [*COMMAND, path, "--what", "envelope", "--on", on]
     if on == "mpi":
-        script = [Path(sys.executable).with_name("mpirun"), "-n", "3", *script]
+        command = [Path(sys.executable).with_name("mpirun"), "-n", "3", *command]
     options = ["--workers", "1", "--memory", "1 GB", "--queue", "short", "--select", "friction=0.1"]
     done = subprocess.run(
-        [*script, *options], cwd=tmp_path, env=slurm, capture_output=True, text=True, check=False, timeout=120
+        [*command, *options],
+        cwd=tmp_path,
+        env=slurm,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-2:] == ["few_envelope.nc", "few_envelope.png"]
@@ -221,13 +231,32 @@ def test_cluster_script_reduces_and_draws(
         assert "#SBATCH -p short" in (tmp_path / "bin" / "sbatch.job").read_text()
 
 
-def test_cluster_script_tells_bad_input_in_a_line(path: Path, tmp_path: Path) -> None:
-    script = [sys.executable, ROOT / "jobs" / "cluster" / "reduce.py", path, "--over", "sped_ratio"]
+@pytest.mark.parametrize("on_ranks", [False, True])
+def test_command_refuses_bad_input_in_a_line(on_ranks: bool, path: Path, tmp_path: Path) -> None:
+    command = [*COMMAND, path, "--over", "sped_ratio"]
+    if on_ranks:
+        command = [Path(sys.executable).with_name("mpirun"), "-n", "3", *command, "--on", "mpi"]
     done = subprocess.run(
-        script, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False
+        command, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False
     )
     assert done.returncode == 2
-    assert done.stderr.splitlines() == [f"reduce.py: {path}: no axis sped_ratio; did you mean speed_ratio?"]
+    told = [line for line in done.stderr.splitlines() if line.startswith("rubhpc:")]
+    assert told == [f"rubhpc: {path}: no axis sped_ratio; did you mean speed_ratio?"]
+
+
+def test_command_takes_measures(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = tmp_path / "levels.nc"
+    arguments = ["reduce", str(path), "--what", "quantiles", "--level", "0.5", "--over", "friction"]
+    with pytest.raises(SystemExit) as end:
+        main([*arguments, "--measure", "peak_torsion", "--data", str(data)])
+    assert not end.value.code
+    with xr.open_dataset(data) as found:
+        expected = quantiles(open_in_pieces(path), "peak_torsion", [0.5], ["friction"])
+        xr.testing.assert_equal(found["peak_torsion"], expected["peak_torsion"])
+    with pytest.raises(SystemExit) as end:
+        main([*arguments, "--signal", "torsion"])
+    assert end.value.code == 2
+    assert "--what quantiles: takes no --signal; give --measure" in capsys.readouterr().err
 
 
 def test_job_asks_for_its_store() -> None:

@@ -100,7 +100,7 @@ def reduce_all(path: Path) -> dict[str, float]:
     began = time.perf_counter()
     store = open_in_pieces(path)
     mean = computed(mean_spectrum(store, "torsion"))
-    worst = computed(envelope(store, "torsion", ["clearance_ratio", "friction"]), is_told=False)
+    worst = computed(envelope(store, "torsion", ["clearance_ratio", "friction"]), show_progress=False)
     middle = quantiles(store, "peak_torsion", [0.5])
     counts = histogram(store, "peak_torsion", 10)
     at = {"order": int(np.argmin(np.abs(store["order"].values - LINE)))}
