@@ -13,22 +13,22 @@ import numpy as np
 
 from rubhpc.errors import RubError, StoppedEarly
 from rubhpc.running.crash import crash
-from rubhpc.running.job import Order, prepare_job
+from rubhpc.running.job import RunRequest, prepare_job
 from rubhpc.running.launch import move_to
-from rubhpc.running.pool import Pool, RankLost, Tally, connect
+from rubhpc.running.pool import Pool, RankLost, Totals, connect
 from rubhpc.running.progress import Progress
 from rubhpc.running.stopping import Stopping
-from rubhpc.running.watch import Watch
+from rubhpc.running.watchdog import Watchdog
 from rubhpc.running.worker import Worker
 from rubhpc.schema import DONE, FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
-from rubhpc.storage.in_progress import Hand, forget
+from rubhpc.storage.in_progress import InProgress, forget
 from rubhpc.storage.journal import count
 from rubhpc.storage.manifest import PRIVATE
 from rubhpc.storage.resume import missing_share
 from rubhpc.storage.store import Store
 from rubhpc.storage.summary import Summary
-from rubhpc.study.cases import Sweep
+from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import Study, read_study
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def run(
         with stopping or Stopping() as watch, ExitStack() as held:
             resolved = pool.from_first(resolve)
             watch.watch(resolved.output / "STOP", resolved.run.time_limit)
-            order = Order(
+            request = RunRequest(
                 study=resolved,
                 stopping=watch,
                 retry_failed=retry_failed,
@@ -114,7 +114,7 @@ def run(
                 quiet=quiet,
                 held=held,
             )
-            summary = _run(order, pool)
+            summary = _run(request, pool)
     except RankLost as error:  # and nobody can go on
         pool.abort(error.exit_code)
     except RubError:  # raised on all ranks alike
@@ -130,7 +130,7 @@ def run(
     return summary
 
 
-def _run(order: Order, pool: Pool) -> Summary:
+def _run(request: RunRequest, pool: Pool) -> Summary:
     """Run the study, again on those that are left where ranks are lost on the way."""
     began, n_rank = time.monotonic(), pool.size
     is_broken = False
@@ -140,20 +140,20 @@ def _run(order: Order, pool: Pool) -> Summary:
                 pool.leave_lost()
                 move_to(pool.rank, pool.size)
                 is_broken = False
-            return replace(_round(order, pool, began), lost=n_rank - pool.size)
+            return replace(_round(request, pool, began), lost=n_rank - pool.size)
         except RankLost:
             is_broken = True
 
 
-def _round(order: Order, pool: Pool, began: float) -> Summary:
+def _round(request: RunRequest, pool: Pool, began: float) -> Summary:
     """Compute what is missing, together."""
-    job = pool.from_first(lambda: prepare_job(order, pool.size))
-    order.token = job.token
-    _together(pool, lambda: _compute(job, pool, order))
-    if job.doubtful and not order.stopping.look():
-        _together(pool, lambda: _try_doubtful(job, pool, order.stopping))
-    reason = next((told for told in pool.gather(order.stopping.verdict) if told), "")
-    summary = pool.from_first(lambda: _finish(job, pool.sums().n_case, time.monotonic() - began))
+    job = pool.from_first(lambda: prepare_job(request, pool.size))
+    request.token = job.token
+    _together(pool, lambda: _compute(job, pool, request))
+    if job.suspect and not request.stopping.look():
+        _together(pool, lambda: _try_doubtful(job, pool, request.stopping))
+    reason = next((told for told in pool.gather(request.stopping.verdict) if told), "")
+    summary = pool.from_first(lambda: _finish(job, pool.totals().n_case, time.monotonic() - began))
     n_missing = summary.counts[MISSING]
     if n_missing and reason:
         raise StoppedEarly(
@@ -171,50 +171,50 @@ def _together(pool: Pool, work: Callable[[], None]) -> None:
     except RankLost:
         raise
     except RubError as trouble:
-        pool.add(Tally(stop=1))
+        pool.add(Totals(stop=1))
         error = trouble
     for other in pool.gather(error):
         if other is not None:
             raise other
 
 
-def _compute(job: Job, pool: Pool, order: Order) -> None:
+def _compute(job: Job, pool: Pool, request: RunRequest) -> None:
     """Compute blocks until there are none left."""
-    stopping = order.stopping
-    sweep = Sweep(job.study, chunk=job.chunk)
+    stopping = request.stopping
+    grid = CaseGrid(job.study, chunk=job.chunk)
     store = Store(job.study.output)
-    every = sweep.chains()
-    chains = [every[i] for i in job.pending]
-    quiet = order.quiet or pool.rank > 0
+    every = grid.sequences()
+    sequences = [every[i] for i in job.pending]
+    quiet = request.quiet or pool.rank > 0
     with (
-        _progress(job, sweep, chains, quiet=quiet, has_bar=pool.size == 1) as progress,
-        _desk(job, pool, sweep, store, stopping, "rank", progress) as worker,
+        _progress(job, grid, sequences, quiet=quiet, has_bar=pool.size == 1) as progress,
+        _desk(job, pool, grid, store, stopping, "rank", progress) as worker,
     ):
         next_packing = time.monotonic() + _PACKING_GAP
-        for block in _claimed(job, sweep, chains, pool, stopping):
+        for block in _claimed(job, grid, sequences, pool, stopping):
             worker.work(block)
             worker.attend()
             if pool.rank == 0 and time.monotonic() > next_packing:
                 store.pack(store.replay())  # for readers who look on
                 next_packing = time.monotonic() + _PACKING_GAP
     if stopping.reason:
-        pool.add(Tally(stop=1))
+        pool.add(Totals(stop=1))
 
 
 def _try_doubtful(job: Job, pool: Pool, stopping: Stopping) -> None:
     """Compute the cases that were in hand when ranks died: last, and each stored before the next begins.
 
-    Those that have seen the fewest deaths come first, so that the guilty ones end up alone.
+    Those that have seen the fewest deaths come first, so that the failed ones end up alone.
     """
-    sweep = Sweep(job.study, chunk=job.chunk)
+    grid = CaseGrid(job.study, chunk=job.chunk)
     store = Store(job.study.output)
     job = replace(job, ledger=store.replay(with_measures=False))
-    blocks = {block.start: (n, block) for n, chain in enumerate(sweep.chains()) for block in chain}
-    with _desk(job, pool, sweep, store, stopping, "tail") as worker:
-        for flat in sorted(job.doubtful, key=lambda i: job.doubtful[i]):
-            n_chain, block = blocks[store.start_of(flat)]
-            if n_chain % pool.size == pool.rank and not stopping.look():  # a block has one writer
-                worker.missing = np.arange(sweep.n_case) == flat
+    blocks = {block.start: (n, block) for n, sequence in enumerate(grid.sequences()) for block in sequence}
+    with _desk(job, pool, grid, store, stopping, "tail") as worker:
+        for flat in sorted(job.suspect, key=lambda i: job.suspect[i]):
+            n_sequence, block = blocks[store.start_of(flat)]
+            if n_sequence % pool.size == pool.rank and not stopping.look():  # a block has one writer
+                worker.missing = np.arange(grid.n_case) == flat
                 worker.work(block)
 
 
@@ -222,7 +222,7 @@ def _try_doubtful(job: Job, pool: Pool, stopping: Stopping) -> None:
 def _desk(
     job: Job,
     pool: Pool,
-    sweep: Sweep,
+    grid: CaseGrid,
     store: Store,
     stopping: Stopping,
     kind: str,
@@ -232,49 +232,51 @@ def _desk(
 
     def attend() -> None:
         if pool.rank == 0 and progress is not None:
-            progress.update(pool.sums())
+            progress.update(pool.totals())
 
     writer = f"{kind}{pool.rank:05d}"
     with disk_errors(store.path):
-        hand = Hand(store.hand_directory, job.run, writer)
+        hand = InProgress(store.in_progress_directory, job.run, writer)
     with (
         hand,
-        Watch(job.study.run.case_time_limit, hand) as watch,
+        Watchdog(job.study.run.case_time_limit, hand) as watch,
         store.journal(job.run, writer) as journal,
     ):
-        worker = Worker(sweep, store, job.ledger, job.missing, journal, watch, stopping, pool.add, attend)
+        worker = Worker(grid, store, job.ledger, job.missing, journal, watch, stopping, pool.add, attend)
         yield worker
         worker.sync()
 
 
 def _claimed(
-    job: Job, sweep: Sweep, chains: list[list[Block]], pool: Pool, stopping: Stopping
+    job: Job, grid: CaseGrid, sequences: list[list[Block]], pool: Pool, stopping: Stopping
 ) -> Iterator[Block]:
     """The blocks this rank is to compute, one chain after another, until there is none, or reason to stop."""
     most_failures = job.study.run.max_failures
-    missing = job.missing.reshape(sweep.shape)
+    missing = job.missing.reshape(grid.shape)
 
-    def is_over(sums: Tally) -> bool:
+    def is_over(sums: Totals) -> bool:
         has_failed = most_failures is not None and sums.failed > most_failures
         return bool(stopping.look() or sums.stop or has_failed)
 
     while not stopping.look():
         sums = pool.claim()
-        if sums.claimed >= len(chains) or is_over(sums):
+        if sums.claimed >= len(sequences) or is_over(sums):
             return
-        for i, block in enumerate(chains[sums.claimed]):
-            if i and is_over(pool.sums()):
+        for i, block in enumerate(sequences[sums.claimed]):
+            if i and is_over(pool.totals()):
                 return
             if missing_share(block, missing):
                 yield block
 
 
-def _progress(job: Job, sweep: Sweep, chains: list[list[Block]], *, quiet: bool, has_bar: bool) -> Progress:
-    grid = job.missing.reshape(sweep.shape)
+def _progress(
+    job: Job, grid: CaseGrid, sequences: list[list[Block]], *, quiet: bool, has_bar: bool
+) -> Progress:
+    is_missing = job.missing.reshape(grid.shape)
     return Progress(
-        sweep.n_case,
-        sum(block.cost * missing_share(block, grid) for chain in chains for block in chain),
-        n_done=sweep.n_case - int(job.missing.sum()),
+        grid.n_case,
+        sum(block.cost * missing_share(block, is_missing) for sequence in sequences for block in sequence),
+        n_done=grid.n_case - int(job.missing.sum()),
         quiet=quiet,
         has_bar=has_bar,
     )
@@ -287,7 +289,7 @@ def _finish(job: Job, computed: int, seconds: float) -> Summary:
     store.pack(ledger)
     with disk_errors(store.path):
         (store.path / "STOP").unlink(missing_ok=True)
-        forget(store.hand_directory, ledger.status != MISSING)
+        forget(store.in_progress_directory, ledger.status != MISSING)
     failed = np.flatnonzero(ledger.status == FAILED)[:_REASONS].tolist()
     return Summary(
         store=store.path,

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.journal import Entry, Ledger
     from rubhpc.storage.store import Store
-    from rubhpc.study.cases import Case, Sweep
+    from rubhpc.study.cases import Case, CaseGrid
 
     Arrays = dict[str, NDArray[Any]]
     Index = tuple[int, ...]
@@ -41,7 +41,7 @@ class Start:
     note: str = ""
 
 
-class Ends:
+class InitialStates:
     """The final states of the cases that others go on from.
 
     Parameters
@@ -50,8 +50,8 @@ class Ends:
         Computes again what is damaged of the block that begins at an index.
     """
 
-    def __init__(self, sweep: Sweep, store: Store, ledger: Ledger, mend: Callable[[Index], None]) -> None:
-        self._sweep, self._store, self._ledger, self._mend = sweep, store, ledger, mend
+    def __init__(self, grid: CaseGrid, store: Store, ledger: Ledger, mend: Callable[[Index], None]) -> None:
+        self._grid, self._store, self._ledger, self._mend = grid, store, ledger, mend
         self._held: dict[int, NDArray[np.float64]] = {}  # of one block, by flat index
 
     def start_of(self, case: Case, flat: NDArray[np.int64], data: Arrays, entries: Sequence[Entry]) -> Start:
@@ -62,10 +62,10 @@ class Ends:
         Stopped
             The case before it has no outcome yet.
         """
-        index = self._sweep.before(case.index)
+        index = self._grid.predecessor(case.index)
         if index is None:
             return Start()
-        before = int(np.ravel_multi_index(index, self._sweep.shape))
+        before = int(np.ravel_multi_index(index, self._grid.shape))
         entered = [entry.status for entry in entries if entry.flat == before]
         if not entered and before not in flat and self._ledger.status[before] == DONE:
             self._fetch(before)
@@ -76,7 +76,7 @@ class Ends:
             return Start(state=self._held[before])
         if status in (DONE, MISSING):  # it could not be computed again before the run was stopped
             raise Stopped
-        return Start(note=rest_note(self._sweep, index, status))
+        return Start(note=rest_note(self._grid, index, status))
 
     def remember(self, flat: NDArray[np.int64], data: Arrays) -> None:
         """Keep where the cases of a block have ended, and forget those of the block before."""
@@ -100,9 +100,9 @@ def is_sound(store: Store, ledger: Ledger, start: Index, flat: int, stored: Arra
     return case_checksum(stored, int(np.searchsorted(store.flat(start), flat))) == int(ledger.checksum[flat])
 
 
-def rest_note(sweep: Sweep, before: Index, status: int) -> str:
+def rest_note(grid: CaseGrid, before: Index, status: int) -> str:
     """Why a case of a chain starts at rest: the one before it, at an index, has not been done."""
-    assert sweep.chain is not None
-    axis = sweep.study.axes[sweep.chain.axis]
-    value = axis.values[before[sweep.chain.axis]]
+    assert grid.continuation is not None
+    axis = grid.study.axes[grid.continuation.axis]
+    value = axis.values[before[grid.continuation.axis]]
     return f"it starts at rest, as {written(axis.name, value, axis.unit)} before it has {STATUS[status]}"

@@ -13,9 +13,9 @@ from rubhpc.running.stopping import Stopped, Stopping
 from rubhpc.running.worker import set_up
 from rubhpc.schema import FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
-from rubhpc.storage.in_progress import find_suspects, forget
+from rubhpc.storage.in_progress import forget, read_deaths
 from rubhpc.storage.journal import Entry, Ledger, next_run
-from rubhpc.storage.resume import bring_up_to_date, find_gone, missing_share, open_store, sweep_for
+from rubhpc.storage.resume import bring_up_to_date, cases_without_files, grid_for, missing_share, open_store
 from rubhpc.storage.runs import record_run
 
 if TYPE_CHECKING:
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.lock import Lock
     from rubhpc.storage.store import Store
-    from rubhpc.study.cases import Block, Sweep
+    from rubhpc.study.cases import Block, CaseGrid
     from rubhpc.study.study import Study
 
 
 @dataclass(kw_only=True)
-class Order:
+class RunRequest:
     """What was asked for, and the lock that outlives the loss of a rank.
 
     Attributes
@@ -54,10 +54,10 @@ class Job:
     Attributes
     ----------
     missing : (n_case,) bool
-        Cases to be computed, but for the doubtful ones.
+        Cases to be computed, but for the suspect ones.
     pending : (n,) int
-        Positions in `Sweep.chains()` of those that hold one.
-    doubtful : dict
+        Positions in `CaseGrid.sequences()` of those that hold one.
+    suspect : dict
         Flat index -> deaths of ranks in this case, or in one before it in its chain; these come last, each by
         itself, those of a chain in their order.
     token : str
@@ -70,94 +70,100 @@ class Job:
     ledger: Ledger
     missing: NDArray[np.bool_]
     pending: NDArray[np.int64]
-    doubtful: dict[int, int]
+    suspect: dict[int, int]
     token: str
 
 
-def prepare_job(order: Order, n_rank: int) -> Job:
+def prepare_job(request: RunRequest, n_rank: int) -> Job:
     """Find or make the store, lock it, see what is missing, compile the kernels."""
-    study, stopping = order.study, order.stopping
-    sweep = sweep_for(study, accept_version=order.accept_version)
-    store = open_store(sweep)
+    study, stopping = request.study, request.stopping
+    grid = grid_for(study, accept_version=request.accept_version)
+    store = open_store(grid)
     with disk_errors(study.output):
-        if order.lock is None:
-            order.lock = order.held.enter_context(
-                store.lock(on_loss=lambda: stopping.ask("the loss of its lock"), heir_of=order.token)
+        if request.lock is None:
+            request.lock = request.held.enter_context(
+                store.lock(on_loss=lambda: stopping.ask("the loss of its lock"), heir_of=request.token)
             )
-        bring_up_to_date(store, sweep, accept_version=order.accept_version)
+        bring_up_to_date(store, grid, accept_version=request.accept_version)
         ledger = store.replay(with_measures=not store.is_packed())
         store.pack(ledger)  # readers see what a killed run has left, from now on
         ledger.measures = None  # the other ranks need none
         run = next_run(store.journal_directory)
         record_run(store.path, run, n_rank)
-        store.take_back(ledger, find_gone(store, ledger), run, "gone")
+        store.mark_missing(ledger, cases_without_files(store, ledger), run, "gone")
         missing = ledger.status == MISSING
-        if order.retry_failed:
+        if request.retry_failed:
             failed = np.flatnonzero(ledger.status == FAILED).tolist()
-            store.take_back(
-                ledger, _with_those_behind(sweep, failed), run, "anew"
+            store.mark_missing(
+                ledger, _with_those_behind(grid, failed), run, "anew"
             )  # a name that comes before those of ranks
             missing = (ledger.status == MISSING) | (ledger.status == FAILED)
-        doubtful = _with_followers(sweep, _judge(store, ledger, missing, run), missing)
-    missing[list(doubtful)] = False
-    chains = sweep.chains()
-    grid = missing.reshape(sweep.shape)
-    pending = [i for i, chain in enumerate(chains) if any(missing_share(block, grid) for block in chain)]
+        suspect = _with_followers(grid, _judge(store, ledger, missing, run), missing)
+    missing[list(suspect)] = False
+    sequences = grid.sequences()
+    is_missing = missing.reshape(grid.shape)
+    pending = [
+        i
+        for i, sequence in enumerate(sequences)
+        if any(missing_share(block, is_missing) for block in sequence)
+    ]
     if pending:
-        _warm_up(sweep, chains[pending[-1]][0], stopping)
+        _warm_up(grid, sequences[pending[-1]][0], stopping)
     return Job(
         study=study,
-        chunk=sweep.chunk,
+        chunk=grid.chunk,
         run=run,
         ledger=ledger,
         missing=missing,
         pending=np.array(pending, dtype=np.int64),
-        doubtful=doubtful,
-        token=order.lock.token,
+        suspect=suspect,
+        token=request.lock.token,
     )
 
 
 def _judge(store: Store, ledger: Ledger, missing: NDArray[np.bool_], run: int) -> dict[int, int]:
     """Have the cases fail that kill their ranks; returns the doubtful ones with their deaths."""
-    suspects = find_suspects(store.hand_directory, store.manifest, missing)
-    if suspects.guilty:
+    suspects = read_deaths(store.in_progress_directory, store.manifest, missing)
+    if suspects.failed:
         with store.journal(run, "hand") as journal:
             journal.write(
                 Entry(flat, store.manifest.case_id(flat), FAILED, reason=reason)
-                for flat, reason in suspects.guilty.items()
+                for flat, reason in suspects.failed.items()
             )
             journal.sync()
-        guilty = list(suspects.guilty)
-        ledger.status[guilty] = FAILED
-        ledger.reasons |= suspects.guilty
-        missing[guilty] = False
-        forget(store.hand_directory, ~missing)
-    return suspects.doubtful
+        failed = list(suspects.failed)
+        ledger.status[failed] = FAILED
+        ledger.reasons |= suspects.failed
+        missing[failed] = False
+        forget(store.in_progress_directory, ~missing)
+    return suspects.suspect
 
 
-def _with_those_behind(sweep: Sweep, cases: list[int]) -> list[int]:
+def _with_those_behind(grid: CaseGrid, cases: list[int]) -> list[int]:
     """Cases, by their flat index, and all that go on from them, near or far; none without chains."""
-    if sweep.chain is None:
+    if grid.continuation is None:
         return []
-    marked = np.zeros(sweep.n_case, bool)
+    marked = np.zeros(grid.n_case, bool)
     marked[cases] = True
-    return np.flatnonzero(sweep.chain.highest(marked.reshape(sweep.shape))).tolist()
+    return np.flatnonzero(grid.continuation.running_maximum(marked.reshape(grid.shape))).tolist()
 
 
-def _with_followers(sweep: Sweep, doubtful: dict[int, int], missing: NDArray[np.bool_]) -> dict[int, int]:
-    """Doubtful cases, and those that have to wait for them; of one chain in the order of the chain."""
-    chain = sweep.chain
-    if chain is None or not doubtful:
-        return doubtful
-    deaths = np.zeros(sweep.n_case, np.int64)
-    deaths[list(doubtful)] = list(doubtful.values())
-    deaths = chain.highest(deaths.reshape(sweep.shape)).ravel()
+def _with_followers(grid: CaseGrid, suspect: dict[int, int], missing: NDArray[np.bool_]) -> dict[int, int]:
+    """Doubtful cases, and those that have to wait for them; of one chain in the order of the continuation."""
+    continuation = grid.continuation
+    if continuation is None or not suspect:
+        return suspect
+    deaths = np.zeros(grid.n_case, np.int64)
+    deaths[list(suspect)] = list(suspect.values())
+    deaths = continuation.running_maximum(deaths.reshape(grid.shape)).ravel()
     waiting = np.flatnonzero((deaths > 0) & missing).tolist()
-    turns = {flat: chain.turn([int(i) for i in np.unravel_index(flat, sweep.shape)]) for flat in waiting}
+    turns = {
+        flat: continuation.position([int(i) for i in np.unravel_index(flat, grid.shape)]) for flat in waiting
+    }
     return {flat: int(deaths[flat]) for flat in sorted(waiting, key=lambda flat: turns[flat])}
 
 
-def _warm_up(sweep: Sweep, block: Block, stopping: Stopping) -> None:
+def _warm_up(grid: CaseGrid, block: Block, stopping: Stopping) -> None:
     """Compile every kernel once, on two revolutions: concurrent compilations into one cache have crashed."""
 
     def check() -> None:
@@ -165,11 +171,11 @@ def _warm_up(sweep: Sweep, block: Block, stopping: Stopping) -> None:
             raise Stopped
 
     with suppress(Exception):  # what is wrong with this case will be its reason to fail
-        case = sweep.cases(block)[0]
+        case = grid.cases(block)[0]
         compile_kernels(
-            set_up(sweep.study, case),
+            set_up(grid.study, case),
             clearance=case.clearance,
             friction=case.friction,
-            recording=sweep.study.recording,
+            recording=grid.study.recording,
             check=check,
         )

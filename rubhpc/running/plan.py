@@ -16,14 +16,14 @@ from rubhpc.storage.duration import duration
 from rubhpc.storage.growth import origins
 from rubhpc.storage.journal import count
 from rubhpc.storage.manifest import Manifest
-from rubhpc.storage.resume import find_gone, is_store, missing_share, sweep_for
+from rubhpc.storage.resume import cases_without_files, grid_for, is_store, missing_share
 from rubhpc.storage.store import Store
 from rubhpc.study.sampling import CASE
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rubhpc.study.cases import Block, Sweep
+    from rubhpc.study.cases import Block, CaseGrid
     from rubhpc.study.study import Recording, Study
 
 _PILOTS, _FEW_PILOTS, _ENOUGH = 9, 3, 20.0  # asked; asked even where they take more than so many seconds
@@ -41,7 +41,7 @@ class Plan:
     ----------
     counts : tuple of int
         Cases that are missing, done, failed and diverged, in this order.
-    n_chain, n_block, n_per_block, n_file : int
+    n_sequence, n_block, n_per_block, n_file : int
         Chains and blocks of the whole grid, and cases in a block; files of the finished store, about.
     n_byte : int
         Of the finished store before compression, about.
@@ -57,7 +57,7 @@ class Plan:
     store: Path
     shape: dict[str, int]
     counts: tuple[int, ...]
-    n_chain: int
+    n_sequence: int
     n_block: int
     n_per_block: int
     n_file: int
@@ -68,14 +68,14 @@ class Plan:
 
     @property
     def _idle(self) -> str:
-        if self.n_chain == self.n_block:
+        if self.n_sequence == self.n_block:
             return "more ranks would idle"
-        return f"in {self.n_chain} chain{'s' * (self.n_chain > 1)}: more ranks than that would idle"
+        return f"in {self.n_sequence} chain{'s' * (self.n_sequence > 1)}: more ranks than that would idle"
 
     def text(self) -> str:
         """The plan for people, a few lines."""
         n_case = sum(self.counts)
-        grid = " x ".join(f"{n} {name}" for name, n in self.shape.items())
+        sizes = " x ".join(f"{n} {name}" for name, n in self.shape.items())
         cost = (
             f"{self.core_hours:.3g} core-hours ({duration(self.core_hours * 3600)} on one core)"
             if math.isfinite(self.core_hours)
@@ -84,7 +84,7 @@ class Plan:
         return "\n".join(
             [
                 f"{self.title} -> {self.store}",
-                f"cases       {n_case} = {grid}",
+                f"cases       {n_case} = {sizes}",
                 f"blocks      {self.n_block}, at most {self.n_per_block} cases each; {self._idle}",
                 f"store       {_size(self.n_byte)} before compression, {self.n_file} files",
                 "so far      "
@@ -105,20 +105,20 @@ def make_plan(study: Study) -> Plan:
     StoreError
         The store at its output is of another study.
     """
-    sweep = sweep_for(study)
-    manifest = Manifest.of(sweep)
-    blocks = sweep.blocks()
-    status = np.zeros(sweep.n_case, np.int8)
+    grid = grid_for(study)
+    manifest = Manifest.of(grid)
+    blocks = grid.blocks()
+    status = np.zeros(grid.n_case, np.int8)
     if is_store(study.output):
         store = Store(study.output)
         ledger = store.replay(with_measures=False)
-        ledger.status[find_gone(store, ledger)] = MISSING
+        ledger.status[cases_without_files(store, ledger)] = MISSING
         origin = origins(store.manifest, manifest)
         status = np.where(origin < 0, MISSING, ledger.status[origin])
-    missing = (status == MISSING).reshape(sweep.shape)
+    missing = (status == MISSING).reshape(grid.shape)
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
     steps = sum(block.cost * share for block, share in left)
-    pace, failures = _pace(sweep, manifest, [block for block, _ in left])
+    pace, failures = _pace(grid, manifest, [block for block, _ in left])
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
     told = {axis.coordinate: axis.name for axis in study.axes}  # a dimension as the study names its axis
     if study.sample is not None:
@@ -127,20 +127,20 @@ def make_plan(study: Study) -> Plan:
     return Plan(
         title=study.title,
         store=study.output,
-        shape=dict(zip((told.get(dim, dim) for dim in sweep.dims), sweep.shape, strict=True)),
+        shape=dict(zip((told.get(dim, dim) for dim in grid.dims), grid.shape, strict=True)),
         counts=count(status),
-        n_chain=len(sweep.chains()),
+        n_sequence=len(grid.sequences()),
         n_block=len(blocks),
-        n_per_block=math.prod(sweep.chunk),
+        n_per_block=math.prod(grid.chunk),
         n_file=len(blocks) * len(manifest.variables) + _FIXED_FILES,
-        n_byte=sweep.n_case * (per_case + 2 * _LINE),
+        n_byte=grid.n_case * (per_case + 2 * _LINE),
         steps=round(steps),
         core_hours=steps * pace / 3600 if left else 0.0,
         failures=tuple(failures),
     )
 
 
-def _pace(sweep: Sweep, manifest: Manifest, blocks: list[Block]) -> tuple[float, list[str]]:
+def _pace(grid: CaseGrid, manifest: Manifest, blocks: list[Block]) -> tuple[float, list[str]]:
     """Seconds a predicted step takes, and what failed.
 
     The mean over cases spread evenly from the longest block to the last, each from another place in its
@@ -157,19 +157,19 @@ def _pace(sweep: Sweep, manifest: Manifest, blocks: list[Block]) -> tuple[float,
         box = np.unravel_index(int(k * _SECTION % 1.0 * math.prod(block.shape)), block.shape)
         index = tuple(int(start + step) for start, step in zip(block.start, box, strict=True))
         try:
-            paces.append(_pilot(sweep, index, block.cost / math.prod(block.shape)))
+            paces.append(_pilot(grid, index, block.cost / math.prod(block.shape)))
         except Exception as error:  # whatever is wrong with the case: the others are asked all the same
-            where = manifest.name_case(int(np.ravel_multi_index(index, sweep.shape)))
+            where = manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))
             failures.append(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}")
     return (float(np.mean(paces)) if paces else math.nan), failures
 
 
-def _pilot(sweep: Sweep, index: tuple[int, ...], steps: float) -> float:
+def _pilot(grid: CaseGrid, index: tuple[int, ...], steps: float) -> float:
     """Seconds per predicted step of a case, shortened where the whole of it takes long.
 
     Revolutions that are recorded cost more than those thrown away: their shares stay.
     """
-    study, case = sweep.study, sweep.case(index)
+    study, case = grid.study, grid.case(index)
     whole = study.recording
     setup = set_up(study, case)
 

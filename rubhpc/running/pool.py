@@ -26,7 +26,7 @@ T = TypeVar("T")
 _NAP = 2e-3  # s between looks at whether the others have come
 
 
-class Tally(NamedTuple):
+class Totals(NamedTuple):
     """Sums over all ranks.
 
     Blocks claimed; cases done, failed and diverged, and the predicted steps of them all; ranks that stop.
@@ -60,13 +60,13 @@ class Pool(Protocol):
     def from_first(self, make: Callable[[], T]) -> T:
         """What `make` returns, or raises of RubErrors, on the first rank, on all of them."""
 
-    def claim(self) -> Tally:
+    def claim(self) -> Totals:
         """Claim the next block, whose position is `claimed` in the sums as they were before."""
 
-    def add(self, tally: Tally) -> None:
+    def add(self, increment: Totals) -> None:
         """Add to the sums."""
 
-    def sums(self) -> Tally:
+    def totals(self) -> Totals:
         """The sums as they are; for the first rank, which has them at hand."""
 
     def gather(self, value: T) -> list[T]:
@@ -89,25 +89,25 @@ class Alone:
     size = 1
 
     def __init__(self) -> None:
-        self._sums = np.zeros(len(Tally()), np.int64)
+        self._sums = np.zeros(len(Totals()), np.int64)
 
     def from_first(self, make: Callable[[], T]) -> T:
         """See Pool."""
         return make()
 
-    def claim(self) -> Tally:
+    def claim(self) -> Totals:
         """See Pool."""
-        before = self.sums()
+        before = self.totals()
         self._sums[0] += 1
         return before
 
-    def add(self, tally: Tally) -> None:
+    def add(self, increment: Totals) -> None:
         """See Pool."""
-        self._sums += tally
+        self._sums += increment
 
-    def sums(self) -> Tally:
+    def totals(self) -> Totals:
         """See Pool."""
-        return Tally(*self._sums.tolist())
+        return Totals(*self._sums.tolist())
 
     def gather(self, value: T) -> list[T]:
         """See Pool."""
@@ -142,7 +142,7 @@ class Ranks:
         """Make the window of the sums."""
         self.rank, self.size = self._comm.rank, self._comm.size
         with self._losses():
-            n_byte = 8 * len(Tally()) if self.rank == 0 else 0
+            n_byte = 8 * len(Totals()) if self.rank == 0 else 0
             self._window = self._mpi.Win.Allocate(n_byte, 8, comm=self._comm)
             if self.rank == 0:
                 memory: Any = self._window.tomemory()
@@ -166,17 +166,17 @@ class Ranks:
         result: T = value
         return result
 
-    def claim(self) -> Tally:
+    def claim(self) -> Totals:
         """See Pool."""
-        return self._accumulate(Tally(claimed=1))
+        return self._accumulate(Totals(claimed=1))
 
-    def add(self, tally: Tally) -> None:
+    def add(self, increment: Totals) -> None:
         """See Pool."""
-        self._accumulate(tally)
+        self._accumulate(increment)
 
-    def sums(self) -> Tally:
+    def totals(self) -> Totals:
         """See Pool."""
-        return self._accumulate(Tally())
+        return self._accumulate(Totals())
 
     def gather(self, value: T) -> list[T]:
         """See Pool."""
@@ -212,14 +212,14 @@ class Ranks:
             while not request.Test():
                 time.sleep(_NAP)
 
-    def _accumulate(self, tally: Tally) -> Tally:
+    def _accumulate(self, increment: Totals) -> Totals:
         """Add to the sums and return what they were, in one atomic message."""
-        more = np.array(tally, np.int64)
-        before = np.zeros_like(more)
+        added = np.array(increment, np.int64)
+        before = np.zeros_like(added)
         with self._losses():
-            self._window.Get_accumulate(more, before, 0, op=self._mpi.SUM)
+            self._window.Get_accumulate(added, before, 0, op=self._mpi.SUM)
             self._window.Flush(0)
-        return Tally(*before.tolist())
+        return Totals(*before.tolist())
 
     @contextmanager
     def _losses(self) -> Iterator[None]:

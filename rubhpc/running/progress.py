@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from rich.progress import Progress as Bar
 
-    from rubhpc.running.pool import Tally
+    from rubhpc.running.pool import Totals
 
 _REDRAW = 0.2  # s between redraws of the bar
 _FIRST_LINE, _LONGEST_GAP = 10.0, 300.0  # s between lines: they grow rarer as a run grows long
@@ -66,7 +66,7 @@ class Progress:
         if self._bar is not None:
             self._bar.stop()
 
-    def update(self, sums: Tally) -> None:
+    def update(self, sums: Totals) -> None:
         """Show the sums of all ranks, unless that was done a moment ago."""
         now = time.monotonic()
         if self._quiet or now - self._told < (_REDRAW if self._has_bar else self._gap):
@@ -79,7 +79,7 @@ class Progress:
         else:
             self._bar.update(self._bar.task_ids[0], completed=n_ended, rest=self._rest(sums))
 
-    def _rest(self, sums: Tally) -> str:
+    def _rest(self, sums: Totals) -> str:
         """Rate, time left (by predicted steps, for cases differ) and what went wrong."""
         seconds = max(time.monotonic() - self._began, 1e-9)
         texts = [f"{sums.n_case / seconds:.3g} a second"]

@@ -15,7 +15,7 @@ from rubhpc.running.worker import packed_measures, put, set_up
 from rubhpc.schema import DONE, FINAL_STATE, MISSING, STATUS
 from rubhpc.storage.journal import measures_type
 from rubhpc.storage.manifest import Manifest
-from rubhpc.storage.resume import is_store, sweep_for
+from rubhpc.storage.resume import grid_for, is_store
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.study.points import Points
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.record import Record
-    from rubhpc.study.cases import Case, Sweep
+    from rubhpc.study.cases import Case, CaseGrid
     from rubhpc.study.study import Study
 
 SHORTEST = 6  # characters of an id that are enough, if no other case shares them
@@ -74,19 +74,19 @@ def reproduce(study: Study, name: str) -> Reproduction:
     RubError
         The case fails; the text is its reason.
     """
-    sweep = sweep_for(study)
-    manifest = Manifest.of(sweep)
-    flat = _find(sweep, name.lower())
-    case = sweep.case([int(i) for i in np.unravel_index(flat, sweep.shape)])
+    grid = grid_for(study)
+    manifest = Manifest.of(grid)
+    flat = _find(grid, name.lower())
+    case = grid.case([int(i) for i in np.unravel_index(flat, grid.shape)])
     told = manifest.name_case(flat)
     try:
-        record = _compute(sweep, case)
+        record = _compute(grid, case)
         data = {v.name: np.full((1, *manifest.extent(v)), np.nan, v.dtype) for v in manifest.variables}
         put(record, data, 0)
     except Exception as error:
         text = " ".join(str(error).split())
         raise RubError(f"case {case.id}, {told}: {type(error).__name__}: {text}") from error
-    row = packed_measures(record, measures_type(sweep.n_stator))
+    row = packed_measures(record, measures_type(grid.n_stator))
     status = STATUS[record.status] + (f": {record.remark}" if record.remark else "")
     measures = {n: row[n].tolist() for n in row.dtype.names or ()}
     return Reproduction(
@@ -98,11 +98,11 @@ def reproduce(study: Study, name: str) -> Reproduction:
     )
 
 
-def _compute(sweep: Sweep, case: Case) -> Record:
+def _compute(grid: CaseGrid, case: Case) -> Record:
     """The record of a case; those before it in its chain are read from the store, or computed on the way."""
-    study, behind, state = sweep.study, [case], None
-    while (index := sweep.before(behind[-1].index)) is not None:
-        before = sweep.case(index)
+    study, behind, state = grid.study, [case], None
+    while (index := grid.predecessor(behind[-1].index)) is not None:
+        before = grid.case(index)
         status, state = _stored_end(study, before)
         if status != MISSING:
             break
@@ -150,12 +150,12 @@ def _locate(store: Store, study: Study, case: Case) -> int | None:
     return flat if store.manifest.case_id(flat) == case.id else None
 
 
-def _find(sweep: Sweep, name: str) -> int:
+def _find(grid: CaseGrid, name: str) -> int:
     """Flat index of the one case whose id begins so."""
     if len(name) < SHORTEST:
         raise InputError(f"--only {name}: too short; give {SHORTEST} characters of an id at least")
-    manifest = Manifest.of(sweep)
-    found = [flat for flat in range(sweep.n_case) if manifest.case_id(flat).startswith(name)]
+    manifest = Manifest.of(grid)
+    found = [flat for flat in range(grid.n_case) if manifest.case_id(flat).startswith(name)]
     if len(found) != 1:
         what = f"{len(found)} cases have such an id; give more of it" if found else "no case has such an id"
         raise InputError(f"--only {name}: {what}; rubhpc status names those that failed")

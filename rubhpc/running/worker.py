@@ -12,8 +12,8 @@ import numpy as np
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
-from rubhpc.running.initial_states import Ends, Start
-from rubhpc.running.pool import Tally
+from rubhpc.running.initial_states import InitialStates, Start
+from rubhpc.running.pool import Totals
 from rubhpc.running.stopping import Stopped
 from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING
 from rubhpc.storage.disk import disk_errors, flush_to_disk
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from rubhpc.integrate.setup import Setup
     from rubhpc.rig.rig import Rig
     from rubhpc.running.stopping import Stopping
-    from rubhpc.running.watch import Watch
+    from rubhpc.running.watchdog import Watchdog
     from rubhpc.storage.journal import Journal, Ledger
     from rubhpc.storage.store import Store
-    from rubhpc.study.cases import Block, Case, Sweep
+    from rubhpc.study.cases import Block, Case, CaseGrid
     from rubhpc.study.study import Study
 
     Arrays = dict[str, NDArray[Any]]
@@ -74,20 +74,20 @@ class Worker:
         Called several times a second while a case is computed.
     """
 
-    sweep: Sweep
+    grid: CaseGrid
     store: Store
     ledger: Ledger
     missing: NDArray[np.bool_]
     journal: Journal
-    watch: Watch
+    watch: Watchdog
     stopping: Stopping
-    report: Callable[[Tally], None]
+    report: Callable[[Totals], None]
     attend: Callable[[], None]
 
     def __post_init__(self) -> None:
-        self._record_type = measures_type(self.sweep.n_stator)
+        self._record_type = measures_type(self.grid.n_stator)
         self._setups: OrderedDict[tuple[int, float], tuple[Rig, Setup]] = OrderedDict()
-        self._ends = Ends(self.sweep, self.store, self.ledger, self._mend)
+        self._ends = InitialStates(self.grid, self.store, self.ledger, self._mend)
         self._unsynced: list[Path] = []
         self._next_sync = time.monotonic() + _SYNC_GAP
         self._seconds, self._cost = 0.0, 0.0
@@ -111,13 +111,13 @@ class Worker:
         wanted |= spoiled
         entries: list[Entry] = []
         try:
-            cases = self.sweep.cases(block)
+            cases = self.grid.cases(block)
         except Exception as error:
             cases, reason = [], _told(error)
-            ids = self.sweep.case_ids(block)
+            ids = self.grid.case_ids(block)
             entries = [Entry(int(flat[i]), ids[i], FAILED, reason=reason) for i in np.flatnonzero(wanted)]
-            self.report(Tally(failed=len(entries), cost=round(cost * len(entries))))
-        for i_case in self.sweep.in_turn(cases):
+            self.report(Totals(failed=len(entries), cost=round(cost * len(entries))))
+        for i_case in self.grid.in_turn(cases):
             if not wanted[i_case]:
                 continue
             if self.stopping.look() or not self.stopping.fits(cost * self._pace):
@@ -132,7 +132,7 @@ class Worker:
             self._cost += cost
             entries.append(entry)
             self.report(
-                Tally(
+                Totals(
                     done=entry.status == DONE,
                     failed=entry.status == FAILED,
                     diverged=entry.status == DIVERGED,
@@ -193,7 +193,7 @@ class Worker:
 
     def _mend(self, start: tuple[int, ...]) -> None:
         """Compute again what is damaged of a block, which another goes on from."""
-        self.work(next(block for block in self.sweep.blocks() if block.start == start))
+        self.work(next(block for block in self.grid.blocks() if block.start == start))
 
     def _enter(self, case: Case, flat: int, data: Arrays, i_case: int, start: Start) -> Entry:
         """Compute a case and put its arrays in the block's; what goes wrong in it is its reason to fail."""
@@ -214,7 +214,7 @@ class Worker:
         return Entry(flat, case.id, record.status, case_checksum(data, i_case), measures, remark)
 
     def _compute(self, case: Case, start: Start) -> Record:
-        study = self.sweep.study
+        study = self.grid.study
         key = (
             id(case.rig),
             case.speed,

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.storage.journal import Ledger
-    from rubhpc.study.cases import Sweep
+    from rubhpc.study.cases import CaseGrid
 
 _HELD = 64  # blocks of the old grid kept in memory: neighbours in the new one come from few of them
 
@@ -45,17 +45,20 @@ def origins(before: Manifest, after: Manifest) -> NDArray[np.int64]:
         place = np.array([at.get(values, -1) for values in after.points.along(dim)])
         origin = np.add.outer(origin * n, place)
         is_new = np.logical_or.outer(is_new, place < 0)
-    if (chain := after.chain) is not None:
-        kept = chain.kept(before.axes[chain.axis].values, after.axes[chain.axis].values)
+    if (continuation := after.continuation) is not None:
+        kept = continuation.unchanged(
+            before.axes[continuation.axis].values, after.axes[continuation.axis].values
+        )
         shape = [
-            len(axis.values) if i in (chain.axis, chain.direction) else 1 for i, axis in enumerate(after.axes)
+            len(axis.values) if i in (continuation.axis, continuation.direction) else 1
+            for i, axis in enumerate(after.axes)
         ]
         is_new |= ~kept.reshape(shape)
     return np.where(is_new, -1, origin).ravel()
 
 
-def grow(store: Store, sweep: Sweep) -> None:
-    """Give the store the axes and the identity of `sweep`, keeping every case; needs its lock.
+def grow(store: Store, grid: CaseGrid) -> None:
+    """Give the store the axes and the identity of `grid`, keeping every case; needs its lock.
 
     Raises
     ------
@@ -66,17 +69,17 @@ def grow(store: Store, sweep: Sweep) -> None:
     with disk_errors(store.path):
         shutil.rmtree(draft, ignore_errors=True)
         try:
-            _put_together(draft, store, sweep)
+            _put_together(draft, store, grid)
             os.sync()  # all of it is on the disk before it counts
             draft.rename(store.private / GROWTH)
             flush_to_disk(store.private)
         finally:
             shutil.rmtree(draft, ignore_errors=True)
-    settle(store.path)
+    finish_growth(store.path)
     store.reopen()
 
 
-def settle(path: Path) -> None:
+def finish_growth(path: Path) -> None:
     """Finish a growth that was decided on, if there is one; needs the store's lock."""
     growth = path / PRIVATE / GROWTH
     if not growth.is_dir():
@@ -104,17 +107,17 @@ def _move(file: Path, target: Path) -> None:
     file.replace(target)
 
 
-def _put_together(draft: Path, store: Store, sweep: Sweep) -> None:
+def _put_together(draft: Path, store: Store, grid: CaseGrid) -> None:
     """Make in `draft` all that is to change in the store, and a journal of all cases in the new grid."""
     before, ledger = store.manifest, store.replay()
     accepted = before.accepted
-    if before.parts["physics"] != sweep.identity_parts["physics"]:
+    if before.parts["physics"] != grid.identity_parts["physics"]:
         accepted = (*accepted, before.parts["physics"])
-    files = layout.skeleton(sweep, accepted=accepted)
+    files = layout.skeleton(grid, accepted=accepted)
     for name, data in files.items():
         write_whole(draft / name, data, is_synced=False)
     checks = {name: crc32(data) for name, data in files.items()}
-    after = Manifest.of(sweep, files=checks, accepted=accepted)
+    after = Manifest.of(grid, files=checks, accepted=accepted)
     after.write(draft)
     origin = origins(before, after)
     lost = _stage_blocks(Store(draft), store, ledger, origin)

@@ -30,7 +30,7 @@ _DEATHS = 5  # deaths of unknown cause: the launcher may have been killed, or th
 _OVERRUN = "over its time limit"
 
 
-class Hand:
+class InProgress:
     """A rank's record of the case in hand, as a context."""
 
     def __init__(self, directory: Path, run: int, writer: str) -> None:
@@ -48,7 +48,7 @@ class Hand:
         """Note the case that is computed from now on; it outlives this process, at 1 us."""
         os.pwrite(self._handle, f"{flat} {name}".ljust(_RECORD - 1).encode(), 0)
 
-    def accuse(self, seconds: float) -> None:
+    def note_overrun(self, seconds: float) -> None:
         """Leave it as evidence that the case in hand does not end; from any thread."""
         os.write(self._handle, f"{_OVERRUN} of {seconds:g} s, in a single step of it\n".encode())
 
@@ -65,27 +65,27 @@ class Hand:
 
 
 @dataclass(frozen=True)
-class Suspects:
+class RankDeaths:
     """Cases that were in hand when ranks died.
 
     Attributes
     ----------
-    guilty : dict
+    failed : dict
         Flat index -> why the case is not to be tried again.
-    doubtful : dict
+    suspect : dict
         Flat index -> deaths, of cases that are to be computed last, each by itself.
     """
 
-    guilty: dict[int, str]
-    doubtful: dict[int, int]
+    failed: dict[int, str]
+    suspect: dict[int, int]
 
 
-def find_suspects(directory: Path, manifest: Manifest, is_missing: NDArray[np.bool_]) -> Suspects:
+def read_deaths(directory: Path, manifest: Manifest, is_missing: NDArray[np.bool_]) -> RankDeaths:
     """Which missing cases were in hand when ranks died; records of the others are removed."""
     crashes: Counter[int] = Counter()
     deaths: Counter[int] = Counter()
     causes: dict[int, str] = {}
-    guilty: dict[int, str] = {}
+    failed: dict[int, str] = {}
     for record in sorted(directory.glob("run*")) if directory.is_dir() else ():
         found = _read(record)
         if found is None or not _is_open(*found[:2], manifest, is_missing):
@@ -94,17 +94,17 @@ def find_suspects(directory: Path, manifest: Manifest, is_missing: NDArray[np.bo
         flat, _, evidence = found
         deaths[flat] += 1
         if evidence.startswith(_OVERRUN):
-            guilty[flat] = evidence
+            failed[flat] = evidence
         elif evidence:
             crashes[flat] += 1
             causes[flat] = evidence
     for flat, n in deaths.items():
         if crashes[flat] >= _CRASHES:
-            guilty.setdefault(flat, f"its rank died in it {crashes[flat]} times: {causes[flat]}")
+            failed.setdefault(flat, f"its rank died in it {crashes[flat]} times: {causes[flat]}")
         elif n >= _DEATHS:
-            guilty.setdefault(flat, f"its rank died in it {n} times, of unknown cause")
-    doubtful = {flat: n for flat, n in deaths.items() if flat not in guilty and (n > 1 or crashes[flat])}
-    return Suspects(guilty, doubtful)
+            failed.setdefault(flat, f"its rank died in it {n} times, of unknown cause")
+    suspect = {flat: n for flat, n in deaths.items() if flat not in failed and (n > 1 or crashes[flat])}
+    return RankDeaths(failed, suspect)
 
 
 def forget(directory: Path, is_judged: NDArray[np.bool_]) -> None:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.study.continuation import Chain
+    from rubhpc.study.continuation import Continuation
     from rubhpc.study.points import Points
 
 _FORMAT = 1
@@ -81,7 +81,7 @@ class Header:
     identity: str
     points: Points
     n_stator: int
-    chain: Chain | None = None
+    continuation: Continuation | None = None
 
     @property
     def told(self) -> dict[str, Any]:
@@ -100,7 +100,7 @@ class Header:
 
     @cached_property
     def _ids(self) -> CaseIds:
-        return CaseIds(self.identity, self.points.values, self.chain)
+        return CaseIds(self.identity, self.points.values, self.continuation)
 
     def line(self) -> bytes:
         """The header as the first line of a journal."""
@@ -162,9 +162,9 @@ class Ledger:
         Metrics of the cases that have any; None where the replay was asked to leave them out.
     reasons : dict
         Flat index -> why a case failed or diverged.
-    torn : int
+    n_damaged : int
         Lines that were passed over because they are damaged or cut short.
-    torn_cases : set
+    damaged_cases : set
         Flat indices that can still be read in such lines.
     n_recent : int
         Lines of the latest run.
@@ -175,8 +175,8 @@ class Ledger:
     is_known: NDArray[np.bool_]
     measures: NDArray[np.void] | None
     reasons: dict[int, str] = field(default_factory=dict)
-    torn: int = 0
-    torn_cases: set[int] = field(default_factory=set)
+    n_damaged: int = 0
+    damaged_cases: set[int] = field(default_factory=set)
     n_recent: int = 0
 
 
@@ -227,13 +227,13 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
         is_sound = first[:8] == b"%08x" % crc32(first[9:-1])
         if is_sound and json.loads(first[9:-1]) != header.told:
             return 0  # of another study or version, or of other values on the axes
-        ledger.torn += not is_sound
+        ledger.n_damaged += not is_sound
         n_line = 0
         for line in file:
             text = line[9:-1]
             if line[:8] != b"%08x" % crc32(text) or line[-1:] != b"\n":
-                ledger.torn += 1
-                ledger.torn_cases |= _still_legible(text, n_case)
+                ledger.n_damaged += 1
+                ledger.damaged_cases |= _still_legible(text, n_case)
                 continue
             number, name, state, check, packed, reason = text.split(b" ", 5)
             flat = int(number)

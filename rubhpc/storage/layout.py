@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from zarr.core.buffer import Buffer
 
     from rubhpc.schema import Variable
-    from rubhpc.study.cases import Sweep
+    from rubhpc.study.cases import CaseGrid
     from rubhpc.study.study import Study
 
 PACKED = (
@@ -63,19 +63,19 @@ def fill_value(variable: Variable) -> float | int:
     return math.nan if variable.dtype.startswith("float") else -1
 
 
-def skeleton(sweep: Sweep, *, accepted: tuple[int, ...] = ()) -> dict[str, bytes]:
+def skeleton(grid: CaseGrid, *, accepted: tuple[int, ...] = ()) -> dict[str, bytes]:
     """All files of a store that are of no case, by their path in it: metadata, coordinates and settings."""
     files: dict[str, Buffer] = {}
-    manifest = Manifest.of(sweep)
+    manifest = Manifest.of(grid)
     group = zarr.create_group(
-        MemoryStore(files), zarr_format=3, attributes=_attributes(sweep, accepted=accepted)
+        MemoryStore(files), zarr_format=3, attributes=_attributes(grid, accepted=accepted)
     )
     for variable in manifest.variables:
         _create(group, variable, manifest, chunk=manifest.chunk)
     for variable in PACKED:
         _create(group, variable, manifest, chunk=_packed_chunk(manifest.shape))
     with zarr.config.set(_WRITE_ALL):
-        for name, (dims, values, attributes) in _static(sweep).items():
+        for name, (dims, values, attributes) in _static(grid).items():
             group.create_array(
                 name, data=values, dimension_names=dims, attributes=attributes, compressors=_CODECS
             )
@@ -86,14 +86,14 @@ def skeleton(sweep: Sweep, *, accepted: tuple[int, ...] = ()) -> dict[str, bytes
     return {name: held.to_bytes() for name, held in files.items()}
 
 
-def build(path: Path, sweep: Sweep) -> None:
+def build(path: Path, grid: CaseGrid) -> None:
     """Make all of a store in the empty directory `path`."""
-    files = skeleton(sweep)
+    files = skeleton(grid)
     for name, data in files.items():
         write_whole(path / name, data, is_synced=False)
     (path / PRIVATE / "journal").mkdir(parents=True)
     (path / PRIVATE / "logs").mkdir()
-    Manifest.of(sweep, files={name: crc32(data) for name, data in files.items()}).write(path)
+    Manifest.of(grid, files={name: crc32(data) for name, data in files.items()}).write(path)
 
 
 def encode(chunk: NDArray[Any]) -> bytes:
@@ -156,10 +156,10 @@ def _packed_chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(chunk)
 
 
-def _static(sweep: Sweep) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]]:
+def _static(grid: CaseGrid) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]]:
     """Coordinates and settings: name -> (dimensions, values, attributes)."""
-    sizes = Manifest.of(sweep).sizes
-    recording = sweep.study.recording
+    sizes = Manifest.of(grid).sizes
+    recording = grid.study.recording
     own: dict[str, tuple[NDArray[Any], str]] = {
         "stator": (np.arange(1, sizes["stator"] + 1), "number of the stator, as in the rig"),
         "revolution": (
@@ -176,19 +176,19 @@ def _static(sweep: Sweep) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict
             {"units": axis.unit or "1", "long_name": axis.long_name}
             | (_flags(DIRECTIONS) if axis.name == DIRECTION else {}),
         )
-        for axis in sweep.study.axes
+        for axis in grid.study.axes
     }
-    for dim, n_case in zip(sweep.dims, sweep.shape, strict=True):
+    for dim, n_case in zip(grid.dims, grid.shape, strict=True):
         if dim not in static:
             own[dim] = (np.arange(n_case), "number of the case in its sample")
     for name, (values, text) in own.items():
         dim = "sample" if name == "revolution" else name
         static[name] = ((dim,), values, {"units": "1", "long_name": text})
     for name, attribute, unit, text in _PLACES:
-        if not any(axis.name.endswith(f".{attribute}") for axis in sweep.study.axes):  # or it is many places
-            at = np.array([getattr(stator, attribute) for stator in sweep.study.rig.stator])
+        if not any(axis.name.endswith(f".{attribute}") for axis in grid.study.axes):  # or it is many places
+            at = np.array([getattr(stator, attribute) for stator in grid.study.rig.stator])
             static[name] = (("stator",), at, {"units": unit, "long_name": text})
-    for name, (dims, values) in sweep.settings().items():
+    for name, (dims, values) in grid.operating_points().items():
         if name not in static:  # a clearance axis is its own setting
             variable = VARIABLES[name]
             static[name] = (
@@ -199,12 +199,12 @@ def _static(sweep: Sweep) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict
     return static
 
 
-def _attributes(sweep: Sweep, *, accepted: tuple[int, ...]) -> dict[str, Any]:
-    study = sweep.study
+def _attributes(grid: CaseGrid, *, accepted: tuple[int, ...]) -> dict[str, Any]:
+    study = grid.study
     return {
         "title": study.title,
         "conventions": "CF-1.11, SI units; a missing value is NaN, or -1 in integers; status tells why",
-        "identity": sweep.identity,
+        "identity": grid.identity,
         "study": study.as_dict(),
         "rig": study.rig.as_dict(),
         "versions": {

@@ -14,15 +14,15 @@ from rubhpc.schema import STATE, VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import Header
 from rubhpc.study.axes import FROM_REST, coordinate_of, written
-from rubhpc.study.continuation import CaseIds, chain_of
+from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.points import Points
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from rubhpc.schema import Variable
-    from rubhpc.study.cases import Sweep
-    from rubhpc.study.continuation import Chain
+    from rubhpc.study.cases import CaseGrid
+    from rubhpc.study.continuation import Continuation
 
 _FORMAT = 3  # raised with the arrays of the schema too: a store has them all
 PRIVATE = ".rubhpc"  # the directory of a store that zarr does not look into
@@ -106,17 +106,17 @@ class Manifest:
             identity=self.identity,
             points=self.points,
             n_stator=self.sizes["stator"],
-            chain=self.chain,
+            continuation=self.continuation,
         )
 
     @cached_property
-    def chain(self) -> Chain | None:
+    def continuation(self) -> Continuation | None:
         """How the motion is carried from case to case; None where each starts at rest."""
-        return chain_of(self.axes)
+        return continuation_of(self.axes)
 
     @cached_property
     def _ids(self) -> CaseIds:
-        return CaseIds(self.identity, self.points.values, self.chain)
+        return CaseIds(self.identity, self.points.values, self.continuation)
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -143,28 +143,30 @@ class Manifest:
         return ", ".join([*numbers, *values])
 
     @classmethod
-    def of(cls, sweep: Sweep, *, files: dict[str, int] | None = None, accepted: tuple[int, ...] = ()) -> Self:
-        """The manifest of a store for `sweep`."""
-        study = sweep.study
+    def of(
+        cls, grid: CaseGrid, *, files: dict[str, int] | None = None, accepted: tuple[int, ...] = ()
+    ) -> Self:
+        """The manifest of a store for `grid`."""
+        study = grid.study
         recording = study.recording
         n_sample = recording.revolutions * recording.samples_per_revolution
         return cls(
             title=study.title,
-            identity=sweep.identity,
-            parts=json.loads(json.dumps(sweep.identity_parts)),  # tuples become lists, as in a file
+            identity=grid.identity,
+            parts=json.loads(json.dumps(grid.identity_parts)),  # tuples become lists, as in a file
             axes=tuple(
                 AxisRecord(**{f.name: getattr(axis, f.name) for f in fields(AxisRecord)})
                 for axis in study.axes
             ),
-            chunk=tuple(sweep.chunk),
+            chunk=tuple(grid.chunk),
             sizes={
-                "stator": sweep.n_stator,
+                "stator": grid.n_stator,
                 "sample": n_sample,
                 "order": n_sample // 2 + 1,
                 "section": recording.revolutions,
-                **({"degree": sweep.n_degree} if sweep.chain else {}),
+                **({"degree": grid.n_degree} if grid.continuation else {}),
             },
-            keep=tuple(sorted([*recording.keep, *([STATE] if sweep.chain else [])])),
+            keep=tuple(sorted([*recording.keep, *([STATE] if grid.continuation else [])])),
             files=files or {},
             accepted=accepted,
         )

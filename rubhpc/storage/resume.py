@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE
-from rubhpc.storage.growth import grow, settle
+from rubhpc.storage.growth import finish_growth, grow
 from rubhpc.storage.manifest import Manifest, manifests
 from rubhpc.storage.store import Store
-from rubhpc.study.cases import Sweep
+from rubhpc.study.cases import CaseGrid
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,8 +28,8 @@ def is_store(path: Path) -> bool:
     return any(os.path.isfile(place) for place in manifests(path))  # a name too long is none
 
 
-def sweep_for(study: Study, *, accept_version: bool = False) -> Sweep:
-    """The study's sweep, with the blocks of the store it goes on with.
+def grid_for(study: Study, *, accept_version: bool = False) -> CaseGrid:
+    """The study's grid, with the blocks of the store it goes on with.
 
     Raises
     ------
@@ -37,12 +37,12 @@ def sweep_for(study: Study, *, accept_version: bool = False) -> Sweep:
         The store at the study's output is of another study, or of another version of the physics that is
         not accepted; the text lists the differences.
     """
-    sweep = Sweep(study)
+    grid = CaseGrid(study)
     if not is_store(study.output):
-        return sweep
+        return grid
     manifest = Manifest.read(study.output)
-    _refuse_other(manifest, Manifest.of(sweep), study.output, accept_version=accept_version)
-    return sweep if sweep.chunk == manifest.chunk else Sweep(study, chunk=manifest.chunk)
+    _refuse_other(manifest, Manifest.of(grid), study.output, accept_version=accept_version)
+    return grid if grid.chunk == manifest.chunk else CaseGrid(study, chunk=manifest.chunk)
 
 
 def _refuse_other(mine: Manifest, yours: Manifest, path: Path, *, accept_version: bool) -> None:
@@ -59,32 +59,32 @@ def _refuse_other(mine: Manifest, yours: Manifest, path: Path, *, accept_version
     raise StoreError(f"{path}: is the store of another study: {told}; choose another --output")
 
 
-def open_store(sweep: Sweep) -> Store:
+def open_store(grid: CaseGrid) -> Store:
     """The store of the study, made if it is not there."""
-    path = sweep.study.output
+    path = grid.study.output
     if is_store(path):
         return Store(path)
     try:
-        return Store.create(path, sweep)
+        return Store.create(path, grid)
     except StoreError:
         if is_store(path):  # another run was quicker
             return Store(path)
         raise
 
 
-def bring_up_to_date(store: Store, sweep: Sweep, *, accept_version: bool = False) -> None:
-    """Grow the store to the sweep's axes, mend what is damaged beside the cases, remove partial files."""
-    settle(store.path)
+def bring_up_to_date(store: Store, grid: CaseGrid, *, accept_version: bool = False) -> None:
+    """Grow the store to the axes of `grid`, repair damaged metadata, remove partial files."""
+    finish_growth(store.path)
     store.reopen()
-    wanted = Manifest.of(sweep)
+    wanted = Manifest.of(grid)
     _refuse_other(store.manifest, wanted, store.path, accept_version=accept_version)
     store.remove_partial_files()
     if store.manifest.axes != wanted.axes or store.manifest.identity != wanted.identity:
-        grow(store, sweep)
-    store.mend_files(sweep)
+        grow(store, grid)
+    store.repair_files(grid)
 
 
-def find_gone(store: Store, ledger: Ledger) -> list[int]:
+def cases_without_files(store: Store, ledger: Ledger) -> list[int]:
     """Flat indices of the cases that have been stored, but whose files are gone or empty."""
     gone: list[int] = []
     if not store.manifest.variables:

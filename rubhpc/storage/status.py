@@ -43,7 +43,7 @@ class StoreStatus:
     counts: tuple[int, ...]
     holder: Holder | None
     n_recent: int
-    torn: int
+    n_damaged: int
     failures: tuple[tuple[str, str], ...]
 
     @property
@@ -69,8 +69,8 @@ class StoreStatus:
             )
         elif self.counts[MISSING]:
             lines.append("no run is on; run the study again to compute what is missing")
-        if self.torn:
-            lines.append(f"{self.torn} damaged lines in the journals were passed over")
+        if self.n_damaged:
+            lines.append(f"{self.n_damaged} damaged lines in the journals were passed over")
         lines += [f"  {case}: {reason}" for case, reason in self.failures[:_SHOWN]]
         if len(self.failures) > _SHOWN:
             lines.append(f"  and {len(self.failures) - _SHOWN} more")
@@ -98,7 +98,7 @@ def read_status(path: Path) -> StoreStatus:
         counts=count(ledger.status),
         holder=holder,
         n_recent=ledger.n_recent,
-        torn=ledger.torn,
+        n_damaged=ledger.n_damaged,
         failures=tuple(
             (
                 f"{manifest.case_id(i)[:12]} {manifest.name_case(i)}: {STATUS[ledger.status[i]]}",

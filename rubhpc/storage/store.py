@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.study.cases import Sweep
+    from rubhpc.study.cases import CaseGrid
 
 
 class Store:
@@ -49,8 +49,8 @@ class Store:
         self.__dict__.pop("arrays", None)
 
     @classmethod
-    def create(cls, path: Path, sweep: Sweep) -> Self:
-        """Make a store for `sweep` at `path`: built beside it, then renamed, so that it is never half made.
+    def create(cls, path: Path, grid: CaseGrid) -> Self:
+        """Make a store for `grid` at `path`: built beside it, then renamed, so that it is never half made.
 
         Raises
         ------
@@ -64,7 +64,7 @@ class Store:
             _remove_drafts(place)
             draft.mkdir()
             try:
-                layout.build(draft, sweep)
+                layout.build(draft, grid)
                 draft.rename(place)
             except (FileExistsError, NotADirectoryError):
                 raise StoreError(
@@ -91,7 +91,7 @@ class Store:
         return self.private / "journal"
 
     @property
-    def hand_directory(self) -> Path:
+    def in_progress_directory(self) -> Path:
         """Where each rank notes the case it has in hand."""
         return self.private / "hand"
 
@@ -108,7 +108,7 @@ class Store:
         with disk_errors(self.journal_directory):
             return replay(self.journal_directory, self.manifest.header, with_measures=with_measures)
 
-    def take_back(self, ledger: Ledger, flat: Sequence[int], run: int, writer: str) -> None:
+    def mark_missing(self, ledger: Ledger, flat: Sequence[int], run: int, writer: str) -> None:
         """Declare cases missing, in the ledger and by a journal of their own."""
         if flat:
             ledger.status[flat] = MISSING
@@ -128,14 +128,14 @@ class Store:
             damaged.append(name)
         return damaged
 
-    def mend_files(self, sweep: Sweep) -> None:
+    def repair_files(self, grid: CaseGrid) -> None:
         """Write metadata, coordinates and settings anew where they are damaged, and the manifest."""
         damaged = self.damaged_files()
         if not damaged and not self.manifest.damaged_copies(self.path):
             return
         with disk_errors(self.path):
             if damaged:
-                files = layout.skeleton(sweep, accepted=self.manifest.accepted)
+                files = layout.skeleton(grid, accepted=self.manifest.accepted)
                 for name in damaged:
                     write_whole(self.path / name, files[name])
                 checks = {name: crc32(files[name]) for name in damaged}

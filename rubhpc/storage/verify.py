@@ -10,7 +10,7 @@ import zarr
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, MISSING
-from rubhpc.storage.growth import settle
+from rubhpc.storage.growth import finish_growth
 from rubhpc.storage.journal import next_run
 from rubhpc.storage.manifest import GROWTH
 from rubhpc.storage.store import Store, case_checksum
@@ -66,7 +66,7 @@ def verify(path: Path) -> Damage:
     note = ""
     if (store.private / GROWTH).is_dir():  # a run was killed in it
         with store.lock():
-            settle(path)
+            finish_growth(path)
         store.reopen()
     ledger = store.replay()
     spoiled = _spoiled_cases(store, ledger)
@@ -79,7 +79,7 @@ def verify(path: Path) -> Damage:
             with store.lock():
                 if packed:
                     store.forget_packing()
-                store.take_back(ledger, sorted(spoiled), next_run(store.journal_directory), "verify")
+                store.mark_missing(ledger, sorted(spoiled), next_run(store.journal_directory), "verify")
         except (StoreError, OSError) as error:
             note = str(error)
     return Damage(
@@ -127,7 +127,7 @@ def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:
     """Cases whose line in a journal is cut short, damaged, or packed and yet no longer there."""
     never = ~ledger.is_known
     packed = _read(store, "status")
-    lost = set(ledger.torn_cases)
+    lost = set(ledger.damaged_cases)
     if packed is not None:
         lost |= set(np.flatnonzero((packed.ravel() != MISSING) & never).tolist())
     return {flat: "its line in the journal is damaged or gone" for flat in lost if never[flat]}

@@ -1,6 +1,6 @@
-"""A study's grid as cases and blocks: who is who, what belongs together, what each block will cost.
+"""The cases of a study and their blocks: identity, ids, chunks, predicted cost.
 
-Nothing here holds an object a case: a million of them are planned as arrays.
+No object is kept per case: a million cases are planned as arrays.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from rubhpc.fem.model import state_size
 from rubhpc.input.fields import place
 from rubhpc.rig.rig import with_keys
 from rubhpc.study.axes import FROM_REST
-from rubhpc.study.continuation import CaseIds, chain_of
-from rubhpc.study.operating_points import Settings
+from rubhpc.study.continuation import CaseIds, continuation_of
+from rubhpc.study.operating_points import OperatingPoints
 from rubhpc.study.points import Points, boxed
 
 if TYPE_CHECKING:
@@ -32,15 +32,15 @@ if TYPE_CHECKING:
     from rubhpc.rig.rig import Rig
     from rubhpc.study.study import Study
 
-MOST_CASES = 50_000_000  # beyond, a slip of the pen fills the memory
-_BLOCK = 16  # cases of a block, unless told
-_MOST_RIGS = 64  # along an axis, assembled before the run, 1 ms each; of more, the ends
-PHYSICS = 4  # raised whenever the same study gives other numbers than before
+MOST_CASES = 50_000_000  # a larger grid is taken for a mistake: it would fill the memory
+_BLOCK = 16  # cases of a block by default, at most
+_MOST_RIGS = 64  # along an axis: assembled before the run, 1 ms each; of more values only the two ends
+PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Case:
-    """One point of the grid, with all that it takes to compute it."""
+    """One point of the grid, with all that is needed to compute it."""
 
     index: tuple[int, ...]
     id: str
@@ -61,16 +61,16 @@ class Block:
     cost: int  # predicted integration steps
 
 
-class Sweep:
+class CaseGrid:
     """The cases of a study.
 
     Parameters
     ----------
     study : Study
     chunk : tuple of int, optional
-        Cases of a block along each dimension, where a store has them already. Default: at most `[run] block`
-        cases, taken first from the dimensions that leave speed and rig alone: a block then shares its setup.
-        Where an axis is swept, from that one before all.
+        Cases of a block along each dimension, as in an existing store. Default: at most `[run] block` cases,
+        first along the swept axis, then along the dimensions that do not change speed or rig, so that a block
+        shares its setup.
 
     Attributes
     ----------
@@ -82,18 +82,18 @@ class Sweep:
         Number of cases, and of stators.
     chunk : tuple of int
         Cases of a block along each dimension.
-    chain : Chain or None
-        How the motion is carried from case to case.
+    continuation : Continuation or None
+        Of a sweep: from which case each one starts.
     n_degree : int
-        Numbers of the final state that a case of a chain keeps; 0 where there are no chains.
+        Length of the final state that is stored for a continuation; 0 without one.
     identity, identity_parts : str, dict
         SHA-256 of all that changes results but the values on the axes, and what went into it.
 
     Raises
     ------
     InputError
-        When the step asked for is above the stability limit of a rig, or a sweep meets rigs of different
-        degrees of freedom.
+        When the time step exceeds the stability limit of a rig, or rigs along a sweep differ in their degrees
+        of freedom.
     """
 
     def __init__(self, study: Study, chunk: tuple[int, ...] | None = None) -> None:
@@ -102,53 +102,65 @@ class Sweep:
         self.dims, self.shape, self.n_case = self.points.dims, self.points.shape, self.points.n_case
         if self.n_case > MOST_CASES:
             with _named(study):
-                grid = " x ".join(map(str, self.shape))
-                raise InputError(f"[grid]: {grid} cases are too many; at most {MOST_CASES}, part the study")
+                sizes = " x ".join(map(str, self.shape))
+                raise InputError(
+                    f"[grid]: {sizes} cases are too many, the limit is {MOST_CASES}; split the study"
+                )
         self.n_stator = len(study.rig.stator)
         with _named(study):
-            self._settings = Settings(study)
-            self.chain = chain_of(study.axes)
-            self.n_degree = count_state(study) if self.chain else 0
+            self._operating_points = OperatingPoints(study)
+            self.continuation = continuation_of(study.axes)
+            self.n_degree = count_state(study) if self.continuation else 0
         self.chunk = chunk if chunk is not None else self._default_chunk()
         self.identity_parts = identity_parts(study)
         text = json.dumps(self.identity_parts, sort_keys=True, separators=(",", ":"), allow_nan=False)
         self.identity = hashlib.sha256(text.encode()).hexdigest()
-        self._ids = CaseIds(self.identity, self.points.values, self.chain)
+        self._ids = CaseIds(self.identity, self.points.values, self.continuation)
 
-    def chains(self) -> list[list[Block]]:
-        """Return the blocks that one rank has to compute in turn, the longest such chain first.
+    def sequences(self) -> list[list[Block]]:
+        """Return the sequences of blocks that one rank computes in order, the most expensive one first.
 
-        Without a sweep every block is a chain of its own.
+        Without a continuation every block is a sequence of its own.
         """
         blocks = self.blocks()
-        chain = self.chain
-        if chain is None:
+        continuation = self.continuation
+        if continuation is None:
             return [[block] for block in blocks]
         together: dict[tuple[int, ...], list[Block]] = {}
         for block in sorted(blocks, key=lambda block: block.start):
             at = block.start
-            together.setdefault((*at[: chain.axis], *at[chain.axis + 1 :]), []).append(block)
-        chains = [part[::-1] if chain.goes_down(part[0].start) else part for part in together.values()]
-        return sorted(chains, key=lambda part: -sum(block.cost for block in part))
+            together.setdefault((*at[: continuation.axis], *at[continuation.axis + 1 :]), []).append(block)
+        sequences = [
+            part[::-1] if continuation.is_downward(part[0].start) else part for part in together.values()
+        ]
+        return sorted(sequences, key=lambda part: -sum(block.cost for block in part))
 
     def in_turn(self, cases: Sequence[Case]) -> list[int]:
         """Positions of the cases of a block in the order in which they are to be computed."""
-        chain, order = self.chain, range(len(cases))
-        return sorted(order, key=lambda i: chain.turn(cases[i].index)) if chain is not None else list(order)
+        continuation, order = self.continuation, range(len(cases))
+        return (
+            sorted(order, key=lambda i: continuation.position(cases[i].index))
+            if continuation
+            else list(order)
+        )
 
-    def before(self, index: Sequence[int]) -> tuple[int, ...] | None:
-        """Index of the case that this one goes on from; None where it starts at rest."""
-        return self.chain.before(index, self.shape[self.chain.axis]) if self.chain else None
+    def predecessor(self, index: Sequence[int]) -> tuple[int, ...] | None:
+        """Index of the case this one starts from; None where it starts at rest."""
+        return (
+            self.continuation.predecessor(index, self.shape[self.continuation.axis])
+            if self.continuation
+            else None
+        )
 
     def blocks(self) -> list[Block]:
         """Return all blocks, the longest first."""
         starts = [range(0, n, c) for n, c in zip(self.shape, self.chunk, strict=True)]
         sizes = [[min(c, n - s) for s in at] for n, c, at in zip(self.shape, self.chunk, starts, strict=True)]
-        cost: NDArray[np.float64] = self._settings.steps
+        cost: NDArray[np.float64] = self._operating_points.steps
         for i, at in enumerate(starts):
             if cost.shape[i] == self.shape[i]:
                 cost = np.add.reduceat(cost, np.array(at), axis=i)
-            else:  # the same for every case along this dimension
+            else:  # equal for all cases along this dimension
                 cost = cost * np.array(sizes[i]).reshape([-1 if j == i else 1 for j in range(cost.ndim)])
         steps = np.rint(cost.ravel()).astype(np.int64)
         order = np.argsort(-steps, kind="stable")
@@ -172,8 +184,8 @@ class Sweep:
         points = self.points.within(block.start, block.shape)
         return [self._ids(point) for point in points]
 
-    def settings(self) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
-        """Return what the axes amount to: name -> (dimensions that set it, values in SI units).
+    def operating_points(self) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
+        """Return the operating points: name -> (dimensions it depends on, values in SI units).
 
         `spin_speed` in rad/s, `clearance` and `contact_free_amplitude` in m.
 
@@ -183,33 +195,37 @@ class Sweep:
             When a clearance leaves no gap at a stator.
         """
         with _named(self.study):
-            found = self._settings.arrays()
+            found = self._operating_points.arrays()
         return {name: (tuple(self.dims[i] for i in dims), values) for name, (dims, values) in found.items()}
 
     def _case(self, index: tuple[int, ...], name: str) -> Case:
-        speed, amplitude = self._settings.response(index)
+        speed, amplitude = self._operating_points.response(index)
         return Case(
             index=index,
             id=name,
-            rig=self._settings.rig(index),
+            rig=self._operating_points.rig(index),
             speed=speed,
-            clearance=self._settings.clearance(index),
-            friction=self._settings.friction(index),
+            clearance=self._operating_points.clearance(index),
+            friction=self._operating_points.friction(index),
             contact_free_amplitude=amplitude,
         )
 
     def _default_chunk(self) -> tuple[int, ...]:
         wanted = self.study.run.block or min(max(self.n_case // 64, 1), _BLOCK)
-        costly = self._settings.costly_dims
+        costly = self._operating_points.costly_dims
         order = [*(i for i in reversed(range(len(self.shape))) if i not in costly), *costly]
         chunk = [1] * len(self.shape)
-        if (chain := self.chain) is not None:
-            # One rank computes a chain anyway: an eighth of it is stored at once, and several only of many.
-            n = self.shape[chain.axis]
-            chunk[chain.axis] = _evenly(n, self.study.run.block or min(max(n // 8, 1), _BLOCK))
-            n_chain = self.n_case // n
-            wanted = (self.study.run.block or min(max(n_chain // 64, 1), _BLOCK)) // chunk[chain.axis]
-            order = [i for i in order if i not in (chain.axis, chain.direction)]  # a block has one direction
+        if (continuation := self.continuation) is not None:
+            # One rank computes a whole sweep: a block is an eighth of it, or several whole ones.
+            n = self.shape[continuation.axis]
+            chunk[continuation.axis] = _evenly(n, self.study.run.block or min(max(n // 8, 1), _BLOCK))
+            n_sequence = self.n_case // n
+            wanted = (self.study.run.block or min(max(n_sequence // 64, 1), _BLOCK)) // chunk[
+                continuation.axis
+            ]
+            order = [
+                i for i in order if i not in (continuation.axis, continuation.direction)
+            ]  # a block has one direction
         for i in order:
             chunk[i] = _evenly(self.shape[i], wanted)
             wanted = max(wanted // chunk[i], 1)
@@ -217,14 +233,14 @@ class Sweep:
 
 
 def _evenly(n: int, most: int) -> int:
-    """Size of blocks of at most so many, all of one size rather than full ones and a rest."""
+    """Size of equal blocks of at most `most` cases, rather than full blocks and a remainder."""
     n_block = -(-n // max(min(n, most), 1))
     return -(-n // n_block)
 
 
 @contextmanager
 def _named(study: Study) -> Iterator[None]:
-    """Put the study's file in front of what is wrong with its settings."""
+    """Prefix an InputError with the study's file."""
     try:
         yield
     except InputError as error:
@@ -234,10 +250,10 @@ def _named(study: Study) -> Iterator[None]:
 
 
 def identity_parts(study: Study) -> dict[str, Any]:
-    """Return all that changes the results of a study but the values on its axes, for JSON.
+    """Return all that changes the results of a study except the values on its axes, for JSON.
 
-    What the rig says of a key that is an axis is no part of it: every case sets that key. Of a sample, all is
-    that has values drawn but how many.
+    A rig key that is an axis is left out, since every case sets it. Of a sample, everything but the number of
+    points is included.
     """
     keys = [axis.name for axis in study.axes if axis.is_rig_key]
     rig = with_keys(
@@ -250,7 +266,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
     parts = {
         "physics": PHYSICS,
         "axes": [axis.name for axis in study.axes],
-        **({"sweep": swept} if swept else {}),  # older stores know none
+        **({"sweep": swept} if swept else {}),  # absent in older stores
         "rig": rig,
         "contact": asdict(study.contact),
         "integrator": asdict(study.integrator),
@@ -263,12 +279,12 @@ def identity_parts(study: Study) -> dict[str, Any]:
 
 
 def count_state(study: Study) -> int:
-    """Numbers in the final state of a case: displacement and velocity of each degree, two for each stator.
+    """Length of the final state of a case: displacement and velocity of each degree, two per stator.
 
     Raises
     ------
     InputError
-        When it is not the same for all cases: a motion cannot be carried from one to another.
+        When it differs between cases: the final state of one cannot start another.
     """
     first = {axis.name: axis.values[0] for axis in study.axes if axis.is_rig_key}
     n_state = state_size(assemble(with_keys(study.rig, first)))
@@ -277,15 +293,15 @@ def count_state(study: Study) -> int:
         for value in values if axis.is_rig_key else ():
             if state_size(assemble(with_keys(study.rig, {**first, axis.name: value}))) != n_state:
                 swept = next(a.name for a in study.axes if a.sweep != FROM_REST)
-                problem = "changes the degrees of freedom, so that no motion can be carried"
-                raise InputError(
-                    f"[grid] {axis.name}: {problem}; leave out this axis, or the sweep of {swept}"
+                problem = (
+                    "changes the number of degrees of freedom, so a final state cannot start the next case"
                 )
+                raise InputError(f"[grid] {axis.name}: {problem}; remove this axis, or the sweep of {swept}")
     return n_state
 
 
 def _blank(table: Any, key: list[str]) -> None:
-    """Put "axis" in place of the value that a dotted key names, in all items of a list or in one."""
+    """Replace the value of a dotted key by "axis", in one item of a list or in all."""
     if isinstance(table, list):
         items, rest = ([table[int(key[0]) - 1]], key[1:]) if key[0].isdigit() else (table, key)
         for item in items:

@@ -1,7 +1,8 @@
-"""Who a case is, and from which other it goes on: ids, and the chains of a sweep along one axis.
+"""Sequential continuation along a swept axis, and the ids of cases.
 
-A case of a chain depends on all that come before it, so its id tells of them too: a value put in between
-makes new cases of those behind it and leaves those before it as they are.
+In a continuation a case starts from the final state of its predecessor on the swept axis. It depends on all
+predecessors, and its id covers them: a value inserted on the axis makes new cases of all that follow it and
+leaves those before it unchanged.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Named(Protocol):
-    """What a chain knows of an axis."""
+    """What a continuation needs of an axis."""
 
     @property
     def name(self) -> str:
@@ -36,93 +37,99 @@ class Named(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chain:
-    """How the motion is carried through a grid.
+class Continuation:
+    """Which axis of a grid is swept, and in which direction.
 
     Attributes
     ----------
     axis : int
-        Position of the swept axis, whose values rise.
+        Position of the swept axis, whose values ascend.
     direction : int or None
-        Position of the axis that tells up (0) from down (1); None where there is but one of them.
+        Position of the axis `direction`, up (0) or down (1); None where the sweep has one direction.
     is_down : bool
-        Which, where there is but one.
+        Whether a sweep in one direction goes down.
     """
 
     axis: int
     direction: int | None = None
     is_down: bool = False
 
-    def goes_down(self, index: Sequence[int]) -> bool:
-        """Whether the chain of this case runs from high to low values."""
+    def is_downward(self, index: Sequence[int]) -> bool:
+        """Whether the sweep of this case runs from high to low values."""
         return self.is_down if self.direction is None else index[self.direction] == 1
 
-    def turn(self, index: Sequence[int]) -> int:
-        """What orders the cases of a chain: the lowest comes first."""
-        return -index[self.axis] if self.goes_down(index) else index[self.axis]
+    def position(self, index: Sequence[int]) -> int:
+        """Sort key of a case in its sweep: the lowest is computed first."""
+        return -index[self.axis] if self.is_downward(index) else index[self.axis]
 
-    def before(self, index: Sequence[int], n: int) -> tuple[int, ...] | None:
-        """Index of the case that this one goes on from, with `n` values on the axis; None for the first."""
-        place = index[self.axis] + (1 if self.goes_down(index) else -1)
-        return (*index[: self.axis], place, *index[self.axis + 1 :]) if 0 <= place < n else None
+    def predecessor(self, index: Sequence[int], n: int) -> tuple[int, ...] | None:
+        """Index of the case this one starts from, with `n` values on the axis; None for the first."""
+        neighbour = index[self.axis] + (1 if self.is_downward(index) else -1)
+        return (*index[: self.axis], neighbour, *index[self.axis + 1 :]) if 0 <= neighbour < n else None
 
-    def highest(self, values: NDArray[Any]) -> NDArray[Any]:
-        """The highest of the values of each case of the grid and of those before it in its chain."""
+    def running_maximum(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Largest value over each case of the grid and its predecessors."""
         up = np.maximum.accumulate(values, self.axis)
         down = np.flip(np.maximum.accumulate(np.flip(values, self.axis), self.axis), self.axis)
         if self.direction is None:
             return down if self.is_down else up
-        ways = [np.take(way, [i], self.direction) for i, way in enumerate((up, down))]
-        return np.concatenate(ways, self.direction)
+        both = [np.take(values, [i], self.direction) for i, values in enumerate((up, down))]
+        return np.concatenate(both, self.direction)
 
-    def kept(self, before: Sequence[float], after: Sequence[float]) -> NDArray[np.bool_]:
-        """Which values `after` have the same ones before them as in `before`: (n, 2), up and down; or (n, 1).
+    def unchanged(self, before: Sequence[float], after: Sequence[float]) -> NDArray[np.bool_]:
+        """Which values of `after` have the predecessors they had in `before`: (n, 2), up and down; or (n, 1).
 
-        Both rise.
+        Both are in ascending order.
         """
-        ways = [_same_before(before, after), _same_before(before[::-1], after[::-1])[::-1]]
-        return np.stack(ways if self.direction is not None else [ways[self.is_down]], axis=1)
+        both = [_same_before(before, after), _same_before(before[::-1], after[::-1])[::-1]]
+        return np.stack(both if self.direction is not None else [both[self.is_down]], axis=1)
 
 
-def chain_of(axes: Sequence[Named]) -> Chain | None:
-    """The chain of a grid; None where every case starts at rest."""
+def continuation_of(axes: Sequence[Named]) -> Continuation | None:
+    """The continuation of a grid; None where every case starts at rest."""
     swept = next((i for i, axis in enumerate(axes) if axis.sweep != FROM_REST), None)
     if swept is None:
         return None
     direction = next((i for i, axis in enumerate(axes) if axis.name == DIRECTION), None)
     assert (direction is not None) == (axes[swept].sweep == BOTH)
-    return Chain(axis=swept, direction=direction, is_down=axes[swept].sweep == DOWN)
+    return Continuation(axis=swept, direction=direction, is_down=axes[swept].sweep == DOWN)
 
 
 class CaseIds:
-    """Ids of the cases of a grid: hashes of the study's identity, the values on the axes and the chain.
+    """Ids of the cases of a grid: hashes of the study's identity, the axis values and the predecessors.
 
-    They outlive the growth of any axis, and the order of the values on it.
+    They do not change when an axis grows or its values are reordered.
     """
 
-    def __init__(self, identity: str, values: Sequence[Sequence[float]], chain: Chain | None) -> None:
-        self._begun = hashlib.sha256(identity.encode())
-        self._chain = chain
+    def __init__(
+        self, identity: str, values: Sequence[Sequence[float]], continuation: Continuation | None
+    ) -> None:
+        self._identity = hashlib.sha256(identity.encode())
+        self._continuation = continuation
         self._lineage: dict[tuple[float, bool], bytes] = {}
-        if chain is not None:
+        if continuation is not None:
             for is_down in (False, True):
                 lineage = hashlib.sha256()
-                for value in values[chain.axis][:: -1 if is_down else 1]:
+                for value in values[continuation.axis][:: -1 if is_down else 1]:
                     self._lineage[value, is_down] = lineage.digest()
                     lineage.update(struct.pack("<d", value))
 
     def __call__(self, point: Sequence[float]) -> str:
         """Id of the case with these values on the axes."""
-        digest = self._begun.copy()
+        digest = self._identity.copy()
         digest.update(struct.pack(f"<{len(point)}d", *point))
-        if (chain := self._chain) is not None:
-            is_down = chain.is_down if chain.direction is None else point[chain.direction] == 1.0
-            digest.update(self._lineage[point[chain.axis], is_down])
+        if (continuation := self._continuation) is not None:
+            is_down = (
+                continuation.is_down
+                if continuation.direction is None
+                else point[continuation.direction] == 1.0
+            )
+            digest.update(self._lineage[point[continuation.axis], is_down])
         return digest.hexdigest()[:32]
 
 
 def _same_before(before: Sequence[float], after: Sequence[float]) -> NDArray[np.bool_]:
-    """Which values `after` stand at their place in `before`, as do all that come before them."""
+    """Which values of `after` equal `before` at the same position, as do all values ahead of them."""
     n = min(len(before), len(after))
     same = np.zeros(len(after), bool)
     same[:n] = np.logical_and.accumulate(np.array(after[:n]) == np.array(before[:n]))

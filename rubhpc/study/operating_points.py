@@ -32,7 +32,7 @@ _TOUCHING = 0.15  # share of the time in contact, where it takes short steps the
 _MOST_RIGS = 256  # asked for their step, 1 ms each; of more, the first stands for all
 
 
-class Settings:
+class OperatingPoints:
     """Values on the axes, resolved: ratios to SI units, keys to rigs. What is costly is kept for reuse.
 
     Parameters

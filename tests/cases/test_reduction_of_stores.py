@@ -54,7 +54,7 @@ def test_spectra_are_reduced_as_in_memory(
     path: Path, loaded: xr.Dataset, over: list[str], n_byte: float
 ) -> None:
     store = open_in_pieces(path, n_byte)
-    axes = over or list(many_cases.sweep_of((4, 10, 6), 2, path).dims)
+    axes = over or list(many_cases.case_grid_of((4, 10, 6), 2, path).dims)
     mean = computed(mean_spectrum(store, "torsion", over), show_progress=False)
     worst = computed(envelope(store, "torsion", over), show_progress=False)
     expected = loaded[SPECTRUM].astype(float)

@@ -246,7 +246,9 @@ def test_pilots_see_every_value_of_an_axis_within_blocks(tmp_path, monkeypatch):
     from rubhpc.study.study import read_study
 
     asked = []
-    monkeypatch.setattr(plan, "_pilot", lambda sweep, index, steps: asked.append(sweep.case(index)) or 1.0)
+    monkeypatch.setattr(
+        plan, "_pilot", lambda case_grid, index, steps: asked.append(case_grid.case(index)) or 1.0
+    )
     study = read_study(write_study(tmp_path))
     plan.make_plan(study)
     assert {case.friction for case in asked} == set(study.axis("friction").values)

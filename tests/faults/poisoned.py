@@ -25,7 +25,7 @@ end_with_launcher()  # before what takes long, as the command does
 import numpy as np  # noqa: E402
 
 from rubhpc.cli import main  # noqa: E402
-from rubhpc.running import watch, worker  # noqa: E402
+from rubhpc.running import watchdog, worker  # noqa: E402
 
 run_case = worker.run_case
 mode = sys.argv.pop(1)
@@ -60,7 +60,7 @@ def slip(*_: Any) -> None:
 
 if mode != "rank1":
     worker.run_case = poisoned
-    watch.PATIENCE = 1.0
+    watchdog.PATIENCE = 1.0
 elif launch().rank == 1:
     worker.Worker.work = slip  # type: ignore[method-assign]
 main()

@@ -8,7 +8,7 @@ import pytest
 from running import each_launcher, run, stored_bytes, write_study
 
 from rubhpc.schema import DONE, FAILED
-from rubhpc.storage.in_progress import Hand, find_suspects
+from rubhpc.storage.in_progress import InProgress, read_deaths
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
 
@@ -88,9 +88,9 @@ def store(tmp_path: Path) -> Store:
     return Store(tmp_path / "tiny.zarr")
 
 
-def die(store: Store, flat: int, run_number: int = 1) -> Hand:
+def die(store: Store, flat: int, run_number: int = 1) -> InProgress:
     """Leave the record of a rank that died in a case."""
-    hand = Hand(store.hand_directory, run_number, "rank00000")
+    hand = InProgress(store.in_progress_directory, run_number, "rank00000")
     hand.take(flat, store.manifest.case_id(flat))
     return hand
 
@@ -98,28 +98,28 @@ def die(store: Store, flat: int, run_number: int = 1) -> Hand:
 def test_innocent_cases_are_tried_again_and_no_record_of_them_stays(store):
     is_missing = store.replay().status == 0
     die(store, 3)
-    suspects = find_suspects(store.hand_directory, store.manifest, is_missing)
-    assert (suspects.guilty, suspects.doubtful) == ({}, {})  # one kill of the launcher is no suspicion
+    suspects = read_deaths(store.in_progress_directory, store.manifest, is_missing)
+    assert (suspects.failed, suspects.suspect) == ({}, {})  # one kill of the launcher is no suspicion
     for _ in range(3):
         die(store, 3)
-    suspects = find_suspects(store.hand_directory, store.manifest, is_missing)
-    assert (suspects.guilty, suspects.doubtful) == ({}, {3: 4})
+    suspects = read_deaths(store.in_progress_directory, store.manifest, is_missing)
+    assert (suspects.failed, suspects.suspect) == ({}, {3: 4})
     is_missing[3] = False
-    assert find_suspects(store.hand_directory, store.manifest, is_missing).doubtful == {}
-    assert list(store.hand_directory.iterdir()) == []
+    assert read_deaths(store.in_progress_directory, store.manifest, is_missing).suspect == {}
+    assert list(store.in_progress_directory.iterdir()) == []
 
 
 def test_a_record_of_another_grid_or_of_no_case_says_nothing(store):
     is_missing = store.replay().status == 0
     for _ in range(5):
-        with Hand(store.hand_directory, 1, "rank00000"):
+        with InProgress(store.in_progress_directory, 1, "rank00000"):
             pass  # ended in order
-        Hand(store.hand_directory, 1, "rank00000")
-        Hand(store.hand_directory, 1, "rank00000").take(3, store.manifest.case_id(4))
-        Hand(store.hand_directory, 1, "rank00000").take(99, store.manifest.case_id(4))
-    suspects = find_suspects(store.hand_directory, store.manifest, is_missing)
-    assert (suspects.guilty, suspects.doubtful) == ({}, {})
-    assert list(store.hand_directory.iterdir()) == []
+        InProgress(store.in_progress_directory, 1, "rank00000")
+        InProgress(store.in_progress_directory, 1, "rank00000").take(3, store.manifest.case_id(4))
+        InProgress(store.in_progress_directory, 1, "rank00000").take(99, store.manifest.case_id(4))
+    suspects = read_deaths(store.in_progress_directory, store.manifest, is_missing)
+    assert (suspects.failed, suspects.suspect) == ({}, {})
+    assert list(store.in_progress_directory.iterdir()) == []
 
 
 def test_want_of_memory_is_told_from_other_kills(store, monkeypatch):
@@ -131,6 +131,6 @@ def test_want_of_memory_is_told_from_other_kills(store, monkeypatch):
     die(store, 3)
     die(store, 5)
     monkeypatch.setattr(hand, "_oom_kills", lambda: 8)
-    suspects = find_suspects(store.hand_directory, store.manifest, is_missing)
-    assert suspects.guilty == {3: "its rank died in it 2 times: killed, as the machine had no memory left"}
-    assert suspects.doubtful == {5: 1}
+    suspects = read_deaths(store.in_progress_directory, store.manifest, is_missing)
+    assert suspects.failed == {3: "its rank died in it 2 times: killed, as the machine had no memory left"}
+    assert suspects.suspect == {5: 1}

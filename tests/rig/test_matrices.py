@@ -23,7 +23,7 @@ from rubhpc.fem.constraints import find_free
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import first_lateral_frequency, steady_response
 from rubhpc.rig.rig import Torsion, rig_from_dict, with_key, with_keys
-from rubhpc.study.cases import Sweep, identity_parts
+from rubhpc.study.cases import CaseGrid, identity_parts
 from rubhpc.study.study import Study, make_axis
 
 PLANE = [(1, "v"), (1, "w")]
@@ -297,7 +297,7 @@ def test_rotor_free_in_torsion_is_refused_with_the_mend_and_a_soft_drive_twists_
     given = {"speed": 150.0, "clearance": 1e-4, "friction": 0.2}
     axes = tuple(make_axis(name, value, free) for name, value in given.items())
     with pytest.raises(InputError, match=r"free to turn \(torsion\); give it a stiffness, however soft, or"):
-        Sweep(Study(title="free", rig=free, axes=axes, output=Path("none.zarr")))
+        CaseGrid(Study(title="free", rig=free, axes=axes, output=Path("none.zarr")))
     case = given | {"transient": 0, "revolutions": 4}
     drifts = simulate(free, **case, method="central-difference", step="1 us")
     soft = simulate(with_key(packaged, "rotor.torsion.stiffness", 0.01), **case)

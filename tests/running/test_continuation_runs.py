@@ -20,7 +20,7 @@ from rubhpc.running.driver import run
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
 from rubhpc.schema import DONE, FAILED, MISSING
-from rubhpc.storage.in_progress import Hand
+from rubhpc.storage.in_progress import InProgress
 from rubhpc.storage.journal import next_run
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
@@ -175,7 +175,7 @@ def test_what_is_damaged_in_a_chain_is_computed_again_and_nothing_else(finished,
     store = Store(study.output)
     array[1, 0, 0, 0, 0] = array[1, 0, 0, 0, 0] + 1e-9
     flat = int(np.ravel_multi_index((2, 0, 0, 0), store.manifest.shape))
-    store.take_back(store.replay(), [flat], next_run(store.journal_directory), "test")
+    store.mark_missing(store.replay(), [flat], next_run(store.journal_directory), "test")
     run(study, quiet=True)
     assert len(computed) == 3
     assert stored_bytes(study.output) == stored_bytes(finished.output)
@@ -263,7 +263,7 @@ def test_those_behind_a_case_that_kills_its_rank_wait_for_it(finished, tmp_path,
     store = Store(study.output)
     flat = int(np.ravel_multi_index((1, 0, 0, 0), store.manifest.shape))
     for _ in range(3):
-        hand = Hand(store.hand_directory, 1, "rank00000")
+        hand = InProgress(store.in_progress_directory, 1, "rank00000")
         hand.take(flat, store.manifest.case_id(flat))
     run(study, quiet=True)
     assert len(computed) == 20
@@ -304,7 +304,7 @@ def test_the_plan_tells_how_many_ranks_have_work(finished):
         ({"friction": '{ values = [0.1, 0.2], sweep = "up" }'}, "speed_ratio is swept already"),
         (
             {"friction": '[0.1]\n"stator.elements" = [4, 6]'},
-            "stator.elements: changes the degrees of freedom",
+            "stator.elements: changes the number of degrees of freedom",
         ),
         ({"friction": "[0.1]\ndirection = [0, 1]"}, "direction: unknown axis"),
     ],

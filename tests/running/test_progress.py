@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from rubhpc.running import progress
-from rubhpc.running.pool import Tally
+from rubhpc.running.pool import Totals
 from rubhpc.running.progress import Progress
 from rubhpc.storage.duration import duration
 
@@ -37,11 +37,11 @@ def test_lines_come_now_and_then_with_the_time_left_by_predicted_steps(clock, ca
     """Half the cases are done, but three quarters of the steps: a third of the time so far is left."""
     with Progress(20, 1000, n_done=10, quiet=False, has_bar=True) as shown:
         clock.time += 5
-        shown.update(Tally(done=1, cost=10))
+        shown.update(Totals(done=1, cost=10))
         clock.time += 25
-        shown.update(Tally(done=3, failed=1, diverged=1, cost=750))
+        shown.update(Totals(done=3, failed=1, diverged=1, cost=750))
         clock.time += 1
-        shown.update(Tally(done=4, failed=1, diverged=1, cost=800))
+        shown.update(Totals(done=4, failed=1, diverged=1, cost=800))
     assert capsys.readouterr().out.splitlines() == [
         "10/20 cases are there; computing the rest",
         "15/20 cases; 0.167 a second, 10 s left, 1 failed, 1 diverged",
@@ -52,7 +52,7 @@ def test_lines_grow_rarer(clock, capsys):
     with Progress(10**6, 10**6, n_done=0, quiet=False, has_bar=False) as shown:
         for _ in range(3600):
             clock.time += 1
-            shown.update(Tally(done=1, cost=1))
+            shown.update(Totals(done=1, cost=1))
     assert 10 < capsys.readouterr().out.count("\n") < 60
 
 
@@ -60,7 +60,7 @@ def test_lines_grow_rarer(clock, capsys):
 def test_nothing_is_said_where_there_is_nothing_to_say(clock, capsys, n_done, quiet):
     with Progress(20, 1000, n_done=n_done, quiet=quiet, has_bar=True) as shown:
         clock.time += 100
-        shown.update(Tally(done=1, cost=10))
+        shown.update(Totals(done=1, cost=10))
     assert capsys.readouterr().out == ""
 
 
@@ -74,6 +74,6 @@ def test_a_terminal_gets_a_bar(clock, monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     with Progress(20, 1000, n_done=0, quiet=False, has_bar=True) as shown:
         clock.time += 10
-        shown.update(Tally(done=5, cost=500))
+        shown.update(Totals(done=5, cost=500))
     assert "5/20 cases" in terminal.getvalue()
     assert "10 s left" in terminal.getvalue()

@@ -14,7 +14,7 @@ from rubhpc.running import recompute as only
 from rubhpc.running.driver import run
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
-from rubhpc.study.cases import Sweep
+from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import Study, read_study
 
 
@@ -60,12 +60,12 @@ def test_a_case_that_is_not_stored_is_computed_all_the_same(finished, tmp_path):
     grown = replace(
         finished, axes=(*finished.axes[:2], replace(finished.axes[2], values=(0.1, 0.2, 0.3, 0.5)))
     )
-    name = Sweep(grown).case((0, 0, 1)).id
+    name = CaseGrid(grown).case((0, 0, 1)).id
     assert "does not hold it yet" in reproduce(grown, name).verdict
     elsewhere = replace(finished, output=tmp_path / "none.zarr")
-    assert "is not there yet" in reproduce(elsewhere, Sweep(finished).case((0, 0, 0)).id).verdict
+    assert "is not there yet" in reproduce(elsewhere, CaseGrid(finished).case((0, 0, 0)).id).verdict
     assert list(tmp_path.iterdir()) == []
-    assert "bit for bit" in reproduce(grown, Sweep(finished).case((1, 1, 2)).id).verdict  # it has moved
+    assert "bit for bit" in reproduce(grown, CaseGrid(finished).case((1, 1, 2)).id).verdict  # it has moved
 
 
 @pytest.mark.parametrize(("name", "told"), [("12345", "too short"), ("zzzzzz", "no case has such an id")])

@@ -22,7 +22,7 @@ from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
 from rubhpc.storage.growth import origins
 from rubhpc.storage.journal import Entry, measures_type, next_run
 from rubhpc.storage.manifest import Manifest
-from rubhpc.storage.resume import bring_up_to_date, open_store, sweep_for
+from rubhpc.storage.resume import bring_up_to_date, grid_for, open_store
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.storage.verify import verify
 from rubhpc.study import cases as sweep_module
@@ -189,17 +189,17 @@ def grow_and_kill(grids: list[dict[str, list[float]]], block: int, kills: list[i
     """Grow a store through grids, killed after so many changes of the disk, and compare all of it."""
     with tempfile.TemporaryDirectory() as folder:
         study = make_study(Path(folder), grids[0], block)
-        compute(open_store(sweep_for(study)))
+        compute(open_store(grid_for(study)))
         for grid in grids[1:]:
             before = known(Store(study.output))
             study = make_study(Path(folder), grid, block)
             for n_call in kills:
                 with killed_after(n_call):
-                    store = open_store(sweep_for(study))
-                    bring_up_to_date(store, sweep_for(study))
+                    store = open_store(grid_for(study))
+                    bring_up_to_date(store, grid_for(study))
                 assert known(Store(study.output)) == before
-            store = open_store(sweep_for(study))
-            bring_up_to_date(store, sweep_for(study))
+            store = open_store(grid_for(study))
+            bring_up_to_date(store, grid_for(study))
             assert known(store) == before
             assert not verify(study.output).cases
             store.pack(store.replay())
@@ -217,41 +217,41 @@ def test_a_kill_at_every_step_of_a_growth_loses_nothing(tmp_path):
     """Without draws: the process ends before the first, the second, ... change of the disk."""
     grid = {"speed_ratio": [0.9, 2.0], "clearance_ratio": [0.7], "friction": [0.1, 0.3, 0.5]}
     first = make_study(tmp_path, grid)
-    compute(open_store(sweep_for(first)), all_of_it=True)
+    compute(open_store(grid_for(first)), all_of_it=True)
     before = known(Store(first.output))
     study = make_study(tmp_path, {**grid, "speed_ratio": [2.0, 1.5, 0.9], "friction": [0.2, 0.5, 0.3, 0.1]})
     n_call = 0
     while Store(first.output).manifest.shape != (3, 1, 4) or (first.output / ".rubhpc" / "growth").exists():
         with killed_after(n_call):
-            bring_up_to_date(open_store(sweep_for(study)), sweep_for(study))
+            bring_up_to_date(open_store(grid_for(study)), grid_for(study))
         assert known(Store(first.output)) == before
         n_call += 5
     print(f"\na growth killed at {n_call // 5} places lost nothing")
-    bring_up_to_date(Store(first.output), sweep_for(study))
+    bring_up_to_date(Store(first.output), grid_for(study))
     assert compute(Store(first.output), all_of_it=True) == 6
     check_arrays(study)
 
 
 def test_a_growth_at_the_ends_leaves_the_blocks_where_they_are(tmp_path):
     study = make_study(tmp_path, {"speed_ratio": [0.9], "clearance_ratio": [0.7], "friction": [0.1, 0.2]}, 1)
-    store = open_store(sweep_for(study))
+    store = open_store(grid_for(study))
     compute(store, all_of_it=True)
     files = {path: path.stat().st_ino for start in store.blocks() for path in store.chunk_files(start)}
     longer = make_study(
         tmp_path, {"speed_ratio": [0.9, 1.5], "clearance_ratio": [0.7], "friction": [0.1, 0.2, 0.3]}, 1
     )
-    bring_up_to_date(store, sweep_for(longer))
+    bring_up_to_date(store, grid_for(longer))
     assert {path: path.stat().st_ino for path in files} == files
 
 
 def test_a_damaged_case_is_left_behind(tmp_path):
     """A block that moves is written anew: what no longer matches its checksum must not get a new one."""
     grid = {"speed_ratio": [0.9], "clearance_ratio": [0.7], "friction": [0.1, 0.2]}
-    store = open_store(sweep_for(make_study(tmp_path, grid)))
+    store = open_store(grid_for(make_study(tmp_path, grid)))
     compute(store, all_of_it=True)
     store.arrays["section_torsion"][0, 0, 1, 0] = 99.0
     study = make_study(tmp_path, {**grid, "friction": [0.05, 0.2, 0.1]})
-    bring_up_to_date(store, sweep_for(study))
+    bring_up_to_date(store, grid_for(study))
     assert store.replay().status.tolist() == [MISSING, MISSING, DONE]
     assert compute(store, all_of_it=True) == 2
 
@@ -259,7 +259,7 @@ def test_a_damaged_case_is_left_behind(tmp_path):
 def test_a_disk_that_fills_up_during_growth_leaves_the_store_as_it_was(tmp_path, monkeypatch):
     grid = {"speed_ratio": [0.9], "clearance_ratio": [0.7], "friction": [0.1, 0.2]}
     first = make_study(tmp_path, grid)
-    store = open_store(sweep_for(first))
+    store = open_store(grid_for(first))
     compute(store, all_of_it=True)
     before = known(store)
     write_block = Store.write_block
@@ -271,45 +271,45 @@ def test_a_disk_that_fills_up_during_growth_leaves_the_store_as_it_was(tmp_path,
     monkeypatch.setattr(Store, "write_block", fill_up)
     study = make_study(tmp_path, {**grid, "friction": [0.05, 0.2, 0.1]})
     with pytest.raises(StoreError, match="the disk is full"):
-        bring_up_to_date(store, sweep_for(study))
+        bring_up_to_date(store, grid_for(study))
     assert not list(store.private.glob("growth*"))
     assert known(Store(first.output)) == before
     assert not verify(first.output)
-    bring_up_to_date(Store(first.output), sweep_for(first))  # the study as it was goes on as well
+    bring_up_to_date(Store(first.output), grid_for(first))  # the study as it was goes on as well
 
 
 def test_values_that_are_gone_are_refused_by_name(tmp_path):
     grid = {"speed_ratio": [0.9], "clearance_ratio": [0.7], "friction": [0.1, 0.2, 0.3, 0.4, 0.5]}
-    open_store(sweep_for(make_study(tmp_path, grid)))
+    open_store(grid_for(make_study(tmp_path, grid)))
     with pytest.raises(StoreError, match=r"axis friction lacks 0.1, 0.2, 0.4 and 1 more, which is stored"):
-        sweep_for(make_study(tmp_path, {**grid, "friction": [0.3]}))
+        grid_for(make_study(tmp_path, {**grid, "friction": [0.3]}))
 
 
 def test_another_version_of_the_physics_is_refused_unless_it_is_accepted(tmp_path, monkeypatch):
     grid = {"speed_ratio": [0.9], "clearance_ratio": [0.7], "friction": [0.1, 0.2]}
     study = make_study(tmp_path, grid)
-    store = open_store(sweep_for(study))
+    store = open_store(grid_for(study))
     compute(store, all_of_it=True)
     before = known(store)
     old = sweep_module.PHYSICS
     monkeypatch.setattr(sweep_module, "PHYSICS", old + 1)
     told = f"physics was {old}, is {old + 1}"
     with pytest.raises(StoreError, match=f"{told}; --accept-version keeps its cases"):
-        sweep_for(study)
+        grid_for(study)
     changed = make_study(tmp_path, {**grid, "friction": [0.1]})
     with pytest.raises(StoreError, match=f"{told}; axis friction lacks 0.2, .*choose another"):
-        sweep_for(changed, accept_version=True)
-    bring_up_to_date(store, sweep_for(study, accept_version=True), accept_version=True)
+        grid_for(changed, accept_version=True)
+    bring_up_to_date(store, grid_for(study, accept_version=True), accept_version=True)
     assert known(Store(study.output)) == before
     assert compute(store) == 0
     assert xr.open_zarr(study.output).attrs["accepted_physics"] == [old]
-    assert sweep_for(study).identity == Store(study.output).manifest.identity
+    assert grid_for(study).identity == Store(study.output).manifest.identity
 
 
 def test_origins_tell_where_each_case_was(tmp_path):
     grid = {"speed_ratio": [0.9, 2.0], "clearance_ratio": [0.7], "friction": [0.1, 0.3]}
     before, after = (
-        Manifest.of(sweep_for(make_study(tmp_path, g)))
+        Manifest.of(grid_for(make_study(tmp_path, g)))
         for g in (grid, {**grid, "speed_ratio": [2.0, 1.0, 0.9], "friction": [0.2, 0.3, 0.1]})
     )
     assert origins(before, after).tolist() == [-1, 3, 2, -1, -1, -1, -1, 1, 0]

@@ -17,9 +17,9 @@ from rubhpc.storage import layout
 from rubhpc.storage.disk import disk_errors, write_whole
 from rubhpc.storage.journal import Entry, measures_type
 from rubhpc.storage.manifest import Manifest
-from rubhpc.storage.resume import bring_up_to_date, find_gone, open_store, sweep_for
+from rubhpc.storage.resume import bring_up_to_date, cases_without_files, grid_for, open_store
 from rubhpc.storage.store import Store, case_checksum
-from rubhpc.study.cases import Sweep
+from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import read_study
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def study(tmp_path: Path) -> Study:
 
 @pytest.fixture
 def store(study: Study) -> Store:
-    return Store.create(study.output, Sweep(study))
+    return Store.create(study.output, CaseGrid(study))
 
 
 def fill(store: Store, start: tuple[int, ...], seed: int = 0) -> dict[str, np.ndarray]:
@@ -84,14 +84,14 @@ def test_a_new_store_opens_in_xarray_without_a_warning(store, study):
     assert ds.revolution.values[33] == pytest.approx(33 / 32)
     assert ds.order.values[:3].tolist() == [0, 0.5, 1]
     assert ds.spin_speed.dims == ("speed_ratio",)
-    assert ds.attrs["identity"] == Sweep(study).identity
+    assert ds.attrs["identity"] == CaseGrid(study).identity
     assert ds.attrs["rig"]["name"] == "mokhtar2017"
     assert ds.attrs["study"]["record"]["revolutions"] == 2
 
 
 def test_only_what_is_kept_has_arrays(tmp_path):
     study = read_study(write_study(tmp_path, keep='["section"]'))
-    ds = xr.open_zarr(Store.create(study.output, Sweep(study)).path)
+    ds = xr.open_zarr(Store.create(study.output, CaseGrid(study)).path)
     roles = {VARIABLES[str(name)].role for name in ds.data_vars if name in VARIABLES}
     assert roles == {"section", "measure", "setting", "flag"}
     assert "revolution" in ds.coords  # though nothing here lies along it
@@ -130,10 +130,10 @@ def test_blocks_cover_the_grid_once(store):
 
 
 def test_blocks_and_flat_indices_are_those_of_the_sweep(study, store):
-    sweep = Sweep(study)
-    for block in sweep.blocks():
+    case_grid = CaseGrid(study)
+    for block in case_grid.blocks():
         shape = store.manifest.shape
-        expected = [np.ravel_multi_index(case.index, shape) for case in sweep.cases(block)]
+        expected = [np.ravel_multi_index(case.index, shape) for case in case_grid.cases(block)]
         assert store.flat(block.start).tolist() == expected
 
 
@@ -167,8 +167,8 @@ def test_lengthened_axes_keep_what_is_there(tmp_path, study, store):
     journal(store, start, data)
     longer = read_study(write_study(tmp_path, "longer.toml", speed_ratio=[0.9, 2.0, 3.0]))
     axes = (*longer.axes[:2], replace(longer.axes[2], values=(0.1, 0.3, 0.5, 0.7)))
-    sweep = sweep_for(replace(longer, axes=axes))
-    bring_up_to_date(store, sweep)
+    case_grid = grid_for(replace(longer, axes=axes))
+    bring_up_to_date(store, case_grid)
     again = Store(study.output)
     assert again.manifest.shape == (3, 2, 4)
     ledger = again.replay()
@@ -198,7 +198,7 @@ def test_lengthened_axes_keep_what_is_there(tmp_path, study, store):
 )
 def test_another_study_is_refused_with_the_differences(tmp_path, store, changes, told):
     with pytest.raises(StoreError) as refused:
-        sweep_for(read_study(write_study(tmp_path, "other.toml", **changes)))
+        grid_for(read_study(write_study(tmp_path, "other.toml", **changes)))
     assert told in str(refused.value)
     assert "\n" not in str(refused.value)
     assert "--output" in str(refused.value)
@@ -206,14 +206,14 @@ def test_another_study_is_refused_with_the_differences(tmp_path, store, changes,
 
 def test_what_changes_no_result_is_no_difference(tmp_path, store):
     other = read_study(write_study(tmp_path, "other.toml", block=5, run='time_limit = "1 h"'))
-    assert sweep_for(other).chunk == store.manifest.chunk
+    assert grid_for(other).chunk == store.manifest.chunk
 
 
 def test_a_directory_of_something_else_is_left_alone(study):
     study.output.mkdir()
     (study.output / "thesis.tex").write_text("x")
     with pytest.raises(StoreError, match="no rubhpc store"):
-        open_store(Sweep(study))
+        open_store(CaseGrid(study))
     assert [path.name for path in study.output.iterdir()] == ["thesis.tex"]
     with pytest.raises(StoreError, match="not a rubhpc store"):
         Store(study.output)
@@ -222,13 +222,13 @@ def test_a_directory_of_something_else_is_left_alone(study):
 def test_a_file_in_the_way_is_left_alone(study):
     study.output.write_text("x")
     with pytest.raises(StoreError, match="no rubhpc store"):
-        open_store(Sweep(study))
+        open_store(CaseGrid(study))
     assert study.output.read_text() == "x"
 
 
 def test_an_empty_directory_may_become_the_store(study):
     study.output.mkdir()
-    assert open_store(Sweep(study)).manifest.n_case == 12
+    assert open_store(CaseGrid(study)).manifest.n_case == 12
 
 
 def test_a_creation_that_fails_leaves_nothing(study, monkeypatch):
@@ -238,7 +238,7 @@ def test_a_creation_that_fails_leaves_nothing(study, monkeypatch):
     monkeypatch.setattr(layout, "write_whole", fail)
     before = set(study.output.parent.iterdir())
     with pytest.raises(StoreError, match="the disk is full"):
-        open_store(Sweep(study))
+        open_store(CaseGrid(study))
     assert set(study.output.parent.iterdir()) == before
 
 
@@ -247,7 +247,7 @@ def test_the_draft_of_a_killed_creation_is_removed(study):
 
     draft = study.output.with_name(f".tiny.zarr.{socket.gethostname()}.{2**22 + 1}.draft")  # past any pid
     draft.mkdir()
-    open_store(Sweep(study))
+    open_store(CaseGrid(study))
     assert not draft.exists()
 
 
@@ -257,7 +257,7 @@ def test_gone_and_empty_files_are_found(store):
     store.chunk_files((0, 1, 0))[3].unlink()
     store.chunk_files((1, 1, 0))[0].write_bytes(b"")
     expected = [*store.flat((0, 1, 0)).tolist(), *store.flat((1, 1, 0)).tolist()]
-    assert find_gone(store, store.replay()) == expected
+    assert cases_without_files(store, store.replay()) == expected
 
 
 def test_a_garbled_chunk_reads_as_none(store):
@@ -272,7 +272,7 @@ def test_damaged_coordinates_are_written_anew(study, store):
     chunk.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
     damaged = Store(study.output)
     assert damaged.damaged_files() == ["spin_speed/c/0"]
-    bring_up_to_date(damaged, Sweep(study))
+    bring_up_to_date(damaged, CaseGrid(study))
     assert Store(study.output).damaged_files() == []
     assert chunk.read_bytes() == whole
 
@@ -281,7 +281,7 @@ def test_partial_files_are_removed_on_the_way(study, store):
     stray = store.path / "vertical" / "c" / "0.12ab.partial"
     stray.parent.mkdir(parents=True, exist_ok=True)
     stray.write_bytes(b"half")
-    bring_up_to_date(store, Sweep(study))
+    bring_up_to_date(store, CaseGrid(study))
     assert not stray.exists()
 
 
@@ -299,7 +299,7 @@ def test_one_damaged_manifest_costs_nothing(study, store, at):
         again = Store(store.path)
         assert again.manifest == store.manifest
         assert again.manifest.damaged_copies(store.path) == [name]
-        bring_up_to_date(again, Sweep(study))
+        bring_up_to_date(again, CaseGrid(study))
         assert {name: (store.private / name).read_bytes() for name in whole} == whole
 
 
@@ -326,7 +326,7 @@ def test_damaged_metadata_are_written_anew(study, store, name, text):
         (store.path / name).write_text(text)
     damaged = Store(store.path)
     assert damaged.damaged_files() == [name]
-    bring_up_to_date(damaged, Sweep(study))
+    bring_up_to_date(damaged, CaseGrid(study))
     assert (store.path / name).read_bytes() == whole
     np.testing.assert_array_equal(xr.open_zarr(store.path).vertical.values[0, 0, :2], data["vertical"])
 

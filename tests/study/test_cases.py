@@ -17,7 +17,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.rig.rig import read_rig, with_key, with_keys
-from rubhpc.study.cases import Sweep
+from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import Contact, Integrator, Recording, Run, Study, make_axis
 
 RIG = read_rig("mokhtar2017")
@@ -48,19 +48,19 @@ def grids(draw):
 @settings(max_examples=40, deadline=None)
 @given(grid=grids(), block=st.none() | st.integers(1, 40))
 def test_every_case_lies_in_exactly_one_block(grid, block):
-    sweep = Sweep(study(grid, run=Run(block=block)))
-    blocks = sweep.blocks()
-    cases = [case for block in blocks for case in sweep.cases(block)]
-    assert sorted(case.index for case in cases) == list(np.ndindex(sweep.shape))
-    assert len({case.id for case in cases}) == len(cases) == sweep.n_case
+    case_grid = CaseGrid(study(grid, run=Run(block=block)))
+    blocks = case_grid.blocks()
+    cases = [case for block in blocks for case in case_grid.cases(block)]
+    assert sorted(case.index for case in cases) == list(np.ndindex(case_grid.shape))
+    assert len({case.id for case in cases}) == len(cases) == case_grid.n_case
     assert sorted(b.number for b in blocks) == list(range(len(blocks)))
     assert [b.cost for b in blocks] == sorted((b.cost for b in blocks), reverse=True)
     assert all(math.prod(b.shape) <= (block or 16) for b in blocks)
     for b in blocks:  # a block is a chunk of the store: it starts on a multiple of the chunk
-        assert all(s % c == 0 for s, c in zip(b.start, sweep.chunk, strict=True))
-        assert sweep.case_ids(b) == [case.id for case in sweep.cases(b)]
-    assert sweep.case(cases[-1].index) == cases[-1]
-    assert Sweep(sweep.study).blocks() == blocks
+        assert all(s % c == 0 for s, c in zip(b.start, case_grid.chunk, strict=True))
+        assert case_grid.case_ids(b) == [case.id for case in case_grid.cases(b)]
+    assert case_grid.case(cases[-1].index) == cases[-1]
+    assert CaseGrid(case_grid.study).blocks() == blocks
 
 
 @settings(max_examples=30, deadline=None)
@@ -69,7 +69,7 @@ def test_growth_keeps_identity_and_ids(grid, data):
     """Wherever a new value stands, and whatever the order of the old ones."""
     name = data.draw(st.sampled_from(sorted(grid)))
     longer = data.draw(st.permutations([*grid[name], max(grid[name]) * 1.25 + 0.1]))
-    before, after = Sweep(study(grid)), Sweep(study(grid | {name: longer}))
+    before, after = CaseGrid(study(grid)), CaseGrid(study(grid | {name: longer}))
     assert after.identity == before.identity
     kept = {before.case(i).id: before.case(i) for i in np.ndindex(before.shape)}
     grown = {after.case(i).id: after.case(i) for i in np.ndindex(after.shape)}
@@ -93,7 +93,7 @@ def test_growth_keeps_identity_and_ids(grid, data):
     ],
 )
 def test_what_changes_results_changes_the_identity(change):
-    assert Sweep(study(**change)).identity != Sweep(study()).identity
+    assert CaseGrid(study(**change)).identity != CaseGrid(study()).identity
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_what_changes_results_changes_the_identity(change):
 def test_what_changes_no_result_leaves_the_identity(change):
     parts = {"title": "t"} | change
     grid, rig, title = parts.pop("grid", SMALL), parts.pop("rig", RIG), parts.pop("title")
-    assert Sweep(replace(study(grid, rig, **parts), title=title)).identity == Sweep(study()).identity
+    assert CaseGrid(replace(study(grid, rig, **parts), title=title)).identity == CaseGrid(study()).identity
 
 
 @pytest.mark.parametrize(
@@ -122,23 +122,23 @@ def test_what_changes_no_result_leaves_the_identity(change):
 def test_what_the_rig_says_of_a_key_that_is_an_axis_leaves_the_identity(key, unit):
     """Every case sets it; another key of the same part still counts."""
     grid = SMALL | {key: [0.05 * unit, 0.06 * unit]}
-    identity = Sweep(study(grid)).identity
-    assert Sweep(study(grid, with_key(RIG, key, 0.055 * unit))).identity == identity
-    assert Sweep(study(SMALL | {key: [0.06 * unit, 0.07 * unit, 0.05 * unit]})).identity == identity
-    assert Sweep(study(grid, with_key(RIG, "stator.width", 0.004))).identity != identity
-    assert Sweep(study(SMALL)).identity != identity
+    identity = CaseGrid(study(grid)).identity
+    assert CaseGrid(study(grid, with_key(RIG, key, 0.055 * unit))).identity == identity
+    assert CaseGrid(study(SMALL | {key: [0.06 * unit, 0.07 * unit, 0.05 * unit]})).identity == identity
+    assert CaseGrid(study(grid, with_key(RIG, "stator.width", 0.004))).identity != identity
+    assert CaseGrid(study(SMALL)).identity != identity
 
 
 def test_ids_do_not_depend_on_the_machine():
     # a store made elsewhere, or by an earlier version with the same physics, is gone on with
-    assert len(Sweep(study()).identity) == 64
-    one, other = Sweep(study()), Sweep(study())
+    assert len(CaseGrid(study()).identity) == 64
+    one, other = CaseGrid(study()), CaseGrid(study())
     assert one.case((0, 0, 0)).id == other.case((0, 0, 0)).id != one.case((0, 0, 1)).id
 
 
 def test_a_case_says_what_the_axes_amount_to():
     grid = SMALL | {"stator.youngs_modulus": [3e9, 3e10], "rotor.bearing.kyy": [1e6, 5e5]}
-    case = Sweep(study(grid)).case((1, 0, 2, 1, 1))
+    case = CaseGrid(study(grid)).case((1, 0, 2, 1, 1))
     rig = with_keys(RIG, {"stator.youngs_modulus": 3e10, "rotor.bearing.kyy": 5e5})
     model = assemble(rig)
     speed = 1.5 * first_lateral_frequency(model)
@@ -151,10 +151,10 @@ def test_a_case_says_what_the_axes_amount_to():
 
 def test_the_papers_gaps_come_back():
     grid = {"speed_ratio": [3.0, 2.0], "clearance_ratio": [0.70, 0.85], "friction": 0.3}
-    sweep = Sweep(study(grid))
-    assert sweep.case((0, 0, 0)).clearance == pytest.approx(76e-6, abs=1e-6)
-    assert sweep.case((1, 0, 0)).clearance == pytest.approx(90e-6, abs=1.5e-6)
-    assert sweep.case((1, 1, 0)).clearance == pytest.approx(110e-6, abs=1.5e-6)
+    case_grid = CaseGrid(study(grid))
+    assert case_grid.case((0, 0, 0)).clearance == pytest.approx(76e-6, abs=1e-6)
+    assert case_grid.case((1, 0, 0)).clearance == pytest.approx(90e-6, abs=1.5e-6)
+    assert case_grid.case((1, 1, 0)).clearance == pytest.approx(110e-6, abs=1.5e-6)
 
 
 def test_settings_lie_along_the_axes_that_set_them():
@@ -164,13 +164,13 @@ def test_settings_lie_along_the_axes_that_set_them():
         "rotor.bearing.kyy": [1e6, 5e5, 2e6],
     }
     grid |= {"speed_ratio": [0.75, 1.5], "clearance_ratio": [0.7, 0.8, 0.9, 0.95]}
-    sweep = Sweep(study(grid))
-    found = sweep.settings()
+    case_grid = CaseGrid(study(grid))
+    found = case_grid.operating_points()
     assert found["spin_speed"][0] == ("rotor_bearing_kyy", "speed_ratio")
     assert found["contact_free_amplitude"][0] == ("rotor_bearing_kyy", "speed_ratio")
     assert found["clearance"][0] == ("rotor_bearing_kyy", "speed_ratio", "clearance_ratio")
     for index in [(0, 0, 0, 0, 0), (1, 1, 2, 1, 3), (1, 0, 1, 0, 2)]:
-        case, at = sweep.case(index), dict(zip(sweep.dims, index, strict=True))
+        case, at = case_grid.case(index), dict(zip(case_grid.dims, index, strict=True))
         for name, value in (
             ("spin_speed", case.speed),
             ("clearance", case.clearance),
@@ -182,17 +182,19 @@ def test_settings_lie_along_the_axes_that_set_them():
 
 def test_the_node_of_the_stator_is_where_the_amplitude_is_taken():
     rig = with_key(RIG, "stator.radius", 0.06)
-    sweep = Sweep(study(SMALL | {"stator.node": [8, 5]}, rig))
-    dims, amplitude = sweep.settings()["contact_free_amplitude"]
+    case_grid = CaseGrid(study(SMALL | {"stator.node": [8, 5]}, rig))
+    dims, amplitude = case_grid.operating_points()["contact_free_amplitude"]
     assert dims == ("speed_ratio", "stator_node")
     assert np.all(amplitude[:, 1] < 0.9 * amplitude[:, 0])  # nearer to the bearing the shaft swings less
     model = assemble(rig)
-    assert amplitude[0, 1] == pytest.approx(contact_free_amplitude(model, sweep.case((0, 0, 0, 1)).speed, 5))
+    assert amplitude[0, 1] == pytest.approx(
+        contact_free_amplitude(model, case_grid.case((0, 0, 0, 1)).speed, 5)
+    )
 
 
 def test_absolute_axes_are_their_own_settings():
-    sweep = Sweep(study({"speed": [100.0, -100.0], "clearance": ["84 um", "100 um"], "friction": 0.3}))
-    found = sweep.settings()
+    case_grid = CaseGrid(study({"speed": [100.0, -100.0], "clearance": ["84 um", "100 um"], "friction": 0.3}))
+    found = case_grid.operating_points()
     assert found["spin_speed"][0] == ("speed",)
     assert found["clearance"][0] == ("clearance",)
     assert list(found["clearance"][1]) == [84e-6, 100e-6]
@@ -203,7 +205,7 @@ def test_absolute_axes_are_their_own_settings():
 def test_cost_is_revolutions_over_speed_over_step():
     recording = Recording(transient=10, revolutions=6)
     grid = {"speed": [50.0, -200.0, 100.0], "clearance": 1e-4, "friction": [0.1, 0.2]}
-    sweep = Sweep(
+    case_grid = CaseGrid(
         study(
             grid,
             recording=recording,
@@ -211,18 +213,18 @@ def test_cost_is_revolutions_over_speed_over_step():
             run=Run(block=2),
         )
     )
-    assert [(b.start[0], b.cost) for b in sweep.blocks()] == [
+    assert [(b.start[0], b.cost) for b in case_grid.blocks()] == [
         (i, round(2 * 16 * 2 * math.pi / speed / 0.5e-6)) for i, speed in ((0, 50), (2, 100), (1, 200))
     ]
 
 
 def test_a_block_shares_its_speed_and_rig():
     grid = SMALL | {"stator.youngs_modulus": [3e9, 3e10]}
-    sweep = Sweep(study(grid, run=Run(block=6)))
-    assert sweep.chunk == (1, 2, 3, 1)
-    assert Sweep(study(grid, run=Run(block=12))).chunk == (2, 2, 3, 1)
-    assert Sweep(study(grid, run=Run(block=4))).chunk == (1, 1, 3, 1)
-    assert Sweep(study(grid), chunk=(2, 1, 2, 2)).blocks()[0].shape in {(2, 1, 2, 2), (2, 1, 1, 2)}
+    case_grid = CaseGrid(study(grid, run=Run(block=6)))
+    assert case_grid.chunk == (1, 2, 3, 1)
+    assert CaseGrid(study(grid, run=Run(block=12))).chunk == (2, 2, 3, 1)
+    assert CaseGrid(study(grid, run=Run(block=4))).chunk == (1, 1, 3, 1)
+    assert CaseGrid(study(grid), chunk=(2, 1, 2, 2)).blocks()[0].shape in {(2, 1, 2, 2), (2, 1, 1, 2)}
 
 
 def test_a_step_beyond_stability_is_refused_before_the_run():
@@ -230,37 +232,37 @@ def test_a_step_beyond_stability_is_refused_before_the_run():
     with pytest.raises(
         InputError, match=r"\[integrator\] step: 1e-06 s .* stator\.youngs_modulus = 3e\+10; take less"
     ):
-        Sweep(study(grid, integrator=Integrator(method="central-difference", step=1e-6)))
-    Sweep(study(SMALL, integrator=Integrator(method="central-difference", step=1e-6)))
+        CaseGrid(study(grid, integrator=Integrator(method="central-difference", step=1e-6)))
+    CaseGrid(study(SMALL, integrator=Integrator(method="central-difference", step=1e-6)))
 
 
 def test_an_offset_that_closes_a_gap_is_refused_with_the_settings():
     rig = with_key(RIG, "stator.clearance_offset", "-90 um")  # 0.7 of 122 um is less
     with pytest.raises(InputError, match=r"\[grid\] clearance_ratio: .* leave no gap"):
-        Sweep(study(rig=rig)).settings()
+        CaseGrid(study(rig=rig)).operating_points()
 
 
 def test_a_refusal_of_the_settings_names_the_file(tmp_path):
     file = tmp_path / "study.toml"
     with pytest.raises(InputError, match=r"study\.toml: \[integrator\] step: 0\.001 s is above"):
-        Sweep(study(integrator=Integrator(method="central-difference", step=1e-3), source=file))
+        CaseGrid(study(integrator=Integrator(method="central-difference", step=1e-3), source=file))
     rig = with_key(RIG, "stator.clearance_offset", "-90 um")
     with pytest.raises(InputError, match=r"study\.toml: \[grid\] clearance_ratio: .* leave no gap"):
-        Sweep(study(rig=rig, source=file)).settings()
+        CaseGrid(study(rig=rig, source=file)).operating_points()
 
 
 def test_a_million_cases_are_planned_at_once():
     many = {"start": 0.5, "stop": 5.5, "num": 100}
     began = time.perf_counter()
-    sweep = Sweep(
+    case_grid = CaseGrid(
         study({"speed_ratio": many, "clearance_ratio": many | {"start": 0.1, "stop": 0.9}, "friction": many})
     )
-    blocks = sweep.blocks()
-    sweep.settings()
-    assert sum(math.prod(b.shape) for b in blocks) == sweep.n_case == 1_000_000
+    blocks = case_grid.blocks()
+    case_grid.operating_points()
+    assert sum(math.prod(b.shape) for b in blocks) == case_grid.n_case == 1_000_000
     assert time.perf_counter() - began < 5.0  # 0.7 s alone on one core
     began = time.perf_counter()
-    n = sum(len(sweep.case_ids(block)) for block in blocks[:500])
+    n = sum(len(case_grid.case_ids(block)) for block in blocks[:500])
     assert (time.perf_counter() - began) / n < 20e-6
 
 
@@ -268,6 +270,6 @@ def test_the_quick_start_fits_into_a_minute_of_two_cores():
     from rubhpc.study.study import read_study
 
     for job in ("quickstart", "cascade"):
-        sweep = Sweep(read_study(Path(__file__).parents[2] / "jobs" / f"{job}.toml"))
+        case_grid = CaseGrid(read_study(Path(__file__).parents[2] / "jobs" / f"{job}.toml"))
         # half a microsecond of a core for a step of half a microsecond
-        assert sum(block.cost for block in sweep.blocks()) * 0.5e-6 < 70
+        assert sum(block.cost for block in case_grid.blocks()) * 0.5e-6 < 70

@@ -10,10 +10,10 @@ import pytest
 from rubhpc.errors import InputError
 from rubhpc.rig.rig import read_rig
 from rubhpc.study.axes import BOTH, DIRECTION, DOWN, FROM_REST, UP, Axis, make_axis
-from rubhpc.study.continuation import CaseIds, Chain, chain_of
+from rubhpc.study.continuation import CaseIds, Continuation, continuation_of
 
 RIG = read_rig("mokhtar2017")
-BOTH_WAYS = Chain(axis=0, direction=2)
+BOTH_WAYS = Continuation(axis=0, direction=2)
 
 
 class Named(NamedTuple):
@@ -65,40 +65,45 @@ def test_an_axis_made_by_hand_is_checked_too():
 
 
 def test_a_grid_has_a_chain_only_where_an_axis_is_swept():
-    assert chain_of([Named("a", FROM_REST), Named("b", FROM_REST)]) is None
-    assert chain_of([Named("a", FROM_REST), Named("b", DOWN)]) == Chain(axis=1, is_down=True)
-    assert chain_of([Named("a", BOTH), Named("b", FROM_REST), Named(DIRECTION, FROM_REST)]) == BOTH_WAYS
+    assert continuation_of([Named("a", FROM_REST), Named("b", FROM_REST)]) is None
+    assert continuation_of([Named("a", FROM_REST), Named("b", DOWN)]) == Continuation(axis=1, is_down=True)
+    assert (
+        continuation_of([Named("a", BOTH), Named("b", FROM_REST), Named(DIRECTION, FROM_REST)]) == BOTH_WAYS
+    )
 
 
 def test_each_case_goes_on_from_its_neighbour_in_its_own_direction():
-    assert BOTH_WAYS.before((0, 5, 0), 3) is None
-    assert BOTH_WAYS.before((2, 5, 0), 3) == (1, 5, 0)
-    assert BOTH_WAYS.before((0, 5, 1), 3) == (1, 5, 1)
-    assert BOTH_WAYS.before((2, 5, 1), 3) is None
-    down = Chain(axis=1, is_down=True)
-    assert down.before((4, 0), 2) == (4, 1)
-    assert sorted([(0, 0), (0, 1)], key=down.turn) == [(0, 1), (0, 0)]
+    assert BOTH_WAYS.predecessor((0, 5, 0), 3) is None
+    assert BOTH_WAYS.predecessor((2, 5, 0), 3) == (1, 5, 0)
+    assert BOTH_WAYS.predecessor((0, 5, 1), 3) == (1, 5, 1)
+    assert BOTH_WAYS.predecessor((2, 5, 1), 3) is None
+    down = Continuation(axis=1, is_down=True)
+    assert down.predecessor((4, 0), 2) == (4, 1)
+    assert sorted([(0, 0), (0, 1)], key=down.position) == [(0, 1), (0, 0)]
 
 
 def test_marks_spread_to_all_behind_them_and_to_no_other_chain():
     marked = np.zeros((4, 2, 2), int)
     marked[1, 0] = 1
     marked[2, 0, 0] = 5
-    spread = BOTH_WAYS.highest(marked)
+    spread = BOTH_WAYS.running_maximum(marked)
     assert spread[:, 0, 0].tolist() == [0, 1, 5, 5]
     assert spread[:, 0, 1].tolist() == [1, 1, 0, 0]
     assert not spread[:, 1].any()
-    assert Chain(axis=0, is_down=True).highest(marked[:, 0, 0]).tolist() == [5, 5, 5, 0]
+    assert Continuation(axis=0, is_down=True).running_maximum(marked[:, 0, 0]).tolist() == [5, 5, 5, 0]
 
 
-@pytest.mark.parametrize("chain", [Chain(axis=0), Chain(axis=0, is_down=True), Chain(axis=0, direction=1)])
+@pytest.mark.parametrize(
+    "continuation",
+    [Continuation(axis=0), Continuation(axis=0, is_down=True), Continuation(axis=0, direction=1)],
+)
 @pytest.mark.parametrize("after", [(1.0, 1.5, 2.0, 3.0), (1.0, 2.0, 3.0, 4.0), (0.5, 1.0, 2.0, 3.0)])
-def test_ids_and_growth_agree_on_which_cases_are_the_same(chain, after):
+def test_ids_and_growth_agree_on_which_cases_are_the_same(continuation, after):
     """A case keeps its id where the same values come before it, and where growth keeps it."""
     before = (1.0, 2.0, 3.0)
-    ways = (0.0, 1.0) if chain.direction is not None else (float(chain.is_down),)
-    mine, yours = (CaseIds("study", [values, (0.0, 1.0)], chain) for values in (before, after))
-    kept = chain.kept(before, after)
+    ways = (0.0, 1.0) if continuation.direction is not None else (float(continuation.is_down),)
+    mine, yours = (CaseIds("study", [values, (0.0, 1.0)], continuation) for values in (before, after))
+    kept = continuation.unchanged(before, after)
     for i, value in enumerate(after):
         for way in ways:
             point = (value, way)
@@ -112,4 +117,6 @@ def test_ids_and_growth_agree_on_which_cases_are_the_same(chain, after):
 
 def test_without_a_chain_an_id_tells_of_the_case_alone():
     assert CaseIds("s", [(1.0, 2.0)], None)([2.0]) == CaseIds("s", [(2.0,)], None)([2.0])
-    assert CaseIds("s", [(1.0, 2.0)], Chain(axis=0))([2.0]) != CaseIds("s", [(2.0,)], Chain(axis=0))([2.0])
+    assert CaseIds("s", [(1.0, 2.0)], Continuation(axis=0))([2.0]) != CaseIds(
+        "s", [(2.0,)], Continuation(axis=0)
+    )([2.0])

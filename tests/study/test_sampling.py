@@ -20,7 +20,7 @@ from rubhpc.running.recompute import reproduce
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
-from rubhpc.study.cases import Sweep
+from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import Sample, draw, make_axis, make_range, read_study
 
 
@@ -32,15 +32,15 @@ def test_the_points_are_those_of_saltelli(tmp_path):
     np.testing.assert_allclose(speed.values, points[:, 0], rtol=1e-14)
     np.testing.assert_allclose(friction.values, np.exp(points[:, 1]), rtol=1e-14)
     assert clearance.values == (0.7, 0.85)
-    sweep = Sweep(study)
-    assert (sweep.dims, sweep.shape) == (("case", "clearance_ratio"), (64, 2))
-    cases = [case for block in sweep.blocks() for case in sweep.cases(block)]
+    case_grid = CaseGrid(study)
+    assert (case_grid.dims, case_grid.shape) == (("case", "clearance_ratio"), (64, 2))
+    cases = [case for block in case_grid.blocks() for case in case_grid.cases(block)]
     assert len({case.id for case in cases}) == 128
     told = {case.index: case for case in cases}
     for i in (0, 17, 63):
         assert told[i, 1].friction == friction.values[i]
-        assert told[i, 1] == sweep.case((i, 1))
-        assert sweep.settings()["spin_speed"][1][i] == told[i, 0].speed == told[i, 1].speed
+        assert told[i, 1] == case_grid.case((i, 1))
+        assert case_grid.operating_points()["spin_speed"][1][i] == told[i, 0].speed == told[i, 1].speed
 
 
 def test_each_case_has_the_speed_and_the_rig_of_its_row(tmp_path):
@@ -57,13 +57,13 @@ def test_each_case_has_the_speed_and_the_rig_of_its_row(tmp_path):
     ]
     sample = Sample(n=8)
     study = replace(base, axes=draw([*axes, *fixed], sample), sample=sample)
-    sweep = Sweep(study)
-    assert sweep.dims == ("case", "clearance_ratio", "friction")
+    case_grid = CaseGrid(study)
+    assert case_grid.dims == ("case", "clearance_ratio", "friction")
     for i in (0, 1, 13, 39):
         ratio, modulus, thickness = (axis.values[i] for axis in study.axes[:3])
         rig = with_keys(base.rig, {"stator.youngs_modulus": modulus, "rotor.disc.thickness": thickness})
         model = assemble(rig)
-        case = sweep.case((i, 0, 0))
+        case = case_grid.case((i, 0, 0))
         assert case.rig.stator[0].youngs_modulus == modulus
         assert case.rig.rotor.disc[0].thickness == thickness
         assert case.speed == ratio * first_lateral_frequency(model)

@@ -19,7 +19,7 @@ from rubhpc.rig.rig import read_rig
 from rubhpc.schema import DIVERGED, DONE
 from rubhpc.storage.layout import build, encode
 from rubhpc.study.axes import Axis
-from rubhpc.study.cases import Sweep
+from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import Recording, Run, Study
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def axis(name: str, first: float, last: float, n: int) -> Axis:
     return Axis(name=name, dimension=name, unit="1", values=values, long_name=name.replace("_", " "))
 
 
-def sweep_of(shape: tuple[int, int, int], revolutions: int, folder: Path) -> Sweep:
+def case_grid_of(shape: tuple[int, int, int], revolutions: int, folder: Path) -> CaseGrid:
     axes = (
         axis("speed_ratio", 0.9, 6, shape[0]),
         axis("clearance_ratio", 0.5, 0.9, shape[1]),
@@ -52,14 +52,14 @@ def sweep_of(shape: tuple[int, int, int], revolutions: int, folder: Path) -> Swe
         run=Run(block=16),
         output=folder,
     )
-    return Sweep(study)
+    return CaseGrid(study)
 
 
 def write(path: Path, shape: tuple[int, int, int] = SHAPE, revolutions: int = 64) -> Path:
     """Make a store whose torsion has one line at 1X, of known height, over noise; return its path."""
-    sweep = sweep_of(shape, revolutions, path)
+    case_grid = case_grid_of(shape, revolutions, path)
     path.mkdir()
-    build(path, sweep)
+    build(path, case_grid)
     group = zarr.open_group(path, mode="r+")
     is_done = np.ones(shape, dtype=bool)
     is_done[:, ::LOST] = False
@@ -67,14 +67,14 @@ def write(path: Path, shape: tuple[int, int, int] = SHAPE, revolutions: int = 64
     group["peak_torsion"][...] = np.where(is_done, peak(shape), np.nan)
     order = group["order"][...]
     spectrum = FLOOR * np.random.default_rng(1).random(order.size, dtype=np.float32)
-    friction = np.array(sweep.study.axes[2].values)
-    for block in sweep.blocks():
+    friction = np.array(case_grid.study.axes[2].values)
+    for block in case_grid.blocks():
         box = tuple(slice(s, s + n) for s, n in zip(block.start, block.shape, strict=True))
-        chunk = np.full((*sweep.chunk, order.size), np.nan, dtype=np.float32)
+        chunk = np.full((*case_grid.chunk, order.size), np.nan, dtype=np.float32)
         inside = tuple(slice(n) for n in block.shape)
         chunk[inside] = np.where(is_done[box][..., None], spectrum, np.nan)
         chunk[(*inside, order == LINE)] = np.where(is_done[box], 1 + friction[box[2]], np.nan)[..., None]
-        at = [str(s // c) for s, c in zip(block.start, sweep.chunk, strict=True)]
+        at = [str(s // c) for s, c in zip(block.start, case_grid.chunk, strict=True)]
         file = path.joinpath(NAME, "c", *at, "0")
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(encode(chunk))

@@ -1,4 +1,4 @@
-"""Ends a rank whose case does not end: between kernel calls a case is asked, within one it cannot be."""
+"""Ends a rank whose case does not return: within a kernel call no time limit can be checked."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from rubhpc.running.launch import launch
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from rubhpc.storage.in_progress import Hand
+    from rubhpc.storage.in_progress import InProgress
 
 PATIENCE = 10.0  # s over its limit that a case may take to be asked: a kernel call lasts 0.25 s
 _LOOK = 0.5  # s between looks
 _STOPPED = 75  # exit code: run the same command again
 
 
-class Watch:
+class Watchdog:
     """Watches the cases of a rank, as a context; without a limit (s) it watches nothing.
 
     A kernel that does not return cannot be interrupted. So the rank leaves word of its case for the next run,
     which has it fail and goes on, and ends; the launcher ends the others.
     """
 
-    def __init__(self, limit: float | None, hand: Hand) -> None:
+    def __init__(self, limit: float | None, hand: InProgress) -> None:
         self.limit, self._hand = limit, hand
         self._deadline = float("inf")
         self._ended = threading.Event()
@@ -56,7 +56,7 @@ class Watch:
         while time.monotonic() < self._deadline:
             if self._ended.wait(_LOOK):
                 return
-        self._hand.accuse(limit)
+        self._hand.note_overrun(limit)
         print(
             f"rubhpc: rank {launch().rank}: a case is over its time limit of {limit:g} s and cannot be "
             "interrupted; run the same command again, it leaves this case out",
