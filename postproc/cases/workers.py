@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import sys
+from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -52,17 +53,15 @@ def workers(
         yield
         return
     with _packages_of_scale(scheduler):
-        from distributed import Client, LocalCluster
-
-        if scheduler == "slurm":
-            from dask_jobqueue import SLURMCluster
+        distributed: Any = import_module("distributed")
+        jobqueue: Any = import_module("dask_jobqueue") if scheduler == "slurm" else None
     cluster: Any
     if scheduler == "mpi":
         cluster = contextlib.nullcontext()  # the client finds the scheduler of rank 0
     elif scheduler == "processes":
-        cluster = LocalCluster(n_workers=n_worker, threads_per_worker=1, dashboard_address=None)
+        cluster = distributed.LocalCluster(n_workers=n_worker, threads_per_worker=1, dashboard_address=None)
     else:
-        cluster = SLURMCluster(
+        cluster = jobqueue.SLURMCluster(
             cores=cores,
             processes=cores,
             memory=memory,
@@ -71,7 +70,7 @@ def workers(
             job_name="rubhpc-reduce",
         )
         cluster.scale(n=n_worker)
-    with cluster as address, Client(address) as client:
+    with cluster as address, distributed.Client(address) as client:
         client.wait_for_workers(1)  # others join as their jobs start
         yield
 

@@ -17,6 +17,13 @@ if TYPE_CHECKING:
     from postproc.figures.catalogue import Drawing
 
 REVOLUTIONS = click.IntRange(min=1)
+SELECT = click.option(
+    "--select",
+    "selection",
+    multiple=True,
+    metavar="AXIS=VALUE",
+    help='Such as speed_ratio=1.7, clearance="84 um", friction=0.1,0.3 or speed_ratio=1..2.',
+)
 
 
 def of_store(function: Callable[..., None]) -> Callable[..., None]:
@@ -24,13 +31,7 @@ def of_store(function: Callable[..., None]) -> Callable[..., None]:
     for decorate in (
         click.option("--data", metavar="FILE", help="Write the data too: .csv, .json, .zarr or .nc."),
         click.option("--figure", metavar="FILE", help=".png, .pdf or .svg [default: STORE_COMMAND.png here]"),
-        click.option(
-            "--select",
-            "selection",
-            multiple=True,
-            metavar="AXIS=VALUE",
-            help='Such as speed_ratio=1.7, clearance="84 um", friction=0.1,0.3 or speed_ratio=1..2.',
-        ),
+        SELECT,
         click.argument("store"),
     ):
         function = decorate(function)

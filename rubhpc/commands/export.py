@@ -6,19 +6,13 @@ from pathlib import Path
 
 import click
 
-from rubhpc.commands.drawing import open_cases
+from rubhpc.commands.drawing import SELECT, open_cases
 from rubhpc.errors import InputError
 
 
 @click.command()
 @click.argument("store")
-@click.option(
-    "--select",
-    "selection",
-    multiple=True,
-    metavar="AXIS=VALUE",
-    help='Such as speed_ratio=1.7, clearance="84 um", friction=0.1,0.3 or speed_ratio=1..2.',
-)
+@SELECT
 @click.option("--value", "names", multiple=True, metavar="NAME", help="A variable [default: all of them].")
 @click.option("--output", metavar="FILE", help="The file, .h5, .hdf5 or .nc [default: STORE.h5 here].")
 def export(store: str, selection: tuple[str, ...], names: tuple[str, ...], output: str | None) -> None:
@@ -32,7 +26,7 @@ def export(store: str, selection: tuple[str, ...], names: tuple[str, ...], outpu
     cases = open_cases(store, selection)
     for name in names:
         if name not in cases.data_vars:
-            raise InputError(f"{store}: holds no {name}; {nearest(name, map(str, cases.data_vars))}")
+            raise InputError(f"{store}: no variable {name}; {nearest(name, map(str, cases.data_vars))}")
     path = check_data_path(output or f"{Path(store).resolve().stem}.h5")
     if path.suffix.lower() not in HDF5:
         raise InputError(f"{path}: an export is HDF5; name it {path.stem}.h5")

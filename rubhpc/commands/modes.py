@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from rubhpc.commands.quantity import quantity
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -44,10 +46,9 @@ def modes(
     from postproc.figures.style import check_figure_path
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.modes import modes as find_modes
-    from rubhpc.input.quantity import parse_quantity
     from rubhpc.rig.rig import read_rig
 
-    spins = [parse_quantity(_number(speed), "rad/s", "--speed") for speed in speeds] or [0.0]
+    spins = [quantity(speed, "rad/s", "--speed") for speed in speeds] or [0.0]
     path = check_figure_path(figure) if figure else None
     model = assemble(read_rig(rig, trust_rig=trust_rig))
     # stators do not spin: their modes hold at every speed
@@ -63,14 +64,6 @@ def modes(
         _print_tables(found, stators, count or N_TABLE)
     if path:
         _draw(model, max(abs(spin) for spin in spins), count, path)
-
-
-def _number(text: str) -> str | float:
-    """A plain number of the command line as a number, rad/s; other text as it stands."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def _plain(mode: Mode) -> dict[str, Any]:

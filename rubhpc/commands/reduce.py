@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from rubhpc.commands.drawing import pairs
+from rubhpc.commands.drawing import SELECT, pairs
 from rubhpc.errors import InputError
 
 
@@ -23,13 +23,7 @@ from rubhpc.errors import InputError
 @click.option("--signal", help="Whose spectra are reduced [default: torsion].")
 @click.option("--measure", help="For quantiles and histogram [default: peak_contact_force].")
 @click.option("--over", multiple=True, metavar="AXIS", help="May be repeated [default: all axes].")
-@click.option(
-    "--select",
-    "selection",
-    multiple=True,
-    metavar="AXIS=VALUE",
-    help='Such as speed_ratio=1.7, clearance="84 um", friction=0.1,0.3 or speed_ratio=1..2.',
-)
+@SELECT
 @click.option(
     "--level", "levels", multiple=True, type=click.FloatRange(0, 1), default=(0.05, 0.5, 0.95),
     show_default=True, help="Of a quantile; may be repeated.",

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from rubhpc.commands.quantity import quantity
+
 _STORE = click.argument("store", type=click.Path(path_type=Path))
 
 
@@ -24,9 +26,8 @@ def report(store: Path, output: Path | None, limit: str) -> None:
     from postproc.report.budget import write_report
     from postproc.store.live import open_live
     from rubhpc.errors import InputError
-    from rubhpc.input.quantity import parse_quantity
 
-    size = parse_quantity(_number(limit), "byte", "--limit")
+    size = quantity(limit, "byte", "--limit")
     path = output or Path(f"{store.resolve().stem}.html")
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{path}: a report is an HTML page; name it {path.stem}.html")
@@ -56,11 +57,3 @@ def view(store: Path, port: int) -> None:
     with Server(Library(lambda: open_live(store)), port) as server, contextlib.suppress(KeyboardInterrupt):
         click.echo(f"{store} is at {server.url} until Ctrl-C")
         server.serve_forever()
-
-
-def _number(text: str) -> float | str:
-    """Return a plain number of the command line as one, bytes; other text as it stands."""
-    try:
-        return float(text)
-    except ValueError:
-        return text

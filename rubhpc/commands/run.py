@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from rubhpc.commands.quantity import quantity
 from rubhpc.errors import RubError, StoreError
 from rubhpc.running.launch import end_with_launcher, launch
 
@@ -59,7 +60,6 @@ def run(
 
     end_with_launcher()
     with Stopping() as stopping:  # signals are answered from here on, whatever the imports below take
-        from rubhpc.input.quantity import parse_quantity
         from rubhpc.running.driver import run as run_study
 
         summary = run_study(
@@ -68,9 +68,7 @@ def run(
             trust_rig=trust_rig,
             retry_failed=retry_failed,
             max_failures=max_failures,
-            time_limit=None
-            if time_limit is None
-            else parse_quantity(_number(time_limit), "s", "--time-limit"),
+            time_limit=None if time_limit is None else quantity(time_limit, "s", "--time-limit"),
             accept_version=accept_version,
             quiet=quiet,
             stopping=stopping,
@@ -132,10 +130,3 @@ def verify(store: Path) -> int:
     for line in damage.lines():
         click.echo(line)
     raise StoreError(damage.complaint())
-
-
-def _number(text: str) -> str | float:
-    try:
-        return float(text)
-    except ValueError:
-        return text
