@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
     from rubhpc.fem.assemble import assemble
     from rubhpc.integrate.record import Record, State
-    from rubhpc.rig.rig import Load, LumpedStator, MatrixStator, Rig, Stator, Unbalance, read_rig
+    from rubhpc.rig.forces import Load, Unbalance
+    from rubhpc.rig.reading import read_rig
+    from rubhpc.rig.rig import Rig
+    from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
     from rubhpc.running.driver import run
     from rubhpc.simulate import simulate
     from rubhpc.storage.summary import Summary
@@ -49,22 +52,22 @@ __all__ = [
 # Where each name comes from; imported when it is first asked for, so that `import rubhpc` takes no time.
 _HOMES = {
     "InputError": "rubhpc.errors:InputError",
-    "Load": "rubhpc.rig.rig:Load",
-    "LumpedStator": "rubhpc.rig.rig:LumpedStator",
-    "MatrixStator": "rubhpc.rig.rig:MatrixStator",
+    "Load": "rubhpc.rig.forces:Load",
+    "LumpedStator": "rubhpc.rig.stators:LumpedStator",
+    "MatrixStator": "rubhpc.rig.stators:MatrixStator",
     "Record": "rubhpc.integrate.record:Record",
     "Rig": "rubhpc.rig.rig:Rig",
     "RubError": "rubhpc.errors:RubError",
     "State": "rubhpc.integrate.record:State",
-    "Stator": "rubhpc.rig.rig:Stator",
+    "Stator": "rubhpc.rig.stators:Stator",
     "StoppedEarly": "rubhpc.errors:StoppedEarly",
     "StoreError": "rubhpc.errors:StoreError",
     "Study": "rubhpc.study.study:Study",
     "Summary": "rubhpc.storage.summary:Summary",
-    "Unbalance": "rubhpc.rig.rig:Unbalance",
+    "Unbalance": "rubhpc.rig.forces:Unbalance",
     "assemble": "rubhpc.fem.assemble:assemble",
     "open": "postproc.accessor:open",
-    "read_rig": "rubhpc.rig.rig:read_rig",
+    "read_rig": "rubhpc.rig.reading:read_rig",
     "read_study": "rubhpc.study.study:read_study",
     "run": "rubhpc.running.driver:run",
     "simulate": "rubhpc.simulate:simulate",

@@ -11,7 +11,8 @@ from rubhpc.input.reading import parse_quantity
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
-from rubhpc.rig.rig import Rig, read_rig, with_keys
+from rubhpc.rig.reading import read_rig, with_keys
+from rubhpc.rig.rig import Rig
 from rubhpc.study.study import Contact, Integrator, Recording
 
 if TYPE_CHECKING:

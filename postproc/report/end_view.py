@@ -6,7 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from postproc.report.drawing import FOOT, LEAST, Frame, line, scale_bar, svg, wall
-from rubhpc.rig.rig import LumpedStator, Rotor, Stator
+from rubhpc.rig.rotors import Rotor
+from rubhpc.rig.stators import LumpedStator, Stator
 
 if TYPE_CHECKING:
     from rubhpc.rig.rig import Rig

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from postproc.report.drawing import FOOT, LEAST, Frame, line, rect, scale_bar, svg, wall
 from postproc.report.end_view import depth, tip_and_root
-from rubhpc.rig.rig import Rotor, Stator
+from rubhpc.rig.rotors import Rotor
+from rubhpc.rig.stators import Stator
 
 if TYPE_CHECKING:
     from rubhpc.rig.parts import Disc

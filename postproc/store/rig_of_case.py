@@ -8,12 +8,13 @@ import xarray as xr
 
 from postproc.store.axes import source
 from rubhpc.errors import InputError
-from rubhpc.rig.rig import Rig, rig_from_dict, with_keys
+from rubhpc.rig.reading import rig_from_dict, with_keys
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from rubhpc.fem.modes import Mode
+    from rubhpc.rig.rig import Rig
 
 ROTOR_MODES = ("lateral", "torsional")
 

@@ -46,7 +46,7 @@ def modes(
     from postproc.figures.style import check_figure_path
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.modes import modes as find_modes
-    from rubhpc.rig.rig import read_rig
+    from rubhpc.rig.reading import read_rig
 
     spins = [quantity(speed, "rad/s", "--speed") for speed in speeds] or [0.0]
     path = check_figure_path(figure) if figure else None

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.rig.rig import ShaftSection, Stator
+    from rubhpc.rig.parts import ShaftSection
+    from rubhpc.rig.stators import Stator
 
     Matrix = NDArray[np.float64]
 

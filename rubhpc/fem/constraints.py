@@ -1,4 +1,4 @@
-"""Whether something holds what contact and outputs see of a model: a free body has no constant response."""
+"""Search for rigid-body modes in what contact and outputs depend on: these have no constant response."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from rubhpc.fem.modes import KINDS
 if TYPE_CHECKING:
     from rubhpc.fem.model import Body, Model
 
-FREE = 1e-12  # square of a frequency over the greatest, below which a mode is free motion
+RIGID = 1e-12  # square of a frequency over the greatest, below which a mode is a rigid-body mode
 
 
-def find_free(model: Model) -> str:
-    """What is free to move of all that contact and outputs depend on, in words; "" where all is held."""
+def find_rigid_body_mode(model: Model) -> str:
+    """Describe a rigid-body mode that contact or outputs depend on; "" when all of them are constrained."""
     nodes = {model.output_node, *(stator.node for stator in model.stators)}
     seen = [model.rotor.index(node, name) for node in sorted(nodes) for name in ("v", "w", "thx")]
-    if row := free_row(model.rotor, [row for row in seen if row >= 0]):
+    if row := rigid_body_row(model.rotor, [row for row in seen if row >= 0]):
         motion = "turn (torsion)" if model.rotor.degrees[row - 1][1] in KINDS["torsional"] else "move"
         return f"the rotor is free to {motion}"
     for i, stator in enumerate(model.stators, 1):
-        if free_row(stator.body, [row for row in (stator.axial, stator.lateral) if row >= 0]):
+        if rigid_body_row(stator.body, [row for row in (stator.axial, stator.lateral) if row >= 0]):
             return f"stator {i} is free to move"
     return ""
 
 
-def free_row(body: Body, seen: list[int]) -> int:
-    """Row, from 1, of what moves most in a free motion of the parts that are seen; 0: there is none."""
+def rigid_body_row(body: Body, seen: list[int]) -> int:
+    """Row, from 1, that moves most in a rigid-body mode of the parts that hold the rows `seen`; 0: none."""
     couples = csr_array((body.mass != 0) | (body.stiffness != 0))
     part = connected_components(couples, directed=False)[1] if body.n_dof else np.zeros(0)
     for number in np.unique(part[seen]):
@@ -39,6 +39,6 @@ def free_row(body: Body, seen: list[int]) -> int:
         block = np.ix_(rows, rows)
         stiffness = body.stiffness[block]
         square, shape = eigh(0.5 * (stiffness + stiffness.T), body.mass[block])
-        if square[0] <= FREE * square[-1]:
+        if square[0] <= RIGID * square[-1]:
             return int(rows[np.abs(shape[:, 0]).argmax()]) + 1
     return 0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from rubhpc.rig.rig import Damping
+    from rubhpc.rig.parts import Damping
 
 
 def rayleigh_coefficients(damping: Damping) -> tuple[float, float]:

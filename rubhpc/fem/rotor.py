@@ -1,28 +1,29 @@
-"""The rotor assembled: shaft sections, discs, bearings, torsional drive, damping and unbalance."""
+"""Assembly of a rotor: shaft sections, discs, bearings, torsional drive and damping, or its matrices."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import singledispatch
 
 import numpy as np
 
 from rubhpc.fem.beam import ROTOR_DEGREES, join, rotor_element
 from rubhpc.fem.damping import rayleigh_coefficients
 from rubhpc.fem.model import Body
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from rubhpc.rig.rig import Rotor, Unbalance
+from rubhpc.rig.rotors import MatrixRotor, Rotor
 
 
-def assemble_rotor(rotor: Rotor) -> Body:
-    """Rotor reduced to its free degrees: axial motion is held at node 1, torsion where the drive holds it.
+@singledispatch
+def assemble_rotor(rotor: object) -> Body:
+    """Return the body of a rotor; register a function for each kind of `rubhpc.rig.rotors`."""
+    raise TypeError(f"no assembly for {type(rotor).__name__}")
 
-    Rayleigh damping takes in the springs of the bearings and of the drive, as the paper's proportional
-    damping does; dampers of bearings and drive come on top.
+
+@assemble_rotor.register(Rotor)
+def _(rotor: Rotor) -> Body:
+    """Shaft with axial motion constrained at node 1, and torsion where the drive constrains it.
+
+    Rayleigh damping includes the springs of the bearings and of the drive, as the paper's proportional
+    damping does; dampers of bearings and drive are added to it.
 
     Notes
     -----
@@ -54,9 +55,9 @@ def assemble_rotor(rotor: Rotor) -> Body:
         dampers[thx, thx] += drive.damping
 
     alpha, beta = rayleigh_coefficients(rotor.damping)
-    held = {(1, "u"), (drive.fixed_node, "thx")}
+    constrained = {(1, "u"), (drive.fixed_node, "thx")}
     degrees = [(node, name) for node in range(1, n_node + 1) for name in ROTOR_DEGREES]
-    free = [row for row, degree in enumerate(degrees) if degree not in held]
+    free = [row for row, degree in enumerate(degrees) if degree not in constrained]
     rows = np.ix_(free, free)
     return Body(
         mass=M[rows],
@@ -67,21 +68,14 @@ def assemble_rotor(rotor: Rotor) -> Body:
     )
 
 
-def unbalance_vectors(
-    unbalances: Sequence[Unbalance], body: Body
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Unbalance per spin squared, (n_dof,) each, kg m: the factors of cos(spin t) and of sin(spin t).
-
-    An unbalance `m e` at the phase p pulls with `m e spin^2 (cos(spin t + p), sin(spin t + p))` on (v, w); a
-    direction in which the node cannot move does not feel it.
-    """
-    cosine, sine = np.zeros((2, body.n_dof))
-    for unbalance in unbalances:
-        moment = unbalance.mass * unbalance.radius
-        along, across = moment * np.cos(unbalance.phase), moment * np.sin(unbalance.phase)
-        for name, parts in (("v", (along, -across)), ("w", (across, along))):
-            row = body.index(unbalance.node, name)
-            if row >= 0:
-                cosine[row] += parts[0]
-                sine[row] += parts[1]
-    return cosine, sine
+@assemble_rotor.register(MatrixRotor)
+def _(rotor: MatrixRotor) -> Body:
+    assert rotor.damping is not None  # zeros if not given
+    assert rotor.gyroscopic is not None
+    return Body(
+        mass=rotor.mass,
+        damping=rotor.damping,
+        gyroscopic=rotor.gyroscopic,
+        stiffness=rotor.stiffness,
+        degrees=rotor.degrees,
+    )

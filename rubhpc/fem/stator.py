@@ -1,7 +1,9 @@
-"""A stator assembled: a cantilever with its root held, its free end facing the rim."""
+"""Assembly of a stator: a cantilever, a mass on springs or a wall, or its matrices."""
 
 from __future__ import annotations
 
+import math
+from functools import singledispatch
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,20 +11,30 @@ import numpy as np
 from rubhpc.fem.beam import STATOR_DEGREES, join, stator_element
 from rubhpc.fem.damping import rayleigh_coefficients
 from rubhpc.fem.model import Body, StatorModel
+from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
 
 if TYPE_CHECKING:
-    from rubhpc.rig.rig import Stator
+    from numpy.typing import NDArray
+
+    from rubhpc.rig.stators import Seat
 
 
-def assemble_stator(stator: Stator, radius: float) -> StatorModel:
-    """Stator with node 1, its root, held; without lateral freedom only the axial degrees remain.
+@singledispatch
+def assemble_stator(stator: object, radius: float) -> StatorModel:
+    """Return the model of a stator; register a function for each kind of `rubhpc.rig.stators`.
 
     Parameters
     ----------
-    stator : Stator
+    stator : Stator, LumpedStator or MatrixStator
     radius : float
-        Radius of contact, m.
+        Contact radius, m.
     """
+    raise TypeError(f"no assembly for {type(stator).__name__}")
+
+
+@assemble_stator.register(Stator)
+def _(stator: Stator, radius: float) -> StatorModel:
+    """Cantilever with its root, node 1, clamped; without lateral motion only the axial degrees remain."""
     beam = join([stator_element(stator)] * stator.elements)
     names = STATOR_DEGREES if stator.lateral else ("axial",)
     tip = stator.elements + 1
@@ -48,4 +60,54 @@ def assemble_stator(stator: Stator, radius: float) -> StatorModel:
         euler_load=stator.euler_load,
         axial=body.index(tip, "axial"),
         lateral=body.index(tip, "lateral"),
+    )
+
+
+@assemble_stator.register(MatrixStator)
+def _(stator: MatrixStator, radius: float) -> StatorModel:
+    assert stator.damping is not None
+    degrees = tuple((1, name) for name in stator.degrees)
+    return _without_length(stator, radius, stator.mass, stator.damping, stator.stiffness, degrees)
+
+
+@assemble_stator.register(LumpedStator)
+def _(stator: LumpedStator, radius: float) -> StatorModel:
+    """One mass, or a wall without degrees of freedom."""
+    names = [] if stator.rigid else ["axial"]
+    values = [] if stator.rigid else [(stator.mass, stator.damping, stator.stiffness)]
+    if stator.lateral_stiffness is not None:
+        names.append("lateral")
+        mass = stator.mass if stator.lateral_mass is None else stator.lateral_mass
+        values.append((mass, stator.lateral_damping, stator.lateral_stiffness))
+    table = np.array(values, dtype=np.float64).reshape(-1, 3)
+    M, C, K = (np.diag(column) for column in table.T)
+    return _without_length(stator, radius, M, C, K, tuple((1, name) for name in names))
+
+
+def _without_length(
+    seat: Seat,
+    radius: float,
+    mass: NDArray[np.float64],
+    damping: NDArray[np.float64],
+    stiffness: NDArray[np.float64],
+    degrees: tuple[tuple[int, str], ...],
+) -> StatorModel:
+    """Return a stator without a length and an Euler load: both are infinite."""
+    body = Body(
+        mass=mass,
+        damping=damping,
+        gyroscopic=np.zeros_like(mass),
+        stiffness=stiffness,
+        degrees=degrees,
+    )
+    return StatorModel(
+        body=body,
+        node=seat.node,
+        angle=seat.angle,
+        radius=radius,
+        clearance_offset=seat.clearance_offset,
+        length=math.inf,
+        euler_load=math.inf,
+        axial=body.index(1, "axial"),
+        lateral=body.index(1, "lateral"),
     )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fem.constraints import find_free
+from rubhpc.fem.constraints import find_rigid_body_mode
 from rubhpc.fem.model import state_size
 from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State
@@ -127,7 +127,7 @@ def _static_shapes(force: Floats, setup: Setup) -> Floats:
         return shapes
     packed = setup.packed
     resisting = 0.5 * (packed.stiffness + packed.stiffness.T)
-    if find_free(setup.model):
+    if find_rigid_body_mode(setup.model):
         resisting = resisting + setup.spin**2 * packed.mass
     is_seen = packed.row >= 0
     ordered = np.zeros((len(resisting), force.shape[1]))

@@ -1,1 +1,1 @@
-"""What a rig consists of, and how it is read."""
+"""The rig: what a rotor and its stators consist of, and how they are read."""

@@ -1,7 +1,7 @@
-"""The parts of a rig, as frozen dataclasses in SI units: what each is told, and what it will not be.
+"""The parts of a rotor: shaft sections, discs, bearings, the torsional drive, damping.
 
-The unit and the bounds of every field stand with it; `rubhpc.input.reading` reads them from there. A part
-that can say one thing in two ways has a method `displaced`: what becomes of other fields when some are set.
+A part that can give one thing in two ways has a method `displaced`, which returns the changes of other fields
+when some are set.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Damping:
     def __post_init__(self) -> None:
         check_fields(self)
         if self.ratios and (self.alpha or self.beta):
-            raise FieldError("ratios", "stands beside alpha or beta; give either ratios or alpha and beta")
+            raise FieldError("ratios", "conflicts with alpha and beta; give either ratios or alpha and beta")
         frequencies = [f for f, _ in self.ratios]
         for frequency, ratio in self.ratios:
             if not 0 < frequency < math.inf:
@@ -41,7 +41,7 @@ class Damping:
                 problem = f"{ratio:g} at {frequency:g} Hz is out of range; it must be from 0 to below 1"
                 raise FieldError("ratios", problem)
             if frequencies.count(frequency) > 1:
-                raise FieldError("ratios", f"{frequency:g} Hz stands twice; leave one out")
+                raise FieldError("ratios", f"{frequency:g} Hz is duplicated; remove one")
 
 
 UNDAMPED = Damping()
@@ -79,7 +79,7 @@ class ShaftSection:
 class Disc:
     """A rigid disc: either diameter, thickness and density, or mass and inertias.
 
-    Beside a mass, a diameter counts as that of the rim which a stator may touch.
+    With a mass, the diameter is that of the rim that a stator may touch.
     """
 
     node: int = count(doc="Node of the shaft, from 1.", example="8")
@@ -116,7 +116,7 @@ class Disc:
             for key in body:
                 if getattr(self, key) is not None:
                     raise FieldError(
-                        key, f"stands beside {', '.join(lumped)}; give either these or the dimensions"
+                        key, f"conflicts with {', '.join(lumped)}; give either these or the dimensions"
                     )
             wanted = lumped
         else:
@@ -124,7 +124,7 @@ class Disc:
         for key in wanted:
             if getattr(self, key) is None:
                 ways = "diameter, thickness and density, or mass, diametral_inertia and polar_inertia"
-                raise FieldError(key, f"missing; a disc has either {ways}")
+                raise FieldError(key, f"missing; give either {ways}")
 
     @property
     def inertia(self) -> tuple[float, float, float]:
@@ -139,7 +139,7 @@ class Disc:
         return mass, mass * (3 * radius**2 + self.thickness**2) / 12, mass * radius**2 / 2
 
     def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return what setting `keys` does to the other way of giving the same."""
+        """Return the changes of other fields when `keys` are set."""
         if self.mass is None and keys & {"mass", "diametral_inertia", "polar_inertia"}:
             lumped = dict(zip(("mass", "diametral_inertia", "polar_inertia"), self.inertia, strict=True))
             return {"thickness": None, "density": None} | lumped
@@ -196,10 +196,10 @@ class Bearing:
             for key in (f"{letter}yy", f"{letter}zz", f"{letter}yz", f"{letter}zy"):
                 if getattr(self, one) is not None and getattr(self, key) not in (None, 0.0):
                     ways = f"{one} or {letter}yy, {letter}zz, {letter}yz, {letter}zy"
-                    raise FieldError(key, f"stands beside {one}; give either {ways}")
+                    raise FieldError(key, f"conflicts with {one}; give either {ways}")
         if self.stiffness is None and (self.kyy is None or self.kzz is None):
             key = "kyy" if self.kyy is None else "kzz"
-            raise FieldError(key, "missing; a bearing has either stiffness, or kyy and kzz")
+            raise FieldError(key, "missing; give either stiffness, or kyy and kzz")
 
     @property
     def stiffness_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -214,7 +214,7 @@ class Bearing:
         return (cyy, self.cyz), (self.czy, czz)
 
     def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return what setting `keys` does to the other way of giving the same."""
+        """Return the changes of other fields when `keys` are set."""
         changes: dict[str, Any] = {}
         for one, letter in (("stiffness", "k"), ("damping", "c")):
             common = getattr(self, one)
@@ -227,39 +227,8 @@ class Bearing:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Unbalance:
-    """A mass at a radius; `phase` is its angle from +y towards +z at time zero."""
-
-    node: int = count(doc="Node of the rotor, from 1.", example="8")
-    mass: float = quantity("kg", doc="Unbalance mass.", example='"8 g"', at_least=0)
-    radius: float = quantity("m", doc="Distance of the mass from the axis.", example='"4.5 cm"', at_least=0)
-    phase: float = quantity(
-        "rad", doc="Angle from +y towards +z at time zero.", example='"90 deg"', default=0.0
-    )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Load:
-    """A constant force, such as the pull of a belt: up and, at a right angle, along +z."""
-
-    node: int = count(doc="Node of the rotor, from 1.", example="12")
-    vertical: float = quantity(
-        "N", doc="Vertical component, positive upwards (+y).", example='"-120 N"', default=0.0
-    )
-    horizontal: float = quantity(
-        "N", doc="Horizontal component, positive along +z.", example='"30 N"', default=0.0
-    )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-
-@dataclass(frozen=True, kw_only=True)
 class Torsion:
-    """Torsional boundary: one node held by the drive, or a spring (and damper) to ground, or neither."""
+    """Torsional boundary condition: a node fixed by the drive, a spring (and damper) to ground, or none."""
 
     fixed_node: int | None = count(doc="Node whose torsion the drive constrains.", example="1", default=None)
     node: int = count(doc="Node of the spring to ground.", example="1", default=1)
@@ -280,16 +249,16 @@ class Torsion:
         ways = "give one of fixed_node, stiffness, free = true"
         given = [key for key in ("fixed_node", "stiffness", "free") if getattr(self, key)]
         if len(given) > 1:
-            raise FieldError(given[1], f"stands beside {given[0]}; {ways}")
+            raise FieldError(given[1], f"conflicts with {given[0]}; {ways}")
         if not given:
             raise FieldError("fixed_node", f"missing; {ways}")
         if self.damping and self.fixed_node is not None:
             raise FieldError(
-                "damping", "stands beside fixed_node, which cannot turn; give a stiffness instead"
+                "damping", "conflicts with fixed_node, which cannot turn; give a stiffness instead"
             )
 
     def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return what setting `keys` does to the other way of giving the same."""
+        """Return the changes of other fields when `keys` are set."""
         if keys & {"stiffness"}:
             return {"fixed_node": None, "free": False, "node": self.fixed_node or self.node}
         if keys & {"fixed_node", "free"}:
@@ -297,4 +266,4 @@ class Torsion:
         return {}
 
 
-HELD_BY_DRIVE = Torsion(fixed_node=1)
+FIXED_AT_NODE_1 = Torsion(fixed_node=1)

@@ -1,4 +1,4 @@
-"""Rigs that a Python function makes, "my_rig.py:build": code of the user, run only where it is trusted."""
+"""Rigs built by a Python function, "my_rig.py:build": user code, run only if trusted."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ _FORM = re.compile(r"(?P<path>.+\.py):(?P<function>[A-Za-z_]\w*)")
 
 
 def python_function(name: str) -> tuple[str, str] | None:
-    """Return path and function of "my_rig.py:build"; None where it is no such thing."""
+    """Return path and function of "my_rig.py:build"; None for another form."""
     found = _FORM.fullmatch(name)
     return (found["path"], found["function"]) if found else None
 
 
 def call_rig_function(path: Path, function: str, where: str) -> Any:
-    """Return what a function of a Python file returns, called without arguments.
+    """Call a function of a Python file without arguments and return its result.
 
-    Its folder is searched for modules first while it runs, as that of a script is.
+    Its folder is first on the module search path meanwhile, as for a script.
 
     Raises
     ------
     InputError
-        When there is no such file or function, or it raises; with the line where it did.
+        When there is no such file or function, or it raises; the message names the line.
     """
     named = place(f"{where}: {path}" if where else str(path))
     if not path.is_file():
@@ -46,7 +46,7 @@ def call_rig_function(path: Path, function: str, where: str) -> Any:
         spec.loader.exec_module(module)
         build = getattr(module, function, None)
         if not callable(build):
-            raise InputError(f"{named}: no function {function} in it; name the one that returns the rig")
+            raise InputError(f"{named}: has no function {function}; name the function that returns the rig")
         return build()
     except RubError as error:
         raise InputError(str(error) if str(error).startswith(named) else f"{named}: {error}") from error
@@ -55,7 +55,7 @@ def call_rig_function(path: Path, function: str, where: str) -> Any:
         lines = [frame.lineno for frame in frames if frame.filename == module.__file__]
         line = getattr(error, "lineno", None) or (lines[-1] if lines else None)
         at = f"line {line}: " if line else ""
-        told = " ".join(str(error).split())[:200]
-        raise InputError(f"{named}: {at}{type(error).__name__}: {told}; mend it") from error
+        message = " ".join(str(error).split())[:200]
+        raise InputError(f"{named}: {at}{type(error).__name__}: {message}; fix the rig file") from error
     finally:
         sys.path.remove(folder)

@@ -1,4 +1,4 @@
-"""Stators: a cantilever beam, a mass on springs or a rigid wall, or any linear body by its matrices."""
+"""Stators: a cantilever beam, a mass on springs or a rigid wall, or user-supplied matrices."""
 
 from __future__ import annotations
 
@@ -10,18 +10,15 @@ import numpy as np  # noqa: TC002 - annotations are read when a rig is built
 from numpy.typing import NDArray  # noqa: TC002
 
 from rubhpc.input.fields import FieldError, check_fields, count, flag, matrix, quantity, table, words
-from rubhpc.rig.degrees import check_body, checked_matrices
+from rubhpc.rig.matrix_body import check_body, checked_matrices
 from rubhpc.rig.parts import UNDAMPED, Damping
 
-MOST_STATORS = 62  # sets of contacts are counted in the bits of a whole number
+MOST_STATORS = 62  # a contact mode is numbered by the bits of an integer
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Seat:
-    """Where a stator stands: at a node of the rotor, `angle` from straight up (+y) towards +z.
-
-    `count` of them make a ring, at `angle`, `angle` + 360 deg / count and so on; a rig holds them one by one.
-    """
+    """Position of a stator, or of a ring of `count` stators, the first one at `angle`."""
 
     node: int = count(doc="Node of the rotor that the stator faces, from 1.", example="8")
     angle: float = quantity(
@@ -51,7 +48,7 @@ class Seat:
 
 @dataclass(frozen=True, kw_only=True)
 class Stator(Seat):
-    """A cantilever that stands radially over the rotor; its free end faces the rim."""
+    """A radial cantilever whose free end faces the rotor."""
 
     length: float = quantity(
         "m", doc="Length of the cantilever, in the radial direction.", example='"40 mm"', above=0
@@ -80,10 +77,7 @@ class Stator(Seat):
 
 @dataclass(frozen=True, kw_only=True)
 class LumpedStator(Seat):
-    """A mass on a spring and a damper, radial and, where it has a lateral stiffness, tangential; or a wall.
-
-    The lateral mass is the same unless told. A wall (`rigid = true`) has no mass and does not move.
-    """
+    """A mass on a radial and, with a lateral stiffness, a tangential spring and damper; or a rigid wall."""
 
     mass: float | None = quantity(
         "kg", doc="Mass in the radial direction.", example='"0.5 g"', default=None, above=0
@@ -118,30 +112,25 @@ class LumpedStator(Seat):
         springs = ("mass", "stiffness", "lateral_mass", "lateral_stiffness")
         for key in springs:
             if self.rigid and getattr(self, key) is not None:
-                raise FieldError(key, "stands beside rigid = true, which does not move; leave one out")
+                raise FieldError(key, "conflicts with rigid = true, which does not move; remove one")
         for key in springs[:2]:
             if not self.rigid and getattr(self, key) is None:
-                raise FieldError(key, "missing; a stator has mass and stiffness, or rigid = true")
+                raise FieldError(key, "missing; give mass and stiffness, or rigid = true")
         if self.lateral_stiffness is None:
             for key in ("lateral_mass", "lateral_damping"):
                 if getattr(self, key):
-                    raise FieldError(key, "without a lateral_stiffness the stator cannot move so; add it")
+                    raise FieldError(key, "has no effect without lateral_stiffness; add lateral_stiffness")
         if self.rigid and self.damping:
-            raise FieldError("damping", "stands beside rigid = true, which does not move; leave one out")
+            raise FieldError("damping", "conflicts with rigid = true, which does not move; remove one")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MatrixStator(Seat):
-    """Any linear body, `M u'' + C u' + K u = f`, that meets the rotor with one of its points.
+    """A stator given by the matrices of `M u'' + C u' + K u = f`, (n_dof, n_dof), SI units.
 
-    Attributes
-    ----------
-    mass, damping, stiffness : (n_dof, n_dof)
-        SI units; M symmetric and positive definite, K without a negative stiffness. No damping: zeros.
-    degrees : tuple of str
-        A name for each row: "axial" is the displacement of the point of contact away from the rotor (m,
-        positive when the stator is pressed), "lateral", if there is one, along the rim under positive spin.
-        The others are free: rotations, inner points, modal coordinates.
+    M is symmetric and positive definite, and K has no negative stiffness. The degree "axial" is the
+    displacement of the contact point away from the rotor (m, positive under contact), "lateral", if present,
+    that along the rim under positive spin. Other degrees have any names.
     """
 
     mass: NDArray[np.float64] = matrix(
@@ -164,19 +153,19 @@ class MatrixStator(Seat):
         checked_matrices(self, ("mass", "damping", "stiffness"), [str(name) for name in self.degrees])
         check_body(self, self.degrees)
         if "axial" not in self.degrees:
-            raise FieldError("degrees", 'none is "axial", which the rotor presses; name that row so')
+            raise FieldError("degrees", 'none is "axial", on which contact acts; name that row axial')
 
 
 AnyStator: TypeAlias = Stator | LumpedStator | MatrixStator
 
 
-def one_by_one(stators: tuple[AnyStator, ...]) -> tuple[AnyStator, ...]:
-    """Return stators with every ring taken apart, its first one where the ring stands.
+def single_stators(stators: tuple[AnyStator, ...]) -> tuple[AnyStator, ...]:
+    """Return stators with every ring replaced by its single stators.
 
     Raises
     ------
     FieldError
-        When there are more than can be told apart, or one of a ring stands where another does.
+        When there are more than `MOST_STATORS`, or two stators of a ring coincide with others.
     """
     if not any(stator.count for stator in stators):
         n_stator = len(stators)
@@ -193,9 +182,9 @@ def one_by_one(stators: tuple[AnyStator, ...]) -> tuple[AnyStator, ...]:
             place = (stator.node, round(stator.angle / (2 * math.pi) * 1e9) % 10**9)
             if place in taken:
                 angle = math.degrees(stator.angle) % 360
-                problem = f"stands where stator.{taken[place]} does, at {angle:g} deg"
-                raise FieldError(f"stator.{i}.angle", f"{problem}; turn the ring, or leave one out")
+                problem = f"coincides with stator.{taken[place]}, at {angle:g} deg"
+                raise FieldError(f"stator.{i}.angle", f"{problem}; turn the ring, or remove one")
             taken[place] = i
     if n_stator > MOST_STATORS:
-        raise FieldError("stator", f"{n_stator} of them; there may be {MOST_STATORS}, take fewer")
+        raise FieldError("stator", f"{n_stator} stators are too many; use at most {MOST_STATORS}")
     return single

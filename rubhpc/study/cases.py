@@ -18,7 +18,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.model import state_size
 from rubhpc.input.fields import place
-from rubhpc.rig.rig import with_keys
+from rubhpc.rig.reading import with_keys
 from rubhpc.study.axes import FROM_REST
 from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.operating_points import OperatingPoints

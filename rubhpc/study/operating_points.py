@@ -11,9 +11,9 @@ import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
-from rubhpc.fem.constraints import find_free
+from rubhpc.fem.constraints import find_rigid_body_mode
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
-from rubhpc.rig.rig import with_keys
+from rubhpc.rig.reading import with_keys
 from rubhpc.study.axes import CLEARANCE_AXES, SPEED_AXES
 from rubhpc.study.points import Points
 
@@ -234,7 +234,7 @@ class OperatingPoints:
     def _check_held(self) -> None:
         """Refuse the modal scheme for a body that nothing holds: it has no constant response."""
         for index in self._indices(self._dims(*self._response_axes) if self._is_few else ()):
-            if free := find_free(self._model_at(self._on(self._response_axes, index))):
+            if free := find_rigid_body_mode(self._model_at(self._on(self._response_axes, index))):
                 where = self._told(self._response_axes, index)
                 problem = f"modal needs bodies that are held, and {free}{f' at {where}' if where else ''}"
                 # Friction turns a free rotor back for ever: it has no steady twist.

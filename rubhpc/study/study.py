@@ -12,7 +12,7 @@ from rubhpc.errors import InputError
 from rubhpc.input.fields import place
 from rubhpc.input.quantity import brief
 from rubhpc.input.reading import build, read_toml, refuse_unknown
-from rubhpc.rig.rig import Rig, read_rig, with_keys
+from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import (
     BOTH,
@@ -33,6 +33,8 @@ from rubhpc.study.tables import Contact, Integrator, Recording, Run, Sample
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from os import PathLike
+
+    from rubhpc.rig.rig import Rig
 
 __all__ = [
     "Axis",

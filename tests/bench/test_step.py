@@ -4,7 +4,7 @@ import pytest
 
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.setup import prepare
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import Contact, Integrator, Recording
 
 pytestmark = pytest.mark.bench

@@ -15,7 +15,7 @@ from rubhpc.integrate import case as case_module
 from rubhpc.integrate import event_driven_march, neighbour_motions
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.setup import prepare
-from rubhpc.rig.rig import read_rig, with_keys
+from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.study.study import Contact, Integrator, Recording
 
 pytestmark = pytest.mark.bench

@@ -16,7 +16,7 @@ from postproc.figures.sensitivity_figure import bars
 from postproc.store.axes import drawn_axes
 from rubhpc.commands.sensitivity import sensitivity as command
 from rubhpc.errors import InputError
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.study.axes import make_range
 from rubhpc.study.sampling import draw

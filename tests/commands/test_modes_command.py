@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from rubhpc.commands.modes import modes
 from rubhpc.errors import InputError
-from rubhpc.rig.rig import PACKAGED
+from rubhpc.rig.reading import PACKAGED
 
 
 def run(*arguments):

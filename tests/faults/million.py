@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.running import driver, job, plan, worker
 from rubhpc.schema import DONE
 from rubhpc.storage.journal import MEASURES

@@ -20,7 +20,7 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-import rubhpc.rig.rig
+import rubhpc
 from rubhpc.cli import main
 from rubhpc.running import job
 

@@ -15,7 +15,8 @@ from rubhpc.fem.beam import (
     shear_coefficient_rectangle,
     stator_element,
 )
-from rubhpc.rig.rig import ShaftSection, Stator
+from rubhpc.rig.parts import ShaftSection
+from rubhpc.rig.stators import Stator
 
 LENGTH = 0.13
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}

@@ -13,7 +13,9 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.campbell import campbell, critical_speeds
 from rubhpc.fem.modes import modes
 from rubhpc.fem.rotor import assemble_rotor
-from rubhpc.rig.rig import Bearing, Disc, Rotor, ShaftSection, Torsion, read_rig
+from rubhpc.rig.parts import Bearing, Disc, ShaftSection, Torsion
+from rubhpc.rig.reading import read_rig
+from rubhpc.rig.rotors import Rotor
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rubhpc.fem.damping import rayleigh_coefficients
-from rubhpc.rig.rig import Damping
+from rubhpc.rig.parts import Damping
 
 
 def ratio(coefficients, frequency):

@@ -10,7 +10,9 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.modes import modes
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.fem.whirl import whirl_index
-from rubhpc.rig.rig import Bearing, Damping, Disc, Rotor, ShaftSection, Torsion, read_rig
+from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
+from rubhpc.rig.reading import read_rig
+from rubhpc.rig.rotors import Rotor
 
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 # all but rigid and massless, so that a disc on it obeys textbook formulas

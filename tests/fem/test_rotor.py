@@ -6,8 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rubhpc.fem.rotor import assemble_rotor, unbalance_vectors
-from rubhpc.rig.rig import Bearing, Damping, Disc, Rotor, ShaftSection, Torsion, Unbalance
+from rubhpc.fem.forces import forces_on
+from rubhpc.fem.rotor import assemble_rotor
+from rubhpc.rig.forces import Unbalance
+from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
+from rubhpc.rig.rotors import Rotor
 
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 SHAFT = (
@@ -104,7 +107,7 @@ def test_unbalance_turns_from_y_to_z_ahead_by_its_phase():
     phase, moment = 0.8, 2e-3 * 0.05
     rotor = replace(ROTOR, unbalance=(Unbalance(node=4, mass=2e-3, radius=0.05, phase=phase),))
     body = assemble_rotor(rotor)
-    cosine, sine = unbalance_vectors(rotor.unbalance, body)
+    cosine, sine = forces_on(rotor, body)[1:]
     rows = [body.index(4, "v"), body.index(4, "w")]
     for angle in np.linspace(0, 2 * math.pi, 7):
         pull = cosine * math.cos(angle) + sine * math.sin(angle)
@@ -115,5 +118,5 @@ def test_unbalance_turns_from_y_to_z_ahead_by_its_phase():
 def test_unbalances_on_one_node_add_up():
     pair = tuple(Unbalance(node=4, mass=2e-3, radius=0.05, phase=phase) for phase in (0.3, 0.3 + math.pi))
     rotor = replace(ROTOR, unbalance=pair)
-    vectors = unbalance_vectors(rotor.unbalance, assemble_rotor(rotor))
+    vectors = forces_on(rotor, assemble_rotor(rotor))[1:]
     assert np.abs(vectors).max() < 1e-18

@@ -8,7 +8,9 @@ import pytest
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.beam import shear_coefficient_rectangle
 from rubhpc.fem.stator import assemble_stator
-from rubhpc.rig.rig import Damping, Disc, Stator, read_rig
+from rubhpc.rig.parts import Damping, Disc
+from rubhpc.rig.reading import read_rig
+from rubhpc.rig.stators import Stator
 
 STATOR = Stator(
     node=8,

@@ -16,7 +16,7 @@ from postproc.signals.cascade import below, cascade, hold_peaks, hold_rows
 from postproc.store.rig_of_case import natural_frequencies, stator_places
 from postproc.store.select import select
 from rubhpc.errors import InputError
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.study.axes import make_axis
 from rubhpc.study.study import Study
 

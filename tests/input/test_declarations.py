@@ -9,12 +9,13 @@ import pytest
 
 from rubhpc.input.fields import check_value, parse_field
 from rubhpc.input.reading import build
-from rubhpc.rig import matrices, parts, rig, stators
+from rubhpc.rig import forces, parts, rig, rotors, stators
+from rubhpc.rig.reading import read_rig
 from rubhpc.study import axes, tables
 
 TABLES = {
     cls
-    for module in (rig, matrices, parts, stators, tables)
+    for module in (rig, rotors, forces, parts, stators, tables)
     for cls in vars(module).values()
     if isinstance(cls, type) and dataclasses.is_dataclass(cls) and cls.__module__.startswith("rubhpc.")
 }
@@ -43,5 +44,5 @@ def test_a_key_has_a_meaning_and_an_example(cls, field):
 def test_an_axis_has_a_meaning_and_an_example(field):
     assert field.metadata["doc"].endswith(".")
     example = tomllib.loads(f"axis = {field.metadata['example']}")["axis"]
-    axis = axes.make_axis(field.name, example, rig.read_rig("mokhtar2017"))
+    axis = axes.make_axis(field.name, example, read_rig("mokhtar2017"))
     assert len(axis.values) > 1

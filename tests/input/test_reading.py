@@ -13,7 +13,7 @@ import pytest
 from rubhpc.errors import InputError
 from rubhpc.input.quantity import _EVERYDAY, _factor
 from rubhpc.input.reading import build, parse_quantity, read_toml
-from rubhpc.rig.rig import Damping
+from rubhpc.rig.parts import Damping
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_what_is_no_length_is_refused_in_one_line_and_at_once(value):
 def test_pint_stays_away_until_it_is_needed():
     code = """
 import sys
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.input.reading import parse_quantity
 read_rig("mokhtar2017")
 assert "pint" not in sys.modules

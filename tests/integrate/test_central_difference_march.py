@@ -14,7 +14,8 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import step_limit
 from rubhpc.kernels.central_difference import CONTACT_UNSOLVED, DIVERGED, FINISHED
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W
-from rubhpc.rig.rig import Bearing, with_keys
+from rubhpc.rig.parts import Bearing
+from rubhpc.rig.reading import with_keys
 
 PACKAGED = read_rig("mokhtar2017")
 ANGLES = (0.3, 0.5, 2.4)

@@ -9,7 +9,7 @@ from trial_rig import trial_rig
 from rubhpc import simulate
 from rubhpc.integrate import case
 from rubhpc.integrate.contact_stepping_march import SteppedMarch
-from rubhpc.rig.rig import with_keys
+from rubhpc.rig.reading import with_keys
 
 RUB = {"speed": 170.0, "clearance": "80 um", "friction": 0.2, "transient": 0, "revolutions": 2}
 CLOSE = RUB | {"clearance": "40 um"}

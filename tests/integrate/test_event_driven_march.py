@@ -19,7 +19,10 @@ from rubhpc.integrate.march import NO_FORCES
 from rubhpc.integrate.mode_library import PhaseBook
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.contact_modes import CONTACT_UNSOLVED
-from rubhpc.rig.rig import LumpedStator, Rig, Torsion, with_keys
+from rubhpc.rig.parts import Torsion
+from rubhpc.rig.reading import with_keys
+from rubhpc.rig.rig import Rig
+from rubhpc.rig.stators import LumpedStator
 from rubhpc.schema import DIVERGED, DONE
 from rubhpc.study.study import Contact, Integrator, Recording
 

@@ -12,7 +12,8 @@ from rubhpc import read_rig
 from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.packing import pack, pairs_of
 from rubhpc.kernels.contact_pairs import N_DEGREE
-from rubhpc.rig.rig import Bearing, Unbalance
+from rubhpc.rig.forces import Unbalance
+from rubhpc.rig.parts import Bearing
 
 SPIN, STEP = 350.0, 6e-7
 PACKAGED = read_rig("mokhtar2017")

@@ -15,7 +15,7 @@ from rubhpc.fem.response import steady_response
 from rubhpc.integrate.packing import degrees_of, output_degrees
 from rubhpc.integrate.reduction import directions, reduce_model
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W
-from rubhpc.rig.rig import Damping, Torsion
+from rubhpc.rig.parts import Damping, Torsion
 
 SPIN = 210.0
 FULL = 1e-30  # accuracy at which no mode that anything sees is left out

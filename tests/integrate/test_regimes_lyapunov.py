@@ -15,7 +15,7 @@ from rubhpc.integrate.event_driven_march import ModalMarch
 from rubhpc.integrate.lyapunov import N_ALIGNING, Marches, growth
 from rubhpc.integrate.neighbour_motions import ModalNeighbours
 from rubhpc.integrate.setup import prepare
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.schema import REGIME
 from rubhpc.study.study import Contact, Integrator, Recording
 

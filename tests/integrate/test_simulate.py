@@ -14,7 +14,7 @@ from rubhpc.integrate.case import run_case
 from rubhpc.integrate.orbit_measures import amplitude_spectrum
 from rubhpc.integrate.record import Record
 from rubhpc.integrate.setup import prepare
-from rubhpc.rig.rig import PACKAGED, with_keys
+from rubhpc.rig.reading import PACKAGED, with_keys
 from rubhpc.schema import DIVERGED, DONE, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
 from rubhpc.study.study import Contact, Integrator, Recording
 

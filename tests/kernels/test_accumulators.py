@@ -21,7 +21,7 @@ from rubhpc.kernels.accumulators import (
 )
 from rubhpc.kernels.central_difference import FINISHED
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION
-from rubhpc.rig.rig import Bearing
+from rubhpc.rig.parts import Bearing
 
 PACKAGED = read_rig("mokhtar2017")
 RIG = replace(

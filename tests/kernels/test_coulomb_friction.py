@@ -16,7 +16,7 @@ from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_pairs import MULTIPLIER, N_DEGREE, Pairs
 from rubhpc.kernels.contact_step import fill_residual, solve_contact
 from rubhpc.kernels.lemke import solve_lemke
-from rubhpc.rig.rig import with_keys
+from rubhpc.rig.reading import with_keys
 
 COULOMB = MULTIPLIER._replace(is_set_valued=True)
 STEP, SPIN, RADIUS = 1e-6, 150.0, 0.06  # s, rad/s, m

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.schema import DONE, VARIABLES
 
 SAMPLES = 1024  # a revolution

@@ -15,7 +15,7 @@ from running import ROOT, run
 import rubhpc
 from postproc.mokhtar2017.claims.index import CLAIMS, FAILS, REPORTED, evaluate, open_studies
 from postproc.mokhtar2017.figures.index import FIGURES
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import read_study
 
 STUDIES = {path.stem: path for path in (ROOT / "jobs" / "paper").glob("*.toml")}

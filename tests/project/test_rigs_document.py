@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rubhpc import read_rig
-from rubhpc.rig.rig import rig_from_dict
+from rubhpc.rig.reading import rig_from_dict
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "guide" / "rigs.md").read_text()
 SHOWN = {block for block in re.findall(r"```python\n(.*?)```", DOCUMENT, re.DOTALL) if "zarr" not in block}

@@ -24,7 +24,8 @@ from postproc.report.page import Page, least_size
 from postproc.store.open import open_store
 from rubhpc.commands.report import report
 from rubhpc.errors import InputError
-from rubhpc.rig.rig import Rig, read_rig
+from rubhpc.rig.reading import read_rig
+from rubhpc.rig.rig import Rig
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -231,7 +232,7 @@ RINGS = {
 def test_every_kind_of_stator_is_drawn(kind: str) -> None:
     from postproc.report.end_view import end_view
     from postproc.report.side_view import side_view
-    from rubhpc.rig.rig import LumpedStator
+    from rubhpc.rig.stators import LumpedStator
 
     rig = read_rig("mokhtar2017")
     told = RINGS[kind]
@@ -248,7 +249,7 @@ def test_every_kind_of_stator_is_drawn(kind: str) -> None:
 def test_a_rotor_of_matrices_is_told_in_words() -> None:
     from postproc.report.end_view import end_view
     from postproc.report.side_view import description, side_view
-    from rubhpc.rig.rig import LumpedStator
+    from rubhpc.rig.stators import LumpedStator
 
     stop = LumpedStator(node=1, mass=1e-4, stiffness=1e6, radius=1.0)
     rig = Rig.from_matrices([[100.0]], None, [[1e4]], degrees=[(1, "v")], stators=[stop])

@@ -19,10 +19,11 @@ from rubhpc import (
     read_rig,
     simulate,
 )
-from rubhpc.fem.constraints import find_free
+from rubhpc.fem.constraints import find_rigid_body_mode
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import first_lateral_frequency, steady_response
-from rubhpc.rig.rig import Torsion, rig_from_dict, with_key, with_keys
+from rubhpc.rig.parts import Torsion
+from rubhpc.rig.reading import rig_from_dict, with_key, with_keys
 from rubhpc.study.cases import CaseGrid, identity_parts
 from rubhpc.study.study import Study, make_axis
 
@@ -42,21 +43,21 @@ def rotor(M=ONE, C=None, K=ONE, G=None, degrees=PLANE, **given):
         ({"M": [[1.0, 0.0], [0.0]]}, "mass: .* is no matrix of real numbers"),
         ({"M": "heavy"}, "mass: .* is no matrix"),
         ({"M": [[1.0, 0.0], [0.0, math.nan]]}, "mass: the entry in row 2, column 2 is not finite"),
-        ({"M": np.eye(3)}, r"mass: of shape \(3, 3\) for 2 degrees"),
+        ({"M": np.eye(3)}, r"mass: of shape \(3, 3\), but there are 2 degrees"),
         ({"M": ONE * 1j}, "mass: .* is no matrix of real numbers"),
         ({"M": [[1.0, 0.2], [0.0, 1.0]]}, r"mass: is not symmetric \(1\.v with 1\.w: 0\.2 and 0\)"),
-        ({"M": [[1.0, 0.0], [0.0, 0.0]]}, r"mass: degree 1\.w has none"),
+        ({"M": [[1.0, 0.0], [0.0, 0.0]]}, r"mass: degree 1\.w has no mass"),
         ({"M": [[1.0, 2.0], [2.0, 1.0]]}, "mass: is not positive definite"),
         ({"K": None}, "K: missing"),
-        ({"K": -ONE}, r"stiffness: degree 1\.v has a negative one"),
+        ({"K": -ONE}, r"stiffness: degree 1\.v has a negative stiffness"),
         ({"K": [[1.0, 2.0], [2.0, 1.0]]}, "stiffness: is not positive semidefinite"),
         ({"G": ONE}, "gyroscopic: is not skew"),
-        ({"C": np.eye(3)}, r"damping: of shape \(3, 3\) for 2 degrees"),
-        ({"degrees": [(1, "v"), (1, "v")]}, r"degrees: 1\.v stands twice"),
-        ({"degrees": [(1, "v"), (1, "x")]}, 'degrees: unknown degree "x"; .* or a name that begins with q'),
+        ({"C": np.eye(3)}, r"damping: of shape \(3, 3\), but there are 2 degrees"),
+        ({"degrees": [(1, "v"), (1, "v")]}, r"degrees: 1\.v is duplicated"),
+        ({"degrees": [(1, "v"), (1, "x")]}, 'degrees: unknown degree "x"; .* or use a name'),
         ({"degrees": ["v", "w"]}, "degrees: .* is no list of degrees; write a node and a name"),
         ({"degrees": [(0, "v"), (1, "w")]}, r"degrees: \(0, 'v'\) is no degree"),
-        ({"output_node": 2}, 'output_node: 2 has neither "v" nor "w" among degrees; nodes 1 have'),
+        ({"output_node": 2}, 'output_node: 2 has neither "v" nor "w" in degrees; choose one of 1'),
         ({"unbalance": [Unbalance(node=5, mass=1.0, radius=1.0)]}, r"unbalance\.1\.node: 5 has neither"),
         ({"stators": [replace(WALL, node=3)]}, r"stator\.1\.node: 3 has neither"),
         ({"stators": [replace(WALL, radius=None)]}, r"stator\.1\.radius: missing"),
@@ -81,11 +82,11 @@ def test_what_is_no_body_is_refused_in_one_line(change, told):
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        ({"mass": 1.0}, "stiffness: missing; a stator has mass and stiffness, or rigid = true"),
-        ({"rigid": True, "mass": 1.0}, "mass: stands beside rigid = true"),
-        ({"rigid": True, "damping": 1.0}, "damping: stands beside rigid = true"),
+        ({"mass": 1.0}, "stiffness: missing; give mass and stiffness, or rigid = true"),
+        ({"rigid": True, "mass": 1.0}, "mass: conflicts with rigid = true"),
+        ({"rigid": True, "damping": 1.0}, "damping: conflicts with rigid = true"),
         ({"mass": 1.0, "stiffness": 0.0}, "stiffness: 0 N/m is out of range"),
-        ({"mass": 1.0, "stiffness": 1.0, "lateral_mass": 1.0}, "lateral_mass: without a lateral_stiffness"),
+        ({"mass": 1.0, "stiffness": 1.0, "lateral_mass": 1.0}, "lateral_mass: has no effect without"),
     ],
 )
 def test_lumped_stator_has_mass_and_spring_or_is_rigid(given, told):
@@ -94,9 +95,9 @@ def test_lumped_stator_has_mass_and_spring_or_is_rigid(given, told):
 
 
 def test_stator_of_matrices_names_what_the_rotor_presses():
-    with pytest.raises(InputError, match='none is "axial", which the rotor presses'):
+    with pytest.raises(InputError, match='none is "axial", on which contact acts'):
         MatrixStator(node=1, mass=ONE, stiffness=ONE, degrees=("lateral", "tilt"))
-    with pytest.raises(InputError, match=r"mass: of shape \(2, 2\) for 1 degrees"):
+    with pytest.raises(InputError, match=r"mass: of shape \(2, 2\), but there are 1 degrees"):
         MatrixStator(node=1, mass=ONE, stiffness=ONE)
 
 
@@ -161,7 +162,7 @@ def test_matrices_are_the_identity_of_a_study_not_what_made_them(tmp_path):
         ("def build(:\n", "rig.py:build", "line 1: SyntaxError"),
         ("import nothing_of_this_name\n", "rig.py:build", "line 1: ModuleNotFoundError"),
         ("def build():\n    return 3\n", "rig.py:build", "returned a int; return a rubhpc.Rig"),
-        ("build = 3\n", "rig.py:build", "no function build in it"),
+        ("build = 3\n", "rig.py:build", "has no function build"),
         ("", "other.py:build", "other.py: no such file"),
         (
             "import rubhpc\ndef build():\n    return rubhpc.Rig.from_matrices([[1]], degrees=[(1, 'v')])\n",
@@ -180,9 +181,7 @@ def test_what_is_wrong_with_a_rig_of_python_is_told_in_one_line(tmp_path, code, 
 
 def test_python_runs_for_a_rig_only_where_it_is_trusted(tmp_path):
     (tmp_path / "rig.py").write_text("raise SystemExit('it ran')\n")
-    with pytest.raises(
-        InputError, match="is Python code, which is run only when you trust it; add --trust-rig"
-    ):
+    with pytest.raises(InputError, match="is Python code, which runs only if you trust it; add --trust-rig"):
         read_rig("rig.py:build", tmp_path)
 
 
@@ -277,16 +276,17 @@ def test_whirl_needs_no_tilt():
 
 def test_free_motion_is_found_where_contact_or_outputs_see_it():
     packaged = read_rig("mokhtar2017")
-    assert find_free(assemble(packaged)) == ""
+    assert find_rigid_body_mode(assemble(packaged)) == ""
     free = with_key(packaged, "rotor.torsion.free", True)
-    assert find_free(assemble(free)) == "the rotor is free to turn (torsion)"
+    assert find_rigid_body_mode(assemble(free)) == "the rotor is free to turn (torsion)"
     loose = with_key(packaged, "rotor.bearing.stiffness", 0.0)
-    assert find_free(assemble(loose)) == "the rotor is free to move"
+    assert find_rigid_body_mode(assemble(loose)) == "the rotor is free to move"
     unseen = rotor(np.eye(3), None, np.diag([1.0, 1.0, 0.0]), degrees=[*PLANE, (1, "u")], stators=[WALL])
-    assert find_free(assemble(unseen)) == ""
+    assert find_rigid_body_mode(assemble(unseen)) == ""
     adrift = MatrixStator(node=1, radius=0.1, mass=[[1.0]], stiffness=[[0.0]])
     assert (
-        find_free(assemble(rotor(stators=[WALL, replace(adrift, angle=1.0)]))) == "stator 2 is free to move"
+        find_rigid_body_mode(assemble(rotor(stators=[WALL, replace(adrift, angle=1.0)])))
+        == "stator 2 is free to move"
     )
 
 
@@ -347,8 +347,8 @@ def test_coupling_of_ross_keeps_its_sense():
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"number_dof": 4}, "the rotor has 4 degrees a node, not 6"),
-        ({"K": None}, "is no ross.Rotor; give one"),
+        ({"number_dof": 4}, "the rotor has 4 degrees per node, not 6"),
+        ({"K": None}, "is not a ross.Rotor; pass one"),
     ],
 )
 def test_what_is_no_rotor_of_ross_is_refused(change, told):

@@ -9,17 +9,8 @@ import numpy as np
 import pytest
 
 from rubhpc.errors import InputError
-from rubhpc.rig.rig import (
-    Bearing,
-    Damping,
-    Disc,
-    Torsion,
-    packaged_rigs,
-    read_rig,
-    rig_from_dict,
-    with_key,
-    with_keys,
-)
+from rubhpc.rig.parts import Bearing, Damping, Disc, Torsion
+from rubhpc.rig.reading import packaged_rigs, read_rig, rig_from_dict, with_key, with_keys
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +127,7 @@ def test_ways_of_holding_torsion_replace_each_other(rig):
 def test_damping_that_is_told_in_ratios_is_not_told_twice(rig):
     table = rig.as_dict()
     table["rotor"]["damping"] = {"ratios": {"31.56": 0.08}}
-    with pytest.raises(InputError, match=r"rotor\.damping\.ratios: stands beside alpha or beta"):
+    with pytest.raises(InputError, match=r"rotor\.damping\.ratios: conflicts with alpha and beta"):
         with_key(rig_from_dict(table), "rotor.damping.alpha", 3.0)
 
 

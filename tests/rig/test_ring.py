@@ -12,7 +12,7 @@ from rubhpc import InputError, Rig, assemble, read_rig
 from rubhpc.integrate.packing import pack, pairs_of
 from rubhpc.integrate.workspace import workspace
 from rubhpc.kernels.complementarity import UNSOLVED, solve_complementarity
-from rubhpc.rig.rig import rig_from_dict, with_key
+from rubhpc.rig.reading import rig_from_dict, with_key
 from rubhpc.rig.stators import MOST_STATORS
 from rubhpc.study.study import make_axis
 
@@ -81,11 +81,11 @@ def test_senseless_counts_are_refused(count, told):
 
 
 def test_stators_of_a_ring_do_not_stand_in_each_other():
-    with pytest.raises(InputError, match=r"stator\.5\.angle: stands where stator\.1 does, at 0 deg"):
+    with pytest.raises(InputError, match=r"stator\.5\.angle: coincides with stator\.1, at 0 deg"):
         replace(PACKAGED, stator=(replace(ONE, count=4), replace(ONE, angle=2 * math.pi)))
     two = (replace(ONE, count=4, angle=0.2), replace(ONE, count=4))
     assert len(replace(PACKAGED, stator=two).stator) == 8
-    with pytest.raises(InputError, match="stator: 80 of them; there may be 62"):
+    with pytest.raises(InputError, match="stator: 80 stators are too many; use at most 62"):
         replace(PACKAGED, stator=(replace(ONE, count=40), replace(ONE, count=40, angle=0.01)))
     assert isinstance(ring(3), Rig)
 

@@ -14,7 +14,7 @@ from running import stored_bytes, write_study
 
 from rubhpc import State, assemble, simulate
 from rubhpc.errors import InputError, StoppedEarly, StoreError
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.running import driver, job, worker
 from rubhpc.running.driver import run
 from rubhpc.running.plan import make_plan

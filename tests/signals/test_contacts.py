@@ -22,7 +22,7 @@ from rubhpc import read_rig, simulate
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.modes import modes
-from rubhpc.rig.rig import with_keys
+from rubhpc.rig.reading import with_keys
 
 N = 512  # samples a revolution
 TURN = 0.04  # s

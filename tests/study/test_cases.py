@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
-from rubhpc.rig.rig import read_rig, with_key, with_keys
+from rubhpc.rig.reading import read_rig, with_key, with_keys
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import Contact, Integrator, Recording, Run, Study, make_axis
 

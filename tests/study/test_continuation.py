@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rubhpc.errors import InputError
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.study.axes import BOTH, DIRECTION, DOWN, FROM_REST, UP, Axis, make_axis
 from rubhpc.study.continuation import CaseIds, Continuation, continuation_of
 

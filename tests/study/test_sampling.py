@@ -13,7 +13,7 @@ from SALib.sample import sobol
 from rubhpc.errors import InputError, StoreError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
-from rubhpc.rig.rig import with_keys
+from rubhpc.rig.reading import with_keys
 from rubhpc.running.driver import run as run_here
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from malformed import CASES, RIG, STUDY, Malformed
 
 from rubhpc.errors import InputError
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import Contact, Integrator, Recording, Run, make_axis, read_study
 
 JOBS = Path(__file__).parents[2] / "jobs"

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import rubhpc.rig.rig
+import rubhpc
 
 STUDY = """\
 title = "Good"

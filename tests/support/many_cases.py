@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import zarr
 
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.schema import DIVERGED, DONE
 from rubhpc.storage.layout import build, encode
 from rubhpc.study.axes import Axis

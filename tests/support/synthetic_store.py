@@ -7,7 +7,7 @@ import math
 import numpy as np
 import xarray as xr
 
-from rubhpc.rig.rig import read_rig
+from rubhpc.rig.reading import read_rig
 from rubhpc.schema import DIVERGED, DONE, FAILED, VARIABLES
 
 SAMPLES, REVOLUTIONS = 32, 8

@@ -15,7 +15,9 @@ from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.contact_pairs import normal_and_gap
-from rubhpc.rig.rig import Bearing, Rotor, ShaftSection, with_keys
+from rubhpc.rig.parts import Bearing, ShaftSection
+from rubhpc.rig.reading import with_keys
+from rubhpc.rig.rotors import Rotor
 from rubhpc.study.study import Contact, Integrator, Recording
 
 G = 9.81  # m/s2
@@ -198,7 +200,7 @@ def test_matrices_take_gravity_and_loads_like_the_beam():
 
 def test_what_nothing_holds_is_refused():
     wall = LumpedStator(node=1, rigid=True, radius=1.0)
-    with pytest.raises(InputError, match="nothing holds it there; add a bearing"):
+    with pytest.raises(InputError, match="is unconstrained there; add a bearing"):
         assemble(Rig.from_matrices([[1.0]], K=[[0.0]], degrees=[(1, "v")], stators=wall, gravity=G))
     with pytest.raises(InputError, match=r"gravity: how it acts on the coordinates q\.\.\. is not known"):
         Rig.from_matrices(np.eye(2), K=np.eye(2), degrees=[(1, "v"), (1, "q1")], stators=wall, gravity=G)

@@ -9,7 +9,7 @@ import pytest
 import rubhpc
 from rubhpc import LumpedStator, MatrixStator, Rig, State, Unbalance, assemble, read_rig, simulate
 from rubhpc.fem.modes import modes
-from rubhpc.rig.rig import with_keys
+from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DONE
 
 SMALL = 1e-12  # m, a gap that is none

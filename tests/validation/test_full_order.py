@@ -13,7 +13,11 @@ import pytest
 import reference
 
 from rubhpc import simulate
-from rubhpc.rig.rig import Bearing, Damping, Disc, Rig, Rotor, ShaftSection, Stator, Torsion, Unbalance
+from rubhpc.rig.forces import Unbalance
+from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
+from rubhpc.rig.rig import Rig
+from rubhpc.rig.rotors import Rotor
+from rubhpc.rig.stators import Stator
 
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 STEPPED = (

@@ -12,7 +12,7 @@ from rubhpc.integrate.case import run_case
 from rubhpc.integrate.packing import pack
 from rubhpc.integrate.reduction import reduce_model
 from rubhpc.integrate.setup import prepare
-from rubhpc.rig.rig import with_keys
+from rubhpc.rig.reading import with_keys
 from rubhpc.study.study import Contact, Integrator, Recording
 
 STILL = {

@@ -15,7 +15,9 @@ from rubhpc.fem.modes import modes
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.fem.undamped import undamped_modes
-from rubhpc.rig.rig import Bearing, Damping, Rotor, ShaftSection, Torsion, read_rig
+from rubhpc.rig.parts import Bearing, Damping, ShaftSection, Torsion
+from rubhpc.rig.reading import read_rig
+from rubhpc.rig.rotors import Rotor
 
 RIG = read_rig("mokhtar2017")
 

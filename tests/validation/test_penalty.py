@@ -9,7 +9,7 @@ from lone_bodies import body, set_up, set_up_modal, tip
 
 from rubhpc import State, read_rig, simulate
 from rubhpc.integrate.case import run_case
-from rubhpc.rig.rig import with_keys
+from rubhpc.rig.reading import with_keys
 from rubhpc.rig.stators import LumpedStator
 from rubhpc.study.study import Contact, Recording
 

@@ -13,7 +13,7 @@ from rubhpc import State
 from rubhpc.integrate.case import run_case
 from rubhpc.kernels.central_difference import FINISHED
 from rubhpc.kernels.contact_pairs import MULTIPLIER
-from rubhpc.rig.rig import with_keys
+from rubhpc.rig.reading import with_keys
 from rubhpc.study.study import Contact, Recording
 
 WALL = tip(body(1.0, 1.0, ((1, "axial"),)), 0.0, axial=-1)  # it is held

@@ -9,7 +9,8 @@ import pytest
 from rubhpc import State, read_rig, simulate
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, steady_response
-from rubhpc.rig.rig import Damping, with_keys
+from rubhpc.rig.parts import Damping
+from rubhpc.rig.reading import with_keys
 
 LATERAL, TWIST, AXIAL = 143343.35, 3125.88, 3e9 * 25e-6 / 0.04  # N/m, N m/rad at the disc; N/m of the stator
 RADIUS = 0.06

@@ -1,4 +1,4 @@
-"""What the rows of a linear body's matrices are, and whether the matrices can be those of a body."""
+"""Checks of user-supplied matrices: sizes, names of the rows, mass and stiffness of a physical body."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-NEGATIVE = 1e-8  # of a matrix scaled to a unit diagonal: the least eigenvalue that is taken for zero
+NEGATIVE = 1e-8  # of a matrix scaled to a unit diagonal: eigenvalues above minus this count as zero
 
 
 def checked_matrices(owner: Any, keys: Sequence[str], rows: Sequence[str]) -> None:
-    """Make the fields of a frozen dataclass matrices of one size, zeros where there is none.
+    """Convert fields of a frozen dataclass to matrices of one size; missing ones become zero.
 
     Parameters
     ----------
     keys : sequence of str
-        Fields; the first one is there and gives the size.
+        Fields; the first one is present and gives the size.
     rows : sequence of str
-        What an error calls each row.
+        Name of each row.
     """
     for key in keys:
         value = getattr(owner, key)
@@ -39,43 +39,43 @@ def checked_matrices(owner: Any, keys: Sequence[str], rows: Sequence[str]) -> No
             raise FieldError(key, str(error).removeprefix(f"{key}: ")) from None
         if len(entries) != len(rows):
             shape = f"({len(entries)}, {len(entries)})"
-            problem = f"of shape {shape} for {len(rows)} degrees; every row has one degree"
-            raise FieldError(key, f"{problem}: mend the matrix or degrees")
+            problem = f"of shape {shape}, but there are {len(rows)} degrees"
+            raise FieldError(key, f"{problem}; give one degree per row")
         object.__setattr__(owner, key, entries)
 
 
 def check_body(owner: Any, rows: Sequence[object]) -> None:
-    """Refuse mass and stiffness that no body has, and names that stand twice; make symmetric what is so.
+    """Refuse duplicate names and an unphysical mass or stiffness; remove asymmetry that is rounding.
 
-    M has to be symmetric and positive definite. Rounding of K is taken out; its skew part, that of a bearing
-    with cross-coupling, stays, but its symmetric part may not have a negative stiffness.
+    M must be symmetric and positive definite. K may have a skew part, that of a bearing with cross-coupling,
+    but its symmetric part must have no negative stiffness.
     """
     named = [name if isinstance(name, str) else f"{name[0]}.{name[1]}" for name in rows]  # type: ignore[index]
     for name in named:
         if named.count(name) > 1:
-            raise FieldError("degrees", f"{name} stands twice; every row has a name of its own")
+            raise FieldError("degrees", f"{name} is duplicated; give every row its own name")
     mass, stiffness = owner.mass, owner.stiffness
     if not is_symmetric(mass):
-        raise FieldError("mass", f"is not symmetric{_worst(mass, named)}; mend it")
+        raise FieldError("mass", f"is not symmetric{_worst(mass, named)}; make it symmetric")
     object.__setattr__(owner, "mass", symmetric_part(mass))
     diagonal = np.diag(mass)
     if not diagonal.min() > 0.0:
         name = named[int(diagonal.argmin())]
-        problem = f"degree {name} has none (its entry on the diagonal is {diagonal.min():g})"
-        raise FieldError("mass", f"{problem}; give it some, or condense the degree out of the matrices")
+        problem = f"degree {name} has no mass (its diagonal entry is {diagonal.min():g})"
+        raise FieldError("mass", f"{problem}; add some, or condense the degree out of the matrices")
     if not _least_eigenvalue(mass) > 0.0:
-        raise FieldError("mass", "is not positive definite: a motion would have no inertia; mend it")
+        raise FieldError("mass", "is not positive definite; correct the matrix")
     if is_symmetric(stiffness):
         object.__setattr__(owner, "stiffness", symmetric_part(stiffness))
     if np.diag(stiffness).min() < 0.0:
         name = named[int(np.diag(stiffness).argmin())]
-        raise FieldError("stiffness", f"degree {name} has a negative one; mend the matrix")
+        raise FieldError("stiffness", f"degree {name} has a negative stiffness; correct the matrix")
     if _least_eigenvalue(symmetric_part(stiffness)) < -NEGATIVE:
-        raise FieldError("stiffness", "is not positive semidefinite: a motion has a negative one; mend it")
+        raise FieldError("stiffness", "is not positive semidefinite; correct the matrix")
 
 
 def _least_eigenvalue(entries: NDArray[np.float64]) -> float:
-    """Of a symmetric matrix scaled to a unit diagonal."""
+    """Least eigenvalue of a symmetric matrix scaled to a unit diagonal."""
     diagonal = np.abs(np.diag(entries))
     scale = np.sqrt(np.where(diagonal > 0.0, diagonal, max(diagonal.max(), 1.0)))
     return float(np.linalg.eigvalsh(entries / np.outer(scale, scale))[0])

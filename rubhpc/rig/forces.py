@@ -1,0 +1,67 @@
+"""Forces at the nodes of a rotor: unbalance, constant loads, weight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, TypeAlias
+
+from rubhpc.input.fields import check_fields, count, quantity, table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unbalance:
+    """A mass at a radius, fixed to the rotor."""
+
+    node: int = count(doc="Node of the rotor, from 1.", example="8")
+    mass: float = quantity("kg", doc="Unbalance mass.", example='"8 g"', at_least=0)
+    radius: float = quantity("m", doc="Distance of the mass from the axis.", example='"4.5 cm"', at_least=0)
+    phase: float = quantity(
+        "rad", doc="Angle from +y towards +z at time zero.", example='"90 deg"', default=0.0
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """A constant force, such as that of a belt."""
+
+    node: int = count(doc="Node of the rotor, from 1.", example="12")
+    vertical: float = quantity(
+        "N", doc="Vertical component, positive upwards (+y).", example='"-120 N"', default=0.0
+    )
+    horizontal: float = quantity(
+        "N", doc="Horizontal component, positive along +z.", example='"30 N"', default=0.0
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+NodeForce: TypeAlias = Unbalance | Load
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RotorForces:
+    """What acts on a rotor besides contact."""
+
+    unbalance: tuple[Unbalance, ...] = table(doc="Unbalance masses.", default=())
+    load: tuple[Load, ...] = table(doc="Constant forces.", default=())
+    gravity: float = quantity(
+        "m/s^2",
+        doc="Gravitational acceleration, towards -y.",
+        example='"9.81 m/s^2"',
+        default=0.0,
+        at_least=0,
+    )
+
+    def node_forces(self) -> Iterator[tuple[str, NodeForce]]:
+        """Yield every force at a node with its dotted key, "load.1"."""
+        for declared in fields(RotorForces):
+            value = getattr(self, declared.name)
+            if isinstance(value, tuple):
+                yield from ((f"{declared.name}.{i}", force) for i, force in enumerate(value, 1))

@@ -1,0 +1,94 @@
+"""Reading a rig from a file, a Python function or a dict, and setting single keys of it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rubhpc.errors import InputError
+from rubhpc.input.dotted import replace_keys
+from rubhpc.input.fields import nearest, place
+from rubhpc.input.reading import build, read_toml
+from rubhpc.rig.python_rig import call_rig_function, python_function
+from rubhpc.rig.rig import Rig
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from os import PathLike
+
+PACKAGED = Path(__file__).parents[1] / "rigs"
+
+
+def rig_from_dict(table: Mapping[str, Any], where: str = "rig") -> Rig:
+    """Return the rig that `Rig.as_dict` described; `where` starts error messages."""
+    return build(Rig, table, where)
+
+
+def packaged_rigs() -> list[str]:
+    """Return the names of the packaged rigs."""
+    return sorted(p.stem for p in PACKAGED.glob("*.toml"))
+
+
+def read_rig(
+    name_or_path: str | PathLike[str],
+    relative_to: Path | None = None,
+    where: str = "rig",
+    *,
+    trust_rig: bool = False,
+) -> Rig:
+    """Return a packaged rig by its name, the rig of a TOML file, or the one that a Python function returns.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        "mokhtar2017", the path of a rig file, or "my_rig.py:build", a function called without arguments.
+    relative_to : Path, optional
+        Folder from which a relative path counts; the working directory by default.
+    where : str
+        Start of error messages: the file and key that name the rig.
+    trust_rig : bool
+        Whether Python code may be run.
+
+    Raises
+    ------
+    InputError
+        When there is no such rig, its file is invalid, or it is code that is not trusted.
+    """
+    name = str(name_or_path)
+    if code := python_function(name):
+        if not trust_rig:
+            problem = f"{place(name)} is Python code, which runs only if you trust it"
+            raise InputError(f"{where}: {problem}; add --trust-rig (in Python, pass the Rig itself)")
+        rig = call_rig_function((relative_to or Path()) / code[0], code[1], where)
+        if not isinstance(rig, Rig):
+            raise InputError(f"{where}: {place(name)} returned a {type(rig).__name__}; return a rubhpc.Rig")
+        return rig
+    if name in packaged_rigs():
+        path = PACKAGED / f"{name}.toml"
+        return build(Rig, read_toml(path), f"{name}.toml")
+    path = (relative_to or Path()) / name
+    if not name.endswith(".toml") and "/" not in name and not os.path.exists(path):
+        fix = nearest(name, packaged_rigs())
+        raise InputError(f"{where}: neither a packaged rig nor a file {place(str(path))}; {fix}")
+    return build(Rig, read_toml(path, where), str(path))
+
+
+def with_key(rig: Rig, dotted: str, value: object) -> Rig:
+    """Return the rig with one key set, in SI units or as text with a unit.
+
+    "stator.youngs_modulus" sets it in all stators, "stator.1.angle" in the first. Keys that give the same in
+    another way are replaced: `kyy` splits a bearing's common `stiffness`, and `stiffness` replaces `kyy` and
+    `kzz`.
+
+    Raises
+    ------
+    InputError
+        When there is no such key, or the rig with that value is invalid.
+    """
+    return with_keys(rig, {dotted: value})
+
+
+def with_keys(rig: Rig, values: Mapping[str, object]) -> Rig:
+    """Return the rig with several dotted keys set at once; only the result has to be valid."""
+    return replace_keys(rig, values)
