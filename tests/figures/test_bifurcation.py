@@ -20,13 +20,6 @@ SPEEDS = synthetic_store.AXES["speed_ratio"][2]
 POINTS = synthetic_store.REVOLUTIONS
 
 
-@pytest.fixture(scope="module")
-def path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("stores") / "study.zarr"
-    synthetic_store.write(path, synthetic_store.make())
-    return path
-
-
 @pytest.fixture
 def ax():
     return Figure(layout="constrained").subplots()
@@ -37,8 +30,8 @@ def drawn(ax):
     return {line.get_label(): np.unique(line.get_xdata()) for line in ax.lines}
 
 
-def test_points_have_the_colour_of_their_regime(path, ax):
-    data = bifurcation_data(select(open_store(path), CHOICE), "vertical", "speed_ratio")
+def test_points_have_the_colour_of_their_regime(synthetic_path, ax):
+    data = bifurcation_data(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio")
     assert bifurcation(data, "vertical", ax) is ax
     expected = {name: [] for name in ("no contact", "periodic", "quasi-periodic", "chaotic")}
     for speed, code in zip(SPEEDS, synthetic_store.REGIMES, strict=True):
@@ -50,8 +43,8 @@ def test_points_have_the_colour_of_their_regime(path, ax):
     assert "once a revolution (µm)" in ax.get_ylabel()
 
 
-def test_points_have_the_colour_of_their_period(path, ax):
-    data = bifurcation_data(select(open_store(path), CHOICE), "vertical", "speed_ratio")
+def test_points_have_the_colour_of_their_period(synthetic_path, ax):
+    data = bifurcation_data(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio")
     bifurcation(data, "vertical", ax, "period")
     assert {name: list(at) for name, at in drawn(ax).items()} == {
         "none": [1.5, 1.7],
@@ -60,44 +53,46 @@ def test_points_have_the_colour_of_their_period(path, ax):
     }
 
 
-def test_points_are_every_whole_revolution_of_the_waveform(path, ax):
-    store = select(open_store(path), CHOICE)
+def test_points_are_every_whole_revolution_of_the_waveform(synthetic_path, ax):
+    store = select(open_store(synthetic_path), CHOICE)
     data = bifurcation_data(store, "vertical", "speed_ratio")
     bifurcation(data, "vertical", ax, color=None)
     whole = store["vertical"].values[:, :: synthetic_store.SAMPLES]
     assert ax.lines[0].get_ydata() == pytest.approx(1e6 * whole.ravel(), rel=1e-6)
 
 
-def test_cases_that_are_not_done_leave_no_point(path, ax):
+def test_cases_that_are_not_done_leave_no_point(synthetic_path, ax):
     one = {"clearance": "70 um", "friction": 0.1, "stator.youngs_modulus": "3 GPa"}
-    bifurcation(bifurcation_data(select(open_store(path), one), "vertical", "speed_ratio"), "vertical", ax)
+    bifurcation(
+        bifurcation_data(select(open_store(synthetic_path), one), "vertical", "speed_ratio"), "vertical", ax
+    )
     values = synthetic_store.make()["status"].values[:, 0, 0, 0]
     there = np.concatenate(list(drawn(ax).values()))
     assert sorted(there) == [s for s, status in zip(SPEEDS, values, strict=True) if status == DONE]
 
 
-def test_points_are_read_lazily(path):
-    store = select(open_store(path), CHOICE)
+def test_points_are_read_lazily(synthetic_path):
+    store = select(open_store(synthetic_path), CHOICE)
     assert bifurcation_data(store, "vertical", "speed_ratio")["section_vertical"].chunks is not None
 
 
-def test_signal_without_section_is_taken_from_its_waveform(path):
-    store = select(open_store(path), CHOICE)
+def test_signal_without_section_is_taken_from_its_waveform(synthetic_path):
+    store = select(open_store(synthetic_path), CHOICE)
     found = bifurcation_data(store, "contact_force", "speed_ratio")["section_contact_force"]
     assert found.shape == (5, POINTS)
 
 
-def test_longest_axis_is_the_one(path):
-    store = open_store(path)
+def test_longest_axis_is_the_one(synthetic_path):
+    store = open_store(synthetic_path)
     assert default_axis(store) == "speed_ratio"
     assert default_axis(store, "stator.youngs_modulus") == "stator_youngs_modulus"
     with pytest.raises(InputError, match="several values"):
         default_axis(store.isel(dict.fromkeys(store["status"].dims, 0)))
 
 
-def test_command_takes_the_first_of_other_axes_and_writes_the_points(path, tmp_path, monkeypatch):
+def test_command_takes_the_first_of_other_axes_and_writes_the_points(synthetic_path, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    args = [str(path), "--along", "clearance", "--color", "period", "--data", "points.csv"]
+    args = [str(synthetic_path), "--along", "clearance", "--color", "period", "--data", "points.csv"]
     args += ["--select", "speed_ratio=1.5", "--signal", "torsion"]
     said = CliRunner().invoke(bifurcation_diagram, args, catch_exceptions=False).output.splitlines()
     assert "friction = 0.1: the first of 2; change with --select friction=VALUE" in said
@@ -107,15 +102,17 @@ def test_command_takes_the_first_of_other_axes_and_writes_the_points(path, tmp_p
     assert set(np.unique(table["clearance_(m)"])) == {70e-6, 84e-6, 100e-6}
 
 
-def test_an_axis_of_even_ratios_is_drawn_on_a_log_scale(path, ax):
-    store = select(open_store(path), {"friction": 0.3, "stator.youngs_modulus": "30 GPa", "speed_ratio": 1.0})
+def test_an_axis_of_even_ratios_is_drawn_on_a_log_scale(synthetic_path, ax):
+    store = select(
+        open_store(synthetic_path), {"friction": 0.3, "stator.youngs_modulus": "30 GPa", "speed_ratio": 1.0}
+    )
     store = store.assign_coords(clearance=store["clearance"].copy(data=[1e-5, 1e-4, 1e-3]))
     bifurcation(bifurcation_data(store, "vertical", "clearance"), "vertical", ax)
     assert ax.get_xscale() == "log"
 
 
-def test_points_that_differ_by_rounding_do_not_fill_the_axes(path, ax):
-    data = bifurcation_data(select(open_store(path), CHOICE), "vertical", "speed_ratio").load()
+def test_points_that_differ_by_rounding_do_not_fill_the_axes(synthetic_path, ax):
+    data = bifurcation_data(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio").load()
     data["section_vertical"][...] = 1e-4 * (1 + 1e-9 * np.random.default_rng(1).random((5, POINTS)))
     bifurcation(data, "vertical", ax)
     assert np.ptp(ax.get_ylim()) == pytest.approx(2.0)  # um, of 100

@@ -26,19 +26,12 @@ def options(*chosen):
 ONE = options("speed_ratio=1.5", CLEARANCE, FRICTION, MODULUS)
 
 
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    path = tmp_path_factory.mktemp("stores") / "study.zarr"
-    synthetic_store.write(path, synthetic_store.make())
-    return str(path)
-
-
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def invoke(name, *args):
-        return CliRunner().invoke(BY_NAME[name], list(args), catch_exceptions=False).output
+        return CliRunner().invoke(BY_NAME[name], [str(word) for word in args], catch_exceptions=False).output
 
     return invoke
 
@@ -65,33 +58,33 @@ def run(tmp_path, monkeypatch):
         ("section", [*options(CLEARANCE, FRICTION, MODULUS), "--over", "speed_ratio", "--y", "torsion"]),
     ],
 )
-def test_each_command_leaves_its_figure_and_says_where(run, store, name, args):
-    said = run(name, store, *args).splitlines()
+def test_each_command_leaves_its_figure_and_says_where(run, synthetic_path, name, args):
+    said = run(name, synthetic_path, *args).splitlines()
     assert said[-1] == f"study_{name}.png"
     assert Path(said[-1]).read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_map_tells_what_it_took_for_the_other_axes(run, store):
-    said = run("map", store)
+def test_a_map_tells_what_it_took_for_the_other_axes(run, synthetic_path):
+    said = run("map", synthetic_path)
     assert "friction = 0.1: the first of 2" in said
     assert "stator_youngs_modulus = 3 GPa: the first of 2" in said
 
 
-def test_a_spectrum_tells_its_lines(run, store):
-    said = run("spectrum", store, *ONE, "--signal", "vertical").splitlines()
+def test_a_spectrum_tells_its_lines(run, synthetic_path):
+    said = run("spectrum", synthetic_path, *ONE, "--signal", "vertical").splitlines()
     assert said[0].split() == ["1X", "47.339", "Hz", "1.0000e-04", "m"]
 
 
-def test_data_come_as_a_table(run, store):
-    run("spectrum", store, *ONE, "--signal", "vertical", "--data", "lines.csv")
+def test_data_come_as_a_table(run, synthetic_path):
+    run("spectrum", synthetic_path, *ONE, "--signal", "vertical", "--data", "lines.csv")
     table = np.genfromtxt("lines.csv", delimiter=",", names=True, deletechars="")
     row = table[np.isclose(table["order"], 1.0)]
     assert row["spectrum_vertical_(m)"] == pytest.approx(1e-4, rel=1e-5)
     assert row["frequency_(Hz)"] == pytest.approx(1.5 * synthetic_store.FIRST_LATERAL)
 
 
-def test_data_come_as_json_with_null_for_what_is_missing(run, store):
-    run("map", store, "--data", "map.json")
+def test_data_come_as_json_with_null_for_what_is_missing(run, synthetic_path):
+    run("map", synthetic_path, "--data", "map.json")
     table = json.loads(Path("map.json").read_text())
     assert table["data_vars"]["peak_contact_force"]["attrs"]["units"] == "N"
     assert table["data_vars"]["peak_contact_force"]["data"][0][0] is None
@@ -99,8 +92,8 @@ def test_data_come_as_json_with_null_for_what_is_missing(run, store):
 
 
 @pytest.mark.parametrize("name", ["orbit.zarr", "orbit.nc"])
-def test_data_come_as_arrays(run, store, name):
-    run("orbit", store, *ONE, "--data", name)
+def test_data_come_as_arrays(run, synthetic_path, name):
+    run("orbit", synthetic_path, *ONE, "--data", name)
     opened = xr.open_zarr(name, consolidated=False) if name.endswith(".zarr") else xr.open_dataset(name)
     with opened:
         assert float(opened["horizontal"].max()) == pytest.approx(1e-4, rel=1e-3)
@@ -121,18 +114,19 @@ def test_data_come_as_arrays(run, store, name):
         ("map", ["--value", "vertical"], "no scalar of a case"),
     ],
 )
-def test_bad_input_is_one_line_and_leaves_nothing(run, store, name, args, said):
+def test_bad_input_is_one_line_and_leaves_nothing(run, synthetic_path, name, args, said):
     with pytest.raises(InputError) as refusal:
-        run(name, store, *args)
+        run(name, synthetic_path, *args)
     assert said in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert list(Path().iterdir()) == []
 
 
-def test_a_figure_needs_no_display_and_no_pyplot(store, tmp_path):
+def test_a_figure_needs_no_display_and_no_pyplot(synthetic_path, tmp_path):
     script = (
         "import sys; from rubhpc.commands.figures import map as command;"
-        f"command([{store!r}], standalone_mode=False); assert 'matplotlib.pyplot' not in sys.modules;"
+        f"command([{str(synthetic_path)!r}], standalone_mode=False);"
+        "assert 'matplotlib.pyplot' not in sys.modules;"
         "assert 'mpi4py' not in sys.modules; assert 'numba' not in sys.modules"
     )
     environment = {k: v for k, v in os.environ.items() if k != "DISPLAY"}

@@ -20,25 +20,18 @@ from rubhpc.schema import FAILED
 FACETS = ["stator_youngs_modulus", "friction"]  # down, across
 
 
-@pytest.fixture(scope="module")
-def path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("stores") / "study.zarr"
-    synthetic_store.write(path, synthetic_store.make())
-    return path
-
-
 @pytest.fixture
 def axes():
     with house_style():
         yield new_figure(2, 120, 180, 2)[1]
 
 
-def data(path, value):
-    return map_data(open_store(path), value, ["speed_ratio", "clearance"], FACETS)
+def data(synthetic_path, value):
+    return map_data(open_store(synthetic_path), value, ["speed_ratio", "clearance"], FACETS)
 
 
-def test_each_panel_shows_its_own_cases_in_one_scale(path, axes):
-    shown = data(path, "peak_contact_force")
+def test_each_panel_shows_its_own_cases_in_one_scale(synthetic_path, axes):
+    shown = data(synthetic_path, "peak_contact_force")
     assert shown["peak_contact_force"].dims == (*FACETS, "clearance", "speed_ratio")
     shown["peak_contact_force"][1, 1] *= 2.0
     value_maps(shown, "peak_contact_force", axes)
@@ -59,8 +52,8 @@ def test_each_panel_shows_its_own_cases_in_one_scale(path, axes):
     assert [bool(ax.get_ylabel()) for ax in axes] == [True, False, True, False]
 
 
-def test_panels_share_one_legend_and_the_names_of_regimes(path, axes):
-    value_maps(data(path, "regime"), "regime", axes)
+def test_panels_share_one_legend_and_the_names_of_regimes(synthetic_path, axes):
+    value_maps(data(synthetic_path, "regime"), "regime", axes)
     figure = axes[0].figure
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["missing", "failed", "diverged", "out of range: slip, Euler load"]
@@ -68,9 +61,9 @@ def test_panels_share_one_legend_and_the_names_of_regimes(path, axes):
     assert names == ["no contact", "periodic", "quasi-periodic", "chaotic"]
 
 
-def test_contours_lie_at_their_level(path, axes):
+def test_contours_lie_at_their_level(synthetic_path, axes):
     """The force is 100 N r / (g / 84 um): a line of equal force is straight through the origin."""
-    shown = data(path, "peak_contact_force")
+    shown = data(synthetic_path, "peak_contact_force")
     value_maps(shown, "peak_contact_force", axes, n_contour=4)
     lines = axes[3].collections[-1]
     assert len(lines.levels) >= 3
@@ -79,13 +72,13 @@ def test_contours_lie_at_their_level(path, axes):
         assert 100 * r / (g / 84) == pytest.approx(level, rel=0.03)  # linear between grid values
 
 
-def test_regimes_have_no_contours(path, axes):
+def test_regimes_have_no_contours(synthetic_path, axes):
     with pytest.raises(InputError, match="without --contours"):
-        value_maps(data(path, "regime"), "regime", axes, n_contour=3)
+        value_maps(data(synthetic_path, "regime"), "regime", axes, n_contour=3)
 
 
-def test_facets_are_other_axes_of_few_values(path):
-    store = open_store(path)
+def test_facets_are_other_axes_of_few_values(synthetic_path):
+    store = open_store(synthetic_path)
     assert facet_axes(store, ["friction", "stator.youngs_modulus"], ["speed_ratio", "clearance"]) == FACETS
     with pytest.raises(InputError, match="not speed_ratio or clearance"):
         facet_axes(store, ["clearance"], ["speed_ratio", "clearance"])
@@ -96,9 +89,9 @@ def test_facets_are_other_axes_of_few_values(path):
         facet_axes(many, ["friction"], ["speed_ratio", "clearance"])
 
 
-def test_command_draws_a_panel_for_each_value(path, tmp_path, monkeypatch):
+def test_command_draws_a_panel_for_each_value(synthetic_path, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    args = [str(path), "--facet", "friction", "--contours", "3", "--log", "--data", "map.csv"]
+    args = [str(synthetic_path), "--facet", "friction", "--contours", "3", "--log", "--data", "map.csv"]
     said = CliRunner().invoke(map_command, args, catch_exceptions=False).output.splitlines()
     assert said[0].startswith("stator_youngs_modulus = 3 GPa: the first of 2")
     assert said[-2:] == ["study_map.png", "map.csv"]
@@ -106,8 +99,8 @@ def test_command_draws_a_panel_for_each_value(path, tmp_path, monkeypatch):
     assert len(table) == 2 * 3 * 5
 
 
-def test_maps_spread_over_what_the_facets_leave(path):
-    store = open_store(path).isel(clearance=[0, 1], speed_ratio=[1, 2, 3])
+def test_maps_spread_over_what_the_facets_leave(synthetic_path):
+    store = open_store(synthetic_path).isel(clearance=[0, 1], speed_ratio=[1, 2, 3])
     assert default_axes(store) == ("speed_ratio", "clearance")
     assert default_axes(store, facets=["speed_ratio"]) == ("clearance", "friction")
     with pytest.raises(InputError, match="--x and --y are both friction"):
@@ -116,15 +109,15 @@ def test_maps_spread_over_what_the_facets_leave(path):
         default_axes(store.isel(clearance=0, friction=0, stator_youngs_modulus=0))
 
 
-def test_regimes_that_no_case_has_need_no_bar(path, axes):
-    shown = data(path, "regime")
+def test_regimes_that_no_case_has_need_no_bar(synthetic_path, axes):
+    shown = data(synthetic_path, "regime")
     shown["status"][...] = FAILED
     value_maps(shown, "regime", axes)
     assert axes[0].figure.axes == axes
 
 
-def test_a_map_reads_speeds_in_rpm_as_its_axes_do(path, axes):
-    value_maps(data(path, "spin_speed"), "spin_speed", axes)
+def test_a_map_reads_speeds_in_rpm_as_its_axes_do(synthetic_path, axes):
+    value_maps(data(synthetic_path, "spin_speed"), "spin_speed", axes)
     assert axes[0].figure.axes[-1].get_ylabel() == "Spin speed (rpm)"
     assert axes[0].collections[0].get_clim()[1] == pytest.approx(1.7 * synthetic_store.FIRST_LATERAL * 60)
 

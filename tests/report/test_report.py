@@ -59,21 +59,14 @@ class Elements(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("stores") / "study.zarr"
-    synthetic_store.write(path, synthetic_store.make(n_stator=2))
-    return path
-
-
-@pytest.fixture(scope="module")
-def written(store: Path) -> Elements:
-    path = store.with_suffix(".html")
-    write_report(open_store(store), path, 20 * MB)
+def written(two_stator_path: Path) -> Elements:
+    path = two_stator_path.with_suffix(".html")
+    write_report(open_store(two_stator_path), path, 20 * MB)
     return Elements(path.read_text())
 
 
-def test_all_that_is_shown_of_a_quantity_has_one_unit(store: Path) -> None:
-    told = json.loads(Elements(Page(open_store(store)).html(values={})).scripts["told"])
+def test_all_that_is_shown_of_a_quantity_has_one_unit(two_stator_path: Path) -> None:
+    told = json.loads(Elements(Page(open_store(two_stator_path)).html(values={})).scripts["told"])
     assert {n: s["unit"] for n, s in told["signals"].items()} == {
         "vertical": "µm",
         "horizontal": "µm",
@@ -83,7 +76,9 @@ def test_all_that_is_shown_of_a_quantity_has_one_unit(store: Path) -> None:
         "stator_lateral": "µm",
         "contact_force": "N",
     }
-    stronger = Page(open_store(store).assign(peak_torsion=open_store(store)["peak_torsion"] * 1e3))
+    stronger = Page(
+        open_store(two_stator_path).assign(peak_torsion=open_store(two_stator_path)["peak_torsion"] * 1e3)
+    )
     assert stronger.measures.scale("torsion") == stronger.measures.scale("peak_torsion")
     assert stronger.measures.scale("torsion").unit == "mrad"
 
@@ -124,8 +119,8 @@ def test_every_control_and_drawing_has_a_name(written: Elements) -> None:
     assert named <= set(ids)
 
 
-def test_failures_are_told_with_their_reasons(store: Path) -> None:
-    dataset = open_store(store).assign_attrs(reasons={0: "ran away <b>", 12: "worker died"})
+def test_failures_are_told_with_their_reasons(two_stator_path: Path) -> None:
+    dataset = open_store(two_stator_path).assign_attrs(reasons={0: "ran away <b>", 12: "worker died"})
     text = Page(dataset).html(values={})
     assert "1 case diverged" in text
     assert "1 case failed" in text
@@ -134,8 +129,8 @@ def test_failures_are_told_with_their_reasons(store: Path) -> None:
     assert "speed ratio 1, clearance 70 µm, friction coefficient 0.1, stator modulus 3 GPa" in text
 
 
-def test_validity_counts_what_is_out_of_range(store: Path) -> None:
-    text = Page(open_store(store)).html(values={})
+def test_validity_counts_what_is_out_of_range(two_stator_path: Path) -> None:
+    text = Page(open_store(two_stator_path)).html(values={})
     rows = re.findall(r'scope="row">([^<]+)</th><td>[^<]+</td>\D*?data-label="Cases">(\d+)<', text)
     told = {name: int(n) for name, n in rows}
     # Of 60 cases those at the speeds 1.5 and 1.7 slip back, and those at 1.7 are over the Euler load.
@@ -144,8 +139,8 @@ def test_validity_counts_what_is_out_of_range(store: Path) -> None:
     assert told["Tip deflection over length"] == 0
 
 
-def test_slip_may_reverse_under_coulombs_law(store: Path) -> None:
-    dataset = open_store(store)
+def test_slip_may_reverse_under_coulombs_law(two_stator_path: Path) -> None:
+    dataset = open_store(two_stator_path)
     study = {**dataset.attrs["study"], "contact": {"friction_law": "coulomb"}}
     text = Page(dataset.assign_attrs(study=study)).html(values={})
     assert "Contact force over Euler load" in text
@@ -160,11 +155,11 @@ def test_slip_may_reverse_under_coulombs_law(store: Path) -> None:
 
 @pytest.mark.parametrize(("room", "is_cut"), [(20_000, True), (30_000, True), (300_000, False)])
 def test_the_size_is_kept_and_what_is_left_out_is_said(
-    store: Path, tmp_path: Path, room: int, is_cut: bool
+    two_stator_path: Path, tmp_path: Path, room: int, is_cut: bool
 ) -> None:
     path = tmp_path / "small.html"
-    limit = least_size(Page(open_store(store))) + room
-    load = write_report(open_store(store), path, limit)
+    limit = least_size(Page(open_store(two_stator_path))) + room
+    load = write_report(open_store(two_stator_path), path, limit)
     assert path.stat().st_size <= limit
     text = path.read_text()
     n_kept = len(json.loads(Elements(text).scripts["records"]))
@@ -175,7 +170,7 @@ def test_the_size_is_kept_and_what_is_left_out_is_said(
 
 
 def test_foreseeing_the_size_reads_no_case_but_the_pilots(
-    store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    two_stator_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What lies around the pilots of 100 000 cases took longer to read than all that is on the page."""
     asked: list[int] = []
@@ -184,13 +179,13 @@ def test_foreseeing_the_size_reads_no_case_but_the_pilots(
         Cases, "records", lambda self, flats, level: records(self, asked.append(1) or flats, level)
     )
     monkeypatch.setattr(budget, "_PILOTS", 3)
-    write_report(open_store(store), tmp_path / "page.html", 20e6)
+    write_report(open_store(two_stator_path), tmp_path / "page.html", 20e6)
     assert len(asked) == 1  # for those that are on the page
 
 
-def test_a_limit_that_nothing_fits_is_refused(store: Path, tmp_path: Path) -> None:
+def test_a_limit_that_nothing_fits_is_refused(two_stator_path: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"--limit: 0\.1 MB is too small for this store; give 0\.\d MB"):
-        write_report(open_store(store), tmp_path / "none.html", 0.1 * MB)
+        write_report(open_store(two_stator_path), tmp_path / "none.html", 0.1 * MB)
     assert not (tmp_path / "none.html").exists()
 
 
@@ -258,9 +253,13 @@ def test_a_rotor_of_matrices_is_told_in_words() -> None:
     assert description(rig) == "rotor of 1 degree of freedom, by its matrices; 1 stator"
 
 
-def test_the_command_writes_the_page_and_says_what_is_on_it(store: Path, tmp_path: Path, monkeypatch) -> None:
+def test_the_command_writes_the_page_and_says_what_is_on_it(
+    two_stator_path: Path, tmp_path: Path, monkeypatch
+) -> None:
     monkeypatch.chdir(tmp_path)
-    said = CliRunner().invoke(report, [str(store), "--limit", "3 MB"], catch_exceptions=False).output
+    said = (
+        CliRunner().invoke(report, [str(two_stator_path), "--limit", "3 MB"], catch_exceptions=False).output
+    )
     assert said.startswith("study.html (")
     assert "all cases with a result" in said
     assert (tmp_path / "study.html").is_file()
@@ -276,10 +275,10 @@ def test_the_command_writes_the_page_and_says_what_is_on_it(store: Path, tmp_pat
     ],
 )
 def test_wrong_input_is_one_line(
-    store: Path, tmp_path: Path, monkeypatch, args: list[str], told: str
+    two_stator_path: Path, tmp_path: Path, monkeypatch, args: list[str], told: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError) as refusal:
-        CliRunner().invoke(report, [str(store), *args], catch_exceptions=False)
+        CliRunner().invoke(report, [str(two_stator_path), *args], catch_exceptions=False)
     assert told in str(refusal.value)
     assert list(tmp_path.iterdir()) == []

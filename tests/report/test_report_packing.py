@@ -22,13 +22,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-@pytest.fixture(scope="module")
-def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("stores") / "study.zarr"
-    synthetic_store.write(path, synthetic_store.make(n_stator=2))
-    return path
-
-
 @given(arrays(np.float32, st.integers(0, 40), elements=st.floats(width=32)))
 def test_floats_keep_four_digits(values: np.ndarray) -> None:
     values = np.where(np.abs(values) > 1e38, 0, values)  # rounding may not carry into infinity
@@ -65,8 +58,8 @@ def test_a_spectrum_is_kept_within_a_pixel_over_five_decades() -> None:
 
 
 @pytest.mark.parametrize("detail", [FULL, *LEVELS])
-def test_a_record_holds_what_the_store_does(store: Path, detail) -> None:
-    cases = Cases(open_store(store))
+def test_a_record_holds_what_the_store_does(two_stator_path: Path, detail) -> None:
+    cases = Cases(open_store(two_stator_path))
     flat = int(np.ravel_multi_index((0, 1, 1, 0), (5, 3, 2, 2)))  # of period 2
     record = unpacked_record(cases.record(flat, detail))
     waves = {(w["name"], w["stator"]): w for w in record["waves"]}
@@ -87,8 +80,8 @@ def test_a_record_holds_what_the_store_does(store: Path, detail) -> None:
     assert len(record["section"]) == 3
 
 
-def test_of_forces_the_highest_samples_are_kept(store: Path) -> None:
-    dataset = open_store(store).load()
+def test_of_forces_the_highest_samples_are_kept(two_stator_path: Path) -> None:
+    dataset = open_store(two_stator_path).load()
     dataset["contact_force"][...] = 0.0
     dataset["contact_force"][..., 3::8] = 5.0
     dataset["period"][...] = 1
@@ -99,8 +92,8 @@ def test_of_forces_the_highest_samples_are_kept(store: Path) -> None:
     assert record["waves"][0]["values"] == pytest.approx(np.full(8, 5.0))
 
 
-def test_a_motion_without_a_period_keeps_more_of_its_orbit_than_of_the_rest(store: Path) -> None:
-    dataset = open_store(store).load()
+def test_a_motion_without_a_period_keeps_more_of_its_orbit_than_of_the_rest(two_stator_path: Path) -> None:
+    dataset = open_store(two_stator_path).load()
     dataset["period"][...] = 0
     few = replace(LEVELS[0], samples=8, revolutions=3, shown=2)
     cases = Cases(dataset.chunk())
@@ -110,8 +103,8 @@ def test_a_motion_without_a_period_keeps_more_of_its_orbit_than_of_the_rest(stor
     assert n["torsion"] == n["contact_force"] == record["shown"] == 2
 
 
-def test_cases_come_block_by_block_as_they_come_alone(store: Path) -> None:
-    cases = Cases(open_store(store))
+def test_cases_come_block_by_block_as_they_come_alone(two_stator_path: Path) -> None:
+    cases = Cases(open_store(two_stator_path))
     some = [int(i) for i in cases.done[::7]]
     found = dict(cases.records(some, LEVELS[1]))
     assert sorted(found) == some

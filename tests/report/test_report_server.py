@@ -10,7 +10,6 @@ import zlib
 from typing import TYPE_CHECKING
 
 import pytest
-import synthetic_store
 from running import start
 
 from postproc.report.server import Library, Server
@@ -23,15 +22,8 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture(scope="module")
-def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("stores") / "study.zarr"
-    synthetic_store.write(path, synthetic_store.make())
-    return path
-
-
-@pytest.fixture(scope="module")
-def server(store: Path) -> Iterator[Server]:
-    with Server(Library(lambda: open_store(store))) as server:
+def server(synthetic_path: Path) -> Iterator[Server]:
+    with Server(Library(lambda: open_store(synthetic_path))) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield server
         server.shutdown()
@@ -102,13 +94,13 @@ def test_nothing_can_be_sent_to_it(server: Server) -> None:
     assert (status, body) == (200, b"")
 
 
-def test_a_port_in_use_is_said(server: Server, store: Path) -> None:
+def test_a_port_in_use_is_said(server: Server, synthetic_path: Path) -> None:
     with pytest.raises(InputError, match=f"--port: {server.port} cannot be had"):
-        Server(Library(lambda: open_store(store)), server.port)
+        Server(Library(lambda: open_store(synthetic_path)), server.port)
 
 
-def test_the_command_says_where_it_is_and_ends_on_interrupt(store: Path) -> None:
-    process = start("view", store)
+def test_the_command_says_where_it_is_and_ends_on_interrupt(synthetic_path: Path) -> None:
+    process = start("view", synthetic_path)
     assert process.stdout is not None
     line = process.stdout.readline()
     port = int(line.split("http://127.0.0.1:")[1].split("/")[0])

@@ -5,7 +5,6 @@ import json
 import h5py
 import numpy as np
 import pytest
-import synthetic_store
 import xarray as xr
 from click.testing import CliRunner
 
@@ -14,22 +13,17 @@ from rubhpc.commands.export import export
 from rubhpc.errors import InputError
 
 
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    path = tmp_path_factory.mktemp("stores") / "study.zarr"
-    synthetic_store.write(path, synthetic_store.make())
-    return str(path)
-
-
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    return lambda *words: CliRunner().invoke(export, list(words), catch_exceptions=False).output
+    return lambda *words: (
+        CliRunner().invoke(export, [str(word) for word in words], catch_exceptions=False).output
+    )
 
 
-def test_whole_store_comes_back(store, run, tmp_path):
-    assert run(store).startswith("study.h5 (")
-    with xr.open_dataset("study.h5", engine="h5netcdf") as back, open_store(store) as known:
+def test_whole_store_comes_back(synthetic_path, run, tmp_path):
+    assert run(synthetic_path).startswith("study.h5 (")
+    with xr.open_dataset("study.h5", engine="h5netcdf") as back, open_store(synthetic_path) as known:
         assert set(back.variables) == set(known.variables)
         for name in known.variables:
             np.testing.assert_array_equal(back[name], known[name])
@@ -41,9 +35,11 @@ def test_whole_store_comes_back(store, run, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["study.h5"]
 
 
-def test_chosen_cases_and_variables(store, run):
-    run(store, "--select", "speed_ratio=1.5", "--value", "peak_contact_force", "--output", "force.nc")
-    with xr.open_dataset("force.nc", engine="h5netcdf") as back, open_store(store) as known:
+def test_chosen_cases_and_variables(synthetic_path, run):
+    run(
+        synthetic_path, "--select", "speed_ratio=1.5", "--value", "peak_contact_force", "--output", "force.nc"
+    )
+    with xr.open_dataset("force.nc", engine="h5netcdf") as back, open_store(synthetic_path) as known:
         assert list(back.data_vars) == ["peak_contact_force"]
         np.testing.assert_array_equal(back.peak_contact_force, known.peak_contact_force.sel(speed_ratio=1.5))
 
@@ -58,14 +54,14 @@ def test_chosen_cases_and_variables(store, run):
         (["--select", "speed_ratio=77"], "speed_ratio"),
     ],
 )
-def test_mistakes_are_told_and_leave_nothing(store, run, tmp_path, words, told):
+def test_mistakes_are_told_and_leave_nothing(synthetic_path, run, tmp_path, words, told):
     with pytest.raises(InputError, match=told):
-        run(store, *words)
+        run(synthetic_path, *words)
     assert not list(tmp_path.iterdir())
 
 
-def test_file_that_is_there_stays_until_the_new_one_is_whole(store, run, tmp_path, monkeypatch):
-    run(store, "--value", "period")
+def test_file_that_is_there_stays_until_the_new_one_is_whole(synthetic_path, run, tmp_path, monkeypatch):
+    run(synthetic_path, "--value", "period")
     before = (tmp_path / "study.h5").read_bytes()
 
     def fail(*_, **__):
@@ -73,6 +69,6 @@ def test_file_that_is_there_stays_until_the_new_one_is_whole(store, run, tmp_pat
 
     monkeypatch.setattr(xr.Dataset, "to_netcdf", fail)
     with pytest.raises(InputError, match="No space left"):
-        run(store)
+        run(synthetic_path)
     assert (tmp_path / "study.h5").read_bytes() == before
     assert len(list(tmp_path.iterdir())) == 1

@@ -14,16 +14,9 @@ from rubhpc.errors import InputError, StoreError
 ONE = {"speed_ratio": 0.75, "clearance": "84 um", "friction": 0.3, "stator.youngs_modulus": "30 GPa"}
 
 
-@pytest.fixture(scope="module")
-def path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("stores") / "study.zarr"
-    synthetic_store.write(path, synthetic_store.make())
-    return path
-
-
 @pytest.fixture
-def store(path):
-    return open_store(path)
+def store(synthetic_path):
+    return open_store(synthetic_path)
 
 
 @pytest.fixture
@@ -41,8 +34,8 @@ def chunks_read(monkeypatch):
     return read
 
 
-def test_a_store_opens_lazily(path, chunks_read):
-    store = open_store(path)
+def test_a_store_opens_lazily(synthetic_path, chunks_read):
+    store = open_store(synthetic_path)
     assert store["vertical"].chunks is not None
     assert not [key for key in chunks_read if key.split("/")[0] in store.data_vars]
 
