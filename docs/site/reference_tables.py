@@ -1,0 +1,279 @@
+"""Reference tables from the declarations themselves: keys of files, commands, variables, Python names.
+
+A page asks for one by a comment, `<!-- generated: study -->`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import inspect
+import pkgutil
+import re
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import postproc
+import rubhpc
+from rubhpc.cli import COMMANDS, commands
+from rubhpc.rig.matrices import MatrixRotor
+from rubhpc.rig.parts import Bearing, Damping, Disc, Load, ShaftSection, Torsion, Unbalance
+from rubhpc.rig.rig import Rig, Rotor
+from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
+from rubhpc.schema import VARIABLES
+from rubhpc.study.axes import _OwnAxes as OwnAxes
+from rubhpc.study.tables import Contact, Integrator, Recording, Run, Sample
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+# Table of a file -> the dataclass that declares its keys, in the order of the pages.
+STUDY_TABLES = {
+    "[contact]": Contact,
+    "[integrator]": Integrator,
+    "[record]": Recording,
+    "[sample]": Sample,
+    "[run]": Run,
+}
+RIG_TABLES = {
+    "Top of the file": Rig,
+    "[rotor]": Rotor,
+    "[[rotor.shaft]]": ShaftSection,
+    "[[rotor.disc]]": Disc,
+    "[[rotor.bearing]]": Bearing,
+    "[[rotor.unbalance]]": Unbalance,
+    "[[rotor.load]]": Load,
+    "[rotor.torsion]": Torsion,
+    "[rotor.damping], [stator.damping]": Damping,
+    "[[stator]], a beam": Stator,
+    "[[stator]], a mass on springs or a wall": LumpedStator,
+    "[rotor], by matrices": MatrixRotor,
+    "[[stator]], by matrices": MatrixStator,
+}
+ROOMS = ("store", "signals", "cases", "figures")  # of postproc, whose functions the reference shows
+
+
+def expand(text: str) -> str:
+    """Return a page with the tables that it asks for."""
+    return re.sub(r"^<!-- generated: (\w+) -->$", lambda found: _TABLES[found[1]](), text, flags=re.MULTILINE)
+
+
+def key_tables(tables: dict[str, type]) -> str:
+    """Return a section for each table of a file, with a row for each key."""
+    sections = []
+    for title, owner in tables.items():
+        about = (inspect.getdoc(owner) or "").split("\n\n")[0].replace("\n", " ")
+        rows = [_key_row(field) for field in dataclasses.fields(owner) if "kind" in field.metadata]
+        head = f"## {title}" if "[" not in title else "## " + re.sub(r"(\[+[\w.]+\]+)", r"`\1`", title)
+        sections.append(f"{head}\n\n{about}\n\n{_table(_KEY_HEAD, rows)}")
+    return "\n\n".join(sections)
+
+
+def axis_table() -> str:
+    """Return the table of the axes that are no keys of the rig."""
+    return _table(_KEY_HEAD, [_key_row(field) for field in dataclasses.fields(OwnAxes)])
+
+
+_KEY_HEAD = ("key", "type", "unit", "default", "meaning", "example")
+
+
+def _key_row(field: dataclasses.Field[Any]) -> tuple[str, ...]:
+    meta = field.metadata
+    example = meta.get("example")
+    return (
+        f"`{field.name}`",
+        _kind(meta),
+        " ".join(f"`{unit}`" for unit in (meta.get("units") or (meta.get("unit"),)) if unit),
+        _default(field),
+        meta.get("doc", ""),
+        f"`{example}`" if example else "",
+    )
+
+
+def _kind(meta: Any) -> str:
+    """Return the type of a key and its bounds, in words."""
+    names = {
+        "quantity": "number",
+        "count": "whole number",
+        "flag": "`true` or `false`",
+        "text": "text",
+        "words": "list of words",
+        "pairs": "table of numbers",
+        "matrix": "matrix",
+        "degrees": "list of node and name",
+    }
+    kind = meta["kind"]
+    if kind in ("choice", "choices"):
+        listed = ", ".join(f'`"{word}"`' for word in meta["of"])
+        return f"list of {listed}" if kind == "choices" else listed.replace(", ", " or ")
+    bounds = [
+        f"{word} {meta[key]:g}"
+        for key, word in (
+            ("above", "above"),
+            ("at_least", "at least"),
+            ("below", "below"),
+            ("at_most", "at most"),
+        )
+        if meta.get(key) is not None
+    ]
+    unlike = f', or `"{meta["or_word"]}"`' if meta.get("or_word") else ""
+    return ", ".join([names[kind], *bounds]) + unlike
+
+
+def _default(field: dataclasses.Field[Any]) -> str:
+    if field.default is dataclasses.MISSING:
+        return "**required**"
+    value = field.default
+    if value is None or value == ():
+        return ""
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if isinstance(value, str):
+        return f'`"{value}"`'
+    if isinstance(value, tuple):
+        return "`[" + ", ".join(f'"{word}"' for word in value) + "]`"
+    return f"`{value:g}`"
+
+
+def command_sections() -> str:
+    """Return a section for each command: what it does, its arguments and its options."""
+    context = click.Context(commands)
+    sections = []
+    for name in COMMANDS:
+        command = commands.get_command(context, name)
+        assert command is not None
+        own = click.Context(command, info_name=name, parent=click.Context(commands, info_name="rubhpc"))
+        usage = " ".join([own.command_path, *command.collect_usage_pieces(own)])
+        options = [p for p in command.params if isinstance(p, click.Option) and not p.hidden]
+        rows = [
+            (
+                "`" + ", ".join([*p.opts, *p.secondary_opts]) + "`",
+                "" if p.is_flag else f"`{p.make_metavar(own)}`",
+                _option_default(p),
+                (p.help or "")
+                + (" May be repeated." if p.multiple and "repeat" not in (p.help or "") else ""),
+            )
+            for p in options
+        ]
+        sections.append(
+            f"## `rubhpc {name}`\n\n```text\n{usage}\n```\n\n{_prose(command.help or '')}\n\n"
+            + (_table(("option", "value", "default", "meaning"), rows) if rows else "")
+        )
+    return "\n\n".join(sections)
+
+
+def _option_default(option: click.Option) -> str:
+    value = option.to_info_dict()["default"]
+    if (
+        option.is_flag
+        or value is None
+        or value in ((), "")
+        or option.default.__class__.__name__ == "Sentinel"
+    ):
+        return ""
+    return f"`{', '.join(map(str, value)) if isinstance(value, tuple | list) else value}`"
+
+
+def _prose(text: str) -> str:
+    return inspect.cleandoc(text).replace("\b\n", "")
+
+
+_VARIABLE_SECTIONS = {
+    "Signals": "waveform",
+    "Spectra": "spectrum",
+    "Poincaré sections": "section",
+    "Settings": "setting",
+    "Flags": "flag",
+    "Measures": "measure",
+    "Final state": "state",
+}
+
+
+def variable_sections() -> str:
+    """Return a section for each role that a stored variable has, with its variables."""
+    sections = []
+    for title, role in _VARIABLE_SECTIONS.items():
+        rows = []
+        for variable in (v for v in VARIABLES.values() if v.role == role):
+            dims = ("the axes that set it",) if role == "setting" else ("axes", *variable.dims)
+            flags = ", ".join(f"{i} {flag}" for i, flag in enumerate(variable.flags))
+            meaning = variable.long_name + (f"; {flags}" if flags else "")
+            rows.append((f"`{variable.name}`", ", ".join(dims), variable.dtype, variable.unit, meaning))
+        sections.append(
+            f"## {title}\n\n{_table(('variable', 'dimensions', 'type', 'unit', 'meaning'), rows)}"
+        )
+    return "\n\n".join(sections)
+
+
+def python_names() -> str:
+    """Return autodoc directives for the public names of `rubhpc`: functions, classes, errors."""
+    found = {name: getattr(rubhpc, name) for name in rubhpc.__all__}
+    errors = [
+        name for name, value in found.items() if inspect.isclass(value) and issubclass(value, Exception)
+    ]
+    classes = [name for name, value in found.items() if inspect.isclass(value) and name not in errors]
+    functions = [name for name in found if name not in errors and name not in classes]
+    first = [name for name in ("simulate", "run", "open") if name in functions]
+    functions = first + [name for name in functions if name not in first]
+    return "\n\n".join(
+        f"## {title}\n\n" + _autodoc("rubhpc", names)
+        for title, names in (("Functions", functions), ("Classes", classes), ("Errors", errors))
+    )
+
+
+def postproc_names() -> str:
+    """Return autodoc directives for the public functions of `postproc`, room by room and module by module."""
+    sections = []
+    for room in ROOMS:
+        package = importlib.import_module(f"postproc.{room}")
+        sections.append(f"## `postproc.{room}`\n\n{inspect.getdoc(package)}")
+        for name, module in _modules(package):
+            names = [
+                key
+                for key, value in vars(module).items()
+                if not key.startswith("_")
+                and (inspect.isfunction(value) or inspect.isclass(value))
+                and value.__module__ == name
+                and not (inspect.isclass(value) and issubclass(value, Exception))
+            ]
+            if names:
+                about = (inspect.getdoc(module) or "").split("\n\n")[0].replace("\n", " ")
+                sections.append(f"### `{name}`\n\n{about}\n\n{_autodoc(name, names)}")
+    return "\n\n".join(sections)
+
+
+def _modules(package: Any) -> Iterator[tuple[str, Any]]:
+    for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        if not found.name.rpartition(".")[2].startswith("_"):
+            yield found.name, importlib.import_module(found.name)
+
+
+def _autodoc(module: str, names: Iterable[str]) -> str:
+    home = importlib.import_module(module)
+    lines = []
+    for name in names:
+        is_class = inspect.isclass(getattr(home, name))
+        lines.append(f".. auto{'class' if is_class else 'function'}:: {module}.{name}")
+        if is_class and not issubclass(getattr(home, name), Exception):
+            lines.append("   :members:")
+        lines.append("")
+    return "```{eval-rst}\n" + "\n".join(lines) + "```"
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """Return a Markdown table."""
+    lines = [head, tuple("---" for _ in head), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+_TABLES = {
+    "axes": axis_table,
+    "study": lambda: key_tables(STUDY_TABLES),
+    "rig": lambda: key_tables(RIG_TABLES),
+    "commands": command_sections,
+    "variables": variable_sections,
+    "python": python_names,
+    "postproc": postproc_names,
+}
+assert postproc  # its rooms are imported by name
