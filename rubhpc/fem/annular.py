@@ -71,7 +71,7 @@ def annular_rub(model: Model, spin: float, clearance: float, friction: float) ->
     InputError
         When the contact-free orbit does not reach the ring, or no circular orbit balances the forces.
     """
-    rotor, stator = model.rotor, model.stators[0]
+    rotor, stator = model.rotor.at(spin), model.stators[0]
     rows = [rotor.index(stator.node, name) for name in ("v", "w")]
     sense = math.copysign(1.0, spin)
     free = steady_response(model, spin)[rows[0]]

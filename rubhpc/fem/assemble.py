@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rubhpc.fem.forces import forces_on
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 def assemble(rig: Rig) -> Model:
     """Assemble the finite element model of a rig.
 
+    Where bearings depend on the speed, it is the rotor at standstill: at 0, or where a table does not begin
+    there at its lowest speed. `model_at` gives it at another.
+
     The recorded node is the first stator's, or else the first disc's, or else the middle of the shaft; a
     `MatrixRotor` may name another one.
     """
@@ -31,7 +35,22 @@ def assemble(rig: Rig) -> Model:
         stators=tuple(_stator(rig, stator) for stator in rig.stator),
         output_node=rig.rotor.recorded_node([stator.node for stator in rig.stator]),
         sag=sag_under(body, constant),
+        load=constant,
     )
+
+
+def model_at(model: Model, spin: float) -> Model:
+    """Return a model at a spin (rad/s): its rotor and sag where bearings depend on the speed, or itself.
+
+    Raises
+    ------
+    InputError
+        When the spin is outside the table of a bearing.
+    """
+    if model.rotor.by_speed is None:
+        return model
+    rotor = model.rotor.at(spin)
+    return replace(model, rotor=rotor, sag=sag_under(rotor, model.load))
 
 
 def _stator(rig: Rig, stator: AnyStator) -> StatorModel:

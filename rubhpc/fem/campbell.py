@@ -38,12 +38,7 @@ def campbell(body: Body, speeds: Sequence[float] | NDArray[np.float64]) -> xr.Da
         `frequency` (Hz), `damping_ratio` and `whirl` (mode, speed), with the coordinates `kind` (mode) and
         `speed` (rad/s). Modes are numbered by their natural frequency at the first speed.
     """
-    followed = [modes(body, float(speeds[0]))]
-    for speed in speeds[1:]:
-        found = modes(body, float(speed))
-        order = _order(body, followed[-1], found)
-        followed.append([found[i] for i in order])
-    tracks = list(zip(*followed, strict=True))
+    tracks = follow_modes(body, speeds)
     return xr.Dataset(
         {
             "frequency": (
@@ -67,6 +62,20 @@ def campbell(body: Body, speeds: Sequence[float] | NDArray[np.float64]) -> xr.Da
             ),
         },
     )
+
+
+def follow_modes(body: Body, speeds: Sequence[float] | NDArray[np.float64]) -> list[tuple[Mode, ...]]:
+    """Return every mode of a body, each at all speeds (rad/s, in order)."""
+    followed = [modes(body, float(speeds[0]))]
+    for speed in speeds[1:]:
+        followed.append(continued(body, followed[-1], float(speed)))
+    return list(zip(*followed, strict=True))
+
+
+def continued(body: Body, before: list[Mode], speed: float) -> list[Mode]:
+    """Return the modes at a speed (rad/s) in the order of those at a speed close by."""
+    found = modes(body, speed)
+    return [found[i] for i in _order(body, before, found)]
 
 
 def critical_speeds(curves: xr.Dataset, order: float = 1.0) -> list[tuple[int, float]]:

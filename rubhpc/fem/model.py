@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,12 +11,54 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from rubhpc.errors import InputError
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from rubhpc.rig.bearing_table import BearingTable
+
 NOTHING = 1e-14  # of a matrix's greatest entry: a coupling that is rounding
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Support:
+    """A bearing or seal with coefficients that depend on the spin."""
+
+    table: BearingTable
+    rows: tuple[int, int]  # of "v" and "w" of its node; -1 where there is none
+    name: str  # for messages
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SpeedDependence:
+    """What a body is made of at any spin: constant matrices, and supports.
+
+    Attributes
+    ----------
+    stiffness, damping : (n_dof, n_dof)
+        Without the supports.
+    proportional : float
+        Rayleigh's beta, s: damping that the stiffness of a support brings with it.
+    """
+
+    stiffness: NDArray[np.float64]
+    damping: NDArray[np.float64]
+    proportional: float = 0.0
+    supports: tuple[Support, ...]
+
+    def matrices_at(self, spin: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return stiffness and damping matrix at a spin (rad/s), (n_dof, n_dof) each."""
+        stiffness, damping = self.stiffness.copy(), self.damping.copy()
+        for support in self.supports:
+            k, c = support.table.at(spin, support.name)
+            there = [i for i, row in enumerate(support.rows) if row >= 0]
+            rows = [support.rows[i] for i in there]
+            stiffness[np.ix_(rows, rows)] += k[np.ix_(there, there)]
+            damping[np.ix_(rows, rows)] += (c + self.proportional * k)[np.ix_(there, there)]
+        return stiffness, damping
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,7 +68,8 @@ class Body:
     Attributes
     ----------
     mass, damping, gyroscopic, stiffness : (n_dof, n_dof)
-        M, D (bearings included), G (to be multiplied by the spin, rad/s) and K in SI units.
+        M, D (bearings included), G (to be multiplied by the spin, rad/s) and K in SI units. Where bearings
+        depend on the speed, D and K hold at one spin; `at` gives them at another.
     degrees : tuple of (node, name)
         Which degree each row is. Rotor: "u", "v", "w", "thx", "thy", "thz"; stator: "axial"
         (positive outward, compressed), "lateral" (positive with the rim under positive spin), "rotation".
@@ -37,6 +81,40 @@ class Body:
     gyroscopic: NDArray[np.float64]
     stiffness: NDArray[np.float64]
     degrees: tuple[tuple[int, str], ...]
+    by_speed: SpeedDependence | None = None
+
+    def at(self, spin: float) -> Body:
+        """Return the body at a spin, rad/s: itself, where nothing depends on the speed.
+
+        Raises
+        ------
+        InputError
+            When the spin is outside the table of a bearing.
+        """
+        if self.by_speed is None:
+            return self
+        stiffness, damping = self.by_speed.matrices_at(spin)
+        return replace(self, stiffness=stiffness, damping=damping)
+
+    @property
+    def tabulated_speeds(self) -> list[float]:
+        """Speeds of all tables of its bearings within the range that they share, rad/s; none without tables.
+
+        Raises
+        ------
+        InputError
+            When the tables share no range.
+        """
+        supports = self.by_speed.supports if self.by_speed else ()
+        if not supports:
+            return []
+        low, high = max(s.table.speed[0] for s in supports), min(s.table.speed[-1] for s in supports)
+        if low > high:
+            rpm = 30 / math.pi
+            names = ", ".join(support.name for support in supports)
+            problem = f"one table begins at {low * rpm:.6g} rpm, another ends at {high * rpm:.6g} rpm"
+            raise InputError(f"{names}: no speed is common to them: {problem}; extend them")
+        return sorted({speed for s in supports for speed in s.table.speed if low <= speed <= high})
 
     @property
     def n_dof(self) -> int:
@@ -95,6 +173,7 @@ class Model:
     stators: tuple[StatorModel, ...]
     output_node: int  # whose motion is recorded: the first stator's, or else the first disc's
     sag: NDArray[np.float64]  # (n_dof,), of the rotor under its constant loads, no stator touching, m or rad
+    load: NDArray[np.float64]  # (n_dof,), constant loads on the rotor, N or N m
 
 
 def state_size(model: Model) -> int:

@@ -84,6 +84,7 @@ def modes(body: Body, spin: float = 0.0) -> list[Mode]:
     list of Mode
         As many as the body has degrees of freedom.
     """
+    body = body.at(spin)
     found = []
     for rows in _groups(body):
         block = np.ix_(rows, rows)

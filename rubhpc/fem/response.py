@@ -36,9 +36,10 @@ def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
     Raises
     ------
     InputError
-        If the response has no bound: the spin is a natural frequency of an undamped rotor.
+        If the response has no bound: the spin is a natural frequency of an undamped rotor; or if a bearing
+        has no coefficients at that speed.
     """
-    rotor = model.rotor
+    rotor = model.rotor.at(spin)
     lateral = rotor.rows(KINDS["lateral"])
     block = np.ix_(lateral, lateral)
     response = np.zeros(rotor.n_dof, dtype=np.complex128)
@@ -81,9 +82,10 @@ def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -
 def first_lateral_frequency(model: Model) -> float:
     """Lowest undamped lateral natural frequency of the rotor at standstill, rad/s: where `speed_ratio` is 1.
 
-    A rotor free to move sideways has it at its first bending mode, above those of the rigid body.
+    A rotor free to move sideways has it at its first bending mode, above those of the rigid body. Bearings
+    that depend on the speed have the coefficients of standstill, or else of the lowest speed of their table.
     """
-    undamped = replace(model.rotor, damping=np.zeros_like(model.rotor.damping))
+    undamped = replace(model.rotor.at(0.0), damping=np.zeros_like(model.rotor.damping), by_speed=None)
     rows = undamped.rows(KINDS["lateral"])
     stiffness = undamped.stiffness[np.ix_(rows, rows)]
     is_alone = all(undamped.degrees[row][1] in KINDS["lateral"] for row in rows)
@@ -106,8 +108,11 @@ def step_limit(model: Model) -> float:
     difference and m the mean of two successive displacements, falls by what D dissipates; G does no work. The
     energy is a norm, and thus bounds the motion, while `h < 2 / omega_max`. (Damping with the velocity of the
     half step behind would lower the limit.)
+
+    Where bearings depend on the speed, it is the least over the speeds of their tables.
     """
-    bodies = [model.rotor, *(stator.body for stator in model.stators if stator.body.n_dof)]
+    rotors = [model.rotor, *(model.rotor.at(speed) for speed in model.rotor.tabulated_speeds)]
+    bodies = [*rotors, *(stator.body for stator in model.stators if stator.body.n_dof)]
     return 2.0 / math.sqrt(max(_spectral_radius(body) for body in bodies))
 
 

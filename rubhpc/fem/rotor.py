@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import singledispatch
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.fem.beam import ROTOR_DEGREES, join, rotor_element
 from rubhpc.fem.damping import rayleigh_coefficients
-from rubhpc.fem.model import Body
+from rubhpc.fem.model import Body, SpeedDependence, Support
+from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.rotors import MatrixRotor, Rotor
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rubhpc.rig.bearing_table import AnyBearing
 
 
 @singledispatch
@@ -23,7 +31,8 @@ def _(rotor: Rotor) -> Body:
     """Shaft with axial motion constrained at node 1, and torsion where the drive constrains it.
 
     Rayleigh damping includes the springs of the bearings and of the drive, as the paper's proportional
-    damping does; dampers of bearings and drive are added to it.
+    damping does; dampers of bearings and drive are added to it. Speed-dependent bearings are those of
+    standstill; `Body.at` returns the rotor at another speed.
 
     Notes
     -----
@@ -44,6 +53,8 @@ def _(rotor: Rotor) -> Body:
         G[thy, thz] += polar
         G[thz, thy] -= polar
     for bearing in rotor.bearing:
+        if isinstance(bearing, BearingTable):
+            continue
         first = 6 * (bearing.node - 1) + 1
         seat = slice(first, first + 2)
         K[seat, seat] += bearing.stiffness_matrix
@@ -59,23 +70,53 @@ def _(rotor: Rotor) -> Body:
     degrees = [(node, name) for node in range(1, n_node + 1) for name in ROTOR_DEGREES]
     free = [row for row, degree in enumerate(degrees) if degree not in constrained]
     rows = np.ix_(free, free)
-    return Body(
+    body = Body(
         mass=M[rows],
         damping=(alpha * M + beta * K + dampers)[rows],
         gyroscopic=G[rows],
         stiffness=K[rows],
         degrees=tuple(degrees[row] for row in free),
     )
+    return _with_tables(body, rotor.bearing, beta)
 
 
 @assemble_rotor.register(MatrixRotor)
 def _(rotor: MatrixRotor) -> Body:
     assert rotor.damping is not None  # zeros if not given
     assert rotor.gyroscopic is not None
-    return Body(
+    body = Body(
         mass=rotor.mass,
         damping=rotor.damping,
         gyroscopic=rotor.gyroscopic,
         stiffness=rotor.stiffness,
         degrees=rotor.degrees,
     )
+    return _with_tables(body, rotor.bearing)
+
+
+def _with_tables(body: Body, bearings: Sequence[AnyBearing], proportional: float = 0.0) -> Body:
+    """Return a body with its speed-dependent bearings, at standstill.
+
+    Parameters
+    ----------
+    body : Body
+        Without its speed-dependent bearings.
+    bearings : sequence of Bearing or BearingTable
+    proportional : float
+        Rayleigh's beta, s, which includes their stiffness.
+    """
+    supports = tuple(
+        Support(
+            table=bearing,
+            rows=(body.index(bearing.node, "v"), body.index(bearing.node, "w")),
+            name=f"rotor.bearing.{number}",
+        )
+        for number, bearing in enumerate(bearings, 1)
+        if isinstance(bearing, BearingTable)
+    )
+    if not supports:
+        return body
+    by_speed = SpeedDependence(
+        stiffness=body.stiffness, damping=body.damping, proportional=proportional, supports=supports
+    )
+    return replace(body, by_speed=by_speed).at(0.0)

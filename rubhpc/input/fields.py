@@ -53,6 +53,14 @@ def quantity(
     return _declare("quantity", doc, example, default, unit=unit, **bounds)
 
 
+def series(
+    unit: str, *, doc: str, example: str, default: Any = MISSING, at_least: float | None = None
+) -> Any:
+    """Declare a field that holds a tuple of finite numbers in `unit` (SI), none below a bound."""
+    bounds = {"above": None, "at_least": at_least, "below": None}
+    return _declare("series", doc, example, default, unit=unit, **bounds)
+
+
 def count(
     *,
     doc: str,
@@ -108,9 +116,12 @@ def degrees(*, doc: str, example: str) -> Any:
     return _declare("degrees", doc, example, MISSING)
 
 
-def table(*, doc: str, default: Any = MISSING) -> Any:
-    """Declare a field that holds another dataclass, or a tuple of them: a table of its own in the file."""
-    return field(default=default, metadata={"doc": doc})
+def table(*, doc: str, default: Any = MISSING, added: bool = False) -> Any:
+    """Declare a field that holds another dataclass, or a tuple of them: a table of its own in the file.
+
+    `added`: older stores do not have it, and a rig with its default is described without it.
+    """
+    return field(default=default, metadata={"doc": doc, "added": added})
 
 
 def _declare(kind: str, doc: str, example: str, default: Any, **limits: Any) -> Any:
@@ -122,6 +133,10 @@ def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> 
     kind = declared.metadata.get("kind")
     if kind == "quantity":
         return parse_quantity(value, declared.metadata["unit"], where)
+    if kind == "series":
+        values = value if isinstance(value, list | tuple) else [value]
+        unit = declared.metadata["unit"]
+        return tuple(parse_quantity(v, unit, f"{where}: value {i}") for i, v in enumerate(values, 1))
     if kind == "count":
         return _parse_count(value, where, declared.metadata["or_word"])
     if kind == "matrix":
@@ -232,6 +247,15 @@ def _check_quantity(value: object, bounds: Any) -> str:
     return ""
 
 
+def _check_series(values: Any, bounds: Any) -> str:
+    if not isinstance(values, tuple) or not values:
+        return f"{brief(values)} is not a list of numbers; give one or more"
+    problems = (
+        f"value {i}: {problem}" for i, v in enumerate(values, 1) if (problem := _check_quantity(v, bounds))
+    )
+    return next(problems, "")
+
+
 def _check_count(value: object, bounds: Any) -> str:
     if bounds["or_word"] and value == bounds["or_word"]:
         return ""
@@ -277,6 +301,7 @@ def _listed(words: Iterable[str]) -> str:
 
 _CHECKS = {
     "quantity": _check_quantity,
+    "series": _check_series,
     "count": _check_count,
     "flag": _check_flag,
     "text": _check_text,

@@ -99,7 +99,10 @@ def refuse_unknown(table: Mapping[str, object], known: Mapping[str, object], fil
 
 
 def plain(value: Any) -> Any:
-    """Return a dataclass as dicts, lists, numbers and text, from which `build` makes it again."""
+    """Return a dataclass as dicts, lists, numbers and text, from which `build` makes it again.
+
+    A field with `added` among its metadata is left out at its default: rigs of older stores have no such key.
+    """
     if not dataclasses.is_dataclass(value):
         return [plain(v) for v in value] if isinstance(value, tuple) else value
     result: dict[str, Any] = {}
@@ -111,7 +114,7 @@ def plain(value: Any) -> Any:
             result[declared.name] = [list(degree) for degree in held]
         elif kind == "pairs":
             result[declared.name] = {repr(float(key)): float(number) for key, number in held}
-        elif held is not None:
+        elif held is not None and not (declared.metadata.get("added") and held == declared.default):
             result[declared.name] = float(held) if kind == "quantity" else plain(held)
     return result
 

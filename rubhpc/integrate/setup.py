@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 from rubhpc.errors import InputError
-from rubhpc.fem.assemble import assemble
+from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.response import step_limit
 from rubhpc.integrate.contact_mode import Phase, make_phase
 from rubhpc.integrate.mode_library import PhaseBook
@@ -134,7 +134,7 @@ def prepare(
         raise InputError(f"rig {rig.name}: [[stator]]: none; a rub case needs at least one")
     if speed == 0.0 or not math.isfinite(speed):
         raise InputError(f"speed: {speed} rad/s; sampling is locked to the shaft, so it has to turn")
-    model = model or assemble(rig)
+    model = model_at(model or assemble(rig), speed)
     if integrator.method == "modal":
         return ModalSetup(
             model=model,

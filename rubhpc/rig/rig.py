@@ -142,7 +142,8 @@ class Rig:
         gravity : float (m/s2) or str with a unit
             0 by default.
         speed : float (rad/s) or str with a unit, optional
-            Speed at which speed-dependent bearing coefficients are evaluated.
+            Speed at which speed-dependent bearings are evaluated once and for all. By default they keep
+            their tables, and every case uses the coefficients at its own speed.
         torsion : Torsion
             Torsional boundary condition, which a ROSS rotor lacks; by default node 1 is fixed.
         output_node : int, optional

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.errors import InputError
+from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import FIXED_AT_NODE_1, Torsion
 from rubhpc.rig.rotors import DIVERGED_SHARE, MatrixRotor
 
@@ -42,7 +43,7 @@ def rotor_from_ross(
     rotor : ross.Rotor
         With six degrees of freedom per node (ROSS 1.5 and later).
     speed : float, optional
-        Speed at which speed-dependent bearing coefficients are evaluated, rad/s.
+        Speed at which speed-dependent bearings are evaluated, rad/s; by default they keep their tables.
     torsion : Torsion
         Torsional boundary condition, which a ROSS rotor lacks.
     unbalance : sequence of Unbalance
@@ -50,7 +51,7 @@ def rotor_from_ross(
     Raises
     ------
     InputError
-        When it is not such a rotor, or its bearings depend on a speed that is not given.
+        When it is not such a rotor, or a bearing depends on something that its table cannot hold.
     """
     if not all(callable(getattr(rotor, name, None)) for name in "MCKG"):
         raise InputError(f"from_ross: {type(rotor).__name__} is not a ross.Rotor; pass one")
@@ -59,10 +60,14 @@ def rotor_from_ross(
         raise InputError(
             f"from_ross: the rotor has {n_degree} degrees per node, not 6; use ROSS 1.5 or later"
         )
-    if speed is None:
-        _check_constant(rotor)
-        speed = 0.0
-    given = {"mass": rotor.M(speed), "damping": rotor.C(speed), "stiffness": rotor.K(speed)}
+    varying = [b for b in getattr(rotor, "bearing_elements", ()) if speed is None and _varying(b)]
+    tables = tuple(_table(bearing) for bearing in varying)
+    at = speed if speed is not None else max((table.speed[0] for table in tables), default=0.0)
+    given = {"mass": rotor.M(at), "damping": np.array(rotor.C(at)), "stiffness": np.array(rotor.K(at))}
+    for bearing in varying:
+        rows = slice(6 * bearing.n, 6 * bearing.n + 2)
+        given["stiffness"][rows, rows] -= np.asarray(bearing.K(at))[:2, :2]
+        given["damping"][rows, rows] -= np.asarray(bearing.C(at))[:2, :2]
     given["gyroscopic"] = rotor.G()
     n_node = len(given["mass"]) // len(_DEGREES)
     order = [6 * node + theirs for node in range(n_node) for _, theirs, _ in _DEGREES]
@@ -88,6 +93,7 @@ def rotor_from_ross(
     return MatrixRotor(
         **reduced,
         degrees=tuple(degrees[row] for row in kept_rows),
+        bearing=tables,
         unbalance=tuple(unbalance),
         displacement_limit=DIVERGED_SHARE * float(rotor.L),
     )
@@ -99,10 +105,37 @@ def _is_axially_unconstrained(stiffness: NDArray[np.float64], degrees: list[tupl
     return bool(np.abs(stiffness @ along).max() < _NO_FORCE * np.abs(stiffness).max())
 
 
-def _check_constant(rotor: Any) -> None:
-    for bearing in getattr(rotor, "bearing_elements", ()):
-        for name in _COEFFICIENTS:
-            values = np.atleast_1d(np.asarray(getattr(bearing, name, 0.0), dtype=np.float64))
-            if np.ptp(values) > 0.0:
-                problem = f"{name} of the bearing at ROSS node {bearing.n} depends on the speed"
-                raise InputError(f"from_ross: {problem}; pass the speed (rad/s) at which to evaluate it")
+def _varying(bearing: Any) -> list[str]:
+    """Names of the coefficients of a bearing that are not constant."""
+    tables = {name: np.asarray(getattr(bearing, name, 0.0), dtype=np.float64) for name in _COEFFICIENTS}
+    return [name for name, values in tables.items() if np.ptp(values) > 0.0]
+
+
+def _table(bearing: Any) -> BearingTable:
+    """Table over the speed of a ROSS bearing, whose (y, -x) are (v, w).
+
+    ROSS 3 distinguishes rotor speed and whirl frequency. ROSS 2 has one axis, `frequency`, for both.
+    """
+    has_speed = hasattr(bearing, "speed")
+    axis = bearing.speed if has_speed else getattr(bearing, "frequency", None)
+    named = f"from_ross: the bearing at ROSS node {bearing.n}"
+    fix = "pass the speed (rad/s) at which to evaluate all bearings"
+    if axis is None or (has_speed and getattr(bearing, "frequency", None) is not None):
+        raise InputError(f"{named} depends on the whirl frequency; {fix}")
+    if getattr(bearing, "n_link", None) is not None:
+        raise InputError(f"{named} connects two nodes and depends on the speed; {fix}")
+    for name in _varying(bearing):
+        if name.startswith("m") or name.endswith("zz"):
+            raise InputError(f"{named}: {name} depends on the speed; {fix}, or make it constant")
+    columns = {}
+    for letter in "kc":
+        for pair, theirs, sign in (("yy", "yy", 1), ("yz", "yx", -1), ("zy", "xy", -1), ("zz", "xx", 1)):
+            values = np.atleast_1d(np.asarray(getattr(bearing, f"{letter}{theirs}", 0.0), dtype=np.float64))
+            columns[f"{letter}{pair}"] = tuple((sign * values + 0.0).tolist())
+    is_linear = getattr(bearing, "interpolation", "pchip") == "linear"
+    return BearingTable(
+        node=int(bearing.n) + 1,
+        speed=tuple(np.asarray(axis, dtype=np.float64).tolist()),
+        interpolation="linear" if is_linear else "cubic",
+        **columns,
+    )

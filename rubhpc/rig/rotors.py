@@ -14,9 +14,10 @@ from numpy.typing import NDArray  # noqa: TC002 - annotations are read when a ri
 
 from rubhpc.input.fields import FieldError, check_fields, count, degrees, matrix, nearest, quantity, table
 from rubhpc.input.matrix import is_symmetric
+from rubhpc.rig.bearing_table import AnyBearing, BearingTable  # noqa: TC001 - likewise
 from rubhpc.rig.forces import RotorForces
 from rubhpc.rig.matrix_body import check_body, checked_matrices
-from rubhpc.rig.parts import FIXED_AT_NODE_1, UNDAMPED, Bearing, Damping, Disc, ShaftSection, Torsion
+from rubhpc.rig.parts import FIXED_AT_NODE_1, UNDAMPED, Damping, Disc, ShaftSection, Torsion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,7 +32,7 @@ class Rotor(RotorForces):
 
     shaft: tuple[ShaftSection, ...] = table(doc="Shaft sections, from node 1.")
     disc: tuple[Disc, ...] = table(doc="Rigid discs.", default=())
-    bearing: tuple[Bearing, ...] = table(doc="Linear bearings.", default=())
+    bearing: tuple[AnyBearing, ...] = table(doc="Linear bearings and seals.", default=())
     torsion: Torsion = table(doc="Torsional boundary condition at the drive.", default=FIXED_AT_NODE_1)
     damping: Damping = table(doc="Rayleigh damping.", default=UNDAMPED)
 
@@ -107,6 +108,11 @@ class MatrixRotor(RotorForces):
         doc="Node and name of each row: u, v, w, thx, thy, thz, or q... for other coordinates.",
         example='[[1, "v"], [1, "w"]]',
     )
+    bearing: tuple[BearingTable, ...] = table(
+        doc="Speed-dependent bearings and seals; the matrices include all others.",
+        default=(),
+        added=True,
+    )
     output_node: int | None = count(
         doc="Node whose motion is recorded; by default that of the first stator.",
         example="1",
@@ -135,6 +141,8 @@ class MatrixRotor(RotorForces):
             )
         if self.output_node is not None:
             self.check_node("output_node", self.output_node)
+        for i, bearing in enumerate(self.bearing, 1):
+            self.check_node(f"bearing.{i}.node", bearing.node)
         for key, force in self.node_forces():
             self.check_node(f"{key}.node", force.node)
         if self.gravity and any(name.startswith("q") for _, name in self.degrees):

@@ -9,13 +9,13 @@ import pytest
 
 from rubhpc.input.fields import check_value, parse_field
 from rubhpc.input.reading import build
-from rubhpc.rig import forces, parts, rig, rotors, stators
+from rubhpc.rig import bearing_table, forces, parts, rig, rotors, stators
 from rubhpc.rig.reading import read_rig
 from rubhpc.study import axes, tables
 
 TABLES = {
     cls
-    for module in (rig, rotors, forces, parts, stators, tables)
+    for module in (bearing_table, rig, rotors, forces, parts, stators, tables)
     for cls in vars(module).values()
     if isinstance(cls, type) and dataclasses.is_dataclass(cls) and cls.__module__.startswith("rubhpc.")
 }

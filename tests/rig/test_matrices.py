@@ -22,6 +22,7 @@ from rubhpc import (
 from rubhpc.fem.constraints import find_rigid_body_mode
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import first_lateral_frequency, steady_response
+from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Torsion
 from rubhpc.rig.reading import rig_from_dict, with_key, with_keys
 from rubhpc.study.cases import CaseGrid, identity_parts
@@ -356,13 +357,77 @@ def test_what_is_no_rotor_of_ross_is_refused(change, told):
         Rig.from_ross(ross(**change))
 
 
-def test_bearings_of_ross_that_depend_on_the_speed_ask_for_it():
+def ross_bearing(**changed):
+    """A bearing of ROSS 3 at its node 1, twice as stiff at 100 rad/s as at rest."""
     from types import SimpleNamespace
 
-    bearing = SimpleNamespace(n=1, kxx=[1e6, 2e6], frequency=[0.0, 100.0])
-    given = ross(bearing_elements=[bearing], K=lambda w: np.eye(12) * (1.0 + w))
-    with pytest.raises(InputError, match="kxx of the bearing at ROSS node 1 depends on the speed"):
-        Rig.from_ross(given)
-    assert Rig.from_ross(given, speed="955 rpm").rotor.stiffness[0, 0] == pytest.approx(101.0, rel=1e-3)
-    with pytest.raises(InputError, match="nodes run from 1 to 2"):
+    given = {"n": 1, "n_link": None, "speed": [0.0, 100.0], "frequency": None, "interpolation": "pchip"}
+    given |= {"kxx": [1e6, 2e6], "kyy": [3e6, 6e6], "kxy": 2e5, "kyx": [-1e5, -2e5], "cxx": 10.0, "cyy": 20.0}
+    found = SimpleNamespace(**(given | changed))
+    found.K = lambda w: np.array([[1e6, 2e5, 0], [-1e5, 3e6, 0], [0, 0, 0]]) * (1 + w / 100.0)
+    found.C = lambda w: np.diag([10.0, 20.0, 0.0])
+    return found
+
+
+def ross_on_bearing(**changed):
+    bearing = ross_bearing(**changed)
+
+    def matrix(own, whole):
+        def at(w):
+            entries = np.diag(np.full(12, whole))
+            entries[6:9, 6:9] += own(w)
+            return entries
+
+        return at
+
+    K, C = matrix(bearing.K, 1e3), matrix(bearing.C, 0.0)
+    return ross(bearing_elements=[bearing], K=K, C=C)
+
+
+def test_bearings_of_ross_keep_their_tables():
+    """Turned: (v, w) of the shaft are (y, -x) of ROSS."""
+    rig = Rig.from_ross(ross_on_bearing())
+    assert rig.rotor.bearing == (
+        BearingTable(
+            node=2,
+            speed=[0.0, 100.0],
+            kyy=[3e6, 6e6],
+            kzz=[1e6, 2e6],
+            kyz=[1e5, 2e5],
+            kzy=[-2e5],
+            cyy=[20.0],
+            czz=[10.0],
+            cyz=[0.0],
+            czy=[0.0],
+        ),
+    )
+    rows = [rig.rotor.degrees.index((2, name)) for name in ("v", "w")]
+    assert rig.rotor.stiffness[np.ix_(rows, rows)] == pytest.approx(np.diag([1e3, 1e3]))
+    assert not rig.rotor.damping.any()
+    assert rig_from_dict(json.loads(json.dumps(rig.as_dict()))).as_dict() == rig.as_dict()
+
+
+def test_bearings_of_ross_are_frozen_where_a_speed_is_given():
+    frozen = Rig.from_ross(ross_on_bearing(), speed="50 rad/s").rotor
+    assert frozen.bearing == ()
+    row = frozen.degrees.index((2, "v"))
+    assert frozen.stiffness[row, row] == pytest.approx(1e3 + 4.5e6)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"speed": None, "frequency": [0.0, 100.0]}, "depends on the whirl frequency"),
+        ({"n_link": 0}, "connects two nodes"),
+        ({"mxx": [1.0, 2.0]}, "mxx depends on the speed"),
+    ],
+)
+def test_bearings_of_ross_that_no_table_holds_ask_for_a_speed(change, told):
+    with pytest.raises(InputError, match=told):
+        Rig.from_ross(ross_on_bearing(**change))
+    Rig.from_ross(ross_on_bearing(**change), speed=10.0)
+
+
+def test_a_torsional_node_that_ross_does_not_have_is_refused():
+    with pytest.raises(InputError, match="the nodes run from 1 to 2"):
         Rig.from_ross(ross(), torsion=Torsion(fixed_node=3))

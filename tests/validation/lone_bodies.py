@@ -42,6 +42,7 @@ def tip(stator_body, angle, *, radius=1.0, axial=0, lateral=-1):
 def _model(rotor, stators, spin, force, load):
     force = np.zeros(rotor.n_dof) if force is None else np.asarray(force)
     return Model(
+        load=np.zeros(rotor.n_dof) if load is None else np.asarray(load),
         rotor=rotor,
         unbalance_cosine=force.real / spin**2,
         unbalance_sine=-force.imag / spin**2,
