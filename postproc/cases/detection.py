@@ -1,4 +1,4 @@
-"""How often rub indicators tell rub from no rub, each alone and all together."""
+"""How often rub indicators distinguish rub from no rub, each alone and all together."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LEAST = 10  # cases of each kind in either half, to learn from and to judge by
 def judge(scores: xr.Dataset, false_alarm: float = 0.05, seed: int = 1) -> xr.Dataset:
     """Return every case's verdict, and how often it is right.
 
-    The cases are parted at random into halves, and each half is judged by what the other one taught: from its
+    The cases are split at random into halves, and each half is judged with thresholds of the other: from its
     cases without contact come the mean and the standard deviation of each indicator, and its threshold, which
     a share `false_alarm` of them passes. All indicators together are taken by Fisher's method: the sum of
     `-ln p`, with `p` the probability that an indicator is as high without contact, from a normal distribution
@@ -45,7 +45,7 @@ def judge(scores: xr.Dataset, false_alarm: float = 0.05, seed: int = 1) -> xr.Da
         Over (indicator, level): `detection_rate` (of the cases that touch), `false_alarm_rate` (of those that
         do not) and `area_under_curve` (the probability that a case which touches scores higher than one that
         does not; the mean of both halves). Over (indicator, axes, level): `verdict`, the share of the draws
-        in which rub is told. Over the axes: `rub`. Over (axes, level, draw): the indicators.
+        in which rub is detected. Over the axes: `rub`. Over (axes, level, draw): the indicators.
 
     Raises
     ------
@@ -68,25 +68,25 @@ def judge(scores: xr.Dataset, false_alarm: float = 0.05, seed: int = 1) -> xr.Da
             f"{int((done & rub).sum())} with it are too few to learn from; take some {4 * _LEAST} of each"
         )
     names = [*INDICATORS, TOGETHER]
-    told = np.full((len(names), *values.shape[1:]), math.nan)
+    is_detected = np.full((len(names), *values.shape[1:]), math.nan)
     areas = np.zeros((2, len(names), values.shape[-2]))
     for i_half, (learnt, judged) in enumerate((halves, halves[::-1])):
         known = np.concatenate((values, _together(values, learnt & ~rub)[None]))
         threshold = np.quantile(known[:, learnt & ~rub], 1 - false_alarm, axis=(1, 3))
-        told[:, judged] = known[:, judged] > threshold[:, None, :, None]
+        is_detected[:, judged] = known[:, judged] > threshold[:, None, :, None]
         for place in np.ndindex(*threshold.shape):
             level = known[place[0]][..., place[1], :]
             areas[(i_half, *place)] = area_under_curve(
                 level[judged & rub].ravel(), level[judged & ~rub].ravel()
             )
     found = {
-        "detection_rate": (told[:, done & rub].mean(axis=(1, 3)), "share of cases with rub told as such"),
+        "detection_rate": (is_detected[:, done & rub].mean(axis=(1, 3)), "share of cases with rub detected"),
         "false_alarm_rate": (
-            told[:, done & ~rub].mean(axis=(1, 3)),
-            "share of cases without rub told as rub",
+            is_detected[:, done & ~rub].mean(axis=(1, 3)),
+            "share of cases without rub detected as rub",
         ),
         "area_under_curve": (areas.mean(axis=0), "area under the receiver operating curve"),
-        "verdict": (told.mean(axis=-1), "share of draws in which rub is told"),
+        "verdict": (is_detected.mean(axis=-1), "share of draws in which rub is detected"),
     }
     return scores.assign_coords(indicator=names).assign(
         {
@@ -101,7 +101,7 @@ def judge(scores: xr.Dataset, false_alarm: float = 0.05, seed: int = 1) -> xr.Da
 
 
 def area_under_curve(with_rub: Floats, without: Floats) -> float:
-    """Return the area under the receiver operating curve, (n,), (m,) -> 0 to 1; 0.5 tells nothing.
+    """Return the area under the receiver operating curve, (n,), (m,) -> 0 to 1; 0.5 is chance.
 
     It is the share of pairs in which the case with rub scores higher, ties counted half (Mann and Whitney).
     """

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 _PASSES = 200  # of the fill, at most; each takes an unbalanced grid closer to least squares
-_CLOSE = 1e-10  # of the spread: the fill stands still
+_CLOSE = 1e-10  # of the spread: the fill has converged
 
 
 def grid_indices(values: Floats, weights: list[Floats] | None = None) -> Floats:
@@ -94,7 +94,7 @@ def half_widths(
         case[is_filled] += random.choice(residuals, int(is_filled.sum()))
         weights = [_level_weights(random, n) for n in values.shape]
         with np.errstate(divide="ignore", invalid="ignore"):
-            # A draw may by chance take levels among which the measure does not change: it tells nothing.
+            # A draw may by chance take levels between which the measure does not change: no information.
             drawn[i] = grid_indices(case, weights)
     width: Floats = norm.ppf(0.5 + confidence / 2) * np.nanstd(drawn, axis=0, ddof=1)
     return width

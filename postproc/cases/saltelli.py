@@ -46,13 +46,13 @@ def by_point(values: xr.DataArray, store: xr.Dataset) -> Floats:
 
 def is_log(store: xr.Dataset, name: str) -> bool:
     """Whether a quantity was drawn evenly in the logarithm."""
-    told = [about for key, about in _study(store).get("grid", {}).items() if coordinate_of(key) == name]
-    return bool(told) and told[0].get("scale") == "log"
+    found = [about for key, about in _study(store).get("grid", {}).items() if coordinate_of(key) == name]
+    return bool(found) and found[0].get("scale") == "log"
 
 
-def ranges_told(store: xr.Dataset) -> list[str]:
+def drawn_ranges(store: xr.Dataset) -> list[str]:
     """Return what each drawn axis was drawn from: "1.4 to 2.2", "1 to 30 GPa, log"."""
-    told = []
+    found = []
     for name in drawn_axes(store):
         key = next(key for key in _study(store)["grid"] if coordinate_of(key) == name)
         about = _study(store)["grid"][key]
@@ -60,8 +60,8 @@ def ranges_told(store: xr.Dataset) -> list[str]:
         shown, label = displayed(xr.DataArray(ends, name=name, attrs={"units": about["unit"]}))
         unit = label.rpartition(" (")[2].rstrip(")") if label.endswith(")") else ""
         text = f"{shown[0]:.6g} to {shown[1]:.6g} {unit}".rstrip()
-        told.append(text + (", log" if about["scale"] == "log" else ""))
-    return told
+        found.append(text + (", log" if about["scale"] == "log" else ""))
+    return found
 
 
 def _study(store: xr.Dataset) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 A grid is a full factorial, so nothing is estimated where all cases are done (`postproc.cases.factorial`):
 with every level of an axis weighing the same and axes independent, the decomposition of the variance (I. M.
 Sobol', Math. Modelling Comput. Exp. 1, 1993) is a matter of means along axes, exact on the levels that were
-computed. The intervals tell what else could have come of other levels of the same range. The indices of a
+computed. The intervals show the spread that other levels of the same range would give. The indices of a
 sampled study are estimates (`postproc.cases.saltelli`).
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.cases.factorial import filled_in, grid_indices, half_widths
-from postproc.cases.saltelli import by_point, estimate, ranges_told
+from postproc.cases.saltelli import by_point, drawn_ranges, estimate
 from postproc.store.axes import axes_of, drawn_axes, source
 from postproc.store.select import narrow, written_values
 from postproc.store.variables import require_measure
@@ -41,7 +41,7 @@ def sensitivity(
     Of a grid, levels without any usable case are left out; other cases without a value (missing, failed,
     diverged, or done with a value that is not finite) are filled with the sum of main effects that fits the
     rest best. Of a sample, a base point is left out with all its cases where one of them has no value. All of
-    it is told in `notes`.
+    this is reported in `notes`.
 
     Half the width of an interval is the normal quantile times the deviation over `n_draw` draws, as in SALib.
     A draw takes as many levels of every axis again, with replacement and at least two different ones, and
@@ -118,7 +118,7 @@ def _sampled(store: xr.Dataset, measure: str, n_draw: int, confidence: float, se
     shares, half = estimate(kept, n_draw, confidence, seed)
     # Of one base point the first and the last case are independent; the others repeat their values.
     found = _described(store, values, kept[:, [0, -1]], drawn_axes(store), shares, half, confidence)
-    found["drawn_from"] = ("axis", ranges_told(store), {"long_name": "what the axis was drawn from"})
+    found["drawn_from"] = ("axis", drawn_ranges(store), {"long_name": "what the axis was drawn from"})
     return found.assign_attrs(dropped=n_drop * rows.shape[1], notes="\n".join(notes))
 
 
@@ -140,18 +140,18 @@ def _need_variance(store: xr.Dataset, measure: str, values: Floats) -> None:
 
 
 def _usable_values(store: xr.Dataset, measure: str, spread: list[str]) -> tuple[xr.DataArray, list[str]]:
-    """Return the measure over some axes, NaN where a case has no value, and what to tell of those."""
+    """Return the measure over some axes, NaN where a case has no value, and notes on those."""
     data = narrow(store, [measure, "status"], spread).load()
     status = data["status"]
     values = data[measure].astype(float).broadcast_like(status).transpose(*status.dims)
     values.attrs = data[measure].attrs
     is_done = status == DONE
     usable = is_done & np.isfinite(values)
-    return values.where(usable), _cases_told(status.values, (is_done & ~usable).values)
+    return values.where(usable), _cases_without_value(status.values, (is_done & ~usable).values)
 
 
 def _levels(store: xr.Dataset, measure: str) -> tuple[xr.DataArray, list[str]]:
-    """Return the measure over axes and levels with cases, NaN where one has no value, and what to tell."""
+    """Return the measure over axes and levels with cases, NaN where one has no value, and notes."""
     spread = [a for a in axes_of(store) if store.sizes[a] > 1]
     values, notes = _usable_values(store, measure, spread)
     usable = values.notnull()
@@ -170,13 +170,13 @@ def _levels(store: xr.Dataset, measure: str) -> tuple[xr.DataArray, list[str]]:
     return values, notes
 
 
-def _cases_told(status: NDArray[np.int8], is_odd: NDArray[np.bool_]) -> list[str]:
+def _cases_without_value(status: NDArray[np.int8], is_odd: NDArray[np.bool_]) -> list[str]:
     """How many cases have no value, and why."""
     kinds = {MISSING: "missing", FAILED: "failed", DIVERGED: "diverged"}
     counts = {text: int((status == code).sum()) for code, text in kinds.items()}
     counts["done, but the value is not finite"] = int(is_odd.sum())
-    told = ", ".join(f"{n} {text}" for text, n in counts.items() if n)
-    return [f"of {status.size} cases {told}"] if told else []
+    text_of_counts = ", ".join(f"{n} {text}" for text, n in counts.items() if n)
+    return [f"of {status.size} cases {text_of_counts}"] if text_of_counts else []
 
 
 def _described(

@@ -27,7 +27,7 @@ _PILOTS = 24  # cases that are packed to foresee the size of all
 
 @dataclass
 class Load:
-    """What a page is to carry, and what is said of what it does not."""
+    """What a page is to carry, and notes on what is left out."""
 
     values: dict[str, bytes] = field(default_factory=dict)
     records: dict[int, bytes] = field(default_factory=dict)
@@ -35,7 +35,7 @@ class Load:
 
 
 def write_report(store: xr.Dataset, path: Path, limit: float) -> Load:
-    """Write a page of at most `limit` bytes that needs nothing else, and return what is on it.
+    """Write a self-contained page of at most `limit` bytes, and return its content.
 
     Measures come first, the most asked for before the others. Of the rest every case gets the same share:
     as much detail as fits all of them, or, where the least detail does not, cases evenly spread.
@@ -46,7 +46,7 @@ def write_report(store: xr.Dataset, path: Path, limit: float) -> Load:
         The limit is below what a page takes at least, or the file cannot be written.
     """
     page = Page(store)
-    # What the notes will say of the rest takes some room too.
+    # Room for the notes on what is left out.
     room = limit - least_size(page) - 4096
     load = Load()
     room -= _load_measures(page, load, room, limit)
@@ -60,13 +60,13 @@ def write_report(store: xr.Dataset, path: Path, limit: float) -> Load:
 
 
 def _load_measures(page: Page, load: Load, room: float, limit: float) -> int:
-    """Load what fits, and return the bytes that it takes, with what is told of each measure."""
+    """Load what fits, and return the bytes that it takes, with the description of each measure."""
     left_out = []
     used = 0
-    told = {str(variable["name"]): len(json.dumps(variable)) for variable in page.measures.described()}
+    described = {str(variable["name"]): len(json.dumps(variable)) for variable in page.measures.described()}
     for name in page.measures.names:
         packed = pack_floats(page.measures.values(name))
-        size = text_size(packed) + told[name]
+        size = text_size(packed) + described[name]
         share = room if name in _NEEDED or not page.cases.kept else room * _SHARE_OF_MEASURES
         if used + size <= share:
             load.values[name] = packed
@@ -75,7 +75,7 @@ def _load_measures(page: Page, load: Load, room: float, limit: float) -> int:
             least = (limit - room + used + size) / 1e6 + 0.1
             raise InputError(
                 f"--limit: {limit / 1e6:.3g} MB is too small for this store; give {least:.1f} MB or more, or "
-                "look at it with rubhpc view"
+                "open the store with rubhpc view"
             )
         else:
             left_out.append(page.measures.label(name).lower())
@@ -88,12 +88,12 @@ def _load_records(page: Page, load: Load, room: float) -> None:
     cases = page.cases
     done = [int(i) for i in cases.done]
     if not cases.kept:
-        load.notes.append("The store keeps neither waveforms nor spectra nor sections.")
+        load.notes.append("The store contains no waveforms, spectra or sections.")
         return
     if not done:
         return
     pilots = spread(done, _PILOTS)
-    margin = 1.0 if pilots == done else 1.05  # pilots foretell the size of all only so well
+    margin = 1.0 if pilots == done else 1.05  # the pilots give an estimate of the size
     for level in LEVELS:
         # One by one: around cases far apart, `records` would read much that nobody asks for.
         tried = {flat: cases.record(flat, level) for flat in pilots}
@@ -106,10 +106,10 @@ def _load_records(page: Page, load: Load, room: float) -> None:
         if room < 0:
             break
         load.records[flat] = packed
-    _tell(level, load, cases)
+    _note(level, load, cases)
 
 
-def _tell(level: Detail, load: Load, cases: Cases) -> None:
+def _note(level: Detail, load: Load, cases: Cases) -> None:
     n_kept, n_done = len(load.records), len(cases.done)
     if n_kept:
         which = "all" if n_kept == n_done else f"{n_kept} of {n_done}"

@@ -42,7 +42,7 @@ class Detail:
     revolutions : int
         Of the orbit of a motion without a period, at most; a periodic one needs no more than one period.
     shown : int
-        Of the waveforms of such a motion, at most: more of them could not be told apart.
+        Of the waveforms of such a motion, at most: more of them would overlap.
     lines : int
         Of a spectrum, at most.
     signals : tuple of str

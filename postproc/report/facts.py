@@ -1,4 +1,4 @@
-"""What the page says in words: the study, how it stands, what failed, where the model leaves its range."""
+"""The texts of the page: the study, its state, failures, and where the model leaves its range."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.cases.maps import VALIDITY, monitors
-from postproc.cases.saltelli import ranges_told
+from postproc.cases.saltelli import drawn_ranges
 from postproc.report.grid import plain
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.units import Scale, scale_for, short_name
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 _MOST_FAILURES = 200  # listed, of each kind
 _NOTABLE_RESIDUAL = 0.01  # of the energy that goes through a case
 _LIMITS = {
-    "minimum_slip_speed": "below 0: the rim does not outrun the stator, steady sliding is wrong",
+    "minimum_slip_speed": "below 0: the rim slips backwards, which contradicts steady sliding",
     "force_over_euler_load": "above 1: the stator would buckle",
-    "tip_deflection_ratio": "above a tenth: the stator is no linear beam any more",
+    "tip_deflection_ratio": "above 0.1: the stator is no longer a linear beam",
 }
 
 
-# What leaves the range of steady sliding is within that of the law that a store was computed with.
-_FOLLOWED = {"minimum_slip_speed": "no limit of the model; below 0 the rim slips back, by Coulomb's law"}
+# The measure leaves the range of steady sliding only; the store's friction law covers it.
+_FOLLOWED = {"minimum_slip_speed": "no limit of the model; below 0 the rim slips back (Coulomb's law)"}
 
 
 def counts(status: NDArray[np.float64]) -> list[dict[str, Any]]:
@@ -42,12 +42,12 @@ def counts(status: NDArray[np.float64]) -> list[dict[str, Any]]:
 
 
 def _shown(axis: dict[str, Any]) -> list[str]:
-    """Return the values of an axis as people read them, without their unit."""
+    """Return the values of an axis as text, without their unit."""
     return axis["names"] or [f"{value:.6g}" for value in axis["values"]]
 
 
 def case_text(axes: list[dict[str, Any]], flat: int) -> str:
-    """Return where a case stands on the grid, as in `speed ratio 1.7, clearance 84 µm`."""
+    """Return the axis values of a case, as in `speed ratio 1.7, clearance 84 µm`."""
     at = np.unravel_index(flat, [len(axis["values"]) for axis in axes]) if axes else ()
     places = (
         f"{axis['label'][:1].lower()}{axis['label'][1:]} {_shown(axis)[i]} {axis['unit']}".rstrip()
@@ -60,7 +60,7 @@ def failures(store: xr.Dataset, axes: list[dict[str, Any]]) -> list[dict[str, An
     """Return the cases that failed, and those that diverged: how many, and the first of them with reasons."""
     reasons = store.attrs.get("reasons", {})
     status = store["status"].values.ravel()
-    told = []
+    groups = []
     for code, meaning in (
         (FAILED, "failed: no result"),
         (
@@ -78,10 +78,10 @@ def failures(store: xr.Dataset, axes: list[dict[str, Any]]) -> list[dict[str, An
                 }
                 for i in flats[:_MOST_FAILURES]
             ]
-            told.append(
+            groups.append(
                 {"meaning": meaning, "n": flats.size, "cases": listed, "more": flats.size - len(listed)}
             )
-    return told
+    return groups
 
 
 def validity_rows(
@@ -100,7 +100,7 @@ def validity_rows(
         rows.append(_row(measures, axes, name, bad, worst, n_done, limit))
     if "energy_residual" in measures.names:
         bad = measures.values("energy_residual") > _NOTABLE_RESIDUAL
-        limit = "no limit of the model; above 1 % the step, or the sampling, deserves a look"
+        limit = "no limit of the model; above 1 %, check the step and the sampling"
         rows.append(_row(measures, axes, "energy_residual", bad, np.nanargmax, n_done, limit))
     return rows
 
@@ -142,19 +142,19 @@ def axis_rows(axes: list[dict[str, Any]]) -> list[dict[str, str]]:
 
 def drawn_rows(store: xr.Dataset) -> list[dict[str, str]]:
     """Return name and range of what a sampled study has drawn."""
-    told = zip(drawn_axes(store), ranges_told(store), strict=True)
+    drawn = zip(drawn_axes(store), drawn_ranges(store), strict=True)
     return [
-        {"label": plain(short_name(store[name])), "listed": f"drawn, {text}", "n": ""} for name, text in told
+        {"label": plain(short_name(store[name])), "listed": f"drawn, {text}", "n": ""} for name, text in drawn
     ]
 
 
 def study_rows(store: xr.Dataset) -> list[tuple[str, str]]:
-    """Return how contact, integration and recording were set, as the store tells it."""
+    """Return how contact, integration and recording were set, from the attributes of the store."""
     study = store.attrs.get("study")
-    told = study if isinstance(study, dict) else {}
+    tables = study if isinstance(study, dict) else {}
     rows = []
     for table in ("contact", "integrator", "record"):
-        settings = told.get(table)
+        settings = tables.get(table)
         if isinstance(settings, dict):
             text = ", ".join(
                 f"{k.replace('_', ' ')} {_value(v)}" for k, v in settings.items() if v is not None
@@ -164,7 +164,7 @@ def study_rows(store: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def run_rows(store: xr.Dataset, measures: Measures) -> list[tuple[str, str]]:
-    """Return machine, versions and times of what ran, as far as the store tells them."""
+    """Return machine, versions and times of what ran, as far as the store contains them."""
     rows = []
     for run in store.attrs.get("runs", []):
         began, wrote = (time.strftime("%Y-%m-%d %H:%M", time.localtime(run[k])) for k in ("began", "wrote"))
@@ -191,7 +191,7 @@ def run_rows(store: xr.Dataset, measures: Measures) -> list[tuple[str, str]]:
 
 
 def seconds_text(seconds: float) -> str:
-    """Return a time as people say it."""
+    """Return a duration as text."""
     if seconds < 100:
         scale = scale_for("s", seconds) if seconds else Scale(1.0, "s")
         return f"{seconds * scale.factor:.3g} {scale.unit}"

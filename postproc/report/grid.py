@@ -1,4 +1,4 @@
-"""The grid of a study and its measures, as the page is told of them: names, units, cells and colours."""
+"""The grid of a study and its measures, as the page needs them: names, units, cells and colours."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Measures:
         self._has_result = np.isin(self._data["status"].values, (DONE, DIVERGED))
 
     def values(self, name: str) -> NDArray[np.float64]:
-        """Return a variable in SI units over the axes, and the stators where it tells them apart."""
+        """Return a variable in SI units over the axes, and the stators where it depends on them."""
         data = self._data[name]
         by_stator = self.is_by_stator(name)
         dims = (*self._dims, *(("stator",) if by_stator else ()))
@@ -73,7 +73,7 @@ class Measures:
         return full
 
     def is_by_stator(self, name: str) -> bool:
-        """Whether a variable tells the stators apart."""
+        """Whether a variable depends on the stator."""
         return "stator" in self._data[name].dims
 
     def scale(self, name: str) -> Scale:
@@ -84,23 +84,23 @@ class Measures:
         if name == "spin_speed":
             return Scale(30 / np.pi, "rpm")
         unit = VARIABLES[name].unit if name in SIGNAL_NAMES else self._unit(name)
-        told = next((group for group, names in _SHARED if name in names), (name,))
+        described = next((group for group, names in _SHARED if name in names), (name,))
         sizes = np.abs(
-            np.concatenate([np.zeros(1), *(self.values(n).ravel() for n in told if n in self.names)])
+            np.concatenate([np.zeros(1), *(self.values(n).ravel() for n in described if n in self.names)])
         )
         sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
         return scale_for(unit, float(np.quantile(sizes, 0.9)) if sizes.size else 0.0)
 
-    def signals_told(self, store: xr.Dataset) -> dict[str, dict[str, Any]]:
+    def described_signals(self, store: xr.Dataset) -> dict[str, dict[str, Any]]:
         """Return name, unit and factor from SI of each signal that the store keeps anything of."""
         kept = {str(n).removeprefix("spectrum_").removeprefix("section_"): n for n in store.data_vars}
-        told = {}
+        described = {}
         for name in SIGNAL_NAMES:
             if name in kept:
                 scale = self.scale(name)
                 label = plain(short_name(store[kept[name]].rename(name)))
-                told[name] = {"label": label, "unit": scale.unit, "factor": scale.factor}
-        return told
+                described[name] = {"label": label, "unit": scale.unit, "factor": scale.factor}
+        return described
 
     def label(self, name: str) -> str:
         """Return what the variable is called."""
@@ -108,10 +108,10 @@ class Measures:
 
     def described(self) -> list[dict[str, Any]]:
         """Return what the page has to know of each variable."""
-        told = []
+        described = []
         for name in self.names:
             scale = self.scale(name)
-            told.append(
+            described.append(
                 {
                     "name": name,
                     "label": self.label(name),
@@ -123,7 +123,7 @@ class Measures:
                     "categories": self._categories(name),
                 }
             )
-        return told
+        return described
 
     def _unit(self, name: str) -> str:
         return str(self._data[name].attrs.get("units", "1"))
@@ -159,18 +159,18 @@ def validity_text(code: int) -> str:
     return ", ".join(text for bit, text, _ in VALIDITY.values() if code & bit) or "within range"
 
 
-def axes_told(store: xr.Dataset) -> list[dict[str, Any]]:
+def described_axes(store: xr.Dataset) -> list[dict[str, Any]]:
     """Return name, label, unit, values, cells and study key of each axis of the grid, in its order."""
     study = store.attrs.get("study")
     keys = list(study.get("grid", {})) if isinstance(study, dict) else []
     key_of = {key.replace(".", "_"): key for key in keys}
-    told = []
+    described = []
     for dim in axes_of(store):
         axis = store[dim]
         shown, label = displayed(axis)
         name, _, unit = label.partition(" (")
         order = np.argsort(shown, kind="stable")
-        told.append(
+        described.append(
             {
                 "name": dim,
                 "key": key_of.get(dim, dim),
@@ -184,7 +184,7 @@ def axes_told(store: xr.Dataset) -> list[dict[str, Any]]:
                 "is_log": is_geometric(shown[order]),
             }
         )
-    return told
+    return described
 
 
 def plain(label: str) -> str:

@@ -44,7 +44,7 @@ def quantised(
 def bends(codes: NDArray[np.uint16]) -> NDArray[np.uint16]:
     """Return the second differences of `WAVE_STEPS`, from 0 on: small numbers where a curve is smooth.
 
-    Those below 0 stand between the others: 0, -1, 1, -2, ...
+    Negative integers alternate with the others: 0, -1, 1, -2, ...
     """
     second = np.diff(codes.astype(np.int64), n=2, prepend=[0, 0])
     return np.where(second < 0, -2 * second - 1, 2 * second).astype("<u2")
@@ -65,7 +65,7 @@ def quantised_spectrum(amplitude: NDArray[np.floating[Any]]) -> tuple[dict[str, 
 
 
 def pack_record(header: Mapping[str, Any], arrays: Sequence[NDArray[np.uint16]]) -> bytes:
-    """Return a header and the arrays it tells of as one compressed record.
+    """Return a header and the arrays it describes as one compressed record.
 
     It has the header's length, the header as JSON, the low bytes of all arrays and then the high ones.
     """
@@ -74,13 +74,13 @@ def pack_record(header: Mapping[str, Any], arrays: Sequence[NDArray[np.uint16]])
     return zlib.compress(len(text).to_bytes(4, "little") + text + body.tobytes(), 9)
 
 
-def _shortened(told: Any) -> Any:
-    """Return what is told with its numbers to nine digits."""
-    if isinstance(told, float):
-        return float(f"{told:.9g}")
-    if isinstance(told, dict):
-        return {name: _shortened(value) for name, value in told.items()}
-    return [_shortened(value) for value in told] if isinstance(told, list | tuple) else told
+def _shortened(header: Any) -> Any:
+    """Return the header with its numbers to nine digits."""
+    if isinstance(header, float):
+        return float(f"{header:.9g}")
+    if isinstance(header, dict):
+        return {name: _shortened(value) for name, value in header.items()}
+    return [_shortened(value) for value in header] if isinstance(header, list | tuple) else header
 
 
 def as_text(data: bytes) -> str:

@@ -1,4 +1,4 @@
-"""The page itself: what is told in words, the library that draws, and the data that it carries or fetches."""
+"""The page itself: its texts, the library that draws, and the data that it contains or fetches."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from postproc.report.facts import (
     study_rows,
     validity_rows,
 )
-from postproc.report.grid import Measures, axes_told, validity_text
+from postproc.report.grid import Measures, described_axes, validity_text
 from postproc.report.packing import as_text
 from postproc.report.side_view import description, side_view
 from postproc.store.axes import source
@@ -41,13 +41,13 @@ _SCRIPTS = ("data.js", "chart.js", "map.js", "panels.js", "page.js")
 
 
 class Page:
-    """A page on a store as it stands; `measures` and `cases` are what it shows."""
+    """A page on the current state of a store; `measures` and `cases` are what it shows."""
 
     def __init__(self, store: xr.Dataset) -> None:
         self._store = store
         self.measures = Measures(store)
         self.cases = Cases(store)
-        self._axes = axes_told(store)
+        self._axes = described_axes(store)
 
     def html(
         self,
@@ -59,7 +59,7 @@ class Page:
         is_served = values is None
         names = list(self.measures.names) if values is None else list(values)
         data = {
-            "told": self._told(names, is_served=is_served),
+            "facts": self._embedded_facts(names, is_served=is_served),
             "values": {name: as_text(packed) for name, packed in (values or {}).items()},
             "records": {str(flat): as_text(packed) for flat, packed in (records or {}).items()},
         }
@@ -71,7 +71,7 @@ class Page:
             style=_asset("report.css"),
             library=_library(),
             script="\n".join(_asset(name) for name in _SCRIPTS),
-            data={name: _in_script(told) for name, told in data.items()},
+            data={name: _in_script(content) for name, content in data.items()},
         )
         return text
 
@@ -103,7 +103,7 @@ class Page:
             "n_done": len(self.cases.done),
         }
 
-    def _told(self, names: list[str], *, is_served: bool) -> dict[str, Any]:
+    def _embedded_facts(self, names: list[str], *, is_served: bool) -> dict[str, Any]:
         """Return what the scripts have to know."""
         store = self._store
         described = {variable["name"]: variable for variable in self.measures.described()}
@@ -115,7 +115,7 @@ class Page:
             "free": free_axes(store),
             "variables": [described[name] for name in names],
             "nStator": store.sizes.get("stator", 1),
-            "signals": self.measures.signals_told(store),
+            "signals": self.measures.described_signals(store),
             "kept": self.cases.kept,
             "places": self._places(),
             "frequencies": self._frequencies(),
@@ -149,9 +149,9 @@ def text_size(data: bytes) -> int:
     return 4 * math.ceil(len(data) / 3) + 16
 
 
-def _in_script(told: object) -> str:
-    """Return JSON that nothing in it can end the element it stands in."""
-    return json.dumps(told, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+def _in_script(content: object) -> str:
+    """Return JSON that cannot end the script element around it."""
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 @cache

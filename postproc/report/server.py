@@ -35,7 +35,7 @@ class Library:
         self._page = Page(open_now())
 
     def page(self) -> bytes:
-        """Return the page of the store as it stands now."""
+        """Return the page of the store in its current state."""
         page = Page(self._open())
         with self._lock:
             self._page = page
@@ -54,7 +54,7 @@ class Library:
         return page.cases.record(int(flat), FULL)
 
     def answer(self, path: str) -> tuple[bytes, str] | None:
-        """Return what stands at a path, and its kind; there are no files behind it. None: nothing does."""
+        """Return content and type at a path, which is no file; None where there is nothing."""
         if path == "/":
             return self.page(), _HTML
         kind, _, name = path.removeprefix("/").partition("/")

@@ -40,7 +40,7 @@ def cascade(store: xr.Dataset, signal: str = "torsion", along: str | None = None
 
 
 def default_axis(store: xr.Dataset) -> str:
-    """Return the axis that a cascade spreads over unless told: the speed, or else the longest."""
+    """Return the axis that a cascade spreads over by default: the speed, or else the longest."""
     axes = ordered_axes(store, "a cascade")
     return next((a for a in SPEED_AXES if a in axes), max(axes, key=lambda a: store.sizes[a]))
 

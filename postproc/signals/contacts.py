@@ -149,7 +149,7 @@ def events_in_signal(
     stator: int | None = None,
     threshold: float = 10.0,
 ) -> xr.Dataset:
-    """Return where a signal jumps, told from the signal alone: a test rig has no contact force to look at.
+    """Return where a signal jumps, found from the signal alone, as on a test rig without a force sensor.
 
     An event is where the departure (see `event_jumps`) peaks above `threshold` times its median over the
     revolution. Its time is known to within four samples.
@@ -196,7 +196,7 @@ def free_decay(case: xr.Dataset, signal: str = "stator_lateral", stator: int | N
     spans = free_spans(case, stator)
     pieces = [wave.values[i:j] for i, j in zip(spans["first"].values, spans["end"].values, strict=True)]
     fits = [decaying_sine(piece, dt) if piece.size >= _LEAST else {} for piece in pieces]
-    told = {
+    quantities = {
         "frequency": ("Hz", "damped natural frequency"),
         "damping_ratio": ("1", "damping as a fraction of critical"),
         "decay_rate": ("s-1", "decay rate"),
@@ -206,7 +206,7 @@ def free_decay(case: xr.Dataset, signal: str = "stator_lateral", stator: int | N
     found = spans[["start", "duration"]].assign(
         {
             name: ("span", [fit.get(name, math.nan) for fit in fits], {"units": unit, "long_name": text})
-            for name, (unit, text) in told.items()
+            for name, (unit, text) in quantities.items()
         }
     )
     text = "amplitude at the end of the span over that at its start"

@@ -54,7 +54,7 @@ def empirical_modes(values: Floats, n_mode: int = 1) -> Floats:
     size = float(np.abs(values).max(initial=0.0))
     if values.size < _LEAST or not size > 0:
         return modes
-    # The library's limits on what is left to sift are absolute: they want a signal of the order of one.
+    # The library's limits on what is left to sift are absolute: they assume a signal of the order of one.
     sift = EMD(FIXE_H=_SIFTINGS, range_thr=1e-6, total_power_thr=1e-9)
     sift.emd(values / size, max_imf=n_mode)
     found = sift.imfs[:n_mode]
@@ -65,8 +65,9 @@ def empirical_modes(values: Floats, n_mode: int = 1) -> Floats:
 def analytic(mode: Floats, dt: float) -> tuple[Floats, Floats]:
     """Return amplitude and instantaneous frequency of an intrinsic mode by the Hilbert transform.
 
-    Only what lies between its first and its last zero is told: continued oddly there the mode stays smooth,
-    and no edge leaks into what has decayed. That costs less than half a cycle at either end.
+    Only the part between its first and its last zero is returned: continued as an odd function there, the
+    mode stays smooth, and no edge effect leaks into a decayed part. At
+    most half a cycle is lost at either end.
 
     Parameters
     ----------

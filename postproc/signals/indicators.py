@@ -1,6 +1,6 @@
 """Rub indicators: what a case's measured vibration says of contact, under noise.
 
-The paper proposes to tell rub from rotor and stator vibration together. Each indicator here is a level in dB
+The paper proposes to detect rub from rotor and stator vibration together. Each indicator is a level in dB
 that rises with rub and uses only what a test rig measures: both lateral motions of the disc, its torsion, the
 lateral vibration of a stator. The contact force is never looked at.
 """
@@ -79,7 +79,7 @@ def indicator_scores(
     Dataset over (axes, level, draw)
         The four indicators in dB of SI units squared, for densities a hertz (NaN where a case is not done); a
         density lets white noise read the same however long a revolution takes. Over the axes `rub`, whether
-        the case touches; over `channel` `reference`, the rms that a level of 1 stands for.
+        the case touches; over `channel` `reference`, the rms that corresponds to a level of 1.
 
     Raises
     ------
@@ -98,12 +98,12 @@ def indicator_scores(
     require_results(is_done.where(is_done), store)
     is_free = data["regime"] == REGIME.index("no_contact")  # of all stators, whichever is looked at
     rub, free = is_done & ~is_free, is_done & is_free
-    for mask, kind, mend in (
+    for mask, kind, fix in (
         (rub, "touches", "take smaller clearances"),
         (free, "stays free of contact", "take clearances above the contact-free amplitude"),
     ):
         if not mask.any():
-            raise InputError(f"{source(store)}: no case of this selection {kind}; {mend} into the study")
+            raise InputError(f"{source(store)}: no selected case {kind}; {fix} into the study")
     n = samples_per_revolution(data[CHANNELS[0]])
     n_turn = data.sizes["sample"] // n
     data = data.isel(sample=slice(-n * (n_turn // _WHOLE * _WHOLE or n_turn), None))
@@ -273,7 +273,7 @@ def _power(lines: Lines) -> Floats:
 
 
 def _burst_level(band: Lines, n_turn: int) -> Floats:
-    """Return by how many dB the envelope's lines at the orders of bursts stand above its other lines.
+    """Return the level (dB) of the envelope's lines at the orders of bursts over its other lines.
 
     The lines of a band, taken as those of a slow complex signal, are its envelope; its squared magnitude is
     zero-padded so that it is not aliased.

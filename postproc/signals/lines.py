@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SPIKE = 0.004  # half width of a spike, as a part of the abscissa
-MAX_DENOMINATOR = 8  # sub-harmonics beyond the eighth are not told apart from quasi-periodic lines
+MAX_DENOMINATOR = 8  # sub-harmonics beyond the eighth cannot be distinguished from quasi-periodic lines
 
 
 def order_name(order: float, tolerance: float = 1e-6, max_denominator: int = MAX_DENOMINATOR) -> str:
@@ -69,7 +69,7 @@ def strongest_lines(
     -------
     Dataset over `line`
         `order`, `amplitude`, `name`, and `frequency` (Hz) where the spectrum has it. A name holds to within
-        half a line's width, since a record that does not hold whole periods puts a line beside its order.
+        half a line's width, since a record that does not hold whole periods shifts a line off its order.
     """
     order = spectrum["order"].values
     amplitude = np.where(np.isfinite(spectrum.values), spectrum.values, 0.0)

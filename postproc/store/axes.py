@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 def source(store: xr.Dataset) -> str:
-    """Return the path the dataset came from, for messages."""
+    """Return the path that the dataset was opened from, for messages."""
     return str(store.encoding.get("source", "this store"))
 
 
 def axes_of(store: xr.Dataset) -> tuple[str, ...]:
-    """Return the study's axes that are still there, in the order of its grid; none for a single record."""
+    """Return the study's axes that are left, in the order of its grid; none for a single record."""
     return tuple(str(d) for d in store["status"].dims) if "status" in store else ()
 
 
@@ -29,11 +29,11 @@ def ordered_axes(store: xr.Dataset, figure: str) -> list[str]:
     Raises
     ------
     InputError
-        There is none; `figure` says what needs one.
+        There is none; the message names the `figure` that needs one.
     """
     axes = [axis for axis in axes_of(store) if store.sizes[axis] > 1 and axis != CASE]
     if not axes:
-        what = "the cases of a sample lie in no order, rubhpc map draws them"
+        what = "the cases of a sample have no order, rubhpc map draws them"
         left = what if drawn_axes(store) else "this selection is one case"
         raise InputError(f"{source(store)}: {figure} needs an axis of several values; {left}")
     return axes
@@ -50,23 +50,23 @@ def drawn_axes(store: xr.Dataset) -> list[str]:
 
 
 def find_axis(store: xr.Dataset, name: str) -> str:
-    """Return the dimension of an axis, known by it or by its dotted rig key; "stator" counts as an axis.
+    """Return the dimension of an axis, given by its name or its dotted rig key; "stator" counts as an axis.
 
     Raises
     ------
     InputError
-        There is no such axis any more; the nearest, or else all, are named.
+        There is no such axis left; the message names the nearest one, or all.
     """
     axis = name.replace(".", "_")
     known = [*axes_of(store), *(d for d in ("stator",) if d in store.dims)]
     if axis in known:
         return axis
     if axis in store.coords and store.coords[axis].ndim == 0:
-        raise InputError(f"{source(store)}: {name}: has been selected already; leave one of the two out")
+        raise InputError(f"{source(store)}: {name}: has already been selected; select it once")
     if axis in drawn_axes(store):
         raise InputError(
-            f"{source(store)}: {name}: was drawn at random, so that nothing runs along it; rubhpc map draws "
-            "measures over what was drawn"
+            f"{source(store)}: {name}: was drawn at random and is not an axis; rubhpc map draws measures "
+            "over drawn quantities"
         )
     near = difflib.get_close_matches(axis, known, n=1)
     hint = f"did you mean {near[0]}?" if near else f"the axes are {', '.join(known) or 'none'}"

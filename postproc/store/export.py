@@ -18,24 +18,24 @@ FORMATS = (".csv", ".json", ".zarr", *HDF5)
 
 
 def check_data_path(path: str | Path) -> Path:
-    """Return `path` where data can be written to it; InputError with the mend where not."""
+    """Return `path` if data can be written to it; InputError with the remedy if not."""
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
-        raise InputError(f"{path}: data is written as {', '.join(FORMATS)}; name it {path.stem}.csv")
+        raise InputError(f"{path}: unknown format; choose one of {', '.join(FORMATS)}")
     if not path.parent.is_dir():
         raise InputError(f"{path}: no directory {path.parent}; make it first")
     if path.suffix.lower() == ".zarr" and path.exists():
-        raise InputError(f"{path}: is there already; choose another --data, or remove it")
+        raise InputError(f"{path}: exists already; choose another --data, or remove it")
     return path
 
 
 def write_data(data: xr.Dataset, path: str | Path) -> Path:
-    """Write a dataset, one line a point in csv, and return where it lies.
+    """Write a dataset, in csv one line a point, and return its path.
 
     Raises
     ------
     InputError
-        The extension is none of the known ones, or the file cannot be written.
+        The extension is unknown, or the file cannot be written.
     """
     path = check_data_path(path)
     kind = path.suffix.lower()
@@ -58,7 +58,7 @@ def write_data(data: xr.Dataset, path: str | Path) -> Path:
 
 
 def _write_csv(data: xr.Dataset, path: Path) -> None:
-    """One column a variable, its unit in the heading."""
+    """Write one column a variable, with its unit in the heading."""
     table = data.to_dataframe().reset_index()
     units = {str(n): str(v.attrs.get("units", "1")) for n, v in data.variables.items()}
     headings = {n: f"{n} ({u})" for n, u in units.items() if u not in ("", "1")}
@@ -68,7 +68,7 @@ def _write_csv(data: xr.Dataset, path: Path) -> None:
 
 
 def write_hdf5(data: xr.Dataset, path: Path) -> None:
-    """Write an HDF5 file that is netCDF 4 too, chunk by chunk; it appears under its name when it is whole.
+    """Write an HDF5 file that is netCDF 4 too, chunk by chunk; it gets its name once it is complete.
 
     Tables of attributes (study, rig, versions) become text in JSON.
     """
@@ -90,7 +90,7 @@ def _bare(data: xr.Dataset) -> xr.Dataset:
 
 
 def _plain(value: Any) -> Any:
-    """Nested dicts and lists with null for what is not finite."""
+    """Return nested dicts and lists with null for numbers that are not finite."""
     if isinstance(value, dict):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):

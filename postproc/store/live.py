@@ -1,4 +1,4 @@
-"""A store as it stands now, amid a run as well: measures from the journals where none are packed yet."""
+"""A store in its current state, also during a run: measures come from the journals until they are packed."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 
 def open_live(path: Path) -> xr.Dataset:
-    """Return the store as `open_store` does, with status and measures of every case that is journalled.
+    """Return the store as `open_store` does, with status and measures of every case in the journals.
 
-    What only the journals know goes into the attributes: `reasons` (flat index of a case to why it failed
-    or diverged), `runs` (machine, ranks and times of each) and `running` (who computes now; "" for nobody).
-    A store without journals, such as a copy that xarray has made, comes as it is.
+    What only the journals contain becomes attributes: `reasons` (flat index of a case to why it failed
+    or diverged), `runs` (machine, ranks and times of each) and `running` (who computes now; "" if nobody).
+    A store without journals, such as a copy made with xarray, is returned unchanged.
 
     Raises
     ------
@@ -47,5 +47,5 @@ def open_live(path: Path) -> xr.Dataset:
         dataset = dataset.assign(
             {name: (dataset[name].dims, values, dataset[name].attrs) for name, values in packed.items()}
         )
-    told = {"reasons": dict(ledger.reasons), "runs": runs, "running": running}
-    return dataset.assign_attrs(told)
+    about_runs = {"reasons": dict(ledger.reasons), "runs": runs, "running": running}
+    return dataset.assign_attrs(about_runs)

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 def open_store(path: str | Path) -> xr.Dataset:
     """Return the store as a lazy, dask-backed dataset.
 
-    Waveforms, spectra and sections are divided as they lie on disk, so that a selection reads no more than
-    its own chunks; scalars are read in pieces of up to some 100 MB, since a map wants all of them at once.
+    Waveforms, spectra and sections keep the chunks of the disk, so that a selection reads only its own
+    chunks; measures are read in pieces of about 100 MB, since a map needs all of them at once.
 
     Raises
     ------
     StoreError
-        There is nothing at `path`, or no store of rubhpc.
+        `path` does not exist, or is not a store of rubhpc.
     """
     path = Path(path)
     if not path.exists():
@@ -32,12 +32,12 @@ def open_store(path: str | Path) -> xr.Dataset:
     long = [n for n, v in VARIABLES.items() if v.role in LONG_ROLES]
     short = [n for n in VARIABLES if n not in long]
     try:
-        scalars = _open(path, chunks="auto", without=long)
+        measures = _open(path, chunks="auto", without=long)
         arrays = _open(path, chunks={}, without=short)
-    except Exception as error:  # zarr and xarray raise a dozen kinds for a directory that is none of theirs
+    except Exception as error:  # zarr and xarray raise a dozen kinds for a directory that is not a store
         reason = str(error).partition("\n")[0]
         raise StoreError(f"{path}: cannot be read as a zarr store ({reason}); check the path") from error
-    store: xr.Dataset = scalars.assign(arrays.data_vars)
+    store: xr.Dataset = measures.assign(arrays.data_vars)
     store = store[
         [*(n for n in VARIABLES if n in store.data_vars), *(n for n in store.data_vars if n not in VARIABLES)]
     ]
@@ -51,7 +51,7 @@ def _open(path: Path, chunks: Any, without: list[str]) -> xr.Dataset:
     import xarray as xr
 
     with warnings.catch_warnings():
-        # A store made elsewhere may lack consolidated metadata. Durations in seconds stay numbers, and
+        # A store made by other tools may lack consolidated metadata. Durations in seconds stay numbers, and
         # nothing here is a date.
         warnings.simplefilter("ignore", RuntimeWarning)
         store = xr.open_zarr(

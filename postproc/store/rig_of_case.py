@@ -1,4 +1,4 @@
-"""The rig that a case ran on, as its store tells it: natural frequencies, and where the stators stand."""
+"""The rig of one case, from the attributes of its store: natural frequencies and positions of the stators."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
     Raises
     ------
     InputError
-        The store tells no rig, or not one that this version reads.
+        The store contains no rig, or one that this version cannot read.
     """
     table = case.attrs.get("rig")
     if not isinstance(table, dict):
-        raise InputError(f"{source(case)}: tells no rig; only a store that rubhpc has written does")
+        raise InputError(f"{source(case)}: contains no rig; give a store that rubhpc has written")
     rig = rig_from_dict(table, f"{source(case)}: rig")
     chosen = {
         str(n): float(c.values.item())

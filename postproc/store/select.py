@@ -80,7 +80,7 @@ def narrow(store: xr.Dataset, names: Iterable[str], spread: Iterable[str] = ()) 
 def first_of_rest(store: xr.Dataset, keep: Iterable[str], variable: str) -> tuple[xr.Dataset, list[str]]:
     """Return the store at the first value of every axis not kept, and a line on each such axis of several.
 
-    The stators count as an axis where the variable tells them apart.
+    The stators count as an axis where the variable depends on it.
     """
     require_variables(store, [variable])
     keep = set(keep)
@@ -96,7 +96,7 @@ def first_of_rest(store: xr.Dataset, keep: Iterable[str], variable: str) -> tupl
 
 
 def _of_stator(store: xr.Dataset) -> list[str]:
-    """Return the coordinates of stators: the only one there is, and its place, need not stand in captions."""
+    """Return the coordinates of stators: a single stator and its position are left out of captions."""
     return [str(name) for name, values in store.coords.items() if "stator" in values.dims]
 
 
@@ -165,9 +165,9 @@ def _number(store: xr.Dataset, axis: str, wanted: Any) -> float:
         if names := meanings(store[axis]):
             if wanted in names:
                 return float(names.index(wanted))
-            told = ", ".join(names)
+            known = ", ".join(names)
             raise InputError(
-                f"{source(store)}: {axis} = {wanted}: not on the grid; there is {told}"
+                f"{source(store)}: {axis} = {wanted}: not on the grid; the values are {known}"
             ) from None
         unit = str(store[axis].attrs.get("units", "1"))
         # "rad s-2" to "rad * s**-2": a store spells units as netCDF does, a study as pint does.

@@ -36,7 +36,7 @@ _WRITTEN = {
 }
 _MICRO_UP_TO = 2e-3  # orbits stay in µm, and twists in µrad, a little beyond a thousand of them
 
-# What a quantity is called where there is no room for its long name, and its symbol in the paper.
+# Names for axes, where a long name does not fit, and symbols of the paper.
 _SHORT = {
     "vertical": "Vertical displacement",
     "horizontal": "Horizontal displacement",
@@ -137,7 +137,7 @@ def scale_of(data: xr.DataArray, unit: str | None = None) -> Scale:
 
 
 def displayed(data: xr.DataArray) -> tuple[NDArray[np.float64], str]:
-    """Return the values in their display unit and the label of the axis they stand on."""
+    """Return the values in their display unit and the label of their axis."""
     scale = scale_of(data)
     return np.asarray(data.values, dtype=float) * scale.factor, scale.label(short_name(data))
 

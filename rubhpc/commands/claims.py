@@ -34,7 +34,7 @@ def claims(number: int | None, stores: str, is_json: bool, document: str | None,
     from postproc.mokhtar2017.figures.index import FIGURES, draw_figures
 
     if document and number is not None:
-        raise InputError("--document: is of all claims; leave out --figure")
+        raise InputError("--document: contains all claims; leave out --figure")
     chosen = on_figure(number) if number is not None else list(CLAIMS)
     figures = [n for n in FIGURES if number in (None, n)] if draw else []
     needed = [*(s for c in chosen for s in c.studies), *(s for n in figures for s in FIGURES[n].studies)]

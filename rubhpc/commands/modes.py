@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.fem.modes import Mode
 
-N_TABLE = 12  # modes of the rotor in a table, unless told
+N_TABLE = 12  # modes of the rotor in a table, by default
 N_SPEED = 61  # of a Campbell diagram: curves are smooth, and each speed is an eigenproblem
 
 

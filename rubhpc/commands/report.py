@@ -18,10 +18,10 @@ _STORE = click.argument("store", type=click.Path(path_type=Path))
 )
 @click.option("--limit", default="10 MB", show_default=True, metavar="SIZE", help="The page's size, at most.")
 def report(store: Path, output: Path | None, limit: str) -> None:
-    """Write one HTML page on STORE that needs nothing else: no network, no server, no store.
+    """Write one self-contained HTML page on STORE: it needs no network, server or store.
 
-    It tells the study, the rig, what ran, what failed and where the model leaves its range; in its maps each
-    case shows its orbit, spectrum, waveform and Poincaré section. Works while a run is on.
+    It shows the study, the rig, the runs, failures, and where the model leaves its range; from its maps each
+    case opens with its orbit, spectrum, waveform and Poincaré section. Works while a run is on.
     """
     from postproc.report.budget import write_report
     from postproc.store.live import open_live
@@ -45,9 +45,9 @@ def report(store: Path, output: Path | None, limit: str) -> None:
     "--port", type=click.IntRange(0, 65535), default=0, show_default="any that is free", help="To listen on."
 )
 def view(store: Path, port: int) -> None:
-    """Serve the page of `rubhpc report` over STORE, however big, to this machine alone; Ctrl-C ends it.
+    """Serve the page of `rubhpc report` over STORE, of any size, to this machine only; Ctrl-C ends it.
 
-    Every case is there in full, read when it is looked at. Reload the page to see what a run has added.
+    Every case is shown in full, read when it is selected. Reload the page to see new results of a run.
     """
     import contextlib
 

@@ -179,7 +179,7 @@ def test_one_case_needs_no_map(visit: Visit, pages: dict[str, str]) -> None:
 def test_a_store_of_measures_has_maps_alone(visit: Visit, pages: dict[str, str]) -> None:
     page = visit(pages["scalars"])
     assert page.is_visible("#map canvas >> nth=0")
-    expect(page.locator("#right")).to_contain_text("The store keeps neither waveforms")
+    expect(page.locator("#right")).to_contain_text("The store contains only measures")
 
 
 def test_a_case_that_was_left_out_says_how_to_see_it(visit: Visit, pages: dict[str, str]) -> None:

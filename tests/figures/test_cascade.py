@@ -187,7 +187,7 @@ def test_a_stator_over_another_disc_is_not_at_this_one(cases):
 
 
 def test_a_store_without_a_rig_says_so():
-    with pytest.raises(InputError, match="tells no rig"):
+    with pytest.raises(InputError, match="contains no rig"):
         natural_frequencies(xr.Dataset())
 
 

@@ -106,7 +106,7 @@ def test_data_come_as_arrays(run, synthetic_path, name):
         ("orbit", ["--select", "speed_ratio=1.5"], "select one value of clearance"),
         ("orbit", ["--select", "speed_ratio"], "is no pair; write NAME=VALUE"),
         ("orbit", [*ONE, "--figure", "orbit.bmp"], "a figure is one of"),
-        ("orbit", [*ONE, "--data", "orbit.xls"], "data is written as"),
+        ("orbit", [*ONE, "--data", "orbit.xls"], "unknown format; choose one of"),
         ("waveform", [*ONE, "--signal", "twist"], "twist: no such signal"),
         ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--order-lines", "1/0"], "no list of orders"),
         ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--max-frequency", "1 kg"], "--max-frequency"),

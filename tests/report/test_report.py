@@ -19,7 +19,7 @@ from postproc.cases.maps import validity
 from postproc.report import budget
 from postproc.report.budget import write_report
 from postproc.report.cases import Cases
-from postproc.report.grid import axes_told
+from postproc.report.grid import described_axes
 from postproc.report.page import Page, least_size
 from postproc.store.open import open_store
 from rubhpc.commands.report import report
@@ -66,8 +66,8 @@ def written(two_stator_path: Path) -> Elements:
 
 
 def test_all_that_is_shown_of_a_quantity_has_one_unit(two_stator_path: Path) -> None:
-    told = json.loads(Elements(Page(open_store(two_stator_path)).html(values={})).scripts["told"])
-    assert {n: s["unit"] for n, s in told["signals"].items()} == {
+    facts = json.loads(Elements(Page(open_store(two_stator_path)).html(values={})).scripts["facts"])
+    assert {n: s["unit"] for n, s in facts["signals"].items()} == {
         "vertical": "µm",
         "horizontal": "µm",
         "torsion": "µrad",
@@ -98,10 +98,10 @@ def test_the_page_carries_every_case_that_is_done(written: Elements) -> None:
     assert sorted(map(int, records)) == np.flatnonzero(status == 1).tolist()
     values = json.loads(written.scripts["values"])
     assert np.array_equal(unpacked_floats(base64.b64decode(values["status"])), status)
-    told = json.loads(written.scripts["told"])
-    assert [axis["key"] for axis in told["axes"]][-1] == "stator.youngs_modulus"
-    assert [len(axis["values"]) for axis in told["axes"]] == [5, 3, 2, 2]
-    assert told["nStator"] == 2
+    facts = json.loads(written.scripts["facts"])
+    assert [axis["key"] for axis in facts["axes"]][-1] == "stator.youngs_modulus"
+    assert [len(axis["values"]) for axis in facts["axes"]] == [5, 3, 2, 2]
+    assert facts["nStator"] == 2
 
 
 def test_every_control_and_drawing_has_a_name(written: Elements) -> None:
@@ -144,7 +144,7 @@ def test_slip_may_reverse_under_coulombs_law(two_stator_path: Path) -> None:
     study = {**dataset.attrs["study"], "contact": {"friction_law": "coulomb"}}
     text = Page(dataset.assign_attrs(study=study)).html(values={})
     assert "Contact force over Euler load" in text
-    assert "steady sliding is wrong" not in text
+    assert "contradicts steady sliding" not in text
     assert "no limit of the model; below 0 the rim slips back" in text  # how many cases is still told
     found, sliding = validity(dataset.assign_attrs(study=study)), validity(dataset)
     assert int((found & 1).sum()) == 0
@@ -195,7 +195,7 @@ def test_a_store_that_keeps_less_has_a_page_too(tmp_path: Path, keep: tuple[str,
     load = write_report(open_store(tmp_path / "less.zarr"), tmp_path / "less.html", 20 * MB)
     if not keep:
         assert load.records == {}
-        assert "neither waveforms nor spectra nor sections" in (tmp_path / "less.html").read_text()
+        assert "no waveforms, spectra or sections" in (tmp_path / "less.html").read_text()
         return
     record = unpacked_record(next(iter(load.records.values())))
     kinds = {kind for kind in ("waves", "spectra", "section") if record[kind]}
@@ -209,7 +209,7 @@ def test_a_store_that_keeps_less_has_a_page_too(tmp_path: Path, keep: tuple[str,
 
 def test_an_unsorted_axis_has_its_cells_in_order() -> None:
     dataset = synthetic_store.make(keep=()).isel(clearance=[2, 0, 1])
-    axis = axes_told(dataset)[1]
+    axis = described_axes(dataset)[1]
     assert axis["values"] == pytest.approx([100, 70, 84])
     assert axis["order"] == [1, 2, 0]
     assert axis["edges"] == sorted(axis["edges"])

@@ -186,7 +186,7 @@ def test_a_rub_scores_higher_than_free_whirl_by_every_indicator():
 @pytest.mark.parametrize(
     ("rub", "arguments", "said"),
     [
-        ([False, False], {}, "no case of this selection touches; take smaller clearances"),
+        ([False, False], {}, "no selected case touches; take smaller clearances"),
         ([True, True], {}, "stays free of contact; take clearances above"),
         ([True, False], {"levels": [0.0]}, "levels above 0"),
         ([True, False], {"levels": []}, "levels above 0"),

@@ -12,7 +12,7 @@ from running import write_study
 
 import rubhpc
 from postproc.figures.bifurcation import bifurcation, bifurcation_data, default_coloring
-from postproc.report.grid import axes_told
+from postproc.report.grid import described_axes
 from postproc.store.select import first_of_rest, select
 from postproc.store.units import caption, written_value
 from rubhpc.cli import commands
@@ -94,9 +94,9 @@ def test_every_figure_takes_a_store_of_two_directions(path, tmp_path, arguments)
 
 
 def test_the_page_names_the_directions(store):
-    axis = axes_told(store)[-1]
+    axis = described_axes(store)[-1]
     assert (axis["name"], axis["names"], axis["label"]) == ("direction", ["up", "down"], "Direction")
-    assert all(told["names"] == [] for told in axes_told(store)[:-1])
+    assert all(about["names"] == [] for about in described_axes(store)[:-1])
 
 
 def test_the_store_keeps_its_study_without_the_added_axis(store):

@@ -34,7 +34,7 @@ class Claim:
     expected : str
         What makes it hold.
     is_reported : bool
-        Whether it is only told what was found, since the paper leaves open, or contradicts, what it takes.
+        Whether the finding is only reported, since the paper leaves its setting open or contradicts itself.
     evaluate : function
         Of one Dataset a study.
     """
@@ -70,9 +70,9 @@ def claim(
 def report(
     name: str, figure: str, *studies: str, says: str, reason: str
 ) -> Callable[[Callable[..., str]], Claim]:
-    """Return a decorator that makes a claim, never gated for the `reason` given, of a function that tells."""
+    """Return a decorator that makes a claim of a function; it is only reported, for the `reason` given."""
 
-    def decorate(tell: Callable[..., str]) -> Claim:
+    def decorate(describe: Callable[..., str]) -> Claim:
         return Claim(
             id=name,
             figure=figure,
@@ -80,7 +80,7 @@ def report(
             says=says,
             expected=f"reported: {reason}",
             is_reported=True,
-            evaluate=lambda *stores: Finding(tell(*stores), True),
+            evaluate=lambda *stores: Finding(describe(*stores), True),
         )
 
     return decorate

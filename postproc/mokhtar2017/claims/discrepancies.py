@@ -1,4 +1,4 @@
-"""Where the paper disagrees with itself or leaves its model's range: told, never gated."""
+"""Where the paper disagrees with itself or leaves its model's range: reported only."""
 
 from __future__ import annotations
 

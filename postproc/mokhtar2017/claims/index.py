@@ -37,7 +37,7 @@ HOLDS, FAILS, REPORTED = "holds", "fails", "reported"
 
 @dataclass(frozen=True)
 class Result:
-    """A claim and what the stores say to it."""
+    """A claim and what was found in the stores."""
 
     claim: Claim
     finding: Finding
@@ -85,12 +85,12 @@ def open_studies(folder: str | Path, names: Iterable[str]) -> dict[str, xr.Datas
     missing = [path.name for path in paths.values() if not path.exists()]
     if missing:
         problem = f"there is no {', '.join(missing)}"
-        raise StoreError(f"{folder}: {problem}; run make paper, or name another folder by --stores")
+        raise StoreError(f"{folder}: {problem}; run make paper, or give another folder with --stores")
     return {name: open_store(path) for name, path in paths.items()}
 
 
 def evaluate(claims: Iterable[Claim], stores: Mapping[str, xr.Dataset]) -> list[Result]:
-    """Return what the stores say to each claim; one on a case that failed or diverged fails."""
+    """Return the result of each claim; one on a case that failed or diverged fails."""
     return [Result(claim, _find(claim, stores)) for claim in claims]
 
 

@@ -64,11 +64,11 @@ def conventional_law_twists_more(penalty: xr.Dataset, multiplier: xr.Dataset) ->
     """Tell sizes, periods and the unevenness of successive revolutions with either law."""
     found = []
     for name, case in (("wall", cases(penalty)), ("multiplier", cases(multiplier, **SMALL_GAP_CASE))):
-        told = [f"{name}: period {int(case['period'])}"]
+        parts = [f"{name}: period {int(case['period'])}"]
         for signal, unit in (("vertical", "µm"), ("torsion", "µrad")):
             size = written(peak_to_peak(case[signal]), unit, MICRO)
-            told.append(f"{signal} {size} (uneven by {100 * unevenness(case[signal]):.2g} %)")
-        found.append(", ".join(told))
+            parts.append(f"{signal} {size} (uneven by {100 * unevenness(case[signal]):.2g} %)")
+        found.append(", ".join(parts))
     return "; ".join(found)
 
 

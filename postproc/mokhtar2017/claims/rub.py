@@ -139,7 +139,7 @@ def contact_lasts_three_milliseconds(store: xr.Dataset) -> Finding:
     expected="exact",
 )
 def one_contact_a_revolution(store: xr.Dataset) -> Finding:
-    """Count the contacts as they passed and in the samples; both tell the same share of the time."""
+    """Count the contacts as they passed and in the samples; both give the same share of the time."""
     case = cases(store, **LARGE_GAP_CASE)
     rate, share = float(case["contacts_per_revolution"]), float(case["contact_fraction"])
     force = case["contact_force"]

@@ -26,7 +26,7 @@ against the studies in `jobs/paper`. `rubhpc claims --document docs/claims.md` w
 paper` had run them; [gallery.md](gallery.md) shows the figures. `rubhpc claims` evaluates the same from
 any stores of these studies, and exits with 1 when a claim fails.
 
-Unless told: the packaged rig, friction 0.3, fixed normal, sliding friction, steady state. `r` is the spin
+By default: the packaged rig, friction 0.3, fixed normal, sliding friction, steady state. `r` is the spin
 speed over the first lateral natural frequency, `g` the gap, `cg` the gap over the amplitude that the disc
 would have at that speed without the stator. What the paper leaves open, or contradicts itself on, is
 *reported* with what was found, and never counted as held or failed; ids that begin with D are such

@@ -21,9 +21,9 @@ def page(rows: str, height: float, width: float | None = None) -> tuple[Figure, 
     Parameters
     ----------
     rows : str
-        Rows of letters, as in "ab cc": panels a and b beside each other over a wide panel c.
+        Rows of letters, as in "ab cc": panels a and b side by side over a wide panel c.
     height, width : float
-        mm; unless told, a page of one panel a row is one column wide, any other two.
+        mm; by default, a page of one panel a row is one column wide, any other two.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

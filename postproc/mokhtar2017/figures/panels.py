@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-LABEL_WIDTH = 22  # characters beside a panel
-# Of curves over one another, told apart without colour as well.
+LABEL_WIDTH = 22  # characters left of a panel
+# Of overlaid curves, distinguishable without colour too.
 STYLES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)))
 
 
@@ -96,7 +96,7 @@ def orbits(
     names: Sequence[str] | None = None,
     gap: float | None = None,
 ) -> None:
-    """Draw one period of orbits over one another; a dotted line marks the gap (m) where the stator stands.
+    """Draw one period of orbits over one another; a dotted line marks the gap (m) of the stator.
 
     Of an orbit that has no period, `revolutions` are shown. `names` are those of the legend, in place of the
     values of the axis.

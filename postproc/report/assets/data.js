@@ -1,10 +1,10 @@
 "use strict";
-// What the page is told, and its data: in the page itself, or fetched from the server that gave it.
+// Facts and data of the page: in the page itself, or fetched from its server.
 const byId = (id) => document.getElementById(id);
-const told = JSON.parse(byId("told").textContent);
-const shape = told.axes.map((axis) => axis.values.length);
+const facts = JSON.parse(byId("facts").textContent);
+const shape = facts.axes.map((axis) => axis.values.length);
 const nCase = shape.reduce((product, n) => product * n, 1);
-const variable = Object.fromEntries(told.variables.map((v) => [v.name, v]));
+const variable = Object.fromEntries(facts.variables.map((v) => [v.name, v]));
 const FAILED = 2, DIVERGED = 3, MISSING = 0;
 
 function fromBase64(text) {
@@ -48,7 +48,7 @@ function remembered(most, make) {
 
 // A measure of all cases, SI, in the order of the grid; the stators run fastest.
 const valuesOf = remembered(64, async (name) => {
-  const bytes = told.isServed ? await fetched("values/" + name) : fromBase64(embedded.values[name]);
+  const bytes = facts.isServed ? await fetched("values/" + name) : fromBase64(embedded.values[name]);
   const planes = new Uint8Array(await inflate(bytes));
   const n = planes.length / 4;
   const whole = new Uint8Array(planes.length);
@@ -67,10 +67,10 @@ function unbend(codes) {
 
 // Waveforms, spectra and sections of one case in display units; null where the page has none.
 const recordOf = remembered(200, async (flat) => {
-  if (!told.kept.length) return null;
+  if (!facts.kept.length) return null;
   const text = embedded.records[flat];
-  if (!told.isServed && text === undefined) return null;
-  const buffer = await inflate(told.isServed ? await fetched("record/" + flat) : fromBase64(text));
+  if (!facts.isServed && text === undefined) return null;
+  const buffer = await inflate(facts.isServed ? await fetched("record/" + flat) : fromBase64(text));
   const length = new DataView(buffer).getUint32(0, true);
   const record = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   const entries = [...record.waves, ...record.spectra, ...record.section];
@@ -79,7 +79,7 @@ const recordOf = remembered(200, async (flat) => {
   for (const entry of entries) {
     const codes = Array.from({ length: entry.n }, (_, i) => bytes[at + i] | (bytes[n + at + i] << 8));
     at += entry.n;
-    const { factor } = told.signals[entry.name];
+    const { factor } = facts.signals[entry.name];
     if (entry.top !== undefined) {
       entry.top *= factor;
       entry.values = codes.map((q) => (q ? entry.top * 10 ** (5 * (q / 2047 - 1)) : 0));

@@ -41,8 +41,8 @@ class CaseMap {
   }
 
   async redraw({ x, y, value, stator, at, isLog }) {
-    this.x = told.axes[x];
-    this.y = y === null ? null : told.axes[y];
+    this.x = facts.axes[x];
+    this.y = y === null ? null : facts.axes[y];
     this.iX = x;
     this.iY = y;
     const v = variable[value];
@@ -71,7 +71,7 @@ class CaseMap {
   // Every cell by rows from below: its case, its value, and what is to be seen of it.
   describe(v, values, status, validity, stator, at) {
     const nX = this.x.values.length, nY = this.y ? this.y.values.length : 1;
-    const stride = v.by_stator ? told.nStator : 1, shift = v.by_stator ? stator : 0;
+    const stride = v.by_stator ? facts.nStator : 1, shift = v.by_stator ? stator : 0;
     const step = (k) => shape.slice(k + 1).reduce((product, n) => product * n, 1);
     const base = at.slice();
     base[this.iX] = 0;
@@ -98,10 +98,10 @@ class CaseMap {
     const where = [`${this.x.label} ${axisValue(this.x, this.x.order[i])}`];
     if (this.y) where.push(`${this.y.label} ${axisValue(this.y, this.y.order[j])}`);
     const what = kind === "known" || kind === "beyond" ? `${v.label}: ${valueText(v, cells.value[n])}` : kind === "empty" ? "no value" : kind;
-    return `${where.join(", ")}\n${what}${kind === "beyond" ? `\nout of range: ${told.validity[validity[cells.flat[n]]]}` : ""}`;
+    return `${where.join(", ")}\n${what}${kind === "beyond" ? `\nout of range: ${facts.validity[validity[cells.flat[n]]]}` : ""}`;
   }
 
-  // Colours run over the whole study, so that they mean the same wherever the other axes stand.
+  // Colours run over the whole study, so that they mean the same whatever the other axes are set to.
   colours(v, values, cells, isLog) {
     const painted = (i) => cells.kind[i] === "known" || cells.kind[i] === "beyond";
     const color = cells.kind.map((kind, i) => (painted(i) ? null : HATCHES[kind][0]));
@@ -169,7 +169,7 @@ class CaseMap {
     this.colourBar(v, scale);
   }
 
-  // Columns stand on zero; what has no height fills the figure.
+  // Columns start at zero; what has no height fills the figure.
   columns(v, cells) {
     const heights = cells.value.map((x, i) => (v.is_flag || !["known", "beyond"].includes(cells.kind[i]) ? NaN : x * v.factor));
     const finite = heights.filter(Number.isFinite);

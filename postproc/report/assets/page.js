@@ -38,8 +38,8 @@ function setAxes(x, y) {
 
 function buildControls() {
   const place = byId("controls");
-  const several = told.free.map((name) => [told.axes.findIndex((a) => a.name === name), name]).map(([k]) => [String(k), told.axes[k].label]);
-  place.replaceChildren(choice("Show", told.variables.map((v) => [v.name, v.label]), state.value, (value) => update({ value })));
+  const several = facts.free.map((name) => [facts.axes.findIndex((a) => a.name === name), name]).map(([k]) => [String(k), facts.axes[k].label]);
+  place.replaceChildren(choice("Show", facts.variables.map((v) => [v.name, v.label]), state.value, (value) => update({ value })));
   const swap = (which) => (k) => {
     const other = which === "x" ? "y" : "x";
     const old = state[which];
@@ -51,13 +51,13 @@ function buildControls() {
   if (several.length > 1) {
     place.append(choice("Across", several, String(state.x), swap("x")), choice("Up", several, String(state.y), swap("y")));
   }
-  if (told.nStator > 1) {
-    const numbers = Array.from({ length: told.nStator }, (_, i) => [String(i), `Stator ${i + 1}`]);
+  if (facts.nStator > 1) {
+    const numbers = Array.from({ length: facts.nStator }, (_, i) => [String(i), `Stator ${i + 1}`]);
     place.append(choice("Of", numbers, String(state.stator), (i) => update({ stator: Number(i) })));
   }
-  if (told.free.length > 1) place.append(check("Logarithmic colours", state.isLog, (isLog) => update({ isLog })));
+  if (facts.free.length > 1) place.append(check("Logarithmic colours", state.isLog, (isLog) => update({ isLog })));
   byId("panel-controls").replaceChildren(
-    choice("Signal of spectrum and waveform", Object.entries(told.signals).map(([name, { label }]) => [name, label]), state.signal, (signal) => update({ signal })),
+    choice("Signal of spectrum and waveform", Object.entries(facts.signals).map(([name, { label }]) => [name, label]), state.signal, (signal) => update({ signal })),
     check("Logarithmic amplitudes", state.isLogSpectrum, (isLogSpectrum) => update({ isLogSpectrum })),
     check("Orders instead of Hz", state.isOrder, (isOrder) => update({ isOrder })),
   );
@@ -65,7 +65,7 @@ function buildControls() {
 
 function buildSliders() {
   const place = byId("sliders");
-  told.axes.forEach((axis, k) => {
+  facts.axes.forEach((axis, k) => {
     if (axis.values.length < 2) return;
     const output = element("span", { className: "value" });
     const slider = element("input", { type: "range", min: 0, max: axis.values.length - 1, step: 1, id: `axis-${k}` });
@@ -84,7 +84,7 @@ function move(places) {
 
 // Arrow keys move on the map, by cells.
 function onKey(event) {
-  const across = told.axes[state.x], up = state.y === null ? null : told.axes[state.y];
+  const across = facts.axes[state.x], up = state.y === null ? null : facts.axes[state.y];
   const step = (axis, k, by) => {
     if (!axis) return null;
     const next = Math.min(Math.max(axis.order.indexOf(state.at[k]) + by, 0), axis.values.length - 1);
@@ -102,7 +102,7 @@ function onKey(event) {
   move(found);
 }
 
-const caseWords = () => told.axes.map((axis, k) => `${axis.label.toLowerCase()} ${axisValue(axis, state.at[k])}`).join(", ");
+const caseWords = () => facts.axes.map((axis, k) => `${axis.label.toLowerCase()} ${axisValue(axis, state.at[k])}`).join(", ");
 
 // Updates follow one another; of those that wait, only the last is drawn.
 let updating = false, again = false;
@@ -126,7 +126,7 @@ async function update(changes) {
 async function redraw() {
   const flat = flatOf(state.at);
   byId("broken").hidden = true;
-  told.axes.forEach((axis, k) => {
+  facts.axes.forEach((axis, k) => {
     if (!axis.slider) return;
     axis.slider.value = axis.order.indexOf(state.at[k]);
     axis.slider.setAttribute("aria-valuetext", axisValue(axis, state.at[k]));
@@ -153,7 +153,7 @@ function drawLegend(v, cells) {
     if (kinds.has(kind)) swatches.push(element("span", {}, element("i", { className: kind === "beyond" && v.is_flag ? "beyond dark" : kind }), text));
   }
   byId("legend").replaceChildren(...swatches);
-  byId("map-title").textContent = v.label + (v.by_stator && told.nStator > 1 ? `, stator ${state.stator + 1}` : "");
+  byId("map-title").textContent = v.label + (v.by_stator && facts.nStator > 1 ? `, stator ${state.stator + 1}` : "");
 }
 
 async function drawCase(flat) {
@@ -161,13 +161,13 @@ async function drawCase(flat) {
   const spin = variable.spin_speed ? (await valuesOf("spin_speed"))[flat] : NaN;
   const words = await caseTable(flat);
   const meaning = ["not computed yet", "done", "failed", "diverged"][status];
-  const reason = told.reasons[flat] ? `: ${told.reasons[flat]}` : "";
-  const range = status === 1 ? (validity > 0 ? `; out of the model's range: ${told.validity[validity]}` : "; within the model's range") : "";
+  const reason = facts.reasons[flat] ? `: ${facts.reasons[flat]}` : "";
+  const range = status === 1 ? (validity > 0 ? `; out of the model's range: ${facts.validity[validity]}` : "; within the model's range") : "";
   byId("case-text").textContent = `${caseWords() || "The only case"} – ${status === 1 ? words : meaning + reason}${range}`.replace(/^./, (c) => c.toUpperCase());
   const record = status === 1 ? await recordOf(flat) : null;
   if (!record) {
     const why = status !== 1 ? `This case ${status === 0 ? "is" : "has"} ${meaning}${reason}`
-      : `Left out to keep this page small. To see it: rubhpc view ${told.store}`;
+      : `Left out to limit the size of this page; run rubhpc view ${facts.store}`;
     for (const panel of Object.values(panels)) panel.say(why);
     return;
   }
@@ -180,30 +180,30 @@ async function drawCase(flat) {
 // The clearance, m: a setting of the case, or an axis of the study.
 async function clearanceOf(flat) {
   if (variable.clearance) return (await valuesOf("clearance"))[flat];
-  const k = told.axes.findIndex((axis) => axis.name === "clearance");
-  return k < 0 ? 0 : Number(told.axes[k].typed[state.at[k]]);
+  const k = facts.axes.findIndex((axis) => axis.name === "clearance");
+  return k < 0 ? 0 : Number(facts.axes[k].typed[state.at[k]]);
 }
 
 // Fill the table of measures; what matters most in words.
 async function caseTable(flat) {
   const said = [];
   const rows = [];
-  for (const v of told.variables) {
+  for (const v of facts.variables) {
     const values = await valuesOf(v.name);
-    const n = v.by_stator ? told.nStator : 1;
+    const n = v.by_stator ? facts.nStator : 1;
     const texts = Array.from({ length: n }, (_, i) => valueText(v, values[flat * n + i]));
-    rows.push(element("tr", {}, element("th", { scope: "row", textContent: v.label }), ...texts.map((t) => element("td", { className: "number", textContent: t, colSpan: n === 1 ? told.nStator : 1 }))));
+    rows.push(element("tr", {}, element("th", { scope: "row", textContent: v.label }), ...texts.map((t) => element("td", { className: "number", textContent: t, colSpan: n === 1 ? facts.nStator : 1 }))));
     if (["regime", "peak_contact_force", "peak_torsion"].includes(v.name) || v.name === state.value) said.push(`${v.label.toLowerCase()} ${texts[v.by_stator ? state.stator : 0]}`);
-    if (told.isServed && !v.by_stator && rows.length > 40) break;
+    if (facts.isServed && !v.by_stator && rows.length > 40) break;
   }
-  const head = told.nStator > 1
-    ? [element("thead", {}, element("tr", {}, element("th", { textContent: "" }), ...Array.from({ length: told.nStator }, (_, i) => element("th", { scope: "col", className: "number", textContent: `Stator ${i + 1}` }))))]
+  const head = facts.nStator > 1
+    ? [element("thead", {}, element("tr", {}, element("th", { textContent: "" }), ...Array.from({ length: facts.nStator }, (_, i) => element("th", { scope: "col", className: "number", textContent: `Stator ${i + 1}` }))))]
     : [];
   byId("case-table").replaceChildren(...head, element("tbody", {}, ...rows));
   return said.join(", ");
 }
 
-// The place on the page stands in its address, so that a link leads back to it.
+// The state of the page is in its address, so that a link restores it.
 function rememberPlace() {
   const text = new URLSearchParams({ at: state.at.join("."), show: state.value, across: state.x ?? "", up: state.y ?? "" });
   history.replaceState(null, "", "#" + text);
@@ -214,7 +214,7 @@ function recallPlace() {
   const at = (asked.get("at") ?? "").split(".").map(Number);
   if (at.length === shape.length && at.every((i, k) => Number.isInteger(i) && i >= 0 && i < shape[k])) state.at = at;
   if (variable[asked.get("show")]) state.value = asked.get("show");
-  const free = told.free.map((name) => String(told.axes.findIndex((a) => a.name === name)));
+  const free = facts.free.map((name) => String(facts.axes.findIndex((a) => a.name === name)));
   if (free.includes(asked.get("across")) && free.includes(asked.get("up")) && asked.get("across") !== asked.get("up")) {
     state.x = Number(asked.get("across"));
     state.y = Number(asked.get("up"));
@@ -224,18 +224,18 @@ function recallPlace() {
 async function startAt() {
   const status = await valuesOf("status");
   let flat = [...status.keys()].find((i) => status[i] === 1) ?? 0;
-  const shown = told.isServed ? null : Object.keys(embedded.records).map(Number);
+  const shown = facts.isServed ? null : Object.keys(embedded.records).map(Number);
   if (shown?.length) flat = shown[Math.floor(shown.length / 2)];
   state.at = placeOf(flat);
-  const axes = told.free.slice(0, 2).map((name) => told.axes.findIndex((a) => a.name === name));
-  // The speed runs across, wherever it stands in the grid.
-  axes.sort((i, k) => told.axes[k].name.startsWith("speed") - told.axes[i].name.startsWith("speed"));
+  const axes = facts.free.slice(0, 2).map((name) => facts.axes.findIndex((a) => a.name === name));
+  // The speed runs across, wherever it is in the grid.
+  axes.sort((i, k) => facts.axes[k].name.startsWith("speed") - facts.axes[i].name.startsWith("speed"));
   [state.x = null, state.y = null] = axes;
   const first = ["regime", "peak_contact_force", "status"];
   if (state.y === null) first.unshift("peak_contact_force");
   if (!status.includes(1)) first.unshift("status");
   state.value = first.find((name) => variable[name]);
-  state.signal = Object.keys(told.signals).includes("torsion") ? "torsion" : Object.keys(told.signals)[0] ?? "";
+  state.signal = Object.keys(facts.signals).includes("torsion") ? "torsion" : Object.keys(facts.signals)[0] ?? "";
 }
 
 async function begin() {
@@ -246,8 +246,8 @@ async function begin() {
   buildSliders();
   Object.assign(panels, { orbit: new Orbit("orbit"), section: new Section("section"), spectrum: new Spectrum("spectrum"), waveform: new Waveform("waveform") });
   for (const panel of Object.values(panels)) await panel.begin();
-  if (!told.kept.length) {
-    byId("right").replaceChildren(element("p", { className: "note", textContent: "The store keeps neither waveforms nor spectra nor sections, only measures. To see orbits, run the study with [record] keep = [\"waveform\"]." }));
+  if (!facts.kept.length) {
+    byId("right").replaceChildren(element("p", { className: "note", textContent: "The store contains only measures, no waveforms, spectra or sections. To see orbits, run the study with [record] keep = [\"waveform\"]." }));
     for (const name of Object.keys(panels)) delete panels[name];
   }
   if (state.x === null) {

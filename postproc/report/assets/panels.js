@@ -63,7 +63,7 @@ class Plane extends Panel {
   }
 
   label() {
-    const { unit } = told.signals.vertical;
+    const { unit } = facts.signals.vertical;
     this.figure.xaxis.axis_label = `Horizontal (${unit})`;
     this.figure.yaxis.axis_label = `Vertical (${unit})`;
   }
@@ -104,8 +104,8 @@ class Orbit extends Plane {
     const turns = y.map((_, i) => i).filter((i) => i % record.samples === 0);
     this.marks.data = { y: turns.map((i) => y[i]), z: turns.map((i) => z[i]) };
     this.first.data = { y: [y[0]], z: [z[0]] };
-    const { unit, factor } = told.signals.vertical;
-    const faces = this.bench(clearance * factor, factor, record.places ?? told.places, reach);
+    const { unit, factor } = facts.signals.vertical;
+    const faces = this.bench(clearance * factor, factor, record.places ?? facts.places, reach);
     this.label();
     this.frame([0, ...y, ...faces.map((p) => p[1])], [0, ...z, ...faces.map((p) => p[0])], 1.12);
     const n = y.length / record.samples;
@@ -198,10 +198,10 @@ class Spectrum extends Panel {
     setRange(this.figure.x_range, 0, end);
     setRange(this.figure.y_range, floor, isLog ? top * 6 : top * 1.18);
     this.figure.xaxis.axis_label = isOrder ? "Order (multiples of spin speed)" : "Frequency (Hz)";
-    this.figure.yaxis.axis_label = `Amplitude (${told.signals[signal].unit})`;
+    this.figure.yaxis.axis_label = `Amplitude (${facts.signals[signal].unit})`;
     const strongest = this.name(shown[0], spacing, rate, end, top);
     this.mark(isOrder ? 2 * Math.PI / spin : 1, end, floor, isLog ? top * 6 : top * 1.18);
-    this.heading.textContent = `Spectrum: ${told.signals[signal].label}`;
+    this.heading.textContent = `Spectrum: ${facts.signals[signal].label}`;
     this.describe(strongest.length ? `strongest lines ${strongest.join(", ")}` : "no lines");
   }
 
@@ -216,11 +216,11 @@ class Spectrum extends Panel {
     }
     const text = named.map((i) => orderName((i + 1) * spacing, spacing / 2));
     this.names.data = { x: named.map((i) => (i + 1) * spacing * rate), y: named.map((i) => a[i]), text };
-    return named.map((i, k) => `${text[k]} ${withUnit(a[i], told.signals[s.name].unit, 3)}`);
+    return named.map((i, k) => `${text[k]} ${withUnit(a[i], facts.signals[s.name].unit, 3)}`);
   }
 
   mark(rate, end, floor, top) {
-    const inside = Object.entries(told.frequencies).filter(([, f]) => f * rate < 0.97 * end);
+    const inside = Object.entries(facts.frequencies).filter(([, f]) => f * rate < 0.97 * end);
     const x = inside.map(([, f]) => f * rate);
     this.modes.data = { x, low: x.map(() => floor), high: x.map(() => top) };
     // Names that would lie over one another are left out.
@@ -245,7 +245,7 @@ class Waveform extends Panel {
     const shown = record.waves.filter((w) => w.name === signal);
     if (!shown.length) return this.say(notKept("waveform", signal));
     this.say("");
-    const { label, unit } = told.signals[signal];
+    const { label, unit } = facts.signals[signal];
     const n = Math.min(shown[0].n, record.shown * record.samples), x = Array.from({ length: n }, (_, i) => i / record.samples);
     this.curves.data = {
       xs: shown.map(() => x), ys: shown.map((w) => w.values.slice(-n)), color: shown.map((_, k) => ink(CURVES[k % CURVES.length])),
@@ -283,6 +283,6 @@ class Waveform extends Panel {
 
 function notKept(role, signal) {
   const what = { waveform: "waveforms", spectrum: "spectra", section: "sections" }[role];
-  if (told.kept.includes(role)) return `No ${what} of ${(told.signals[signal]?.label ?? "this signal").toLowerCase()} here`;
-  return `The store keeps no ${what}: put "${role}" into [record] keep`;
+  if (facts.kept.includes(role)) return `No ${what} of ${(facts.signals[signal]?.label ?? "this signal").toLowerCase()} here`;
+  return `The store contains no ${what}; put "${role}" into [record] keep`;
 }
