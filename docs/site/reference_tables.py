@@ -10,6 +10,7 @@ import importlib
 import inspect
 import pkgutil
 import re
+import typing
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -17,10 +18,7 @@ import click
 import postproc
 import rubhpc
 from rubhpc.cli import COMMANDS, commands
-from rubhpc.rig.matrices import MatrixRotor
-from rubhpc.rig.parts import Bearing, Damping, Disc, Load, ShaftSection, Torsion, Unbalance
-from rubhpc.rig.rig import Rig, Rotor
-from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
+from rubhpc.rig.rig import Rig
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import _OwnAxes as OwnAxes
 from rubhpc.study.tables import Contact, Integrator, Recording, Run, Sample
@@ -36,22 +34,40 @@ STUDY_TABLES = {
     "[sample]": Sample,
     "[run]": Run,
 }
-RIG_TABLES = {
-    "Top of the file": Rig,
-    "[rotor]": Rotor,
-    "[[rotor.shaft]]": ShaftSection,
-    "[[rotor.disc]]": Disc,
-    "[[rotor.bearing]]": Bearing,
-    "[[rotor.unbalance]]": Unbalance,
-    "[[rotor.load]]": Load,
-    "[rotor.torsion]": Torsion,
-    "[rotor.damping], [stator.damping]": Damping,
-    "[[stator]], a beam": Stator,
-    "[[stator]], a mass on springs or a wall": LumpedStator,
-    "[rotor], by matrices": MatrixRotor,
-    "[[stator]], by matrices": MatrixStator,
-}
 ROOMS = ("store", "signals", "cases", "figures")  # of postproc, whose functions the reference shows
+
+
+def rig_tables() -> dict[str, type]:
+    """Return the tables of a rig file with their dataclasses, found from the fields of the rig."""
+    found: dict[type, list[str]] = {Rig: ["Top of the file"]}
+    _walk(Rig, "", found)
+    names = [head for heads in found.values() for head in heads]
+    return {
+        ", ".join(f"{head} ({kind.__name__})" if names.count(head) > 1 else head for head in heads): kind
+        for kind, heads in found.items()
+    }
+
+
+def _walk(owner: type, above: str, found: dict[type, list[str]]) -> None:
+    """Add the dataclasses in the fields of one, and the tables of the file that hold them."""
+    hints = typing.get_type_hints(owner)
+    for field in dataclasses.fields(owner):
+        if "kind" in field.metadata:
+            continue
+        for kind in _dataclasses_in(hints[field.name]):
+            path = f"{above}{field.name}"
+            head = f"[[{path}]]" if typing.get_origin(hints[field.name]) is tuple else f"[{path}]"
+            if kind not in found:
+                found[kind] = []
+                _walk(kind, f"{path}.", found)
+            if head not in found[kind]:
+                found[kind].append(head)
+
+
+def _dataclasses_in(hint: Any) -> list[type]:
+    if dataclasses.is_dataclass(hint):
+        return [hint] if isinstance(hint, type) else []
+    return [kind for part in typing.get_args(hint) for kind in _dataclasses_in(part)]
 
 
 def expand(text: str) -> str:
@@ -102,6 +118,7 @@ def _kind(meta: Any) -> str:
         "pairs": "table of numbers",
         "matrix": "matrix",
         "degrees": "list of node and name",
+        "series": "list of numbers",
     }
     kind = meta["kind"]
     if kind in ("choice", "choices"):
@@ -118,7 +135,7 @@ def _kind(meta: Any) -> str:
         if meta.get(key) is not None
     ]
     unlike = f', or `"{meta["or_word"]}"`' if meta.get("or_word") else ""
-    return ", ".join([names[kind], *bounds]) + unlike
+    return ", ".join([names.get(kind, kind), *bounds]) + unlike
 
 
 def _default(field: dataclasses.Field[Any]) -> str:
@@ -270,7 +287,7 @@ def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 _TABLES = {
     "axes": axis_table,
     "study": lambda: key_tables(STUDY_TABLES),
-    "rig": lambda: key_tables(RIG_TABLES),
+    "rig": lambda: key_tables(rig_tables()),
     "commands": command_sections,
     "variables": variable_sections,
     "python": python_names,

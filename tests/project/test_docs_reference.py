@@ -21,7 +21,7 @@ sys.path.insert(0, str(DOCS / "site"))
 import github_markdown  # noqa: E402
 import reference_tables as tables  # noqa: E402
 
-TABLES = tables.STUDY_TABLES | tables.RIG_TABLES
+TABLES = tables.STUDY_TABLES | tables.rig_tables()
 KEYS = [(table, field) for table, owner in TABLES.items() for field in dataclasses.fields(owner)]
 DECLARED = [(table, field) for table, field in KEYS if "kind" in field.metadata]
 
