@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
-from rubhpc.input.reading import parse_quantity
+from rubhpc.input.quantity import parse_quantity
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare

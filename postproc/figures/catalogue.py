@@ -326,7 +326,7 @@ def _several(names: str | Sequence[str]) -> tuple[str, ...]:
 
 def _hertz(value: float | str, option: str) -> float:
     """Return a frequency above 0, Hz, of a number or a text with or without a unit."""
-    from rubhpc.input.reading import parse_quantity
+    from rubhpc.input.quantity import parse_quantity
 
     with suppress(ValueError):  # text with a unit
         value = float(value)

@@ -11,7 +11,7 @@ from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.units import meanings, scale_for
 from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
-from rubhpc.input.reading import parse_quantity
+from rubhpc.input.quantity import parse_quantity
 from rubhpc.study.axes import coordinate_of
 from rubhpc.study.sampling import CASE
 

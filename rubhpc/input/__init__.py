@@ -1,1 +1,1 @@
-"""Study and rig files read, checked and resolved."""
+"""Generic reading of TOML files: quantities with units, ranges, matrices, declared fields, dotted keys."""

@@ -1,4 +1,4 @@
-"""Dotted keys, single values in nested dataclasses: "stator.length" in all, "stator.1.angle" in the first."""
+"""Dotted keys of nested dataclasses: "stator.length" sets all stators, "stator.1.angle" the first."""
 
 from __future__ import annotations
 
@@ -18,46 +18,46 @@ _SETTABLE = ("quantity", "count", "flag")  # kinds of fields that one number can
 
 
 def find_key(owner: object, dotted: str) -> dataclasses.Field[Any]:
-    """Return the field that a dotted key names, or refuse the key, naming the nearest.
+    """Return the field that a dotted key names.
 
     Raises
     ------
     InputError
-        When there is no such key: a part is unknown, names a whole table, or counts past the end.
+        When there is no such key; the message names the nearest.
     """
-    held: Any = owner
+    current: Any = owner
     declared = None
     for part in dotted.split("."):
-        if isinstance(held, tuple) and held and part.isdigit():
-            held, declared = (held[int(part) - 1] if 0 < int(part) <= len(held) else None), None
+        if isinstance(current, tuple) and current and part.isdigit():
+            current, declared = (current[int(part) - 1] if 0 < int(part) <= len(current) else None), None
             continue
-        if isinstance(held, tuple) and held:  # a key of all: each has to have it
-            held = min(held, key=lambda item: part in _fields(type(item)))
-        declared = _fields(type(held)).get(part)
-        held = getattr(held, part) if declared else None
+        if isinstance(current, tuple) and current:  # a key of all items: each must have it
+            current = min(current, key=lambda item: part in _fields(type(item)))
+        declared = _fields(type(current)).get(part)
+        current = getattr(current, part) if declared else None
     if declared is not None and _is_settable(declared):
         return declared
     if declared is not None and declared.metadata.get("kind") in _SETTABLE:
-        raise InputError("is no key for a study to set; write it in the rig")
+        raise InputError("cannot be set by a study; write it in the rig")
     known = list(_keys(owner))
     inside = [k for k in known if k.startswith(f"{dotted}.")]
     if inside:
         raise InputError(f"is a table, not a value; did you mean {inside[0]}?")
-    mend = nearest(dotted, known)
-    is_told = "?" in mend or len(known) <= _FEW
-    raise InputError(f"unknown key; {mend if is_told else 'see the rig file for its keys'}")
+    fix = nearest(dotted, known)
+    is_short = "?" in fix or len(known) <= _FEW
+    raise InputError(f"unknown key; {fix if is_short else 'see the rig file for its keys'}")
 
 
 def replace_keys(owner: T, values: Mapping[str, object]) -> T:
     """Return a nested dataclass with some dotted keys set, all at once.
 
-    A dataclass that can say one thing in two ways has a method `displaced(keys)` which returns what becomes
-    of the other fields when those in `keys` are set.
+    A dataclass that can give one thing in two ways has a method `displaced(keys)`, which returns the changes
+    of other fields when those in `keys` are set.
 
     Raises
     ------
     InputError
-        When a key is unknown or a value does not fit.
+        When a key is unknown or a value is invalid.
     """
     parsed = {}
     for dotted, value in values.items():

@@ -1,4 +1,4 @@
-"""Fields of a study and a rig: what each may hold is declared once, and read and checked from there."""
+"""Fields of the study and rig files: each is declared once, and read, checked and documented from there."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class FieldError(InputError):
-    """A value that its field cannot hold; whoever knows the file adds it."""
+    """A value that its field cannot hold; `within` adds the file and table."""
 
     def __init__(self, key: str, problem: str) -> None:
         super().__init__(f"{key}: {problem}")
@@ -129,7 +129,7 @@ def _declare(kind: str, doc: str, example: str, default: Any, **limits: Any) -> 
 
 
 def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> Any:
-    """Return the value that a field takes from a file or a caller; bounds are left to `check_fields`."""
+    """Return the value of a field from that of a file or caller; `check_fields` checks its bounds."""
     kind = declared.metadata.get("kind")
     if kind == "quantity":
         return parse_quantity(value, declared.metadata["unit"], where)
@@ -145,31 +145,33 @@ def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> 
         return _parse_degrees(value, where)
     if kind == "words":
         if not isinstance(value, list | tuple) or not all(isinstance(word, str) for word in value):
-            raise InputError(f'{where}: {brief(value)} is no list of words; write ["axial", "lateral"]')
+            raise InputError(f'{where}: {brief(value)} is not a list of words; write ["axial", "lateral"]')
         return tuple(value)
     if kind == "flag":
         if isinstance(value, float) and value in (0.0, 1.0):
             return bool(value)  # an axis holds floats
         if not isinstance(value, bool):
-            raise InputError(f"{where}: {brief(value)} is neither true nor false; write one, without quotes")
+            raise InputError(
+                f"{where}: {brief(value)} is neither true nor false; write one of them, without quotes"
+            )
         return value
     if kind == "choices":
         if not isinstance(value, list | tuple):
             words = _listed(declared.metadata["of"])
-            raise InputError(f"{where}: {brief(value)} is no list; write [{words}] or part of it")
+            raise InputError(f"{where}: {brief(value)} is not a list; write [{words}] or part of it")
         return tuple(value)
     if not isinstance(value, str):
-        raise InputError(f'{where}: {brief(value)} is no text; write it in quotes, {declared.name} = "..."')
+        raise InputError(f'{where}: {brief(value)} is not text; write it in quotes, {declared.name} = "..."')
     return value
 
 
 def check_fields(owner: Any) -> None:
-    """Refuse values that the declarations of a dataclass exclude; called where it is made.
+    """Refuse values that the declarations of a dataclass exclude; call it in `__post_init__`.
 
     Raises
     ------
     FieldError
-        Naming the field, what is wrong and the mend.
+        Names the field, what is wrong and how to fix it.
     """
     for declared in dataclasses.fields(owner):
         problem = check_value(declared, getattr(owner, declared.name))
@@ -178,7 +180,7 @@ def check_fields(owner: Any) -> None:
 
 
 def check_value(declared: dataclasses.Field[Any], value: Any) -> str:
-    """Return what is wrong with the value of a field, and the mend; "" when nothing is."""
+    """Return what is wrong with the value of a field and how to fix it; "" if nothing is."""
     check = _CHECKS.get(declared.metadata.get("kind", ""))
     if check is None or (value is None and declared.default is None):
         return ""
@@ -186,19 +188,19 @@ def check_value(declared: dataclasses.Field[Any], value: Any) -> str:
 
 
 def place(file: str, table: str = "", key: str = "") -> str:
-    """Return "file: [table] key", the head of every message about an input, on one line."""
+    """Return "file: [table] key", the start of a message about an input, on one line."""
     name = " ".join(p for p in (f"[{table[:80]}]" if table else "", key[:80]) if p)
     head = ": ".join(p for p in (file, name) if p)
     return "".join(c if c.isprintable() else " " for c in head)
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return the mend for a word that nobody knows: the one most like it, or the whole list."""
+    """Return how to fix an unknown word: the known word most like it, or the whole list."""
     known = list(known)
     close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     if not close:  # letters aside, people leave a word out
         close = [k for k in known if word and (word.lower() in k.lower() or k.lower() in word.lower())][:1]
-    return f"did you mean {close[0]}?" if close else f"there is {', '.join(known)}"
+    return f"did you mean {close[0]}?" if close else f"choose one of {', '.join(known)}"
 
 
 def _parse_count(value: object, where: str, or_word: str) -> int | str:
@@ -215,11 +217,11 @@ def _parse_count(value: object, where: str, or_word: str) -> int | str:
 
 
 def _parse_degrees(value: object, where: str) -> tuple[tuple[int, str], ...]:
-    mend = 'write a node and a name for each row, [[1, "v"], [1, "w"]]'
+    fix = 'write a node and a name for each row, [[1, "v"], [1, "w"]]'
     try:
         pairs = [(node, name) for node, name in value]  # type: ignore[attr-defined]
     except (TypeError, ValueError):
-        raise InputError(f"{where}: {brief(value)} is no list of degrees; {mend}") from None
+        raise InputError(f"{where}: {brief(value)} is not a list of degrees; {fix}") from None
     degrees = []
     for node, name in pairs:
         try:
@@ -227,7 +229,7 @@ def _parse_degrees(value: object, where: str) -> tuple[tuple[int, str], ...]:
         except TypeError:
             number = 0
         if number < 1 or not isinstance(name, str):
-            raise InputError(f"{where}: {brief((node, name))} is no degree; {mend}")
+            raise InputError(f"{where}: {brief((node, name))} is not a degree; {fix}")
         degrees.append((number, str(name)))
     return tuple(degrees)
 
@@ -274,7 +276,7 @@ def _check_flag(value: object, _: Any) -> str:
 
 def _check_text(value: object, _: Any) -> str:
     if not isinstance(value, str):
-        return f"{brief(value)} is no text; give one in quotes"
+        return f"{brief(value)} is not text; write it in quotes"
     if not value.strip() or not value.isprintable():
         return f"{brief(value)} is not a line of text; give one without control characters"
     return ""
@@ -283,7 +285,7 @@ def _check_text(value: object, _: Any) -> str:
 def _check_choice(value: object, bounds: Any) -> str:
     if value in bounds["of"]:
         return ""
-    return f"{brief(value)} is not available; there is {_listed(bounds['of'])}"
+    return f"{brief(value)} is not available; choose one of {_listed(bounds['of'])}"
 
 
 def _check_choices(value: Any, bounds: Any) -> str:
@@ -291,7 +293,7 @@ def _check_choices(value: Any, bounds: Any) -> str:
         if problem := _check_choice(word, bounds):
             return problem
         if value.count(word) > 1:
-            return f"{brief(word)} stands twice; leave one out"
+            return f"{brief(word)} is duplicated; remove one"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""Square matrices from outside: arrays or lists of rows, checked; and as text that keeps every digit."""
+"""Square matrices: checked when read from arrays or lists of rows, and encoded as text without loss."""
 
 from __future__ import annotations
 
@@ -30,26 +30,28 @@ def parse_matrix(value: object, where: str) -> Matrix:
     """
     if isinstance(value, dict):
         return _decoded(value, where)
-    mend = "give the rows, [[1.0, 0.0], [0.0, 1.0]]"
+    fix = "give the rows, [[1.0, 0.0], [0.0, 1.0]]"
     try:
         given = np.asarray(value.toarray() if hasattr(value, "toarray") else value)  # or a sparse one
         is_number = given.dtype.kind in "iuf"
     except ValueError:  # rows of unequal length
         is_number = False
     if not is_number:
-        raise InputError(f"{where}: {brief(value)} is no matrix of real numbers; {mend}")
+        raise InputError(f"{where}: {brief(value)} is not a matrix of real numbers; {fix}")
     if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.size:
-        raise InputError(f"{where}: of shape {given.shape}; it must be square, (n_dof, n_dof)")
+        raise InputError(f"{where}: has the shape {given.shape}; give a square one, (n_dof, n_dof)")
     entries: Matrix = np.array(given, dtype=np.float64) + 0.0  # no negative zeros: they would not be equal
     if not np.isfinite(entries).all():
         row, column = np.argwhere(~np.isfinite(entries))[0]
-        raise InputError(f"{where}: the entry in row {row + 1}, column {column + 1} is not finite; mend it")
+        raise InputError(
+            f"{where}: the entry in row {row + 1}, column {column + 1} is not finite; correct it"
+        )
     entries.setflags(write=False)
     return entries
 
 
 def encode_matrix(entries: Matrix) -> dict[str, Any]:
-    """Return a matrix as JSON can hold it: its size, and the entries that are not zero in base64."""
+    """Return a matrix for JSON: its size, and the nonzero entries in base64."""
     row, column = np.nonzero(entries)
     packed = np.empty(row.size, dtype=_ENTRY)
     packed["row"], packed["column"], packed["value"] = row, column, entries[row, column]
@@ -64,7 +66,7 @@ def symmetric_part(entries: Matrix) -> Matrix:
 
 
 def is_symmetric(entries: Matrix, sign: float = 1.0) -> bool:
-    """Whether a matrix is symmetric but for rounding; skew for the sign -1."""
+    """Whether a matrix is symmetric up to rounding; skew-symmetric for the sign -1."""
     return bool(np.abs(entries - sign * entries.T).max() <= ROUNDING * np.abs(entries).max())
 
 
@@ -75,5 +77,5 @@ def _decoded(table: dict[str, Any], where: str) -> Matrix:
         entries = np.zeros((size, size))
         entries[packed["row"], packed["column"]] = packed["value"]
     except (KeyError, TypeError, ValueError, IndexError, binascii.Error):
-        raise InputError(f"{where}: no matrix can be read from it; give its rows") from None
+        raise InputError(f"{where}: cannot be decoded; give the rows of the matrix") from None
     return parse_matrix(entries, where)

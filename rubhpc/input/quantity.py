@@ -1,4 +1,4 @@
-"""Numbers that come from outside: SI as they stand, or text with a unit, `"100 um"`, read with pint."""
+"""Numbers from files and callers: plain ones in SI units, or text with a unit, `"100 um"`, read with pint."""
 
 from __future__ import annotations
 
@@ -48,32 +48,32 @@ def parse_quantity(value: object, unit: str, where: str) -> float:
     ----------
     value : int, float or str
         A number counts as SI; text carries a number and a unit ("1800 rpm", "100 um", "5 %").
-        Hertz are turns a second where `unit` is rad/s, and the other way round.
+        1 Hz is 2 pi rad/s where `unit` is rad/s, and the other way round.
     unit : str
         Unit of the result, readable by pint; "" for a number without dimension.
     where : str
-        What an error names: "study.toml: [grid] speed".
+        Start of error messages: "study.toml: [grid] speed".
 
     Raises
     ------
     InputError
-        When `value` is no finite number, or its unit does not fit.
+        When `value` is not a finite number, or has the wrong unit.
     """
     if isinstance(value, str):
         return _parse_text(value, unit, where)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{where}: {brief(value)} is not a number; {_mend(unit)}")
+        raise InputError(f"{where}: {brief(value)} is not a number; {_fix(unit)}")
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
         raise InputError(f"{where}: {brief(value)} is not finite; write a finite number")
-    return number + 0.0  # no negative zero: it would make two cases of one
+    return number + 0.0  # no negative zero, which would be a second case
 
 
 def brief(value: object) -> str:
-    """Return a value as it may stand in a one-line message."""
+    """Return a value shortened for a one-line message."""
     text = (
         f'"{value}"'
         if isinstance(value, str)
@@ -88,12 +88,10 @@ def brief(value: object) -> str:
 def _parse_text(text: str, unit: str, where: str) -> float:
     match = _TEXT.fullmatch(text) if len(text) <= 200 else None
     if match is None:
-        raise InputError(f"{where}: {brief(text)} is not a number with a unit; {_mend(unit)}")
+        raise InputError(f"{where}: {brief(text)} is not a number with a unit; {_fix(unit)}")
     number, given = match[1], (match[2] or "").strip()
     if not given and unit:
-        raise InputError(
-            f"{where}: {brief(text)} carries no unit; write {brief(f'{number} {unit}')} or a number"
-        )
+        raise InputError(f"{where}: {brief(text)} has no unit; write {brief(f'{number} {unit}')} or a number")
     if not math.isfinite(float(number)):
         raise InputError(f"{where}: {brief(text)} is not finite; write a finite number")
     factor = 1.0 if given == unit else _EVERYDAY.get(unit, {}).get(given) or _factor(given, unit, where, text)
@@ -115,11 +113,11 @@ def _factor(given: str, unit: str, where: str, text: str) -> float:
         has_offset = registry.convert(0.0, units, wanted) != 0.0
     except pint.DimensionalityError:
         kind = f"in {unit}" if unit else "a plain number"
-        raise InputError(f"{where}: {brief(text)} is not {kind}; {_mend(unit)}") from None
+        raise InputError(f"{where}: {brief(text)} is not {kind}; {_fix(unit)}") from None
     except Exception:
-        raise InputError(f'{where}: unknown unit "{given}"; {_mend(unit)}') from None
+        raise InputError(f'{where}: unknown unit "{given}"; {_fix(unit)}') from None
     if has_offset or not math.isfinite(factor) or factor <= 0:
-        raise InputError(f"{where}: {brief(text)} is not a multiple of {unit or 1}; {_mend(unit)}")
+        raise InputError(f"{where}: {brief(text)} is not a multiple of {unit or 1}; {_fix(unit)}")
     # To pint a radian is 1, and so is the turn in a hertz: count the turns that it loses.
     turns = _turns(units) - _turns(wanted)
     if _angles(units) + turns == _angles(wanted):
@@ -151,9 +149,9 @@ def example(unit: str) -> str:
     return _EXAMPLES.get(unit) or f'"1.5 {unit}"'
 
 
-def _mend(unit: str) -> str:
+def _fix(unit: str) -> str:
     return (
         f"write a number ({unit}) or text such as {example(unit)}"
         if unit
-        else f"write one such as {example(unit)}"
+        else f"write a number such as {example(unit)}"
     )

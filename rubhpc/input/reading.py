@@ -1,4 +1,4 @@
-"""TOML files to frozen dataclasses; the unit and the bounds of every key stand with its field.
+"""TOML files to frozen dataclasses, by the declarations of their fields.
 
 A file is data: nothing in it is evaluated, imported or run.
 """
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-__all__ = ["build", "parse_quantity", "plain", "read_toml", "refuse_unknown"]
-
 T = TypeVar("T")
 
 
@@ -31,12 +29,12 @@ def read_toml(path: Path, where: str = "") -> dict[str, Any]:
     ----------
     path : Path
     where : str
-        What asked for the file, for the error when there is none: "study.toml: rig".
+        Start of error messages: the file and key that name the file, "study.toml: rig".
 
     Raises
     ------
     InputError
-        When the file is missing, unreadable, not UTF-8 or not TOML; with line and column where there are any.
+        When the file is missing, unreadable, not UTF-8 or not TOML; the message gives line and column.
     """
     named = place(": ".join(p for p in (where, str(path)) if p))
     try:
@@ -52,7 +50,7 @@ def read_toml(path: Path, where: str = "") -> dict[str, Any]:
 
 
 def build(cls: type[T], table: object, file: str, name: str = "") -> T:
-    """Return a dataclass made from a table of a file.
+    """Return a dataclass built from a table of a file.
 
     Parameters
     ----------
@@ -61,19 +59,19 @@ def build(cls: type[T], table: object, file: str, name: str = "") -> T:
     table : dict
         As TOML gives it.
     file, name : str
-        What errors name: the file, and the dotted name of the table in it.
+        Start of error messages: the file, and the dotted name of the table in it.
 
     Raises
     ------
     InputError
-        When a key is unknown or missing, or a value does not fit.
+        When a key is unknown or missing, or a value is invalid.
     """
     if not isinstance(table, dict):
         raise InputError(
-            f"{place(file, name)}: {brief(table)} is no table; write [{name}] and its keys below"
+            f"{place(file, name)}: {brief(table)} is not a table; write [{name}] and its keys below"
         )
     fields = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
-    for key, declared in fields.items():  # first of all: a way that is not there has keys that are unknown
+    for key, declared in fields.items():  # first: an unknown choice explains unknown keys
         if declared.metadata.get("kind") == "choice" and (
             problem := check_value(declared, table.get(key, declared.default))
         ):
@@ -84,7 +82,7 @@ def build(cls: type[T], table: object, file: str, name: str = "") -> T:
         if key in table:
             values[key] = _parse(declared, hints[key], table[key], file, name)
         elif declared.default is dataclasses.MISSING:
-            raise InputError(f"{place(file, name, key)}: missing; add {_mend(declared, hints[key], name)}")
+            raise InputError(f"{place(file, name, key)}: missing; add {_missing(declared, hints[key], name)}")
     try:
         return cls(**values)
     except FieldError as error:
@@ -99,23 +97,23 @@ def refuse_unknown(table: Mapping[str, object], known: Mapping[str, object], fil
 
 
 def plain(value: Any) -> Any:
-    """Return a dataclass as dicts, lists, numbers and text, from which `build` makes it again.
+    """Return a dataclass as dicts, lists, numbers and text, which `build` reads back.
 
-    A field with `added` among its metadata is left out at its default: rigs of older stores have no such key.
+    A field with `added` among its metadata is omitted at its default: rigs of older stores have no such key.
     """
     if not dataclasses.is_dataclass(value):
         return [plain(v) for v in value] if isinstance(value, tuple) else value
     result: dict[str, Any] = {}
     for declared in dataclasses.fields(value):
-        held, kind = getattr(value, declared.name), declared.metadata.get("kind")
+        entry, kind = getattr(value, declared.name), declared.metadata.get("kind")
         if kind == "matrix":
-            result[declared.name] = encode_matrix(held)
+            result[declared.name] = encode_matrix(entry)
         elif kind == "degrees":
-            result[declared.name] = [list(degree) for degree in held]
+            result[declared.name] = [list(degree) for degree in entry]
         elif kind == "pairs":
-            result[declared.name] = {repr(float(key)): float(number) for key, number in held}
-        elif held is not None and not (declared.metadata.get("added") and held == declared.default):
-            result[declared.name] = float(held) if kind == "quantity" else plain(held)
+            result[declared.name] = {repr(float(key)): float(number) for key, number in entry}
+        elif entry is not None and not (declared.metadata.get("added") and entry == declared.default):
+            result[declared.name] = float(entry) if kind == "quantity" else plain(entry)
     return result
 
 
@@ -128,15 +126,15 @@ def _parse(declared: dataclasses.Field[Any], hint: Any, value: object, file: str
     if kind:
         return parse_field(declared, value, where)
     if get_origin(hint) is not tuple:
-        return build(_told(hint, value), value, file, inner)
+        return build(_kind_of(hint, value), value, file, inner)
     if not isinstance(value, list):
         raise InputError(f"{where}: not a list of tables; write [[{inner}]], in two brackets")
     item = get_args(hint)[0]
-    return tuple(build(_told(item, v), v, file, f"{inner}.{i}") for i, v in enumerate(value, 1))
+    return tuple(build(_kind_of(item, v), v, file, f"{inner}.{i}") for i, v in enumerate(value, 1))
 
 
-def _told(hint: Any, table: object) -> Any:
-    """Which of several dataclasses a table describes: the first of those that know most of its keys."""
+def _kind_of(hint: Any, table: object) -> Any:
+    """Return the dataclass of a union that a table describes: the first of those with most of its keys."""
     kinds = get_args(hint) or (hint,)
     keys = set(table) if isinstance(table, dict) else set()
     return max(kinds, key=lambda kind: len(keys & {f.name for f in dataclasses.fields(kind)}))
@@ -146,27 +144,27 @@ def _parse_pairs(table: object, units: tuple[str, str], file: str, name: str) ->
     """Pairs from a table of numbers; to TOML a bare `31.56` is the table 31 with the key 56."""
     key_unit, unit = units
     if not isinstance(table, dict):
-        raise InputError(f"{place(file, name)}: {brief(table)} is no table; write {{ 31.56 = 0.09 }}")
+        raise InputError(f"{place(file, name)}: {brief(table)} is not a table; write {{ 31.56 = 0.09 }}")
     flat: dict[str, object] = {}
     for key, value in table.items():
         inner = value.items() if isinstance(value, dict) else [(None, value)]
         flat.update({key if tail is None else f"{key}.{tail}": v for tail, v in inner})
     return tuple(
-        (parse_quantity(_number(key), key_unit, where), parse_quantity(value, unit, where))
+        (parse_quantity(_spelled(key), key_unit, where), parse_quantity(value, unit, where))
         for key, value in flat.items()
         for where in [place(file, name, key)]
     )
 
 
-def _number(text: str) -> object:
-    """Return the number that a key spells, or the key itself where it carries a unit."""
+def _spelled(text: str) -> object:
+    """Return the number that a key spells, or the key itself if it has a unit."""
     try:
         return float(text)
     except ValueError:
         return text
 
 
-def _mend(declared: dataclasses.Field[Any], hint: Any, name: str) -> str:
+def _missing(declared: dataclasses.Field[Any], hint: Any, name: str) -> str:
     if example := declared.metadata.get("example"):
         return f"{declared.name} = {example}"
     inner = f"{name}.{declared.name}" if name else declared.name
@@ -187,12 +185,12 @@ def _parse_toml(content: bytes, file: str) -> dict[str, Any]:
         lines = text.splitlines() or [""]
         end = (str(len(lines)), str(len(lines[-1]) + 1))
         where = (at[1], at[2]) if at and at[1] else end
-        said = (message[: at.start()] if at else message)[:120]
-        said = "".join(c if c.isprintable() else " " for c in said)
+        reason = (message[: at.start()] if at else message)[:120]
+        reason = "".join(c if c.isprintable() else " " for c in reason)
         raise InputError(
-            f"{file}: line {where[0]}, column {where[1]}: not TOML: {said}; mend that line"
+            f"{file}: line {where[0]}, column {where[1]}: not TOML: {reason}; correct that line"
         ) from None
     except RecursionError:
         raise InputError(f"{file}: tables nested too deeply; write them flat") from None
     except ValueError:
-        raise InputError(f"{file}: holds a number that is too long; shorten it") from None
+        raise InputError(f"{file}: contains a number that is too long; shorten it") from None

@@ -11,8 +11,8 @@ import pint
 import pytest
 
 from rubhpc.errors import InputError
-from rubhpc.input.quantity import _EVERYDAY, _factor
-from rubhpc.input.reading import build, parse_quantity, read_toml
+from rubhpc.input.quantity import _EVERYDAY, _factor, parse_quantity
+from rubhpc.input.reading import build, read_toml
 from rubhpc.rig.parts import Damping
 
 
@@ -92,7 +92,7 @@ def test_pint_stays_away_until_it_is_needed():
     code = """
 import sys
 from rubhpc.rig.reading import read_rig
-from rubhpc.input.reading import parse_quantity
+from rubhpc.input.quantity import parse_quantity
 read_rig("mokhtar2017")
 assert "pint" not in sys.modules
 parse_quantity("1 inch", "m", "")

@@ -50,7 +50,7 @@ def test_a_direction_is_selected_by_its_name(store, word, i):
 
 def test_both_directions_may_be_listed_and_others_are_refused(store):
     assert select(store, {"direction": "down,up"}).direction.values.tolist() == [1, 0]
-    with pytest.raises(InputError, match="direction = sideways: not on the grid; there is up, down"):
+    with pytest.raises(InputError, match="direction = sideways: not on the grid; choose one of up, down"):
         select(store, {"direction": "sideways"})
     _, notes = first_of_rest(store, ["speed_ratio", "clearance_ratio"], "peak_torsion")
     assert notes == ["direction = up: the first of 2; change with --select direction=VALUE"]

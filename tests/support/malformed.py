@@ -121,7 +121,7 @@ CASES = [
     _study("wrong unit", _FRICTION, 'friction = "3 mm"', '[grid] friction: "3 mm" is not a plain number'),
     _study("unit on a ratio", _SPEED, 'speed_ratio = "30 Hz"', "[grid] speed_ratio:", "30 Hz"),
     _study("speed in metres", _SPEED, 'speed = "3 m/s"', "[grid] speed:", "rad/s"),
-    _study("no unit in text", _GAP, 'clearance = "100"', '[grid] clearance: "100" carries no unit'),
+    _study("no unit in text", _GAP, 'clearance = "100"', '[grid] clearance: "100" has no unit'),
     _study("unknown unit", _GAP, 'clearance = "100 microns_"', "[grid] clearance: unknown unit", "um"),
     _study(
         "code for a number", _GAP, "clearance = \"__import__('os')\"", "[grid] clearance:", "not a number"
@@ -239,12 +239,12 @@ CASES = [
         "few samples", "revolutions = 16", "samples_per_revolution = 8", "[record] samples_per_revolution: 8"
     ),
     _study("keep unknown", "revolutions = 16", 'keep = ["waveforms"]', "[record] keep:", '"waveform"'),
-    _study("keep twice", "revolutions = 16", 'keep = ["section", "section"]', "[record] keep:", "twice"),
-    _study("keep a word", "revolutions = 16", 'keep = "section"', "[record] keep:", "no list"),
+    _study("keep twice", "revolutions = 16", 'keep = ["section", "section"]', "[record] keep:", "duplicated"),
+    _study("keep a word", "revolutions = 16", 'keep = "section"', "[record] keep:", "not a list"),
     _study("transient below zero", "revolutions = 16", "transient = -1", "[record] transient: -1"),
     _study("no block", "block = 4", "block = 0", "[run] block: 0"),
     _study("time without unit", "block = 4", 'time_limit = "2"', "[run] time_limit:", "no unit"),
-    _study("run a list", "[run]\nblock = 4", "[[run]]\nblock = 4", "[run]", "no table"),
+    _study("run a list", "[run]\nblock = 4", "[[run]]\nblock = 4", "[run]", "not a table"),
     # the rig
     _rig("rig not TOML", "node = 8", "node = ", "own.toml: line"),
     _rig(
