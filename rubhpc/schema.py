@@ -1,7 +1,11 @@
-"""Every array of a store: dimensions after the axes, type, unit and name. Store, docs and tests read it."""
+"""Every array of a store: dimensions after the axes, type, unit and name.
+
+This is the only declaration of a stored variable: storage, docs and tests read it.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 
@@ -16,6 +20,13 @@ class Variable:
     unit: str = "1"
     long_name: str
     flags: tuple[str, ...] = field(default=())  # meanings of 0, 1, 2, ...
+
+    @property
+    def fill_value(self) -> float | int:
+        """Value of a case that has none: NaN, -1 in integers, 0 in `status`."""
+        if self.name == "status":
+            return MISSING
+        return math.nan if self.dtype.startswith("float") else -1
 
 
 STATUS = ("missing", "done", "failed", "diverged")
@@ -116,5 +127,12 @@ _MEASURES = (
 VARIABLES: dict[str, Variable] = {
     v.name: v for v in (*_WAVEFORMS, *_SPECTRA, *_SECTIONS, _STATE, *_SETTINGS, *_FLAGS, *_MEASURES)
 }
+
+
+def case_measures() -> tuple[Variable, ...]:
+    """The measures of a case: one value each, or one a stator. The regime is one too."""
+    return tuple(v for v in VARIABLES.values() if v.role == "measure" or v.name == "regime")
+
+
 KEEPABLE = ("waveform", "spectrum", "section")  # what [record] keep may name; the rest is always stored
-STATE = "state"  # kept where a sweep carries it to the next case
+STATE = "state"  # kept in a sweep, where it starts the next case

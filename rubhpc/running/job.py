@@ -84,7 +84,9 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
             request.lock = request.held.enter_context(
                 store.lock(on_loss=lambda: stopping.ask("the loss of its lock"), heir_of=request.token)
             )
-        bring_up_to_date(store, grid, accept_version=request.accept_version)
+        note = bring_up_to_date(store, grid, accept_version=request.accept_version)
+        if note and not request.quiet:
+            print(note, flush=True)
         ledger = store.replay(with_measures=not store.is_packed())
         store.pack(ledger)  # readers see what a killed run has left, from now on
         ledger.measures = None  # the other ranks need none

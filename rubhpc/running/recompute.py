@@ -13,8 +13,8 @@ from rubhpc.integrate.record import State
 from rubhpc.running.initial_states import is_sound
 from rubhpc.running.worker import packed_measures, put, set_up
 from rubhpc.schema import DONE, FINAL_STATE, MISSING, STATUS
-from rubhpc.storage.journal import measures_type
 from rubhpc.storage.manifest import Manifest
+from rubhpc.storage.measures import blank_records
 from rubhpc.storage.resume import grid_for, is_store
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.study.points import Points
@@ -86,7 +86,7 @@ def reproduce(study: Study, name: str) -> Reproduction:
     except Exception as error:
         text = " ".join(str(error).split())
         raise RubError(f"case {case.id}, {told}: {type(error).__name__}: {text}") from error
-    row = packed_measures(record, measures_type(grid.n_stator))
+    row = packed_measures(record, manifest.header.record_type)
     status = STATUS[record.status] + (f": {record.remark}" if record.remark else "")
     measures = {n: row[n].tolist() for n in row.dtype.names or ()}
     return Reproduction(
@@ -182,8 +182,10 @@ def _compare(
     start = store.start_of(flat)
     stored = store.read_block(start)
     i_case = int(np.searchsorted(store.flat(start), flat))
-    names = [n for n in row.dtype.names or () if n != "wall_time"]
-    differing = [n for n in names if ledger.measures[flat][n].tobytes() != row[n].tobytes()]
+    kept, blank = ledger.measures[flat], blank_records((), ledger.measures.dtype)
+    absent = {n for n in store.manifest.added if kept[n].tobytes() == blank[n].tobytes()}
+    names = {*(row.dtype.names or ())} & {*(kept.dtype.names or ())} - absent - {"wall_time"}
+    differing = sorted(n for n in names if kept[n].tobytes() != row[n].tobytes())
     if stored is None:
         raise StoreError(f"{study.output}: case {case.id}: its files are damaged; rubhpc verify marks it")
     differing += [n for n, values in data.items() if values[0].tobytes() != stored[n][i_case].tobytes()]

@@ -17,7 +17,8 @@ from rubhpc.running.pool import Totals
 from rubhpc.running.stopping import Stopped
 from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING
 from rubhpc.storage.disk import disk_errors, flush_to_disk
-from rubhpc.storage.journal import Entry, measures_type
+from rubhpc.storage.journal import Entry
+from rubhpc.storage.measures import blank_records
 from rubhpc.storage.store import case_checksum
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ class Worker:
     attend: Callable[[], None]
 
     def __post_init__(self) -> None:
-        self._record_type = measures_type(self.grid.n_stator)
+        self._record_type = self.store.manifest.header.record_type
         self._setups: OrderedDict[tuple[int, float], tuple[Rig, Setup]] = OrderedDict()
         self._ends = InitialStates(self.grid, self.store, self.ledger, self._mend)
         self._unsynced: list[Path] = []
@@ -267,9 +268,9 @@ def put(record: Record, data: Arrays, i_case: int) -> None:
 
 
 def packed_measures(record: Record, kind: np.dtype[np.void]) -> NDArray[np.void]:
-    """The measures of a record, packed."""
-    row = np.zeros((), kind)
-    for name in kind.names or ():
+    """The measures of a record, packed; one that this version does not know is missing."""
+    row = blank_records((), kind)
+    for name in set(kind.names or ()) & set(record.measures):
         row[name] = record.measures[name]
     return row
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 from zlib import crc32
@@ -21,6 +22,7 @@ from rubhpc.storage import layout
 from rubhpc.storage.disk import disk_errors, flush_to_disk, write_whole
 from rubhpc.storage.journal import Entry, Journal, next_run
 from rubhpc.storage.manifest import GROWTH, PRIVATE, Manifest, manifests
+from rubhpc.storage.measures import added_measures, converted
 from rubhpc.storage.store import Store, case_checksum
 
 if TYPE_CHECKING:
@@ -58,7 +60,7 @@ def origins(before: Manifest, after: Manifest) -> NDArray[np.int64]:
 
 
 def grow(store: Store, grid: CaseGrid) -> None:
-    """Give the store the axes and the identity of `grid`, keeping every case; needs its lock.
+    """Give the store the axes and identity of `grid` and new measures, keeping every case; needs its lock.
 
     Raises
     ------
@@ -113,12 +115,20 @@ def _put_together(draft: Path, store: Store, grid: CaseGrid) -> None:
     accepted = before.accepted
     if before.parts["physics"] != grid.identity_parts["physics"]:
         accepted = (*accepted, before.parts["physics"])
-    files = layout.skeleton(grid, accepted=accepted)
+    added = added_measures(before.measures)
+    after = replace(
+        Manifest.of(grid),
+        measures=(*before.measures, *added),
+        added=(*before.added, *(variable.name for variable in added)),
+        accepted=accepted,
+    )
+    files = layout.skeleton(grid, after)
     for name, data in files.items():
         write_whole(draft / name, data, is_synced=False)
-    checks = {name: crc32(data) for name, data in files.items()}
-    after = Manifest.of(grid, files=checks, accepted=accepted)
+    after = replace(after, files={name: crc32(data) for name, data in files.items()})
     after.write(draft)
+    assert ledger.measures is not None
+    ledger.measures = converted(ledger.measures, after.header.record_type)
     origin = origins(before, after)
     lost = _stage_blocks(Store(draft), store, ledger, origin)
     with Journal(

@@ -3,8 +3,8 @@
 A line is `crc flat id status checksum measures reason`: the CRC-32 of the rest of the line, the case's flat
 index in the grid of the file's header, its id, its status, the CRC-32 of its stored arrays, its measures
 (base64 of one packed record, so that floats keep every bit; `-` where there are none) and the reason of a
-failure (JSON, `-` where none). The header is `crc {json}`. A later run's line overrides an earlier one's; a
-line with status 0 takes a case back.
+failure (JSON, `-` where none). The header is `crc {json}` and lists the measures of the lines. A line of a
+later run overrides an earlier one; a line with status 0 marks a case as missing again.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from zlib import crc32
 
 import numpy as np
 
-from rubhpc.schema import STATUS, VARIABLES
+from rubhpc.schema import STATUS
+from rubhpc.storage.measures import blank_records, columns, converted, measures_type, record_type
 from rubhpc.study.continuation import CaseIds
 
 if TYPE_CHECKING:
@@ -30,27 +31,18 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.schema import Variable
     from rubhpc.study.continuation import Continuation
     from rubhpc.study.points import Points
 
 _FORMAT = 1
+_BATCH = 2**16  # records moved to the ledger at once
 _NAME = re.compile(r"run(\d{6})-(\w+)\.journal")
-MEASURES = tuple(v for v in VARIABLES.values() if v.role == "measure" or v.name == "regime")
-
-
-def measures_type(n_stator: int) -> np.dtype[np.void]:
-    """Packed record of a case's measures, in the order of the schema; per stator where the schema says so."""
-    return np.dtype(
-        [
-            (v.name, np.dtype(v.dtype).newbyteorder("<"), (n_stator,) if "stator" in v.dims else ())
-            for v in MEASURES
-        ]
-    )
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One case as the journal tells it; `checksum` is the CRC-32 of its stored arrays."""
+    """One case in a journal; `checksum` is the CRC-32 of its stored arrays."""
 
     flat: int
     id: str
@@ -76,23 +68,43 @@ class Entry:
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What a journal's lines refer to: the study's identity, its cases and chains, the type of measures."""
+    """What the lines of a journal refer to: the study's identity, its cases, and their measures."""
 
     identity: str
     points: Points
     n_stator: int
+    measures: tuple[Variable, ...]
+    n_added: int = 0  # of these, the last, which older journals of the store may lack
     continuation: Continuation | None = None
 
-    @property
-    def told(self) -> dict[str, Any]:
-        """The header as it is written."""
+    @cached_property
+    def grid(self) -> dict[str, Any]:
+        """The part of the header that the journals of a store share."""
         return {
             "format": _FORMAT,
             "identity": self.identity,
             "shape": list(self.points.shape),
             "axes": [crc32(np.array(values).tobytes()) for values in self.points.values],
-            "metrics": [[v.name, v.dtype, self.n_stator if "stator" in v.dims else 0] for v in MEASURES],
         }
+
+    @cached_property
+    def record_type(self) -> np.dtype[np.void]:
+        """Packed record of the measures of a case."""
+        return measures_type(self.measures, self.n_stator)
+
+    def type_in(self, header: dict[str, Any]) -> np.dtype[np.void] | None:
+        """Packed record in a journal with this header; None where it belongs to another study or grid."""
+        listed = header.pop("metrics", ())
+        if header != self.grid or any(n not in (0, self.n_stator) for *_, n in listed):
+            return None
+        return record_type(listed)
+
+    @cached_property
+    def types_by_size(self) -> dict[int, np.dtype[np.void]]:
+        """Size in bytes -> packed record, of this journal and of older ones with fewer measures."""
+        n = len(self.measures)
+        types = [measures_type(self.measures[:i], self.n_stator) for i in range(n - self.n_added, n + 1)]
+        return {kind.itemsize: kind for kind in types}
 
     def id_at(self, flat: int) -> str:
         """Id of the case at a flat index of the grid; "" beyond it."""
@@ -104,7 +116,8 @@ class Header:
 
     def line(self) -> bytes:
         """The header as the first line of a journal."""
-        text = json.dumps(self.told).encode()
+        listed = columns(self.measures, self.n_stator)
+        text = json.dumps({**self.grid, "metrics": listed}).encode()
         return b"%08x %s\n" % (crc32(text), text)
 
 
@@ -199,8 +212,7 @@ def next_run(directory: Path) -> int:
 def replay(directory: Path, header: Header, *, with_measures: bool = True) -> Ledger:
     """Read every journal in turn; damaged lines and journals of other identities or grids are passed over."""
     n_case = header.points.n_case
-    dtype = measures_type(header.n_stator)
-    measures = np.zeros(n_case, dtype) if with_measures else None
+    measures = blank_records(n_case, header.record_type) if with_measures else None
     ledger = Ledger(
         status=np.zeros(n_case, np.int8),
         checksum=np.zeros(n_case, np.uint32),
@@ -216,17 +228,17 @@ def replay(directory: Path, header: Header, *, with_measures: bool = True) -> Le
 
 
 def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
-    """Take a journal's lines over into the ledger; how many there were."""
+    """Enter the lines of a journal in the ledger; how many there were."""
     n_case = len(ledger.status)
     status, checksum, is_known, reasons = ledger.status, ledger.checksum, ledger.is_known, ledger.reasons
-    size = ledger.measures.dtype.itemsize if ledger.measures is not None else 0
-    store = ledger.measures.view(np.uint8).data if ledger.measures is not None and n_case else None
-    packed_size = measures_type(header.n_stator).itemsize
+    cases: list[int] = []
+    records = bytearray()
     with path.open("rb") as file:
         first = file.readline()
         is_sound = first[:8] == b"%08x" % crc32(first[9:-1])
-        if is_sound and json.loads(first[9:-1]) != header.told:
-            return 0  # of another study or version, or of other values on the axes
+        kind = header.type_in(json.loads(first[9:-1])) if is_sound else None
+        if is_sound and kind is None:
+            return 0
         ledger.n_damaged += not is_sound
         n_line = 0
         for line in file:
@@ -237,23 +249,37 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
                 continue
             number, name, state, check, packed, reason = text.split(b" ", 5)
             flat = int(number)
-            is_wanted = packed != b"-" and (store is not None or not is_sound)
+            is_wanted = packed != b"-" and (ledger.measures is not None or not is_sound)
             measures = binascii.a2b_base64(packed) if is_wanted else b""
-            if not is_sound and (
-                name.decode() != header.id_at(flat) or len(measures) not in (0, packed_size)
-            ):
-                continue  # without its header a line counts only if its case is where it says
+            if not is_sound:  # then a line counts only if its id is that of its case
+                if measures and kind is None:
+                    kind = header.types_by_size.get(len(measures))
+                is_fit = not measures or (kind is not None and len(measures) == kind.itemsize)
+                if name.decode() != header.id_at(flat) or not is_fit:
+                    continue
             n_line += 1
             status[flat] = int(state)
             checksum[flat] = int(check, 16)
             is_known[flat] = True
-            if store is not None and measures:
-                store[flat * size : (flat + 1) * size] = measures
+            if measures:
+                cases.append(flat)
+                records += measures
+                if len(cases) == _BATCH:
+                    _enter(ledger, kind, cases, records)
             if reason != b"-":
                 reasons[flat] = json.loads(reason)
             elif reasons:
                 reasons.pop(flat, None)
+    _enter(ledger, kind, cases, records)
     return n_line
+
+
+def _enter(ledger: Ledger, kind: np.dtype[np.void] | None, cases: list[int], records: bytearray) -> None:
+    """Move packed records to their cases in the ledger; of a repeated case the last one counts."""
+    if ledger.measures is not None and kind is not None and cases:
+        ledger.measures[cases] = converted(np.frombuffer(bytes(records), kind), ledger.measures.dtype)
+    cases.clear()
+    records.clear()
 
 
 def _still_legible(text: bytes, n_case: int) -> set[int]:

@@ -6,6 +6,7 @@ import math
 import platform
 import struct
 import warnings
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 from zlib import crc32
@@ -19,7 +20,6 @@ from zarr.storage import MemoryStore
 
 from rubhpc.schema import VARIABLES
 from rubhpc.storage.disk import write_whole
-from rubhpc.storage.journal import MEASURES
 from rubhpc.storage.manifest import PRIVATE, Manifest
 from rubhpc.study.axes import DIRECTION, DIRECTIONS
 from rubhpc.version import __version__
@@ -34,10 +34,6 @@ if TYPE_CHECKING:
     from rubhpc.study.cases import CaseGrid
     from rubhpc.study.study import Study
 
-PACKED = (
-    VARIABLES["status"],
-    *MEASURES,
-)  # what is packed from the journals, in the order of the schema's roles
 _PACKED_CHUNK = 2**20  # values in a chunk of a packed array, at most
 # Where the stators stand: coordinate, key of the stator, unit, long name.
 _PLACES = (
@@ -56,23 +52,15 @@ _BLOSC = Blosc(cname="lz4", clevel=5, shuffle=Blosc.SHUFFLE)
 _WRITE_ALL = {"array.write_empty_chunks": True}
 
 
-def fill_value(variable: Variable) -> float | int:
-    """What stands for a case that has no value: NaN, -1, or 0 in `status`."""
-    if variable.name == "status":
-        return 0
-    return math.nan if variable.dtype.startswith("float") else -1
-
-
-def skeleton(grid: CaseGrid, *, accepted: tuple[int, ...] = ()) -> dict[str, bytes]:
-    """All files of a store that are of no case, by their path in it: metadata, coordinates and settings."""
+def skeleton(grid: CaseGrid, manifest: Manifest) -> dict[str, bytes]:
+    """Metadata, coordinates and settings of a store: path in it -> content."""
     files: dict[str, Buffer] = {}
-    manifest = Manifest.of(grid)
     group = zarr.create_group(
-        MemoryStore(files), zarr_format=3, attributes=_attributes(grid, accepted=accepted)
+        MemoryStore(files), zarr_format=3, attributes=_attributes(grid, accepted=manifest.accepted)
     )
     for variable in manifest.variables:
         _create(group, variable, manifest, chunk=manifest.chunk)
-    for variable in PACKED:
+    for variable in manifest.packed:
         _create(group, variable, manifest, chunk=_packed_chunk(manifest.shape))
     with zarr.config.set(_WRITE_ALL):
         for name, (dims, values, attributes) in _static(grid).items():
@@ -88,12 +76,13 @@ def skeleton(grid: CaseGrid, *, accepted: tuple[int, ...] = ()) -> dict[str, byt
 
 def build(path: Path, grid: CaseGrid) -> None:
     """Make all of a store in the empty directory `path`."""
-    files = skeleton(grid)
+    manifest = Manifest.of(grid)
+    files = skeleton(grid, manifest)
     for name, data in files.items():
         write_whole(path / name, data, is_synced=False)
     (path / PRIVATE / "journal").mkdir(parents=True)
     (path / PRIVATE / "logs").mkdir()
-    Manifest.of(grid, files={name: crc32(data) for name, data in files.items()}).write(path)
+    replace(manifest, files={name: crc32(data) for name, data in files.items()}).write(path)
 
 
 def encode(chunk: NDArray[Any]) -> bytes:
@@ -136,7 +125,7 @@ def _create(group: zarr.Group, variable: Variable, manifest: Manifest, *, chunk:
         shape=(*manifest.shape, *extent),
         chunks=(*chunk, *(max(n, 1) for n in extent)),
         dtype=variable.dtype,
-        fill_value=fill_value(variable),
+        fill_value=variable.fill_value,
         compressors=_CODECS,
         dimension_names=(*manifest.dims, *variable.dims),
         attributes=attributes,

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
 from rubhpc.errors import StoreError
-from rubhpc.schema import STATE, VARIABLES
+from rubhpc.schema import STATE, VARIABLES, case_measures
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import Header
+from rubhpc.storage.measures import from_json, to_json, unlisted_measures
 from rubhpc.study.axes import FROM_REST, coordinate_of, written
 from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.points import Points
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
     from rubhpc.study.cases import CaseGrid
     from rubhpc.study.continuation import Continuation
 
-_FORMAT = 3  # raised with the arrays of the schema too: a store has them all
+_FORMAT = 4
+_READABLE = (3, 4)  # format 3 does not list its measures
 PRIVATE = ".rubhpc"  # the directory of a store that zarr does not look into
 GROWTH = "growth"  # in it: what a growth that was decided on has yet to move to its place
 _NAMES = ("manifest.json", "manifest.copy.json")  # one damaged byte must not cost a study
@@ -65,6 +67,10 @@ class Manifest:
         Roles of the arrays stored for every case.
     files : dict
         Path of each file that is of no case (metadata, coordinates, settings) -> CRC-32 of its bytes.
+    measures : tuple of Variable
+        Measures of a case, in the order of their packed record.
+    added : tuple of str
+        Measures that the store was made without, so that its older cases lack them.
     accepted : tuple of int
         Earlier versions of the physics whose cases were kept.
     """
@@ -77,6 +83,8 @@ class Manifest:
     sizes: dict[str, int]
     keep: tuple[str, ...]
     files: dict[str, int]
+    measures: tuple[Variable, ...]
+    added: tuple[str, ...] = ()
     accepted: tuple[int, ...] = ()
 
     @cached_property
@@ -106,6 +114,8 @@ class Manifest:
             identity=self.identity,
             points=self.points,
             n_stator=self.sizes["stator"],
+            measures=self.measures,
+            n_added=len(self.added),
             continuation=self.continuation,
         )
 
@@ -122,6 +132,11 @@ class Manifest:
     def variables(self) -> tuple[Variable, ...]:
         """The arrays stored for every case and written block by block, in the order of their checksum."""
         return tuple(v for v in VARIABLES.values() if v.role in self.keep)
+
+    @property
+    def packed(self) -> tuple[Variable, ...]:
+        """The arrays that are packed from the journals: status and measures."""
+        return (VARIABLES["status"], *self.measures)
 
     def extent(self, variable: Variable) -> tuple[int, ...]:
         """Shape of a variable after the axes."""
@@ -143,10 +158,8 @@ class Manifest:
         return ", ".join([*numbers, *values])
 
     @classmethod
-    def of(
-        cls, grid: CaseGrid, *, files: dict[str, int] | None = None, accepted: tuple[int, ...] = ()
-    ) -> Self:
-        """The manifest of a store for `grid`."""
+    def of(cls, grid: CaseGrid) -> Self:
+        """The manifest of a new store for `grid`, without its files."""
         study = grid.study
         recording = study.recording
         n_sample = recording.revolutions * recording.samples_per_revolution
@@ -167,15 +180,15 @@ class Manifest:
                 **({"degree": grid.n_degree} if grid.continuation else {}),
             },
             keep=tuple(sorted([*recording.keep, *([STATE] if grid.continuation else [])])),
-            files=files or {},
-            accepted=accepted,
+            files={},
+            measures=case_measures(),
         )
 
     def write(self, store: Path) -> None:
         """Put the manifest into a store, twice."""
         told = {f.name: getattr(self, f.name) for f in fields(self)}
         axes = [{f.name: getattr(axis, f.name) for f in fields(axis)} for axis in self.axes]
-        text = json.dumps(told | {"axes": axes}).encode()
+        text = json.dumps(told | {"axes": axes, "measures": to_json(self.measures)}).encode()
         for name in _NAMES:
             write_whole(store / PRIVATE / name, b"rubhpc %d %08x\n%s" % (_FORMAT, crc32(text), text))
 
@@ -202,8 +215,9 @@ class Manifest:
                 damaged = error
                 continue
             axes = (AxisRecord(**{**axis, "values": tuple(axis["values"])}) for axis in told["axes"])
-            tuples = {name: tuple(told[name]) for name in ("chunk", "keep", "accepted")}
-            return cls(**{**told, **tuples, "axes": tuple(axes)})
+            tuples = {name: tuple(told.get(name, ())) for name in ("chunk", "keep", "added", "accepted")}
+            measures = from_json(told["measures"]) if "measures" in told else unlisted_measures()
+            return cls(**{**told, **tuples, "axes": tuple(axes), "measures": measures})
         if is_other:
             raise StoreError(f"{store}: made by another version of rubhpc; use that one or another --output")
         if damaged is not None:
@@ -278,7 +292,7 @@ def _vouched(path: Path) -> bytes:
     """The text of a manifest, if its checksum is right."""
     head, _, text = path.read_bytes().partition(b"\n")
     if found := re.fullmatch(rb"rubhpc (\d+) ([0-9a-f]{8})", head):
-        if int(found[1]) != _FORMAT:
+        if int(found[1]) not in _READABLE:
             raise _OtherFormat
         if int(found[2], 16) == crc32(text):
             return text

@@ -5,19 +5,22 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE
 from rubhpc.storage.growth import finish_growth, grow
 from rubhpc.storage.manifest import Manifest, manifests
+from rubhpc.storage.measures import added_measures
 from rubhpc.storage.store import Store
 from rubhpc.study.cases import CaseGrid
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import numpy as np
     from numpy.typing import NDArray
 
+    from rubhpc.schema import Variable
     from rubhpc.storage.journal import Ledger
     from rubhpc.study.cases import Block
     from rubhpc.study.study import Study
@@ -72,16 +75,31 @@ def open_store(grid: CaseGrid) -> Store:
         raise
 
 
-def bring_up_to_date(store: Store, grid: CaseGrid, *, accept_version: bool = False) -> None:
-    """Grow the store to the axes of `grid`, repair damaged metadata, remove partial files."""
+def bring_up_to_date(store: Store, grid: CaseGrid, *, accept_version: bool = False) -> str:
+    """Grow the store to the axes of `grid`, add new measures, repair damaged metadata, remove partial files.
+
+    Returns a note on the measures that were added, "" without any.
+    """
     finish_growth(store.path)
     store.reopen()
     wanted = Manifest.of(grid)
     _refuse_other(store.manifest, wanted, store.path, accept_version=accept_version)
     store.remove_partial_files()
-    if store.manifest.axes != wanted.axes or store.manifest.identity != wanted.identity:
+    added = added_measures(store.manifest.measures)
+    note = _note_on(added, store) if added else ""
+    if added or store.manifest.axes != wanted.axes or store.manifest.identity != wanted.identity:
         grow(store, grid)
     store.repair_files(grid)
+    return note
+
+
+def _note_on(added: tuple[Variable, ...], store: Store) -> str:
+    names = ", ".join(variable.name for variable in added)
+    what = f"measure {names}" if len(added) == 1 else f"measures {names}"
+    n_case = int(np.isin(store.replay(with_measures=False).status, (DONE, DIVERGED)).sum())
+    them = "it" if len(added) == 1 else "them"
+    lack = f"its {n_case} cases have none; only new cases have {them}"
+    return f"{store.path}: was made before the {what} existed: {lack}"
 
 
 def cases_without_files(store: Store, ledger: Ledger) -> list[int]:

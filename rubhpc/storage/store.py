@@ -24,7 +24,7 @@ from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.storage import layout
 from rubhpc.storage.disk import disk_errors, write_whole
-from rubhpc.storage.journal import MEASURES, Entry, Journal, Ledger, journals, replay
+from rubhpc.storage.journal import Entry, Journal, Ledger, journals, replay
 from rubhpc.storage.lock import Lock, process_state
 from rubhpc.storage.manifest import PRIVATE, Manifest
 
@@ -135,7 +135,7 @@ class Store:
             return
         with disk_errors(self.path):
             if damaged:
-                files = layout.skeleton(grid, accepted=self.manifest.accepted)
+                files = layout.skeleton(grid, self.manifest)
                 for name in damaged:
                     write_whole(self.path / name, files[name])
                 checks = {name: crc32(files[name]) for name in damaged}
@@ -225,7 +225,7 @@ class Store:
                 values = data[variable.name].reshape(*shape, *self.manifest.extent(variable))
                 if shape != self.manifest.chunk:
                     inside = [(0, 0)] * len(variable.dims)
-                    values = np.pad(values, beyond + inside, constant_values=layout.fill_value(variable))
+                    values = np.pad(values, beyond + inside, constant_values=variable.fill_value)
                 write_whole(path, layout.encode(values), is_synced=False)
 
     def remove_partial_files(self) -> None:
@@ -251,9 +251,9 @@ class Store:
         void = ~np.isin(ledger.status, (DONE, DIVERGED))
         shape = self.manifest.shape
         packed: dict[str, NDArray[Any]] = {"status": ledger.status.reshape(shape)}
-        for variable in MEASURES:
+        for variable in self.manifest.measures:
             values = ledger.measures[variable.name].copy()
-            values[void] = layout.fill_value(variable)
+            values[void] = variable.fill_value
             packed[variable.name] = values.reshape(*shape, *self.manifest.extent(variable))
         return packed
 

@@ -17,8 +17,7 @@ import numpy as np
 
 from rubhpc.rig.reading import read_rig
 from rubhpc.running import driver, job, plan, worker
-from rubhpc.schema import DONE
-from rubhpc.storage.journal import MEASURES
+from rubhpc.schema import DONE, case_measures
 from rubhpc.storage.status import read_status
 from rubhpc.study.axes import Axis
 from rubhpc.study.study import Recording, Study
@@ -26,7 +25,7 @@ from rubhpc.study.study import Recording, Study
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-measures = {v.name: np.ones(1) if "stator" in v.dims else 1 for v in MEASURES}
+measures = {v.name: np.ones(1) if "stator" in v.dims else 1 for v in case_measures()}
 record = SimpleNamespace(
     status=DONE, reason="", remark="", signals={}, spectra={}, sections={}, measures=measures
 )

@@ -18,8 +18,16 @@ from rubhpc.errors import InputError, StoppedEarly, StoreError
 from rubhpc.integrate.record import Record
 from rubhpc.running import driver, job, stopping, worker
 from rubhpc.running.driver import run
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
-from rubhpc.storage.journal import MEASURES
+from rubhpc.schema import (
+    DIVERGED,
+    DONE,
+    FAILED,
+    MISSING,
+    SECTION_NAMES,
+    SIGNAL_NAMES,
+    VARIABLES,
+    case_measures,
+)
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
@@ -51,7 +59,7 @@ def record(recording: Recording, friction: float, status: int = DONE, reason: st
         signals=waveforms,
         spectra={f"spectrum_{name}": values[..., :n_order] for name, values in waveforms.items()},
         sections={f"section_{name}": np.full(recording.revolutions, friction) for name in SECTION_NAMES},
-        measures={v.name: np.array([friction]) if "stator" in v.dims else 7 for v in MEASURES}
+        measures={v.name: np.array([friction]) if "stator" in v.dims else 7 for v in case_measures()}
         | {"energy_residual": 1e-6},
         final=None,  # type: ignore[arg-type]
     )

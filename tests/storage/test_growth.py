@@ -20,7 +20,7 @@ from running import write_study
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
 from rubhpc.storage.growth import origins
-from rubhpc.storage.journal import Entry, measures_type, next_run
+from rubhpc.storage.journal import Entry, next_run
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import bring_up_to_date, grid_for, open_store
 from rubhpc.storage.store import Store, case_checksum
@@ -74,7 +74,7 @@ def compute(store: Store, *, all_of_it: bool = False) -> int:
                 status = DONE if all_of_it else outcome(point)
                 if status == MISSING:
                     continue
-                row = np.zeros((), measures_type(1))
+                row = np.zeros((), store.manifest.header.record_type)
                 row["steps"] = round(1000 * math.fsum(point))
                 if status == DONE:
                     for name, values in data.items():

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pytest
 
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, VARIABLES
-from rubhpc.storage.journal import Entry, Header, Journal, journals, measures_type, next_run, replay
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, case_measures
+from rubhpc.storage.journal import Entry, Header, Journal, journals, next_run, replay
+from rubhpc.storage.measures import measures_type, unlisted_measures
 from rubhpc.study.points import Points
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ class Column(NamedTuple):
 def header_of(*values: tuple[float, ...], identity: str = "abc", n_stator: int = 2) -> Header:
     """Header of a study with an axis for each of these values."""
     points = Points([Column(f"axis{i}", column) for i, column in enumerate(values)])
-    return Header(identity=identity, points=points, n_stator=n_stator)
+    return Header(identity=identity, points=points, n_stator=n_stator, measures=case_measures())
 
 
 HEADER = header_of((0.1, 0.2), (1.0, 2.0, 3.0))
@@ -39,7 +40,7 @@ def write(
 def measures(seed: int, n_stator: int = 2) -> np.ndarray:
     """Every bit pattern a float may have, near enough: signs, subnormals, infinities, NaN."""
     rng = np.random.default_rng(seed)
-    row = np.zeros((), measures_type(n_stator))
+    row = np.zeros((), measures_type(case_measures(), n_stator))
     for name in row.dtype.names:
         kind = row[name].dtype
         if kind.kind == "f":
@@ -62,9 +63,11 @@ def test_what_is_written_is_read_back_bit_by_bit(tmp_path):
         assert ledger.measures[i].tobytes() == row.tobytes()
 
 
-def test_metrics_are_those_of_the_schema():
-    names = {v.name for v in VARIABLES.values() if v.role == "measure"} | {"regime"}
-    assert set(measures_type(1).names) == names
+def test_the_measures_of_stores_without_a_list_do_not_change():
+    """As long as the schema has them, their type and dimensions are those of old journals."""
+    frozen = measures_type(unlisted_measures(), 2)
+    assert (len(frozen.names), frozen.itemsize) == (22, 9 * 2 * 8 + 11 * 8 + 3)
+    assert measures_type(case_measures()[: len(frozen.names)], 2) == frozen
 
 
 def test_a_reason_of_any_text_stays_on_its_line(tmp_path):

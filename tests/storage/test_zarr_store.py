@@ -15,7 +15,7 @@ from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING, STATE, VARIABLES
 from rubhpc.storage import layout
 from rubhpc.storage.disk import disk_errors, write_whole
-from rubhpc.storage.journal import Entry, measures_type
+from rubhpc.storage.journal import Entry
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import bring_up_to_date, cases_without_files, grid_for, open_store
 from rubhpc.storage.store import Store, case_checksum
@@ -51,7 +51,7 @@ def fill(store: Store, start: tuple[int, ...], seed: int = 0) -> dict[str, np.nd
 
 def journal(store: Store, start: tuple[int, ...], data: dict[str, np.ndarray], run: int = 1) -> None:
     """Journal a block as done, its metrics counting up."""
-    row = np.zeros((), measures_type(store.manifest.sizes["stator"]))
+    row = np.zeros((), store.manifest.header.record_type)
     with store.journal(run, f"rank{sum(start):05d}") as lines:
         for i_case, flat in enumerate(store.flat(start).tolist()):
             for name in row.dtype.names:
@@ -366,7 +366,7 @@ def test_a_file_written_whole_replaces_the_old_one_or_leaves_it(tmp_path, monkey
 
 
 def test_a_diverged_case_keeps_its_metrics(store):
-    row = np.zeros((), measures_type(1))
+    row = np.zeros((), store.manifest.header.record_type)
     row["steps"] = 1234
     with store.journal(1, "rank00000") as lines:
         lines.write([Entry(0, "a", DIVERGED, 0, row.tobytes(), "grew")])
