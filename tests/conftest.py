@@ -2,7 +2,7 @@
 
 Linear algebra has one thread, as under the commands: two would wait for each other on small matrices.
 Examples of hypothesis have no deadline, since the first may compile a kernel, and are the same in every run.
-Tests in a browser are collected where there is one.
+Tests in a browser are collected where there is one. Tests in parallel have a cache of kernels each.
 """
 
 import os
@@ -11,6 +11,35 @@ from pathlib import Path
 import pytest
 from browsers import find_browser
 from hypothesis import settings
+from kernel_cache import compile_once, use_own_cache
+
+TESTS = Path(__file__).parent
+# Folders, files and tests. Over half a second, or a process of their own, each:
+SLOW = (
+    "browser/",
+    "commands/test_cli.py",
+    "faults/",
+    "integrate/test_contact_stepping_march.py",
+    "integrate/test_event_driven_march.py::test_dry_whip_diverges_and_says_so",
+    "integrate/test_event_driven_march.py::test_endless_events_are_left_to_short_steps",
+    "integrate/test_event_driven_march.py::test_shorter_kernel_calls_change_nothing_but_rounding",
+    "integrate/test_initial_state.py",
+    "integrate/test_regimes_lyapunov.py",
+    "kernels/test_coulomb_friction.py",
+    "kernels/test_jit.py",
+    "mokhtar2017/",
+    "mpi/",
+    "project/test_docs.py",
+    "project/test_notebook.py",
+    "project/test_slurm.py",
+    "project/test_wheel.py",
+    "report/test_report.py",
+    "running/",
+    "storage/test_growth.py",
+    "validation/",
+)
+# These start several processes at once, or have deadlines: nothing else may run at the same time.
+SERIAL = ("browser/", "faults/", "mpi/")
 
 for library in ("OMP", "OPENBLAS", "MKL", "BLIS"):
     os.environ[f"{library}_NUM_THREADS"] = "1"
@@ -18,12 +47,32 @@ for library in ("OMP", "OPENBLAS", "MKL", "BLIS"):
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 
+if "PYTEST_XDIST_WORKER" in os.environ:
+    use_own_cache(os.environ["PYTEST_XDIST_WORKER"])
+
 collect_ignore = [] if find_browser() else ["browser"]
 
 
 def pytest_report_header() -> str:
     """Tell which browser there is."""
     return f"browser: {find_browser() or 'no Chromium with playwright, tests/browser is left out'}"
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile the kernels before workers start."""
+    is_controller = not hasattr(session.config, "workerinput")
+    if is_controller and session.config.getoption("numprocesses", None):
+        compile_once()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is slow, and what must run alone."""
+    for item in items:
+        place = f"{item.path.relative_to(TESTS).as_posix()}::{item.name}"
+        for name, places in (("slow", SLOW), ("serial", SERIAL)):
+            if place.startswith(places):
+                item.add_marker(name)
 
 
 @pytest.fixture(scope="session")

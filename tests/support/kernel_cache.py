@@ -1,0 +1,71 @@
+"""Compiled kernels for tests in parallel: compiled once, then a copy of the cache for each worker.
+
+Two processes that compile into one cache at once may overwrite each other's files.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+KERNELS = ROOT / "rubhpc" / "kernels"
+CACHES = ROOT / ".pytest_cache" / "kernels"
+EVERY_SCHEME = """
+import rubhpc
+case = dict(speed_ratio=0.75, clearance_ratio=0.7, transient=1, revolutions=2, samples_per_revolution=32)
+rubhpc.simulate("mokhtar2017", **case)
+rubhpc.simulate("mokhtar2017", **case, friction_law="coulomb")
+rubhpc.simulate("mokhtar2017", **case, normal="updated")
+rubhpc.simulate("mokhtar2017", **case, method="central-difference")
+"""
+
+
+def compile_once() -> None:
+    """Compile the kernels into the cache beside their sources, unless it is up to date."""
+    stamp = CACHES / "compiled"
+    if _is_current(stamp):
+        return
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    subprocess.run([sys.executable, "-c", EVERY_SCHEME], env=environment, cwd=ROOT, check=True)
+    _mark(stamp)
+
+
+def use_own_cache(worker: str) -> None:
+    """Make this process, and those it starts, use the cache of a worker; before numba is imported."""
+    folder = CACHES / worker
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+    if not _is_current(folder / "compiled"):
+        shutil.rmtree(folder, ignore_errors=True)
+        _copy_to(folder)
+        _mark(folder / "compiled")
+
+
+def _copy_to(folder: Path) -> None:
+    """Copy the cache to where numba looks for it below NUMBA_CACHE_DIR."""
+    from numba.core.caching import _CacheLocator
+
+    there = folder / _CacheLocator.get_suitable_cache_subpath(str(KERNELS / "__init__.py"))
+    shutil.copytree(KERNELS / "__pycache__", there, ignore=shutil.ignore_patterns("*.pyc"))
+
+
+def _sources() -> str:
+    stats = [(path.name, path.stat()) for path in sorted(KERNELS.glob("*.py"))]
+    return repr([sys.version, *((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)])
+
+
+def _is_current(stamp: Path) -> bool:
+    return stamp.exists() and stamp.read_text() == _sources()
+
+
+def _mark(stamp: Path) -> None:
+    stamp.parent.mkdir(parents=True, exist_ok=True)
+    stamp.write_text(_sources())
+
+
+if __name__ == "__main__":
+    compile_once()
