@@ -39,7 +39,13 @@ SLOW = (
     "validation/",
 )
 # These start several processes at once, or have deadlines: nothing else may run at the same time.
-SERIAL = ("browser/", "faults/", "mpi/")
+SERIAL = (
+    "browser/",
+    "commands/test_cli.py::test_help_takes_no_time",
+    "faults/",
+    "integrate/test_event_driven_march.py::test_signals_are_answered_however_long_a_revolution_lasts",
+    "mpi/",
+)
 
 for library in ("OMP", "OPENBLAS", "MKL", "BLIS"):
     os.environ[f"{library}_NUM_THREADS"] = "1"
