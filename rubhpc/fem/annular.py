@@ -117,10 +117,10 @@ def annular_rub(model: Model, spin: float, clearance: float, friction: float) ->
     if not crossings.size:
         raise InputError("annular rub: no circular orbit balances the forces; the ring is left or too soft")
     radius = float(brentq(excess, *radii[crossings[0] : crossings[0] + 2]))
-    held = radius + receptance * (1.0 + 1j * friction) * force(radius)
+    balanced = radius + receptance * (1.0 + 1j * friction) * force(radius)
     return AnnularRub(
         radius=radius,
-        phase=sense * cmath.phase(free / held),
+        phase=sense * cmath.phase(free / balanced),
         normal_force=density * float(quad(lambda psi: normal(radius, psi), *arc(radius))[0]),
         arc=arc(radius),
     )

@@ -73,7 +73,7 @@ class Body:
     degrees : tuple of (node, name)
         Which degree each row is. Rotor: "u", "v", "w", "thx", "thy", "thz"; stator: "axial"
         (positive outward, compressed), "lateral" (positive with the rim under positive spin), "rotation".
-        A foreign body may have others.
+        User-supplied matrices may have others.
     """
 
     mass: NDArray[np.float64]
@@ -138,7 +138,7 @@ class Body:
         return [row for row, number in enumerate(part) if number in wanted]
 
     def index(self, node: int, name: str) -> int:
-        """Row of a degree of freedom; -1 where it is held or absent."""
+        """Row of a degree of freedom; -1 where it is constrained or absent."""
         try:
             return self.degrees.index((node, name))
         except ValueError:

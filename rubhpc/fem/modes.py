@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     Vector = NDArray[np.complex128]
     Pair = tuple[complex, complex, Vector]
 
-# What the degrees of a body are part of. Beams do not couple the kinds; a foreign body may.
+# Kind of motion by degree. Beams do not couple the kinds; user-supplied matrices may.
 KINDS = {
     "lateral": ("v", "w", "thy", "thz", "lateral", "rotation"),
     "torsional": ("thx",),
     "axial": ("u", "axial"),
 }
-OTHER = "other"  # kind of the degrees that only a foreign body has
+OTHER = "other"  # kind of the degrees that only user-supplied matrices have
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,10 +45,10 @@ class Mode:
         Of the free oscillation, `Im(eigenvalue) / 2 pi`, Hz; 0 for an overdamped mode.
     damping_ratio : float
         `-Re(eigenvalue) / |eigenvalue|` of a mode that oscillates, negative where it grows. Of an overdamped
-        one `-(a + b) / (2 sqrt(a b))`, at least 1; -1 tells that a or b grows. A rigid body's mode has 0,
+        one `-(a + b) / (2 sqrt(a b))`, at least 1; -1 if a or b grows. A rigid body's mode has 0,
         or 1 where its motion dies out.
     kind : str
-        "lateral", "torsional" or "axial"; where a foreign body couples them, the one with most of the kinetic
+        "lateral", "torsional" or "axial"; where matrices couple them, the one with most of the kinetic
         energy, which may be "other" for coordinates of its own.
     whirl : str
         Lateral modes of a rotor: "forward" (in the sense of the spin), "backward", or "planar" where neither
