@@ -167,7 +167,7 @@ def _number(store: xr.Dataset, axis: str, wanted: Any) -> float:
                 return float(names.index(wanted))
             known = ", ".join(names)
             raise InputError(
-                f"{source(store)}: {axis} = {wanted}: not on the grid; the values are {known}"
+                f"{source(store)}: {axis} = {wanted}: not on the grid; choose one of {known}"
             ) from None
         unit = str(store[axis].attrs.get("units", "1"))
         # "rad s-2" to "rad * s**-2": a store spells units as netCDF does, a study as pint does.
@@ -184,5 +184,5 @@ def _nearest(store: xr.Dataset, axis: str, wanted: float) -> int:
         tolerance = min(tolerance, _CLOSE_IN_SPACING * float(others.min()))
     if not abs(values[i] - wanted) <= tolerance:
         text, near = _typed(store[axis], wanted), written_values(store[axis], around=wanted)
-        raise InputError(f"{source(store)}: {axis} = {text}: not on the grid; there is {near}")
+        raise InputError(f"{source(store)}: {axis} = {text}: not on the grid; choose one of {near}")
     return i
