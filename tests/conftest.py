@@ -35,6 +35,7 @@ SLOW = (
     "project/test_wheel.py",
     "report/test_report.py",
     "running/",
+    "signals/test_hilbert_huang.py",
     "storage/test_growth.py",
     "validation/",
 )
