@@ -62,7 +62,7 @@ def find_axis(store: xr.Dataset, name: str) -> str:
     if axis in known:
         return axis
     if axis in store.coords and store.coords[axis].ndim == 0:
-        raise InputError(f"{source(store)}: {name}: has already been selected; select it once")
+        raise InputError(f"{source(store)}: {name}: is selected already; select it once")
     if axis in drawn_axes(store):
         raise InputError(
             f"{source(store)}: {name}: was drawn at random and is not an axis; rubhpc map draws measures "

@@ -124,9 +124,9 @@ def test_cases_are_selected_by_number_and_by_what_was_drawn(cases):
 def test_nothing_runs_along_what_was_drawn(cases):
     one = cases.isel(clearance_ratio=0)
     for figure in (figures.cascade, figures.bifurcation):
-        with pytest.raises(InputError, match="the cases of a sample lie in no order, rubhpc map draws them"):
+        with pytest.raises(InputError, match="the cases of a sample have no order, rubhpc map draws them"):
             figure(one)
-        with pytest.raises(InputError, match="speed_ratio: was drawn at random, so that nothing"):
+        with pytest.raises(InputError, match="speed_ratio: was drawn at random and is not an axis"):
             figure(one, along="speed_ratio")
     assert figures.bifurcation(cases.isel(case=3)).shown.sizes["clearance_ratio"] == 2
 
