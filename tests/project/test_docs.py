@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -166,3 +167,8 @@ def test_readme_tells_of_every_study_and_its_cases() -> None:
 
 def test_figure_of_the_readme_is_small() -> None:
     assert (ROOT / "docs" / "figures" / "torsion_cascade.png").stat().st_size < 150_000
+
+
+def test_first_study_shows_the_quick_start() -> None:
+    (shown,) = code((ROOT / "docs" / "guide" / "first_study.md").read_text(), "toml")
+    assert tomllib.loads(shown) == tomllib.loads((ROOT / "jobs" / "quickstart.toml").read_text())
