@@ -12,6 +12,7 @@ from importlib import import_module
 
 import click
 
+from postproc.catalogue import figures
 from rubhpc import __version__
 from rubhpc.errors import RubError
 from rubhpc.running.launch import launch
@@ -28,7 +29,7 @@ _THREADS = (
     "ZARR_THREADING__MAX_WORKERS",
 )
 
-# name -> (where it is, what it does); --help shows them in this order.
+# name -> (where it is, what it does). The figure commands come from `postproc.catalogue`.
 COMMANDS = {
     "run": ("rubhpc.commands.run:run", "Run a study, or what is left of it (run may be left out)."),
     "plan": ("rubhpc.commands.run:plan", "Cases, bytes, files, core-hours; what is done, failed, missing."),
@@ -37,25 +38,6 @@ COMMANDS = {
     "modes": (
         "rubhpc.commands.modes:modes",
         "Natural frequencies, damping ratios and whirl of a rig; Campbell diagram.",
-    ),
-    "cascade": ("rubhpc.commands.figures:cascade", "Spectrum cascade along an axis."),
-    "map": ("rubhpc.commands.figures:map", "A scalar over two axes."),
-    "orbit": ("rubhpc.commands.figures:orbit", "Orbit of the disc."),
-    "spectrum": ("rubhpc.commands.figures:spectrum", "Amplitude spectrum of a signal."),
-    "waveform": ("rubhpc.commands.figures:waveform", "Signals over the revolutions."),
-    "section": ("rubhpc.commands.figures:section", "Poincaré section of a signal."),
-    "bifurcation": (
-        "rubhpc.commands.figures:bifurcation_diagram",
-        "Section points along an axis, by regime or period.",
-    ),
-    "hht": ("rubhpc.commands.signals:hht", "Hilbert-Huang analysis of a signal."),
-    "indicators": (
-        "rubhpc.commands.signals:indicators",
-        "How often the vibration tells rub from no rub, under noise.",
-    ),
-    "sensitivity": (
-        "rubhpc.commands.sensitivity:sensitivity",
-        "Which axes a scalar depends on: Sobol indices.",
     ),
     "reduce": ("rubhpc.commands.reduce:reduce", "Mean, envelope, quantiles or histogram over many cases."),
     "report": ("rubhpc.commands.report:report", "One HTML page: maps, and every case behind them."),
@@ -66,12 +48,16 @@ COMMANDS = {
 
 
 class _Commands(click.Group):
-    """A group whose commands are imported when called; what names no command is a study to be run."""
+    """A group whose commands are imported when called; a word that is no command is a study to be run."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
+        return [*COMMANDS, *figures()]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if figure := figures().get(cmd_name):
+            from rubhpc.commands.figures import figure_command
+
+            return figure_command(figure)
         if cmd_name not in COMMANDS:
             return None
         module, _, name = COMMANDS[cmd_name][0].partition(":")
@@ -81,23 +67,26 @@ class _Commands(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+        with formatter.section("Figures"):
+            formatter.write_dl([(name, figure.summary) for name, figure in figures().items()])
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if not args:
             raise click.UsageError("nothing to do; give a STUDY.toml or a command, see rubhpc --help")
-        if args[0] not in COMMANDS and args[0] not in ("--help", "-h", "--version"):
-            _refuse_slip(args[0])
+        commands = self.list_commands(ctx)
+        if args[0] not in (*commands, "--help", "-h", "--version"):
+            _check_word(args[0], commands)
             args = ["run", *args]
         return super().parse_args(ctx, args)
 
 
-def _refuse_slip(word: str) -> None:
-    """Tell a mistyped command from a study that is not there."""
+def _check_word(word: str, commands: list[str]) -> None:
+    """Raise UsageError for a mistyped command, which is neither a file nor the name of one."""
     if word.startswith("-") or "." in word or "/" in word or os.path.exists(word):
         return
-    near = difflib.get_close_matches(word, COMMANDS, n=1)
-    mend = f"did you mean {near[0]}?" if near else "see rubhpc --help"
-    raise click.UsageError(f"{word}: no such command or study; {mend}")
+    near = difflib.get_close_matches(word, commands, n=1)
+    hint = f"did you mean {near[0]}?" if near else "see rubhpc --help"
+    raise click.UsageError(f"{word}: no such command or study; {hint}")
 
 
 @click.group(
@@ -108,12 +97,12 @@ def _refuse_slip(word: str) -> None:
 )
 @click.version_option(__version__, prog_name="rubhpc", message="%(prog)s %(version)s")
 def commands() -> None:
-    """Run parameter studies of rotor-stator rub, and look at what they yield.
+    """Run parameter studies of rotor-stator rub, and draw their results.
 
-    `mpirun -n N rubhpc STUDY.toml` runs a study on N ranks; the same command goes on after a stop.
+    `mpirun -n N rubhpc STUDY.toml` runs a study on N ranks; the same command continues it after a stop.
 
-    Exit codes: 0 complete; 1 finished, some cases failed; 2 bad input; 3 store cannot be used; 70 an error of
-    the program's own; 71 complete, but a rank was lost; 75 stopped early, run the same command again.
+    Exit codes: 0 complete; 1 finished, some cases failed; 2 bad input; 3 store cannot be used; 70 an internal
+    error; 71 complete, but a rank was lost; 75 stopped early, run the same command again.
     """
 
 
@@ -124,11 +113,11 @@ def main(args: list[str] | None = None) -> None:
     try:
         code = commands.main(args, prog_name="rubhpc", standalone_mode=False)
     except RubError as error:
-        code = _tell(str(error), error.exit_code)
+        code = _report(str(error), error.exit_code)
     except click.ClickException as error:
-        code = _tell(_one_line(error), 2)
+        code = _report(_one_line(error), 2)
     except (KeyboardInterrupt, click.Abort):
-        code = _tell("interrupted; run the same command again", _STOPPED)
+        code = _report("interrupted; run the same command again", _STOPPED)
     except BrokenPipeError:  # the reader, `head` say, has had enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
@@ -136,11 +125,11 @@ def main(args: list[str] | None = None) -> None:
         from rubhpc.running.crash import crash
 
         crashed = crash(error)
-        code = _tell(str(crashed), crashed.exit_code)
+        code = _report(str(crashed), crashed.exit_code)
     sys.exit(code)
 
 
-def _tell(text: str, code: int) -> int:
+def _report(text: str, code: int) -> int:
     """Print an error in one line, on the first rank only."""
     if launch().rank == 0:
         print(f"rubhpc: {' '.join(text.split())}", file=sys.stderr)

@@ -17,7 +17,7 @@ import click
 
 import postproc
 import rubhpc
-from rubhpc.cli import COMMANDS, commands
+from rubhpc.cli import commands
 from rubhpc.rig.rig import Rig
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import _OwnAxes as OwnAxes
@@ -157,7 +157,7 @@ def command_sections() -> str:
     """Return a section for each command: what it does, its arguments and its options."""
     context = click.Context(commands)
     sections = []
-    for name in COMMANDS:
+    for name in commands.list_commands(context):
         command = commands.get_command(context, name)
         assert command is not None
         own = click.Context(command, info_name=name, parent=click.Context(commands, info_name="rubhpc"))

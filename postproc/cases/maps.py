@@ -1,4 +1,4 @@
-"""Maps: a scalar, the regime or the status of every case over two axes of the study."""
+"""Data of maps: a measure, the regime or the status of every case over two axes of the study."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from postproc.store.axes import axes_of, find_axis, source
+from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.select import narrow
 from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
-from rubhpc.schema import VARIABLES
+from rubhpc.schema import DONE, VARIABLES
+from rubhpc.study.axes import SPEED_AXES, coordinate_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -29,7 +30,7 @@ VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
 def default_axes(
     store: xr.Dataset, x: str | None = None, y: str | None = None, facets: Sequence[str] = ()
 ) -> tuple[str, str]:
-    """Return the axes a map spreads over, across and up: those named, and else the longest but the facets."""
+    """Return the axes across and up of a map: those named, and else the longest that are no facets."""
     named = [find_axis(store, name) for name in (x, y) if name]
     if len(set(named)) < len(named):
         raise InputError(f"{source(store)}: --x and --y are both {named[0]}; a map needs two axes")
@@ -39,10 +40,34 @@ def default_axes(
     free.sort(key=lambda a: -store.sizes[a])  # stable: of two equal ones the first in the grid
     if len(named) + len(free) < 2:
         sizes = ", ".join(f"{a} ({store.sizes[a]})" for a in axes) or "none"
-        mend = "over one axis, draw rubhpc bifurcation or open rubhpc report"
-        raise InputError(f"{source(store)}: a map needs two axes of several values; there is {sizes}; {mend}")
+        advice = "over one axis, draw rubhpc bifurcation or open rubhpc report"
+        raise InputError(
+            f"{source(store)}: a map needs two axes of several values; there is {sizes}; {advice}"
+        )
     across = named.pop(0) if x else free.pop(0)
     return across, named.pop(0) if y else free.pop(0)
+
+
+def scatter_axes(store: xr.Dataset, x: str | None = None, y: str | None = None) -> tuple[str, str]:
+    """Return the drawn quantities across and up: those named, else a speed and then the first others.
+
+    Raises
+    ------
+    InputError
+        One that is named was not drawn, or both are the same.
+    """
+    drawn = drawn_axes(store)
+    named = [coordinate_of(name) if name else None for name in (x, y)]
+    for name in named:
+        if name is not None and name not in drawn:
+            what = "is an axis: name it with --facet" if name in axes_of(store) else "was not drawn"
+            raise InputError(f"{source(store)}: {name}: {what}; the sample has {', '.join(drawn)}")
+    in_order = dict.fromkeys(name for name in (*SPEED_AXES, *drawn) if name in drawn)
+    free = [name for name in in_order if name not in named]
+    across, up = (name or free.pop(0) for name in named)
+    if across == up:
+        raise InputError(f"{source(store)}: {across} is on both axes; name another one")
+    return across, up
 
 
 def facet_axes(store: xr.Dataset, names: Sequence[str], taken: Sequence[str]) -> list[str]:
@@ -66,14 +91,14 @@ def facet_axes(store: xr.Dataset, names: Sequence[str], taken: Sequence[str]) ->
 
 
 def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Sequence[str] = ()) -> xr.Dataset:
-    """Return what a map shows, loaded: no more than this scalar, the status and the validity monitors.
+    """Return what a map shows, loaded: no more than this measure, the status and the validity monitors.
 
     Parameters
     ----------
     store : Dataset
         All other axes of more than one value must have been selected.
     value : str
-        A scalar, setting or flag of the store.
+        A measure, setting or flag of the store.
     spread : sequence of str
         The axes x and y of a map, or the one along which the cases of a sample lie.
 
@@ -86,7 +111,7 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
     """
     if value not in MAPPABLE:
         require_variables(store, [value])
-        raise InputError(f"{source(store)}: {value}: no scalar of a case; choose {', '.join(MAPPABLE)}")
+        raise InputError(f"{source(store)}: {value}: no measure of a case; choose {', '.join(MAPPABLE)}")
     store = store.assign(validity=validity(store))
     data = narrow(store, dict.fromkeys([value, "status", "validity"]), spread=[*spread, *facets])
     over = [*facets, *reversed(spread)]
@@ -95,11 +120,11 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
 
 
 def monitors(store: xr.Dataset) -> dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]]:
-    """Return the monitors that hold for a store: under Coulomb's law a slip that reverses is no fault."""
+    """Return the monitors that hold for a store: under Coulomb's law slip may reverse."""
     study = store.attrs.get("study")
     contact = study.get("contact", {}) if isinstance(study, dict) else {}
     has_stick = contact.get("friction_law") == "coulomb"
-    return {n: told for n, told in VALIDITY.items() if not (has_stick and n == "minimum_slip_speed")}
+    return {n: monitor for n, monitor in VALIDITY.items() if not (has_stick and n == "minimum_slip_speed")}
 
 
 def validity(store: xr.Dataset) -> xr.DataArray:
@@ -108,8 +133,14 @@ def validity(store: xr.Dataset) -> xr.DataArray:
     for name, (bit, _, is_bad) in monitors(store).items():
         if name in store:
             bad = is_bad(store[name])
-            # One stator out of range spoils the case, whichever is drawn.
+            # A case is out of range where one of its stators is, whichever is drawn.
             bad = bad.any([d for d in ("stator",) if d in bad.dims])
             found = found + np.int8(bit) * bad.astype(np.int8)
     legend = ", ".join(f"{bit} ({text} out of range)" for bit, text, _ in monitors(store).values())
     return found.rename("validity").assign_attrs(units="1", long_name=f"sum of {legend}")
+
+
+def reasons_of(data: xr.Dataset) -> str:
+    """Return what leaves the model's range in any case of `map_data` that is done, as a list in words."""
+    validity = np.where(data["status"].values == DONE, data["validity"].values, 0)
+    return ", ".join(text for bit, text, _ in VALIDITY.values() if (validity & bit).any())

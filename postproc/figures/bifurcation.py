@@ -1,16 +1,17 @@
-"""Bifurcation diagrams: section points of a signal over an axis, by regime, period or way of the sweep."""
+"""The bifurcation diagram: section points along an axis, coloured by regime, period or sweep direction."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from postproc.figures.cells import is_geometric
-from postproc.figures.map_figure import categories
-from postproc.figures.section import section_of
+from postproc.figures.drawing import Drawing
+from postproc.figures.palette import categories
+from postproc.signals.sections import section_of, sections_along
 from postproc.store.axes import find_axis, ordered_axes, source
-from postproc.store.select import narrow
+from postproc.store.select import first_of_rest
 from postproc.store.units import displayed, meanings, scale_of, short_name
 from postproc.store.variables import require_results
 from rubhpc.errors import InputError
@@ -24,12 +25,51 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-COLORINGS = ("regime", "period", DIRECTION)
-WIDTH = 180  # mm: two columns, since an axis has hundreds of values
+    from postproc.figures.options import Axis
+
+_WIDTH = 180  # mm: two columns, since an axis has hundreds of values
 _MOST_DRAWN = 200_000  # points in a pdf or svg; of more, they become a picture in it
 _SIZES = 0.6, 3.5  # of the points, pt
 _LEAST_RANGE = 0.02  # of the largest value: points of one motion differ by rounding over all cases
 _WAYS = (("^", "#E69F00", 2.4), ("v", "#0072B2", 1.2))  # up and down: marker, colour, size
+
+
+def bifurcation(
+    cases: xr.Dataset,
+    signal: str = "vertical",
+    *,
+    along: Axis | None = None,
+    color: Literal["regime", "period", "direction"] | None = None,
+) -> Drawing:
+    """Bifurcation diagram: section points of a signal along an axis.
+
+    There is a point a revolution, coloured by regime, period or direction of the sweep.
+
+    Parameters
+    ----------
+    cases
+        Axes that are not drawn are taken at their first value.
+    signal
+        vertical, horizontal or torsion.
+    along
+        The axis of the diagram [default: the longest].
+    color
+        [default: direction, where an axis was swept both ways; else regime]
+    """
+    coloring = default_coloring(cases, color)
+    axis = default_axis(cases, along)
+    over = coloring if coloring == DIRECTION else None
+    name = f"section_{signal}"
+    kept = [axis] if over is None else [axis, over]
+    cases, notes = first_of_rest(cases.assign({name: section_of(cases, signal)}), kept, name)
+    shown = sections_along(cases, signal, axis, over)
+    return Drawing(
+        shown=shown,
+        draw=lambda axes: draw_bifurcation(shown, signal, axes[0], coloring),
+        height=90,
+        width=_WIDTH,
+        lines=tuple(notes),
+    )
 
 
 def default_axis(store: xr.Dataset, along: str | None = None) -> str:
@@ -63,23 +103,8 @@ def default_coloring(store: xr.Dataset, color: str | None = None) -> str:
     return color or (DIRECTION if ways > 1 else "regime")
 
 
-def bifurcation_data(store: xr.Dataset, signal: str, along: str, over: str | None = None) -> xr.Dataset:
-    """Return the section of a signal with regime, period and status, over ([over,] along, section); lazy.
-
-    Raises
-    ------
-    InputError
-        Axes besides these have several values, or the store keeps neither section nor waveform.
-    """
-    name = f"section_{signal}"
-    store = store.assign({name: section_of(store, signal)})
-    spread = [along] if over is None else [over, along]
-    data = narrow(store, [name, "regime", "period", "status"], spread).sortby(along)
-    return data.transpose(*spread, "section", ...)
-
-
-def bifurcation(data: xr.Dataset, signal: str, ax: Axes, color: str | None = "regime") -> Axes:
-    """Draw the points of `bifurcation_data` over its axis, by regime, period, direction or in one colour."""
+def draw_bifurcation(data: xr.Dataset, signal: str, ax: Axes, color: str | None = "regime") -> Axes:
+    """Draw the points of `sections_along` over its axis, by regime, period, direction or in one colour."""
     section = data[f"section_{signal}"].load()
     require_results(section, data)
     along = str(section.dims[-2])

@@ -1,4 +1,4 @@
-"""Orbits of the disc: whirl in the plane of the bearings, with stator, keyphasor mark and Poincaré points."""
+"""The orbit of the disc: whirl in the plane of the bearings, with stators, keyphasor mark and section."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
-from postproc.signals.spectra import last_revolutions, samples_per_revolution
-from postproc.store.axes import find_axis
+from postproc.signals.spectra import samples_per_revolution
+from postproc.signals.waveforms import orbit_data
 from postproc.store.rig_of_case import stator_places
-from postproc.store.select import narrow
 from postproc.store.units import scale_for
 from postproc.store.variables import require_results
 
@@ -18,26 +18,28 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
+    from postproc.figures.options import Axis, Count
 
-def orbit_data(store: xr.Dataset, revolutions: int | None = None, over: str | None = None) -> xr.Dataset:
-    """Return the last revolutions of vertical and horizontal motion, with the clearance; lazy.
+
+def orbit(cases: xr.Dataset, *, revolutions: Count | None = None, over: Axis | None = None) -> Drawing:
+    """Orbit of the disc.
+
+    The clearance, the stators and a point a revolution are drawn with it.
 
     Parameters
     ----------
-    store : Dataset
+    cases
         One case, or cases along the axis `over`.
-    revolutions : int, optional
-        How many; all that were recorded by default.
+    revolutions
+        Only the last ones [default: all].
+    over
+        Draw the cases along AXIS over one another.
     """
-    names = ["vertical", "horizontal", "clearance"]
-    data = narrow(store, names, [find_axis(store, over)] if over else [])
-    if revolutions is not None:
-        kept = last_revolutions(data["vertical"], revolutions)
-        data = data.isel(sample=slice(-kept.sizes["sample"], None))
-    return data
+    shown = orbit_data(cases, revolutions, over)
+    return Drawing(shown=shown, draw=lambda axes: draw_orbit(shown, axes[0]), height=80)
 
 
-def orbit(data: xr.Dataset, ax: Axes) -> Axes:
+def draw_orbit(data: xr.Dataset, ax: Axes) -> Axes:
     """Draw an orbit, or those along one axis over one another; positive spin turns clockwise.
 
     One case also shows the clearance circle, where its stators stand, the first sample (ring), one point a
@@ -48,7 +50,7 @@ def orbit(data: xr.Dataset, ax: Axes) -> Axes:
     size = float(np.nanmax(np.abs([vertical.values, horizontal.values])))
     scale = scale_for("m", size)
     if vertical.ndim == 1:
-        _draw_bench(data, ax, scale.factor, 1.15 * size * scale.factor)
+        _draw_stators(data, ax, scale.factor, 1.15 * size * scale.factor)
         _draw_one(vertical, horizontal, ax, scale.factor)
     else:
         curves = zip(overlaid(vertical, "sample"), overlaid(horizontal, "sample"), strict=True)
@@ -75,7 +77,7 @@ def _draw_one(vertical: xr.DataArray, horizontal: xr.DataArray, ax: Axes, factor
     ax.annotate("", (z[start + 2], y[start + 2]), xytext=(z[start], y[start]), arrowprops=arrow, zorder=4)
 
 
-def _draw_bench(data: xr.Dataset, ax: Axes, factor: float, reach: float) -> None:
+def _draw_stators(data: xr.Dataset, ax: Axes, factor: float, reach: float) -> None:
     """Add the clearance circle and a stub of each stator; `reach` bounds what is worth showing."""
     from matplotlib.patches import Circle, Polygon
 

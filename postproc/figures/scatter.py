@@ -1,4 +1,4 @@
-"""Maps of a sampled study: a point a case over two of the quantities that were drawn."""
+"""The map of a sample: a point a case over two of the quantities that were drawn at random."""
 
 from __future__ import annotations
 
@@ -6,23 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.cases.maps import reasons_of
 from postproc.cases.saltelli import is_log
-from postproc.figures.map_figure import (
-    CATEGORIES,
-    NOT_DONE,
-    WARNING,
-    color_bar,
-    coloured,
-    legend_below,
-    name_facets,
-    paint_of,
-    reasons_of,
-)
-from postproc.store.axes import axes_of, drawn_axes, source
+from postproc.figures.palette import CATEGORIES, NOT_DONE, WARNING, coloured, paint_of
+from postproc.figures.small_multiples import color_bar, legend_below, name_facets
 from postproc.store.units import displayed
-from rubhpc.errors import InputError
 from rubhpc.schema import DONE
-from rubhpc.study.axes import SPEED_AXES, coordinate_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,28 +23,6 @@ if TYPE_CHECKING:
 
 _INK = 5000.0  # points squared of all marks together, about: they grow small as they become many
 _SMALLEST, _LARGEST = 3.0, 24.0  # points squared
-
-
-def scatter_axes(store: xr.Dataset, x: str | None = None, y: str | None = None) -> tuple[str, str]:
-    """Return the drawn quantities across and up: those named, else a speed and then the first others.
-
-    Raises
-    ------
-    InputError
-        One that is named was not drawn, or both are the same.
-    """
-    drawn = drawn_axes(store)
-    named = [coordinate_of(name) if name else None for name in (x, y)]
-    for name in named:
-        if name is not None and name not in drawn:
-            what = "is an axis: name it with --facet" if name in axes_of(store) else "was not drawn"
-            raise InputError(f"{source(store)}: {name}: {what}; the sample has {', '.join(drawn)}")
-    in_order = dict.fromkeys(name for name in (*SPEED_AXES, *drawn) if name in drawn)
-    free = [name for name in in_order if name not in named]
-    across, up = (name or free.pop(0) for name in named)
-    if across == up:
-        raise InputError(f"{source(store)}: {across} stands on both axes; name another one")
-    return across, up
 
 
 def scatter_maps(
@@ -117,19 +84,21 @@ def _marks(
     size: float,
     reasons: str,
 ) -> list[Artist]:
-    """Cross what has no result or no value, ring what is out of the model's range; return what names them."""
+    """Cross what has no result or no value, ring what is out of the model's range; return legend handles."""
     status = data["status"].values
     is_done = status == DONE
-    told: list[tuple[NDArray[np.bool_], dict[str, Any]]] = [
+    marked: list[tuple[NDArray[np.bool_], dict[str, Any]]] = [
         (status == code, {"label": name, "marker": "x", "color": str(float(grey) / 2), "linewidths": 0.8})
         for code, (name, grey, _) in NOT_DONE.items()
     ]
     empty = is_done & np.isnan(np.asarray(data[value].values, dtype=float))
-    told.append((empty, {"label": "no value", "marker": "+", "color": "0.6", "linewidths": 0.6}))
+    marked.append((empty, {"label": "no value", "marker": "+", "color": "0.6", "linewidths": 0.6}))
     ring = {"s": 2.5 * size, "marker": "o", "facecolors": "none", "linewidths": 0.5}
     colour = "k" if value in CATEGORIES else WARNING
     beyond = is_done & (data["validity"].values > 0)
-    told.append((beyond, ring | {"label": f"out of range: {reasons}", "edgecolors": colour}))
+    marked.append((beyond, ring | {"label": f"out of range: {reasons}", "edgecolors": colour}))
     return [
-        ax.scatter(x[mask], y[mask], **{"s": size, "zorder": 3} | style) for mask, style in told if mask.any()
+        ax.scatter(x[mask], y[mask], **{"s": size, "zorder": 3} | style)
+        for mask, style in marked
+        if mask.any()
     ]

@@ -1,4 +1,4 @@
-"""Poincaré sections: one point a revolution, in a plane of two signals."""
+"""The Poincaré section: one point a revolution, in a plane of two signals."""
 
 from __future__ import annotations
 
@@ -6,47 +6,47 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.signals.spectra import check_signal, samples_per_revolution
-from postproc.store.select import narrow
+from postproc.figures.bifurcation import draw_bifurcation
+from postproc.figures.drawing import Drawing
+from postproc.signals.sections import section_data, sections_along
+from postproc.store.axes import find_axis
 from postproc.store.units import displayed
-from postproc.store.variables import require_results, require_variables
-from rubhpc.schema import SECTION_NAMES
+from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import xarray as xr
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from postproc.figures.options import Axis
 
-def section_of(store: xr.Dataset, signal: str) -> xr.DataArray:
-    """Return the section of a signal: the stored one, or else every sample at a whole revolution; lazy.
 
-    Raises
-    ------
-    InputError
-        The signal is unknown, or neither its section nor its waveform is stored.
+def section(
+    cases: xr.Dataset, x: str = "horizontal", y: str = "vertical", *, over: Axis | None = None
+) -> Drawing:
+    """Poincaré section of two signals.
+
+    It has a point a revolution, in the plane of both signals or of one signal along an axis.
+
+    Parameters
+    ----------
+    cases
+        One case, or cases along the axis `over`.
+    x
+        Signal across.
+    y
+        Signal up.
+    over
+        Draw signal Y of the cases along AXIS: a bifurcation diagram.
     """
-    check_signal(signal)
-    if f"section_{signal}" in store:
-        return store[f"section_{signal}"]
-    if signal not in store:
-        require_variables(store, [f"section_{signal}" if signal in SECTION_NAMES else signal])
-    waveform = store[signal]
-    points = waveform.isel(sample=slice(None, None, samples_per_revolution(waveform)))
-    points = points.rename(sample="section").drop_vars("revolution", errors="ignore")
-    points.name = f"section_{signal}"
-    return points
+    if over:
+        along = sections_along(cases, y, find_axis(cases, over))
+        return Drawing(shown=along, draw=lambda axes: draw_bifurcation(along, y, axes[0], None))
+    plane = section_data(cases, [x, y])
+    return Drawing(shown=plane, draw=lambda axes: draw_section(plane, x, y, axes[0]))
 
 
-def section_data(store: xr.Dataset, signals: Sequence[str]) -> xr.Dataset:
-    """Return the sections of some signals of one case; lazy."""
-    found = {f"section_{s}": section_of(store, s) for s in signals}
-    return narrow(store.assign(found), list(found))
-
-
-def plane(data: xr.Dataset, x: str, y: str, ax: Axes) -> Axes:
+def draw_section(data: xr.Dataset, x: str, y: str, ax: Axes) -> Axes:
     """Draw the section of one case in the plane of two signals, its points darkening as revolutions pass."""
     across, up = data[f"section_{x}"].load(), data[f"section_{y}"].load()
     require_results(across, data)

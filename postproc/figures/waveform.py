@@ -1,17 +1,15 @@
-"""Waveforms: stacked panels of what was recorded, over time or revolutions."""
+"""Waveforms: the recorded signals in stacked panels, over time or revolutions."""
 
 from __future__ import annotations
 
-import math
 from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
-from postproc.signals.spectra import check_signal, last_revolutions
-from postproc.store.axes import find_axis
-from postproc.store.select import narrow
+from postproc.signals.waveforms import DEFAULT_SIGNALS, waveform_data
 from postproc.store.units import displayed, scale_of, short_name
 from postproc.store.variables import require_results
 
@@ -21,45 +19,40 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-DEFAULT_SIGNALS = ("vertical", "horizontal", "torsion", "contact_force")
+    from postproc.figures.options import Axis, Count
+
 _LABEL_WIDTH = 18  # characters that fit beside a low panel
 
 
-def waveform_data(
-    store: xr.Dataset,
-    signals: Sequence[str] = DEFAULT_SIGNALS,
-    revolutions: int | None = 4,
-    over: str | None = None,
-) -> xr.Dataset:
-    """Return the last revolutions of some signals; lazy.
+def waveform(
+    cases: xr.Dataset,
+    signal: str | Sequence[str] = (),
+    *,
+    revolutions: Count = 4,
+    over: Axis | None = None,
+) -> Drawing:
+    """Waveforms of some signals over the last revolutions.
+
+    They are drawn in panels above one another; contact is shaded.
 
     Parameters
     ----------
-    store : Dataset
-        One case (and one stator, for a stator's signals), or cases along the axis `over`.
-    revolutions : int, optional
-        How many; None for all that were recorded.
-
-    Returns
-    -------
-    Dataset
-        The signals over `sample`, with the coordinate `revolution` and, where all cases turn at one speed,
-        `time` (s) from the first sample kept.
+    cases
+        One case, or cases along the axis `over`.
+    signal
+        May be repeated [default: motion and contact force].
+    revolutions
+        The last ones.
+    over
+        Draw the cases along AXIS over one another.
     """
-    for signal in signals:
-        check_signal(signal)
-    data = narrow(store, [*dict.fromkeys(signals), "spin_speed"], [find_axis(store, over)] if over else [])
-    if revolutions is not None:
-        kept = last_revolutions(data[signals[0]], revolutions)
-        data = data.isel(sample=slice(-kept.sizes["sample"], None))
-    spin = np.unique(data["spin_speed"].values)
-    if spin.size == 1 and spin[0] > 0:
-        time = (data["revolution"] - data["revolution"][0]) * (2 * math.pi / float(spin[0]))
-        data = data.assign_coords(time=time.assign_attrs(units="s", long_name="time"))
-    return data
+    named = (signal,) if isinstance(signal, str) else signal
+    signals = tuple(dict.fromkeys(named)) or DEFAULT_SIGNALS
+    shown = waveform_data(cases, signals, revolutions, over)
+    return Drawing(shown=shown, draw=lambda axes: draw_panels(shown, axes), panels=(len(signals), 1))
 
 
-def waveform(signal: xr.DataArray, ax: Axes) -> Axes:
+def draw_waveform(signal: xr.DataArray, ax: Axes) -> Axes:
     """Draw one signal, or that of several cases over one another, over time or else revolutions."""
     signal = signal.load()
     require_results(signal, signal.to_dataset())
@@ -71,11 +64,11 @@ def waveform(signal: xr.DataArray, ax: Axes) -> Axes:
     return ax
 
 
-def panels(data: xr.Dataset, axes: Sequence[Axes]) -> list[Axes]:
+def draw_panels(data: xr.Dataset, axes: Sequence[Axes]) -> list[Axes]:
     """Draw every signal of `waveform_data` in its own panel; contact is shaded where it was recorded."""
     signals = [str(n) for n, v in data.data_vars.items() if "sample" in v.dims]
     for ax, name in zip(axes, signals, strict=True):
-        waveform(data[name], ax)
+        draw_waveform(data[name], ax)
         ax.set_ylabel(fill(ax.get_ylabel(), _LABEL_WIDTH), fontsize=7)
         ax.label_outer()
         ax.locator_params(axis="y", nbins=4)

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.cases.maps import MAPPABLE, VALIDITY, validity
 from postproc.figures.cells import cell_edges, is_geometric
-from postproc.figures.map_figure import categories
+from postproc.figures.palette import categories
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.units import Scale, displayed, meanings, scale_for, short_name
 from rubhpc.schema import DIVERGED, DONE, SIGNAL_NAMES, VARIABLES

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rubhpc.commands.drawing import SELECT, open_cases
+from rubhpc.commands.selection import SELECT, open_cases
 from rubhpc.errors import InputError
 
 

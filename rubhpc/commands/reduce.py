@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from rubhpc.commands.drawing import SELECT, pairs
+from rubhpc.commands.selection import SELECT, pairs
 from rubhpc.errors import InputError
 
 
@@ -102,12 +102,12 @@ def reduce(
 
 
 def _draw(found: Any, what: str, signal: str, path: Path) -> None:
-    from postproc.figures.spectrum_figure import spectrum
+    from postproc.figures.spectrum import draw_spectrum
     from postproc.figures.style import house_style, new_figure, save
 
     shown = found[f"spectrum_{signal}"].squeeze()
     with house_style():
         page, (ax,) = new_figure()
         ax.set_title(f"{what} of {int(found['cases'].max())} cases".capitalize(), fontsize=7)
-        spectrum(shown, ax, abscissa="order", limit=min(10.0, float(shown["order"][-1])))
+        draw_spectrum(shown, ax, abscissa="order", limit=min(10.0, float(shown["order"][-1])))
         save(page, path)

@@ -12,15 +12,18 @@ from matplotlib.figure import Figure
 from SALib.test_functions import Ishigami
 
 from postproc.cases.sensitivity import sensitivity
-from postproc.figures.sensitivity_figure import bars
+from postproc.catalogue import figures
+from postproc.figures.sensitivity import draw_bars
 from postproc.store.axes import drawn_axes
-from rubhpc.commands.sensitivity import sensitivity as command
+from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import read_rig
 from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.study.axes import make_range
 from rubhpc.study.sampling import draw
 from rubhpc.study.tables import Sample
+
+COMMAND = figure_command(figures()["sensitivity"])
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -147,7 +150,7 @@ def test_part_of_a_sample_has_no_indices() -> None:
 
 def test_bars_reach_beyond_the_shares() -> None:
     found = sensitivity(sample_of_sines(8), "peak_torsion")
-    ax = bars(found, Figure().subplots())
+    ax = draw_bars(found, Figure().subplots())
     low = min(float(found[f"{name}_low"].min()) for name in ("first_order", "total"))
     high = max(float(found[f"{name}_high"].max()) for name in ("first_order", "total"))
     assert low < 0
@@ -158,7 +161,10 @@ def test_bars_reach_beyond_the_shares() -> None:
 def test_command_tells_ranges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     sample_of_sines(64).to_zarr("sines.zarr")
-    done = CliRunner().invoke(command, ["sines.zarr", "--scalar", "peak_torsion", "--data", "shares.csv"])
+    done = CliRunner().invoke(
+        COMMAND,
+        ["sines.zarr", "--measure", "peak_torsion", "--data", "shares.csv"],
+    )
     assert done.exit_code == 0, done.output
     assert "axis                                drawn from  first order" in done.output
     assert "stator_youngs_modulus        1 to 100 GPa, log" in done.output

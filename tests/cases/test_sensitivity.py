@@ -16,10 +16,13 @@ from SALib.test_functions import Ishigami
 
 from postproc.cases.factorial import grid_indices
 from postproc.cases.sensitivity import MOST_FILLED, sensitivity
-from postproc.figures.sensitivity_figure import bars
-from rubhpc.commands.sensitivity import sensitivity as command
+from postproc.catalogue import figures
+from postproc.figures.sensitivity import draw_bars
+from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 from rubhpc.schema import DIVERGED, DONE, FAILED
+
+COMMAND = figure_command(figures()["sensitivity"])
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -200,22 +203,22 @@ def test_what_has_no_indices_is_refused(spoil: Callable[[xr.Dataset], xr.Dataset
 
 
 @pytest.mark.parametrize(
-    ("scalar", "said"),
+    ("measure", "said"),
     [
         ("status", "status: is not a measure; choose"),
         ("peak_torson", "did you mean peak_torsion?"),
         ("peak_contact_force", "select one value of stator (one of 1, 2)"),
     ],
 )
-def test_scalar_has_to_be_one(scalar: str, said: str) -> None:
+def test_measure_has_to_be_one(measure: str, said: str) -> None:
     with pytest.raises(InputError) as refusal:
-        sensitivity(sines(6), scalar)
+        sensitivity(sines(6), measure)
     assert said in str(refusal.value)
 
 
 def test_bars_are_as_long_as_the_shares() -> None:
     found = sensitivity(sines(12), "peak_torsion", n_draw=20)
-    ax = bars(found, Figure().subplots())
+    ax = draw_bars(found, Figure().subplots())
     total, first = (np.array([bar.get_width() for bar in group]) for group in ax.containers[::2])
     np.testing.assert_array_equal(total, found["total"].values)
     np.testing.assert_array_equal(first, found["first_order"].values)
@@ -225,8 +228,8 @@ def test_bars_are_as_long_as_the_shares() -> None:
 def test_command_tells_draws_and_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     without(sines(8), share=0.05).to_zarr("study.zarr", zarr_format=3, consolidated=False)
-    words = ["study.zarr", "--scalar", "peak_contact_force", "--select", "stator=2", "--draws", "20"]
-    done = CliRunner().invoke(command, [*words, "--data", "shares.json"], catch_exceptions=False)
+    words = ["study.zarr", "--measure", "peak_contact_force", "--select", "stator=2", "--draws", "20"]
+    done = CliRunner().invoke(COMMAND, [*words, "--data", "shares.json"], catch_exceptions=False)
     lines = done.output.splitlines()
     assert lines[0].startswith("peak_contact_force: mean ")
     assert lines[1] == "of 512 cases 6 missing, 5 failed, 5 diverged"

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import inspect
+import pydoc
 from typing import TYPE_CHECKING
 
-import click
 import matplotlib
 import pytest
 import synthetic_store
 
 import rubhpc
 from postproc.accessor import Rub
-from rubhpc.cli import COMMANDS, commands
+from postproc.catalogue import figures
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-OF_FILES = ("store", "select", "figure", "data", "scores")
 REST = {"clearance": "84 um", "friction": 0.3, "stator_youngs_modulus": "3 GPa"}
 BIFURCATION = "Torsion,\nonce a revolution (nrad)"
 ORDERS = "Order (multiples of spin speed)"
@@ -72,31 +71,25 @@ def test_each_figure_is_drawn(store: xr.Dataset, name: str, args: dict, labels: 
     ax.figure.canvas.draw()
 
 
-def commands_that_draw() -> dict[str, click.Command]:
-    """Return the commands that draw a store, by their names."""
-    found = {}
-    for name in COMMANDS:
-        command = commands.get_command(click.Context(commands), name)
-        assert command is not None
-        if {"store", "figure", "data"} <= {option.name for option in command.params}:
-            found[name] = command
-    return found
+def test_every_figure_is_a_method_with_its_signature_and_docstring(store: xr.Dataset) -> None:
+    assert set(figures()) <= set(dir(store.rub))
+    for name, figure in figures().items():
+        method = getattr(store.rub, name)
+        parameters = inspect.signature(method).parameters
+        assert list(parameters) == [*figure.options, "ax", "choice"]
+        assert {n: p.default for n, p in parameters.items() if n in figure.options} == {
+            n: option.default for n, option in figure.options.items()
+        }
+        document = inspect.getdoc(method) or ""
+        assert document.startswith(figure.description)
+        for option in figure.options:
+            assert f"\n{option}\n    " in document
 
 
-def told(default: object) -> object:
-    """Return a default as both sides tell it: what is left out is nothing, whatever stands for it."""
-    return default or None
-
-
-def test_no_command_that_draws_is_left_out_and_each_word_is_that_of_its_option() -> None:
-    drawn = commands_that_draw()
-    assert len(drawn) >= 10
-    for name, command in drawn.items():
-        method = inspect.signature(getattr(Rub, name)).parameters
-        words = {n: told(p.default) for n, p in method.items() if n not in ("self", "ax", "choice")}
-        options = {o.name: o.opts[0].removeprefix("--").replace("-", "_") for o in command.params}
-        given = command.make_context(name, ["study.zarr"]).params
-        assert words == {options[n]: told(v) for n, v in given.items() if options[n] not in OF_FILES}, name
+def test_a_figure_has_its_options_by_name_in_help() -> None:
+    text = pydoc.render_doc(Rub.spectrum, renderer=pydoc.plaintext)
+    assert "spectrum(self, /, signal: str = 'torsion', *, full: bool = False, orders: bool" in text
+    assert "lines: int = 6, log: bool = False" in text
 
 
 def test_a_map_for_each_value_of_an_axis(store: xr.Dataset) -> None:
@@ -110,21 +103,22 @@ def test_as_many_axes_are_asked_for_as_a_figure_has(store: xr.Dataset) -> None:
     from matplotlib import pyplot
 
     _, ax = pyplot.subplots()
-    with pytest.raises(InputError, match="ax: 1 of them for a figure that has 2; give as many"):
+    with pytest.raises(InputError, match="ax: 1 axes for a figure of 2; give as many"):
         store.rub.map(facet="friction", ax=ax)
 
 
 @pytest.mark.parametrize(
-    ("name", "args", "said"),
+    ("name", "args", "message"),
     [
         ("cascade", {"form": "water"}, 'form: "water" is none of waterfall, intensity'),
         ("cascade", {"max_frequency": -5.0, **REST}, "out of range"),
         ("bifurcation", {"color": "red"}, 'color: "red" is none of regime, period'),
         ("hht", {"contact": "none", **ONE}, "contact: "),
+        ("orbit", {"revolutions": 0, **ONE}, "revolutions: 0 is out of range; it must be at least 1"),
     ],
 )
-def test_a_wrong_word_is_told(store: xr.Dataset, name: str, args: dict, said: str) -> None:
-    with pytest.raises(InputError, match=said):
+def test_a_wrong_value_is_refused(store: xr.Dataset, name: str, args: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         getattr(store.rub, name)(**args)
 
 

@@ -7,13 +7,17 @@ from click.testing import CliRunner
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
-from postproc.figures.bifurcation import bifurcation, bifurcation_data, default_axis
-from postproc.figures.map_figure import REGIME_COLORS
+from postproc.catalogue import figures
+from postproc.figures.bifurcation import default_axis, draw_bifurcation
+from postproc.figures.palette import REGIME_COLORS
+from postproc.signals.sections import sections_along
 from postproc.store.open import open_store
 from postproc.store.select import select
-from rubhpc.commands.figures import bifurcation_diagram
+from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE, REGIME
+
+COMMAND = figure_command(figures()["bifurcation"])
 
 CHOICE = {"clearance": "84 um", "friction": 0.3, "stator.youngs_modulus": "30 GPa"}
 SPEEDS = synthetic_store.AXES["speed_ratio"][2]
@@ -31,8 +35,8 @@ def drawn(ax):
 
 
 def test_points_have_the_colour_of_their_regime(synthetic_path, ax):
-    data = bifurcation_data(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio")
-    assert bifurcation(data, "vertical", ax) is ax
+    data = sections_along(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio")
+    assert draw_bifurcation(data, "vertical", ax) is ax
     expected = {name: [] for name in ("no contact", "periodic", "quasi-periodic", "chaotic")}
     for speed, code in zip(SPEEDS, synthetic_store.REGIMES, strict=True):
         expected[REGIME[code].replace("no_", "no ").replace("_", "-")].append(speed)
@@ -44,8 +48,8 @@ def test_points_have_the_colour_of_their_regime(synthetic_path, ax):
 
 
 def test_points_have_the_colour_of_their_period(synthetic_path, ax):
-    data = bifurcation_data(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio")
-    bifurcation(data, "vertical", ax, "period")
+    data = sections_along(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio")
+    draw_bifurcation(data, "vertical", ax, "period")
     assert {name: list(at) for name, at in drawn(ax).items()} == {
         "none": [1.5, 1.7],
         "P1": [1.0, 1.25],
@@ -55,16 +59,16 @@ def test_points_have_the_colour_of_their_period(synthetic_path, ax):
 
 def test_points_are_every_whole_revolution_of_the_waveform(synthetic_path, ax):
     store = select(open_store(synthetic_path), CHOICE)
-    data = bifurcation_data(store, "vertical", "speed_ratio")
-    bifurcation(data, "vertical", ax, color=None)
+    data = sections_along(store, "vertical", "speed_ratio")
+    draw_bifurcation(data, "vertical", ax, color=None)
     whole = store["vertical"].values[:, :: synthetic_store.SAMPLES]
     assert ax.lines[0].get_ydata() == pytest.approx(1e6 * whole.ravel(), rel=1e-6)
 
 
 def test_cases_that_are_not_done_leave_no_point(synthetic_path, ax):
     one = {"clearance": "70 um", "friction": 0.1, "stator.youngs_modulus": "3 GPa"}
-    bifurcation(
-        bifurcation_data(select(open_store(synthetic_path), one), "vertical", "speed_ratio"), "vertical", ax
+    draw_bifurcation(
+        sections_along(select(open_store(synthetic_path), one), "vertical", "speed_ratio"), "vertical", ax
     )
     values = synthetic_store.make()["status"].values[:, 0, 0, 0]
     there = np.concatenate(list(drawn(ax).values()))
@@ -73,12 +77,12 @@ def test_cases_that_are_not_done_leave_no_point(synthetic_path, ax):
 
 def test_points_are_read_lazily(synthetic_path):
     store = select(open_store(synthetic_path), CHOICE)
-    assert bifurcation_data(store, "vertical", "speed_ratio")["section_vertical"].chunks is not None
+    assert sections_along(store, "vertical", "speed_ratio")["section_vertical"].chunks is not None
 
 
 def test_signal_without_section_is_taken_from_its_waveform(synthetic_path):
     store = select(open_store(synthetic_path), CHOICE)
-    found = bifurcation_data(store, "contact_force", "speed_ratio")["section_contact_force"]
+    found = sections_along(store, "contact_force", "speed_ratio")["section_contact_force"]
     assert found.shape == (5, POINTS)
 
 
@@ -94,7 +98,7 @@ def test_command_takes_the_first_of_other_axes_and_writes_the_points(synthetic_p
     monkeypatch.chdir(tmp_path)
     args = [str(synthetic_path), "--along", "clearance", "--color", "period", "--data", "points.csv"]
     args += ["--select", "speed_ratio=1.5", "--signal", "torsion"]
-    said = CliRunner().invoke(bifurcation_diagram, args, catch_exceptions=False).output.splitlines()
+    said = CliRunner().invoke(COMMAND, args, catch_exceptions=False).output.splitlines()
     assert "friction = 0.1: the first of 2; change with --select friction=VALUE" in said
     assert said[-2:] == ["study_bifurcation.png", "points.csv"]
     table = np.genfromtxt("points.csv", delimiter=",", names=True, deletechars="")
@@ -107,12 +111,12 @@ def test_an_axis_of_even_ratios_is_drawn_on_a_log_scale(synthetic_path, ax):
         open_store(synthetic_path), {"friction": 0.3, "stator.youngs_modulus": "30 GPa", "speed_ratio": 1.0}
     )
     store = store.assign_coords(clearance=store["clearance"].copy(data=[1e-5, 1e-4, 1e-3]))
-    bifurcation(bifurcation_data(store, "vertical", "clearance"), "vertical", ax)
+    draw_bifurcation(sections_along(store, "vertical", "clearance"), "vertical", ax)
     assert ax.get_xscale() == "log"
 
 
 def test_points_that_differ_by_rounding_do_not_fill_the_axes(synthetic_path, ax):
-    data = bifurcation_data(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio").load()
+    data = sections_along(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio").load()
     data["section_vertical"][...] = 1e-4 * (1 + 1e-9 * np.random.default_rng(1).random((5, POINTS)))
-    bifurcation(data, "vertical", ax)
+    draw_bifurcation(data, "vertical", ax)
     assert np.ptp(ax.get_ylim()) == pytest.approx(2.0)  # um, of 100

@@ -10,7 +10,8 @@ import pytest
 import synthetic_store
 import xarray as xr
 
-from postproc.figures.cascade_figure import default_limit, draw_frequencies, draw_orders, intensity, waterfall
+from postproc.figures.cascade import default_limit, intensity, waterfall
+from postproc.figures.cascade_lines import draw_frequencies, draw_orders
 from postproc.figures.style import house_style, new_figure
 from postproc.signals.cascade import below, cascade, hold_peaks, hold_rows
 from postproc.store.rig_of_case import natural_frequencies, stator_places

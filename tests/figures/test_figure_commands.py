@@ -12,10 +12,10 @@ import synthetic_store
 import xarray as xr
 from click.testing import CliRunner
 
-from rubhpc.commands.figures import COMMANDS
+from postproc.catalogue import figures
+from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 
-BY_NAME = {command.name: command for command in COMMANDS}
 CLEARANCE, FRICTION, MODULUS = "clearance=84 um", "friction=0.3", "stator.youngs_modulus=3 GPa"
 
 
@@ -31,7 +31,11 @@ def run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def invoke(name, *args):
-        return CliRunner().invoke(BY_NAME[name], [str(word) for word in args], catch_exceptions=False).output
+        return (
+            CliRunner()
+            .invoke(figure_command(figures()[name]), [str(word) for word in args], catch_exceptions=False)
+            .output
+        )
 
     return invoke
 
@@ -111,7 +115,7 @@ def test_data_come_as_arrays(run, synthetic_path, name):
         ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--order-lines", "1/0"], "no list of orders"),
         ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--max-frequency", "1 kg"], "--max-frequency"),
         ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--max-frequency", "-5"], "out of range"),
-        ("map", ["--value", "vertical"], "no scalar of a case"),
+        ("map", ["--value", "vertical"], "no measure of a case"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(run, synthetic_path, name, args, said):
@@ -124,8 +128,8 @@ def test_bad_input_is_one_line_and_leaves_nothing(run, synthetic_path, name, arg
 
 def test_a_figure_needs_no_display_and_no_pyplot(synthetic_path, tmp_path):
     script = (
-        "import sys; from rubhpc.commands.figures import map as command;"
-        f"command([{str(synthetic_path)!r}], standalone_mode=False);"
+        "import sys; from rubhpc.cli import commands;"
+        f"commands(['map', {str(synthetic_path)!r}], standalone_mode=False);"
         "assert 'matplotlib.pyplot' not in sys.modules;"
         "assert 'mpi4py' not in sys.modules; assert 'numba' not in sys.modules"
     )
@@ -134,9 +138,10 @@ def test_a_figure_needs_no_display_and_no_pyplot(synthetic_path, tmp_path):
     subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=environment, check=True, timeout=120)
 
 
-def test_the_commands_load_nothing_heavy_until_called():
+def test_the_help_of_a_figure_loads_nothing_heavy():
     script = (
-        "import sys, rubhpc.commands.figures;"
+        "import sys; from rubhpc.cli import commands;"
+        "[commands([name, '--help'], standalone_mode=False) for name in ('cascade', 'map', 'hht')];"
         "heavy = {'numpy', 'xarray', 'matplotlib', 'dask', 'numba', 'mpi4py'} & set(sys.modules);"
         "assert not heavy, heavy"
     )

@@ -7,15 +7,17 @@ from matplotlib.colors import to_rgba
 
 from postproc.cases.maps import default_axes, map_data
 from postproc.figures.cells import cell_edges, hatch_cells
-from postproc.figures.map_figure import value_maps
-from postproc.figures.orbit import orbit, orbit_data
+from postproc.figures.map import value_maps
+from postproc.figures.orbit import draw_orbit
 from postproc.figures.overlay import overlaid
-from postproc.figures.section import plane, section_data
-from postproc.figures.spectrum_figure import default_limit, spectrum
+from postproc.figures.section import draw_section
+from postproc.figures.spectrum import default_limit, draw_spectrum
 from postproc.figures.style import check_figure_path, house_style, new_figure, save
-from postproc.figures.waveform import DEFAULT_SIGNALS, panels, waveform, waveform_data
+from postproc.figures.waveform import draw_panels, draw_waveform
 from postproc.signals.lines import strongest_lines
+from postproc.signals.sections import section_data
 from postproc.signals.spectra import spectrum_data
+from postproc.signals.waveforms import DEFAULT_SIGNALS, orbit_data, waveform_data
 from postproc.store.select import select
 from rubhpc.errors import InputError
 
@@ -84,7 +86,7 @@ def test_one_bad_stator_spoils_the_case():
 
 
 def test_no_map_of_what_is_no_scalar(plain_map):
-    with pytest.raises(InputError, match="vertical: no scalar of a case"):
+    with pytest.raises(InputError, match="vertical: no measure of a case"):
         plain_map("vertical")
     with pytest.raises(InputError, match="did you mean peak_torsion"):
         plain_map("peak_torsio")
@@ -165,7 +167,7 @@ def test_hatched_cells_are_one_patch_of_their_area(ax):
 
 def test_an_orbit_is_drawn_in_micrometres_with_its_stator(case, ax):
     data = orbit_data(case)
-    assert orbit(data, ax) is ax
+    assert draw_orbit(data, ax) is ax
     assert ax.get_xlabel() == "Horizontal displacement (µm)"
     assert ax.get_ylabel() == "Vertical displacement (µm)"
     assert ax.get_aspect() == 1.0
@@ -179,7 +181,7 @@ def test_an_orbit_is_drawn_in_micrometres_with_its_stator(case, ax):
 
 
 def test_poincare_points_are_one_a_revolution(case, ax):
-    orbit(orbit_data(case, revolutions=4), ax)
+    draw_orbit(orbit_data(case, revolutions=4), ax)
     dots = next(line for line in ax.lines if line.get_marker() == ".")
     assert len(dots.get_xdata()) == 4
     # half orders: every second point coincides
@@ -188,7 +190,7 @@ def test_poincare_points_are_one_a_revolution(case, ax):
 
 
 def test_orbits_along_an_axis_have_a_legend(store, ax):
-    orbit(orbit_data(select(store, rest("friction")), over="friction"), ax)
+    draw_orbit(orbit_data(select(store, rest("friction")), over="friction"), ax)
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
     assert labels == [r"$\mu$ = 0.1", r"$\mu$ = 0.3"]
 
@@ -203,7 +205,7 @@ def test_too_many_curves_are_refused(store):
 def test_a_case_that_is_not_done_has_no_orbit(store, ax):
     missing = {"speed_ratio": 0.75, "clearance": 70e-6, "friction": 0.1, "stator_youngs_modulus": 3e9}
     with pytest.raises(InputError, match="no selected case is done"):
-        orbit(orbit_data(select(store, missing)), ax)
+        draw_orbit(orbit_data(select(store, missing)), ax)
 
 
 # waveforms
@@ -220,7 +222,7 @@ def test_panels_have_units_and_shade_the_contact(case):
     data = waveform_data(case)
     with house_style():
         _, axes = new_figure(len(DEFAULT_SIGNALS))
-        assert panels(data, axes) == axes
+        assert draw_panels(data, axes) == axes
     labels = [" ".join(ax.get_ylabel().split()) for ax in axes]
     assert labels == [
         "Vertical displacement (µm)",
@@ -235,7 +237,7 @@ def test_panels_have_units_and_shade_the_contact(case):
 
 def test_waveforms_of_several_speeds_run_over_revolutions(store, ax):
     data = waveform_data(select(store, rest("speed_ratio")), ["torsion"], over="speed_ratio")
-    waveform(data["torsion"].isel(speed_ratio=slice(0, 3)), ax)
+    draw_waveform(data["torsion"].isel(speed_ratio=slice(0, 3)), ax)
     assert ax.get_xlabel() == "Revolution"
     assert len(ax.lines) == 3
 
@@ -258,7 +260,7 @@ def test_a_section_that_is_not_kept_says_so():
 
 
 def test_the_section_plane_has_a_point_a_revolution(case, ax):
-    assert plane(section_data(case, ["horizontal", "vertical"]), "horizontal", "vertical", ax) is ax
+    assert draw_section(section_data(case, ["horizontal", "vertical"]), "horizontal", "vertical", ax) is ax
     assert len(ax.collections[0].get_offsets()) == synthetic_store.REVOLUTIONS
     assert ax.get_ylabel() == "Vertical displacement (µm)"
 
@@ -270,7 +272,7 @@ def test_the_section_plane_has_a_point_a_revolution(case, ax):
 def test_a_spectrum_names_its_lines(case, ax, abscissa, label):
     amplitude = spectrum_data(case, "vertical")
     assert (
-        spectrum(amplitude, ax, strongest_lines(amplitude), abscissa, default_limit(amplitude, abscissa))
+        draw_spectrum(amplitude, ax, strongest_lines(amplitude), abscissa, default_limit(amplitude, abscissa))
         is ax
     )
     assert ax.get_xlabel().startswith(label)
@@ -281,13 +283,13 @@ def test_a_spectrum_names_its_lines(case, ax, abscissa, label):
 
 def test_the_whirl_spectrum_has_two_sides(case, ax):
     amplitude = spectrum_data(case, "whirl")
-    spectrum(amplitude, ax, strongest_lines(amplitude), "order", 3.0)
+    draw_spectrum(amplitude, ax, strongest_lines(amplitude), "order", 3.0)
     assert ax.get_xlim() == (-3.0, 3.0)
     assert {"forward", "backward", "1X"} <= {text.get_text() for text in ax.texts}
 
 
 def test_a_spectrum_on_a_log_scale_shows_five_decades(case, ax):
-    spectrum(spectrum_data(case, "vertical"), ax, log=True)
+    draw_spectrum(spectrum_data(case, "vertical"), ax, log=True)
     low, high = ax.get_ylim()
     assert low == pytest.approx(100e-5, rel=1e-3)
     assert high > 100
@@ -300,7 +302,7 @@ def test_figures_are_saved_by_their_extension(tmp_path, case):
     with house_style():
         for suffix in (".png", ".pdf", ".svg"):
             figure, (ax,) = new_figure()
-            orbit(orbit_data(case), ax)
+            draw_orbit(orbit_data(case), ax)
             path = save(figure, tmp_path / f"orbit{suffix}")
             assert path.stat().st_size > 1000
     assert (tmp_path / "orbit.pdf").read_bytes().startswith(b"%PDF")

@@ -11,7 +11,7 @@ import click
 import pytest
 
 import rubhpc
-from rubhpc.cli import COMMANDS, commands
+from rubhpc.cli import commands
 from rubhpc.input.fields import check_value, parse_field
 from rubhpc.schema import VARIABLES
 
@@ -49,7 +49,7 @@ def test_tables_of_keys_are_complete() -> None:
 def test_commands_show_all_their_options() -> None:
     text = tables.command_sections()
     context = click.Context(commands)
-    for name in COMMANDS:
+    for name in commands.list_commands(context):
         command = commands.get_command(context, name)
         assert command is not None
         section = text.split(f"## `rubhpc {name}`\n")[1].split("\n## ")[0]

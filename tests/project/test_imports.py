@@ -11,6 +11,7 @@ import grimp
 import pytest
 from dynamic_imports import dynamic_imports, modules_of, unreadable_imports
 from importlinter.configuration import configure
+from importlinter.contracts.acyclic_siblings import AcyclicSiblingsContract
 from importlinter.contracts.forbidden import ForbiddenContract
 from importlinter.contracts.layers import LayersContract
 
@@ -48,10 +49,14 @@ def graph() -> grimp.ImportGraph:
 
 @pytest.mark.parametrize("contract", CONTRACTS, ids=lambda contract: contract["name"])
 def test_imports_keep_the_contract(graph: grimp.ImportGraph, contract: dict[str, Any]) -> None:
-    kind = {"layers": LayersContract, "forbidden": ForbiddenContract}[contract["type"]]
+    kinds = {
+        "layers": LayersContract,
+        "forbidden": ForbiddenContract,
+        "acyclic_siblings": AcyclicSiblingsContract,
+    }
     options = {key: value for key, value in contract.items() if key not in ("name", "type")}
     session = {"root_packages": PACKAGES, "include_external_packages": True}
-    check = kind(contract["name"], session, options).check(graph, verbose=False)
+    check = kinds[contract["type"]](contract["name"], session, options).check(graph, verbose=False)
     assert check.kept, check.metadata
 
 

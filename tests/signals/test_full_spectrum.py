@@ -7,7 +7,8 @@ import pytest
 import synthetic_store
 import xarray as xr
 
-from postproc.figures.cascade_figure import draw_frequencies, draw_orders, intensity, waterfall
+from postproc.figures.cascade import intensity, waterfall
+from postproc.figures.cascade_lines import draw_frequencies, draw_orders
 from postproc.figures.style import house_style, new_figure
 from postproc.signals.cascade import below, cascade, hold_peaks
 from postproc.signals.spectra import WHIRL, full_spectrum, spectrum_data

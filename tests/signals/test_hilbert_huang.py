@@ -9,7 +9,8 @@ import synthetic_store
 import xarray as xr
 from click.testing import CliRunner
 
-from postproc.figures.hilbert_huang_figure import energy_time_frequency, panels
+from postproc.catalogue import figures
+from postproc.figures.hht import draw_panels, energy_time_frequency
 from postproc.figures.style import house_style, new_figure
 from postproc.signals.hilbert_huang import (
     analytic,
@@ -21,8 +22,10 @@ from postproc.signals.hilbert_huang import (
     span_frequencies,
 )
 from rubhpc import simulate
-from rubhpc.commands.signals import hht as command
+from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
+
+COMMAND = figure_command(figures()["hht"])
 
 N = 1024  # samples a revolution
 SPIN = 2 * math.pi * 25.0  # one revolution takes 40 ms
@@ -225,7 +228,7 @@ def test_figures_show_the_energy_at_its_frequency():
         assert [t.get_text() for t in ax.get_legend().get_texts()] == ["torsional 128 Hz"]
         assert ax.get_ylim() == (0.0, 300.0)
         _, axes = new_figure(2)
-        panels(hht, axes)
+        draw_panels(hht, axes)
         assert axes[1].get_ylim()[1] == pytest.approx(256, rel=0.01)
 
 
@@ -256,7 +259,7 @@ def run(store, tmp_path, monkeypatch):
 
     def invoke(*args):
         words = [word for choice in ONE for word in ("--select", choice)]
-        return CliRunner().invoke(command, [store, *words, *args], catch_exceptions=False).output
+        return CliRunner().invoke(COMMAND, [store, *words, *args], catch_exceptions=False).output
 
     return invoke
 

@@ -9,13 +9,16 @@ from click.testing import CliRunner
 from scipy.stats import norm
 
 from postproc.cases.detection import TOGETHER, area_under_curve, judge
-from postproc.figures.detection_figure import NAMES, panels
+from postproc.catalogue import figures
+from postproc.figures.indicators import NAMES, draw_panels
 from postproc.figures.style import house_style, new_figure
 from postproc.signals.indicators import CHANNELS, INDICATORS, indicator_scores
 from rubhpc import read_rig, simulate
-from rubhpc.commands.signals import indicators as command
+from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE
+
+COMMAND = figure_command(figures()["indicators"])
 
 N, TURNS = 128, 12  # samples a revolution, revolutions
 RATE = 25.0  # Hz
@@ -270,7 +273,7 @@ def test_the_figure_shows_every_indicator():
     judged = judge(made_scores((0.5, 1.0, 2.0, 3.0)))
     with house_style():
         _, axes = new_figure(2)
-        panels(judged, axes)
+        draw_panels(judged, axes)
     for ax in axes:
         assert {line.get_label() for line in ax.lines} >= set(NAMES.values())
 
@@ -288,7 +291,7 @@ def written(tmp_path, monkeypatch):
 
 def test_the_command_prints_its_table_and_writes_what_is_asked(written):
     arguments = [written, "--noise", "0.01", "--noise", "100", "--data", "rates.csv", "--scores", "scores.nc"]
-    said = CliRunner().invoke(command, arguments, catch_exceptions=False).output.splitlines()
+    said = CliRunner().invoke(COMMAND, arguments, catch_exceptions=False).output.splitlines()
     assert "of 50 cases with rub and 50 without" in said[0]
     assert said[1].split() == ["noise", *INDICATORS, TOGETHER]
     low, high = ([float(word) for word in line.split()] for line in said[2:4])
@@ -306,4 +309,4 @@ def test_the_command_prints_its_table_and_writes_what_is_asked(written):
 
 def test_the_command_refuses_bad_levels(written):
     with pytest.raises(InputError, match="levels above 0"):
-        CliRunner().invoke(command, [written, "--noise", "-1"], catch_exceptions=False)
+        CliRunner().invoke(COMMAND, [written, "--noise", "-1"], catch_exceptions=False)

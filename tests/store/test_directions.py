@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from running import write_study
 
 import rubhpc
-from postproc.figures.bifurcation import bifurcation, bifurcation_data, default_coloring
+from postproc.figures.bifurcation import default_coloring, draw_bifurcation
 from postproc.report.grid import described_axes
+from postproc.signals.sections import sections_along
 from postproc.store.select import first_of_rest, select
 from postproc.store.units import caption, written_value
 from rubhpc.cli import commands
@@ -62,8 +63,8 @@ def test_a_diagram_tells_the_directions_apart_unless_one_is_chosen(store):
     assert default_coloring(one) == "regime"
     with pytest.raises(InputError, match='no two directions to tell apart; sweep an axis "both" ways'):
         default_coloring(one, "direction")
-    data = bifurcation_data(select(store, {"clearance_ratio": 0.7}), "vertical", "speed_ratio", "direction")
-    ax = bifurcation(data, "vertical", Figure(layout="constrained").add_subplot(), "direction")
+    data = sections_along(select(store, {"clearance_ratio": 0.7}), "vertical", "speed_ratio", "direction")
+    ax = draw_bifurcation(data, "vertical", Figure(layout="constrained").add_subplot(), "direction")
     up, down = ax.lines
     assert [line.get_label() for line in ax.lines] == ["up", "down"]
     assert up.get_color() != down.get_color()

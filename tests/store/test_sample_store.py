@@ -9,9 +9,11 @@ import pytest
 from matplotlib.figure import Figure
 from running import write_sample
 
-from postproc.figures import catalogue as figures
-from postproc.figures.map_figure import REGIME_COLORS
-from postproc.figures.scatter import scatter_axes
+from postproc.cases.maps import scatter_axes
+from postproc.figures.bifurcation import bifurcation
+from postproc.figures.cascade import cascade
+from postproc.figures.map import map as map_of
+from postproc.figures.palette import REGIME_COLORS
 from postproc.store.axes import drawn_axes
 from postproc.store.open import open_store
 from postproc.store.rig_of_case import natural_frequencies, rig_of
@@ -40,9 +42,9 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
 
 
 def drawn_on(cases: xr.Dataset, value: str, **words: object) -> list:
-    drawing = figures.map_of(cases, value, **words)
+    drawing = map_of(cases, value, **words)
     figure = Figure()
-    axes = list(figure.subplots(drawing.n_row, drawing.n_column, squeeze=False).ravel())
+    axes = list(figure.subplots(*(drawing.panels or (1, 1)), squeeze=False).ravel())
     drawing.draw(axes)
     figure.draw_without_rendering()
     return axes
@@ -75,7 +77,7 @@ def test_each_value_of_a_list_has_its_panel(cases):
     done = (cases["status"] == DONE).values.reshape(-1, 2)
     assert [len(ax.collections[0].get_offsets()) for ax in (first, second)] == done.sum(axis=0).tolist()
     assert first.get_title() != second.get_title()
-    assert figures.map_of(cases, "peak_torsion").notes[0].startswith("clearance_ratio = 0.7: the first of 2")
+    assert map_of(cases, "peak_torsion").lines[0].startswith("clearance_ratio = 0.7: the first of 2")
 
 
 @pytest.mark.parametrize(
@@ -92,7 +94,7 @@ def test_each_value_of_a_list_has_its_panel(cases):
 )
 def test_maps_that_a_sample_does_not_have_are_refused(cases, words, says):
     with pytest.raises(InputError) as refused:
-        figures.map_of(cases, "peak_torsion", **words)
+        map_of(cases, "peak_torsion", **words)
     assert says in str(refused.value)
 
 
@@ -123,12 +125,12 @@ def test_cases_are_selected_by_number_and_by_what_was_drawn(cases):
 
 def test_nothing_runs_along_what_was_drawn(cases):
     one = cases.isel(clearance_ratio=0)
-    for figure in (figures.cascade, figures.bifurcation):
+    for figure in (cascade, bifurcation):
         with pytest.raises(InputError, match="the cases of a sample have no order, rubhpc map draws them"):
             figure(one)
         with pytest.raises(InputError, match="speed_ratio: was drawn at random and is not an axis"):
             figure(one, along="speed_ratio")
-    assert figures.bifurcation(cases.isel(case=3)).shown.sizes["clearance_ratio"] == 2
+    assert bifurcation(cases.isel(case=3)).shown.sizes["clearance_ratio"] == 2
 
 
 def test_each_case_has_the_natural_frequencies_of_its_own_rig(cases):

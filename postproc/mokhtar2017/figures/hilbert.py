@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from postproc.figures.hilbert_huang_figure import energy_time_frequency
+from postproc.figures.hht import energy_time_frequency
 from postproc.figures.waveform import shade_contacts
 from postproc.mokhtar2017.figures.panels import legend, tidy
 from postproc.signals.hilbert_huang import hilbert_huang

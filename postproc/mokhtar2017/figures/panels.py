@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.figures.overlay import overlaid
-from postproc.figures.spectrum_figure import spectrum as draw_spectrum
-from postproc.figures.waveform import shade_contacts, waveform, waveform_data
+from postproc.figures.spectrum import draw_spectrum
+from postproc.figures.waveform import draw_waveform, shade_contacts
 from postproc.signals.lines import strongest_lines
 from postproc.signals.spectra import last_revolutions, samples_per_revolution, spectrum_data
+from postproc.signals.waveforms import waveform_data
 from postproc.store.units import scale_for, scale_of, short_name
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def over_time(
     data = data.isel(sample=slice(start, start + n_sample)).load()
     data = from_zero(data, float(data["time"][0]))
     for signal, ax in panels.items():
-        waveform(data[signal], ax)
+        draw_waveform(data[signal], ax)
         tidy(ax)
         if over is None and is_shaded:
             shade_contacts(data["contact_force"], ax)
@@ -76,7 +77,7 @@ def closeup(
     step = float(data["time"][1])
     data = data.isel(sample=slice(first - round(before / step), first + round(after / step)))
     data = from_zero(data, float(data["time"][0]) + before)
-    waveform(data[signal], ax)
+    draw_waveform(data[signal], ax)
     tidy(ax)
     shade_contacts(data["contact_force"], ax)
     scale = scale_for("s", float(data["time"][-1]))

@@ -6,7 +6,8 @@ import math
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from postproc.figures.cascade_figure import draw_frequencies, draw_orders, waterfall
+from postproc.figures.cascade import waterfall
+from postproc.figures.cascade_lines import draw_frequencies, draw_orders
 from postproc.mokhtar2017.claims.cases import STIFF, cases
 from postproc.mokhtar2017.claims.measures import strongest
 from postproc.mokhtar2017.claims.speed import (

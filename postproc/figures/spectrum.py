@@ -1,25 +1,76 @@
-"""One spectrum as a figure: amplitudes over frequency or orders, the strongest lines named."""
+"""The spectrum: amplitudes over frequency or orders, the strongest lines named."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
 from postproc.signals.lines import SPIKE, spikes, strongest_lines
+from postproc.signals.spectra import spectrum_data
 from postproc.store.units import scale_of, short_name
 from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import xarray as xr
     from matplotlib.axes import Axes
+
+    from postproc.figures.options import Axis, Bounds, Positive
 
 _FLOOR = 1e-5  # of the highest line, on a log scale
 _NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
 
 
 def spectrum(
+    cases: xr.Dataset,
+    signal: str = "torsion",
+    *,
+    full: bool = False,
+    orders: bool = False,
+    max: Positive | None = None,  # noqa: A002 - the word of the command
+    lines: Annotated[int, Bounds(least=0)] = 6,
+    log: bool = False,
+    over: Axis | None = None,
+) -> Drawing:
+    """Amplitude spectrum of a signal.
+
+    Its strongest lines are named as fractions of the spin speed, and printed.
+
+    Parameters
+    ----------
+    cases
+        One case, or cases along the axis `over`.
+    signal
+        Which recorded signal.
+    full
+        Forward and backward whirl of the orbit instead of a signal.
+    orders
+        Draw over orders instead of Hz.
+    max
+        End of the abscissa.
+    lines
+        How many lines are named.
+    log
+        Amplitudes on a logarithmic scale.
+    over
+        Draw the cases along AXIS over one another.
+    """
+    shown = spectrum_data(cases, "whirl" if full else signal, over).compute()
+    abscissa = "order" if orders else "frequency"
+    limit = max or default_limit(shown, abscissa)
+    found = strongest_lines(shown, lines) if over is None and lines else None
+    return Drawing(
+        shown=shown.to_dataset(name=str(shown.name)),
+        draw=lambda axes: draw_spectrum(shown, axes[0], found, abscissa, limit, log),
+        lines=() if found is None else tuple(_table(found, shown.attrs["units"])),
+    )
+
+
+def draw_spectrum(
     amplitude: xr.DataArray,
     ax: Axes,
     lines: xr.Dataset | None = None,
@@ -100,3 +151,9 @@ def _name_lines(ax: Axes, lines: xr.Dataset, factor: float, abscissa: str) -> No
         text = str(lines["name"].values[i])
         style: dict[str, Any] = {"ha": side, "va": "bottom", "fontsize": 6.5}
         ax.annotate(text, (x, y), xytext=(0, 1.5), textcoords="offset points", annotation_clip=True, **style)
+
+
+def _table(lines: xr.Dataset, unit: str) -> Iterator[str]:
+    columns = (lines[n].values for n in ("name", "frequency", "amplitude"))
+    for name, frequency, amplitude in zip(*columns, strict=True):
+        yield f"{name:>8} {frequency:10.3f} Hz  {amplitude:.4e} {unit}"

@@ -1,27 +1,86 @@
-"""Hilbert-Huang analysis as a figure: the signal, and its energy over time and frequency."""
+"""The Hilbert-Huang analysis of a signal: the signal, and its energy over time and frequency."""
 
 from __future__ import annotations
 
+import math
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
-from postproc.signals.hilbert_huang import energy_picture, median_frequency
+from postproc.figures.drawing import Drawing
+from postproc.figures.options import hertz
+from postproc.signals.hilbert_huang import (
+    contact_bandwidth,
+    energy_picture,
+    hilbert_huang,
+    median_frequency,
+    span_frequencies,
+)
+from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
 from postproc.store.units import scale_for, scale_of, short_name
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
 
+    from postproc.figures.options import Bounds, Count, Hertz
+
 _DECIBELS = 40.0  # of energy below its peak that are shown
 _BLUR = 0.006  # of the ordinate: the half width of a line
 _LABEL_WIDTH = 20  # characters that fit beside a panel
 _SHADE = "0.9"
+
+
+def hht(
+    cases: xr.Dataset,
+    signal: str = "torsion",
+    *,
+    contact: Literal["masked", "kept"] | None = None,
+    revolutions: Count = 4,
+    mode: Annotated[int, Bounds(least=1, most=8)] = 1,
+    max_frequency: Hertz | None = None,
+) -> Drawing:
+    """Hilbert-Huang analysis of a signal.
+
+    Its energy over time and frequency is drawn, with contact shaded. Prints the amplitude-weighted median
+    frequency between contacts, of all spans and of each.
+
+    Parameters
+    ----------
+    cases
+        One case.
+    signal
+        Which recorded signal.
+    contact
+        Leave spans in contact out, under windows, or keep them [default: kept for a stator's signals].
+    revolutions
+        The last ones.
+    mode
+        Intrinsic mode, the fastest first.
+    max_frequency
+        End of the ordinate [default: twice the natural frequency].
+    """
+    limit = None if max_frequency is None else hertz(max_frequency, "--max-frequency")
+    shown = hilbert_huang(cases, signal, contact=contact, revolutions=revolutions, n_mode=mode)
+    natural: dict[str, Any] = {}
+    if signal == "stator_lateral":
+        natural = {"stator": stator_frequencies(cases)["lateral"]}
+    elif not signal.startswith(("stator", "contact")):
+        kind = "torsional" if signal.startswith("torsion") else "lateral"
+        natural = {name: f for name, f in natural_frequencies(cases).items() if name == kind}
+    known = {name: float(f) for name, f in natural.items()}
+    return Drawing(
+        shown=shown,
+        draw=lambda axes: draw_panels(shown, axes, limit, known, mode),
+        panels=(2, 1),
+        height=85,
+        lines=tuple(_medians(shown, mode)),
+    )
 
 
 def energy_time_frequency(
@@ -49,7 +108,7 @@ def energy_time_frequency(
     return ax
 
 
-def panels(
+def draw_panels(
     hht: xr.Dataset,
     axes: Sequence[Axes],
     limit: float | None = None,
@@ -130,3 +189,12 @@ def _shade(hht: xr.Dataset, ax: Axes, factor: float) -> None:
 def _add_bar(ax: Axes, beside: list[Axes], mesh: ScalarMappable) -> None:
     bar = ax.figure.colorbar(mesh, ax=beside, pad=0.02, aspect=30)
     bar.set_label("Energy (dB of its peak)")
+
+
+def _medians(shown: xr.Dataset, mode: int) -> Iterator[str]:
+    middle = float(median_frequency(shown, mode))
+    each = ", ".join(f"{f:.1f}" for f in span_frequencies(shown, mode).dropna("span").values)
+    yield f"median frequency out of contact {middle:.2f} Hz (span by span: {each})"
+    spread = {str(name): float(width) for name, width in contact_bandwidth(shown, mode).items()}
+    if math.isfinite(spread["contact"]):
+        yield f"interquartile spread {spread['contact']:.0f} Hz in contact, {spread['free']:.0f} Hz free"

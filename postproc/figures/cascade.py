@@ -1,32 +1,98 @@
-"""The cascade as a figure: stacked spectra (waterfall) or an intensity picture, with orders and modes."""
+"""The cascade: spectra stacked along an axis (waterfall), or their amplitudes as colours (intensity)."""
 
 from __future__ import annotations
 
 import math
-from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
+from postproc.figures.cascade_lines import draw_frequencies, draw_orders, ordinate
 from postproc.figures.cells import cell_edges, is_geometric
+from postproc.figures.drawing import Drawing
+from postproc.figures.options import hertz
 from postproc.signals.cascade import below, hold_peaks, hold_rows
-from postproc.signals.lines import SPIKE, spikes
+from postproc.signals.cascade import cascade as cascade_data
+from postproc.signals.lines import SPIKE, parse_orders, spikes
+from postproc.store.rig_of_case import natural_frequencies
 from postproc.store.units import displayed, scale_of, short_name
 from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     import xarray as xr
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
 
-ORDERS = tuple(Fraction(*f) for f in ((1, 3), (1, 2), (2, 3), (1, 1), (3, 2), (2, 1), (3, 1)))
+    from postproc.figures.options import Axis, Hertz, Metavar, Positive
+
 _ROWS = 60  # of a waterfall: more overlap at column width
 _PIXELS = (800, 500)  # of an intensity picture at column width and 300 dpi
-_CHARACTER = 0.018  # of the axes, for a letter of a name
 _DECADES = 3.0
 _NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
+
+
+def cascade(
+    cases: xr.Dataset,
+    signal: str = "torsion",
+    *,
+    full: bool = False,
+    along: Axis | None = None,
+    form: Literal["waterfall", "intensity"] = "waterfall",
+    max_frequency: Hertz | None = None,
+    max_order: Positive = 5.0,
+    orders: bool = False,
+    order_lines: Annotated[str, Metavar("LIST")] = "1/3,1/2,2/3,1,3/2,2,3",
+    mark: Mapping[str, Hertz] | None = None,
+) -> Drawing:
+    """Spectrum cascade of a signal along an axis.
+
+    Order lines and the rotor's natural frequencies are marked.
+
+    Parameters
+    ----------
+    cases
+        All axes but one are of one value, or selected.
+    signal
+        Which recorded signal.
+    full
+        Forward and backward whirl of the orbit instead of a signal.
+    along
+        The axis of the cascade [default: the speed].
+    form
+        Stacked spectra, or amplitudes as colours.
+    max_frequency
+        End of the abscissa [default: beyond modes and 1X].
+    max_order
+        End of the abscissa over orders.
+    orders
+        Draw over orders instead of Hz.
+    order_lines
+        Multiples of the spin speed whose lines are drawn.
+    mark
+        Mark one more frequency; may be repeated.
+    """
+    lines = parse_orders(order_lines, "--order-lines")
+    spectra = cascade_data(cases, "whirl" if full else signal, along)
+    frequencies: dict[str, Any] = dict(natural_frequencies(cases, str(spectra.dims[0])))
+    if spectra.name == "spectrum_whirl":  # lateral motion alone
+        frequencies.pop("torsional", None)
+    for name, value in (mark or {}).items():
+        frequencies[name] = hertz(value, f"--mark {name}")
+    abscissa = "order" if orders else "frequency"
+    limit = max_order if orders else default_limit(spectra, frequencies)
+    if max_frequency is not None and not orders:
+        limit = hertz(max_frequency, "--max-frequency")
+
+    def draw(axes: list[Axes]) -> None:
+        is_waterfall = form == "waterfall"
+        picture = waterfall if is_waterfall else intensity
+        picture(spectra, axes[0], limit, abscissa)
+        draw_orders(axes[0], spectra, lines, abscissa, "0.35" if is_waterfall else "0.8")
+        draw_frequencies(axes[0], spectra, frequencies, abscissa, "C1" if is_waterfall else "#56B4E9")
+
+    shown = below(spectra, limit, abscissa).to_dataset(name=str(spectra.name))
+    return Drawing(shown=shown, draw=draw, height=80)
 
 
 def waterfall(
@@ -46,7 +112,7 @@ def waterfall(
     """
     spectra = hold_rows(below(spectra, limit, abscissa), _ROWS).compute()
     require_results(spectra, spectra.to_dataset(name="spectra"))
-    rows, label = _ordinate(spectra)
+    rows, label = ordinate(spectra)
     spectra = spectra.where(np.abs(spectra["order"]) > 1e-9)  # the mean is no line
     peak = float(spectra.max())
     span = float(np.ptp(rows)) or 1.0
@@ -81,7 +147,7 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
     )  # the mean is no line
     held = hold_rows(hold_peaks(lines, limit, _PIXELS[0], abscissa), _PIXELS[1]).compute()
     require_results(held, held.to_dataset(name="spectra"))
-    rows, label = _ordinate(held)
+    rows, label = ordinate(held)
     scale = scale_of(held)
     values = held.values * scale.factor
     peak = float(np.nanmax(values)) or 1.0
@@ -100,81 +166,6 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
     _name_senses(ax, "0.9")
     bar = ax.figure.colorbar(mesh, ax=ax, pad=0.02, aspect=30, extend="min")
     bar.set_label(scale.label(f"{short_name(held)} amplitude"))
-    return ax
-
-
-def draw_orders(
-    ax: Axes,
-    spectra: xr.DataArray,
-    orders: Sequence[Fraction] = ORDERS,
-    abscissa: str = "frequency",
-    color: str = "0.35",
-) -> Axes:
-    """Add the lines on which multiples of the spin speed lie, named at their upper ends.
-
-    In full spectra each has its twin on the backward side.
-    """
-    rows, rate = _rows_and_rate(spectra)
-    left, right = ax.get_xlim()
-    style: dict[str, Any] = {"color": color, "linewidth": 0.4, "linestyle": (0, (4, 3)), "zorder": 2.5}
-    tagged: list[float] = []
-    # Whole multiples first, so that they keep their names where there is no room for all.
-    signed = [*orders, *(-o for o in orders)] if left < 0 else list(orders)
-    for order in sorted(signed, key=lambda o: (o.denominator, abs(o))):
-        x = float(order) * (rate if abscissa == "frequency" else np.ones_like(rate))
-        inside = np.flatnonzero((x >= left) & (x <= right))
-        if inside.size < max(2, 0.08 * rows.size):
-            continue  # it would cut a corner only
-        ax.plot(x, rows, scalex=False, scaley=False, **style)
-        if inside[-1] == rows.size - 1:
-            if all(abs(x[-1] - t) > 0.07 * (right - left) for t in tagged):
-                _tag(ax, float(x[-1]), float(rows[-1]), f"{order}X", color, "center")
-                tagged.append(float(x[-1]))
-        else:
-            end, side = (right, "right") if order > 0 else (left, "left")
-            _tag(ax, end, float(np.interp(abs(end), np.abs(x), rows)), f"{order}X", color, side)
-    return ax
-
-
-def draw_frequencies(
-    ax: Axes,
-    spectra: xr.DataArray,
-    frequencies: Mapping[str, xr.DataArray | float],
-    abscissa: str = "frequency",
-    color: str = "C1",
-) -> Axes:
-    """Add natural frequencies (Hz) as dashed lines named beside; they may vary along it.
-
-    In full spectra each has its twin, without a name, on the backward side.
-    """
-    rows, rate = _rows_and_rate(spectra)
-    left, right = ax.get_xlim()
-    ends = ax.get_ylim()
-    style: dict[str, Any] = {"color": color, "linewidth": 0.7, "linestyle": "--", "zorder": 5}
-    named: list[tuple[float, float]] = []  # ends of the names that stand above the axes
-    for name, frequency in frequencies.items():
-        values = np.broadcast_to(np.asarray(frequency, dtype=float), rows.shape)
-        x = values if abscissa == "frequency" else values / rate
-        if not ((x >= left) & (x <= right)).any():
-            continue
-        y = np.concatenate((ends[:1], rows, ends[1:]))
-        curve = np.concatenate((x[:1], x, x[-1:]))
-        for twin in (curve, -curve) if left < 0 else (curve,):
-            ax.plot(twin, y, scalex=False, scaley=False, **style)
-        text: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6.5, "color": color, "zorder": 6}
-        if abscissa == "frequency":
-            at = float(np.clip(x[-1], left + 0.1 * (right - left), right - 0.14 * (right - left)))
-            label = f"{name} {values[-1]:.4g} Hz"
-            half = 0.5 * _CHARACTER * len(label) * (right - left)
-            level = sum(at - half < end and at + half > start for start, end in named)  # the next line up
-            named.append((at - half, at + half))
-            text |= {"xytext": (0, 2 + 8 * level), "ha": "center", "va": "bottom", "annotation_clip": False}
-            ax.annotate(label, (at, 1.0), xycoords=("data", "axes fraction"), **text)
-        else:  # over orders the curves meet at the top and part towards slow rotation
-            side, shift = ("right", -2) if x[0] > left + 0.6 * (right - left) else ("left", 2)
-            text |= {"xytext": (shift, 1), "ha": side, "va": "bottom"}
-            text["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.3, "alpha": 0.8}
-            ax.annotate(f"{name} {values[0]:.4g} Hz", (float(x[0]), ends[0]), **text)
     return ax
 
 
@@ -199,20 +190,6 @@ def _name_senses(ax: Axes, color: str = "k") -> None:
         ax.text(0.98, 0.02, "forward", ha="right", **style)
 
 
-def _rows_and_rate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the displayed ordinates, ascending, and the spin rate (Hz) at each."""
-    rows, _ = _ordinate(spectra)
-    ascending = np.argsort(rows)
-    rate = np.broadcast_to(spectra["spin_speed"].values, rows.shape) / (2 * math.pi)
-    return rows[ascending], rate[ascending]
-
-
-def _ordinate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], str]:
-    """Return where the rows stand, and the label; the logarithm of values that are spaced by a ratio."""
-    rows, label = displayed(spectra[spectra.dims[0]])
-    return np.log10(rows) if is_geometric(np.sort(rows)) else rows, label
-
-
 def _name_decades(ax: Axes, spectra: xr.DataArray) -> None:
     """Have round values name an ordinate that shows their logarithm."""
     rows, _ = displayed(spectra[spectra.dims[0]])
@@ -221,23 +198,6 @@ def _name_decades(ax: Axes, spectra: xr.DataArray) -> None:
         decades = 10.0 ** np.arange(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
         named = [v for v in np.outer(decades, (1, 2, 5)).ravel() if low <= v <= high]
         ax.set_yticks(np.log10(named), [f"{value:g}" for value in named])
-
-
-def _tag(ax: Axes, x: float, y: float, text: str, color: str, ha: str) -> None:
-    bottom, top = ax.get_ylim()
-    has_room = top - y > 0.05 * (top - bottom)
-    ax.annotate(
-        text,
-        (x, y),
-        xytext=({"left": 2, "right": -1}.get(ha, 0 if has_room else -1), 1 if has_room else -1),
-        textcoords="offset points",
-        ha=ha if has_room or ha == "left" else "right",
-        va="bottom" if has_room else "top",
-        fontsize=6,
-        color=color,
-        zorder=6,
-        clip_on=True,
-    )
 
 
 def _scale_bar(spectra: xr.DataArray, ax: Axes, peak: float, gain: float) -> None:

@@ -1,0 +1,128 @@
+"""Lines over a cascade: orders of the spin speed and natural frequencies, with their names."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postproc.figures.cells import is_geometric
+from postproc.store.units import displayed
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+ORDERS = tuple(Fraction(*f) for f in ((1, 3), (1, 2), (2, 3), (1, 1), (3, 2), (2, 1), (3, 1)))
+_CHARACTER = 0.018  # of the axes, for a letter of a name
+
+
+def draw_orders(
+    ax: Axes,
+    spectra: xr.DataArray,
+    orders: Sequence[Fraction] = ORDERS,
+    abscissa: str = "frequency",
+    color: str = "0.35",
+) -> Axes:
+    """Add the lines on which multiples of the spin speed lie, named at their upper ends.
+
+    In full spectra each has its twin on the backward side.
+    """
+    rows, rate = _rows_and_rate(spectra)
+    left, right = ax.get_xlim()
+    style: dict[str, Any] = {"color": color, "linewidth": 0.4, "linestyle": (0, (4, 3)), "zorder": 2.5}
+    tagged: list[float] = []
+    # Whole multiples first, so that they keep their names where there is no room for all.
+    signed = [*orders, *(-o for o in orders)] if left < 0 else list(orders)
+    for order in sorted(signed, key=lambda o: (o.denominator, abs(o))):
+        x = float(order) * (rate if abscissa == "frequency" else np.ones_like(rate))
+        inside = np.flatnonzero((x >= left) & (x <= right))
+        if inside.size < max(2, 0.08 * rows.size):
+            continue  # it would cut a corner only
+        ax.plot(x, rows, scalex=False, scaley=False, **style)
+        if inside[-1] == rows.size - 1:
+            if all(abs(x[-1] - t) > 0.07 * (right - left) for t in tagged):
+                _tag(ax, float(x[-1]), float(rows[-1]), f"{order}X", color, "center")
+                tagged.append(float(x[-1]))
+        else:
+            end, side = (right, "right") if order > 0 else (left, "left")
+            _tag(ax, end, float(np.interp(abs(end), np.abs(x), rows)), f"{order}X", color, side)
+    return ax
+
+
+def draw_frequencies(
+    ax: Axes,
+    spectra: xr.DataArray,
+    frequencies: Mapping[str, xr.DataArray | float],
+    abscissa: str = "frequency",
+    color: str = "C1",
+) -> Axes:
+    """Add natural frequencies (Hz) as dashed lines named beside; they may vary along it.
+
+    In full spectra each has its twin, without a name, on the backward side.
+    """
+    rows, rate = _rows_and_rate(spectra)
+    left, right = ax.get_xlim()
+    ends = ax.get_ylim()
+    style: dict[str, Any] = {"color": color, "linewidth": 0.7, "linestyle": "--", "zorder": 5}
+    named: list[tuple[float, float]] = []  # ends of the names that stand above the axes
+    for name, frequency in frequencies.items():
+        values = np.broadcast_to(np.asarray(frequency, dtype=float), rows.shape)
+        x = values if abscissa == "frequency" else values / rate
+        if not ((x >= left) & (x <= right)).any():
+            continue
+        y = np.concatenate((ends[:1], rows, ends[1:]))
+        curve = np.concatenate((x[:1], x, x[-1:]))
+        for twin in (curve, -curve) if left < 0 else (curve,):
+            ax.plot(twin, y, scalex=False, scaley=False, **style)
+        text: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6.5, "color": color, "zorder": 6}
+        if abscissa == "frequency":
+            at = float(np.clip(x[-1], left + 0.1 * (right - left), right - 0.14 * (right - left)))
+            label = f"{name} {values[-1]:.4g} Hz"
+            half = 0.5 * _CHARACTER * len(label) * (right - left)
+            level = sum(at - half < end and at + half > start for start, end in named)  # the next line up
+            named.append((at - half, at + half))
+            text |= {"xytext": (0, 2 + 8 * level), "ha": "center", "va": "bottom", "annotation_clip": False}
+            ax.annotate(label, (at, 1.0), xycoords=("data", "axes fraction"), **text)
+        else:  # over orders the curves meet at the top and part towards slow rotation
+            side, shift = ("right", -2) if x[0] > left + 0.6 * (right - left) else ("left", 2)
+            text |= {"xytext": (shift, 1), "ha": side, "va": "bottom"}
+            text["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.3, "alpha": 0.8}
+            ax.annotate(f"{name} {values[0]:.4g} Hz", (float(x[0]), ends[0]), **text)
+    return ax
+
+
+def ordinate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], str]:
+    """Return where the rows stand, and the label; the logarithm of values that are spaced by a ratio."""
+    rows, label = displayed(spectra[spectra.dims[0]])
+    return np.log10(rows) if is_geometric(np.sort(rows)) else rows, label
+
+
+def _rows_and_rate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the displayed ordinates, ascending, and the spin rate (Hz) at each."""
+    rows, _ = ordinate(spectra)
+    ascending = np.argsort(rows)
+    rate = np.broadcast_to(spectra["spin_speed"].values, rows.shape) / (2 * math.pi)
+    return rows[ascending], rate[ascending]
+
+
+def _tag(ax: Axes, x: float, y: float, text: str, color: str, ha: str) -> None:
+    bottom, top = ax.get_ylim()
+    has_room = top - y > 0.05 * (top - bottom)
+    ax.annotate(
+        text,
+        (x, y),
+        xytext=({"left": 2, "right": -1}.get(ha, 0 if has_room else -1), 1 if has_room else -1),
+        textcoords="offset points",
+        ha=ha if has_room or ha == "left" else "right",
+        va="bottom" if has_room else "top",
+        fontsize=6,
+        color=color,
+        zorder=6,
+        clip_on=True,
+    )

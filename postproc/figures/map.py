@@ -1,0 +1,171 @@
+"""The map: a measure, the regime or the status over two axes, or over two quantities of a sample."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+
+from postproc.cases.maps import default_axes, facet_axes, map_data, reasons_of, scatter_axes
+from postproc.figures.cells import cell_edges, hatch_cells, is_geometric
+from postproc.figures.drawing import Drawing
+from postproc.figures.palette import CATEGORIES, NOT_DONE, WARNING, coloured, paint_of
+from postproc.figures.scatter import scatter_maps
+from postproc.figures.small_multiples import color_bar, legend_below, name_facets
+from postproc.store.axes import drawn_axes, source
+from postproc.store.select import first_of_rest
+from postproc.store.units import displayed
+from rubhpc.errors import InputError
+from rubhpc.schema import DONE
+from rubhpc.study.sampling import CASE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from postproc.figures.options import Axis, Bounds, Metavar
+    from postproc.figures.palette import Paint
+
+    Edges = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def map(  # noqa: A001 - the name of the command
+    cases: xr.Dataset,
+    value: str = "peak_contact_force",
+    *,
+    x: Axis | None = None,
+    y: Axis | None = None,
+    facet: Axis | Sequence[Axis] = (),
+    contours: Annotated[int, Bounds(least=1), Metavar("N")] | None = None,
+    log: bool = False,
+) -> Drawing:
+    """Map of a measure, the regime or the status over two axes.
+
+    What is missing or out of the model's range is hatched. A sampled study is drawn as a point a case over
+    two of the quantities that were drawn at random.
+
+    Parameters
+    ----------
+    cases
+        Axes that are not drawn are taken at their first value.
+    value
+        A measure, or regime or status.
+    x
+        Axis across [default: the longest].
+    y
+        Axis up [default: the next longest].
+    facet
+        A map for each value; twice: a grid.
+    contours
+        Lines at N levels.
+    log
+        Colours on a logarithmic scale.
+    """
+    named = [facet] if isinstance(facet, str) else list(facet)
+    is_sample = bool(drawn_axes(cases))
+    if is_sample and contours:
+        raise InputError(f"{source(cases)}: map: points of a sample have no contours; leave --contours out")
+    across, up = scatter_axes(cases, x, y) if is_sample else default_axes(cases, x, y, named)
+    spread = [CASE] if is_sample else [across, up]
+    facets = facet_axes(cases, named, spread)
+    cases, notes = first_of_rest(cases, [*spread, *facets], value)
+    shown = map_data(cases, value, spread, facets)
+
+    def draw(axes: list[Axes]) -> None:
+        if is_sample:
+            scatter_maps(shown, value, across, up, axes, log)
+        else:
+            value_maps(shown, value, axes, log, contours or 0)
+
+    if not facets:
+        return Drawing(shown=shown, draw=draw, height=75.0, lines=tuple(notes))
+    n_row, n_column = ([1] + [shown.sizes[axis] for axis in facets])[-2:]
+    return Drawing(
+        shown=shown,
+        draw=draw,
+        panels=(n_row, n_column),
+        height=30.0 + 45.0 * n_row,
+        width=180.0,
+        lines=tuple(notes),
+    )
+
+
+def value_maps(
+    data: xr.Dataset, value: str, axes: Sequence[Axes], log: bool = False, n_contour: int = 0
+) -> Sequence[Axes]:
+    """Draw maps from `map_data`, one for each value of its facets, in one scale of colours.
+
+    Flags and periods have distinct colours, other scalars a continuous bar and, where asked for, contours.
+    Cells without a result are grey and hatched by their status; out of the model's range, by lines.
+
+    Parameters
+    ----------
+    data : Dataset over (row, column, y, x), (column, y, x) or (y, x)
+    axes : sequence of Axes
+        As many as there are facets, row by row.
+    n_contour : int
+        Contour lines at about so many levels.
+    """
+    *facets, y_name, x_name = [str(name) for name in data[value].dims]
+    data = data.sortby([*facets, y_name, x_name])
+    x, x_label = displayed(data[x_name])
+    y, y_label = displayed(data[y_name])
+    edges = cell_edges(x), cell_edges(y)
+    shown, is_known = coloured(data, value)
+    paint = paint_of(shown, log)
+    if n_contour and value in CATEGORIES:
+        raise InputError(f"map: {value} has no contours; draw it without --contours")
+    levels = _levels(paint, n_contour) if n_contour and min(x.size, y.size) > 1 else np.array([])
+    handles: dict[str, Artist] = {}
+    for ax, place in zip(axes, np.ndindex(*(data.sizes[f] for f in facets)), strict=True):
+        here = dict(zip(facets, place, strict=True))
+        cells = paint.cells(shown.isel(here).values)
+        mesh = ax.pcolormesh(*edges, cells, norm=paint.norm, cmap=paint.cmap, rasterized=True)
+        inside = levels[(levels > cells.min()) & (levels < cells.max())] if cells.count() else []
+        if len(inside):
+            ax.contour(x, y, cells, levels=inside, colors="white", linewidths=0.5)
+        if not is_known:
+            for patch in _hatch(ax, edges, data.isel(here), value, reasons_of(data)):
+                handles[str(patch.get_label())] = patch
+        for values, name in ((x, "x"), (y, "y")):
+            if is_geometric(values):
+                getattr(ax, f"set_{name}scale")("log")
+        ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+    if paint.names != []:  # a flag that no case has needs no colours
+        bar = color_bar(axes, mesh, paint)
+        bar.ax.hlines(levels, *bar.ax.get_xlim(), color="white", linewidth=0.5)
+    name_facets(axes, data, facets, x_label, y_label)
+    legend_below(axes[0], list(handles.values()))
+    return axes
+
+
+def _hatch(ax: Axes, edges: Edges, data: xr.Dataset, value: str, reasons: str) -> list[Artist]:
+    """Hatch what has no result, no value, or is out of the model's range, and return what names them."""
+    status = data["status"].values
+    handles: list[Artist] = []
+    for code, (name, color, hatch) in NOT_DONE.items():
+        handles += hatch_cells(ax, edges, status == code, name, hatch, facecolor=color)
+    # Such as durations without contact.
+    empty = (status == DONE) & np.isnan(np.asarray(data[value].values, dtype=float))
+    handles += hatch_cells(ax, edges, empty, "no value", "", facecolor="white")
+    invalid = (status == DONE) & (data["validity"].values > 0)
+    color = "k" if value in CATEGORIES else WARNING
+    return handles + hatch_cells(ax, edges, invalid, f"out of range: {reasons}", "\\\\\\\\", color=color)
+
+
+def _levels(paint: Paint, n_contour: int) -> NDArray[np.float64]:
+    """Return about so many levels for contours, round ones on a linear scale."""
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import MaxNLocator
+
+    assert paint.norm is not None
+    low, high = float(paint.norm.vmin or 0.0), float(paint.norm.vmax or 0.0)
+    if isinstance(paint.norm, LogNorm):
+        levels = np.geomspace(low, high, n_contour + 2)
+    else:
+        levels = np.asarray(MaxNLocator(n_contour + 1).tick_values(low, high))
+    return levels[(levels > low) & (levels < high)]

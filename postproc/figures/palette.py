@@ -1,0 +1,121 @@
+"""Colours of measures, regimes, periods and statuses, the same in every figure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from postproc.store.units import scale_of, short_name
+from rubhpc.errors import InputError
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, REGIME, STATUS, VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import xarray as xr
+    from matplotlib.colors import Normalize
+    from numpy.typing import NDArray
+
+# Cases without a result: name, grey, hatch.
+NOT_DONE = {
+    MISSING: ("missing", "0.93", "...."),
+    FAILED: ("failed", "0.8", "xxxx"),
+    DIVERGED: ("diverged", "0.6", "////"),
+}
+REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
+PERIOD_COLORS = ("#D55E00", "#56B4E9", "#0072B2", "#009E73", "#CC79A7")  # none, P1 to P4
+STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
+WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
+CATEGORIES = ("status", "regime", "period")
+
+
+class Paint(NamedTuple):
+    """How values become colours, the same on every panel."""
+
+    cells: Callable[[NDArray[Any]], np.ma.MaskedArray[Any, Any]]  # values to what is drawn
+    norm: Normalize | None
+    cmap: Any
+    label: str
+    ticks: list[int] | None = None
+    names: list[str] | None = None
+
+
+def coloured(data: xr.Dataset, value: str) -> tuple[xr.DataArray, bool]:
+    """Return the values that have a colour, and whether all have, being known before any case is done."""
+    is_known = value == "status" or VARIABLES[value].role == "setting"
+    return (data[value] if is_known else data[value].where(data["status"] == DONE)), is_known
+
+
+def paint_of(shown: xr.DataArray, log: bool) -> Paint:
+    """Return how values become colours: those of a flag or a period distinct ones, others of a scale."""
+    return _category_paint(shown) if shown.name in CATEGORIES else _scalar_paint(shown, log)
+
+
+def categories(variable: str, codes: NDArray[np.integer]) -> dict[int, tuple[str, Any]]:
+    """Return name and colour of each code of a flag, or of each period, that occurs; those below 0 do not."""
+    import matplotlib
+
+    present = [int(c) for c in np.unique(codes) if c >= 0]
+    if variable == "period":
+        # The short ones have colours of their own, the longer ones darken, and 0, none, stands apart.
+        longer = [c for c in present if c >= len(PERIOD_COLORS)]
+        ramp = matplotlib.colormaps["Greys"](np.linspace(0.45, 1.0, max(len(longer), 2)))
+        colors = {**dict(enumerate(PERIOD_COLORS)), **dict(zip(longer, ramp, strict=False))}
+        return {c: ("none" if c == 0 else f"P{c}", colors[c]) for c in present}
+    meanings, palette = (STATUS, STATUS_COLORS) if variable == "status" else (REGIME, REGIME_COLORS)
+    return {c: (meanings[c].replace("_", "-" if c == 2 else " "), palette[c]) for c in present}
+
+
+def _scalar_paint(shown: xr.DataArray, log: bool) -> Paint:
+    from matplotlib.colors import LogNorm, Normalize
+
+    scale = scale_of(shown)
+
+    def cells(values: NDArray[Any]) -> np.ma.MaskedArray[Any, Any]:
+        drawn = np.ma.masked_invalid(np.asarray(values, dtype=float) * scale.factor)
+        return np.ma.masked_less_equal(drawn, 0.0) if log else drawn
+
+    everything = cells(shown.values)
+    if np.ma.masked_invalid(np.asarray(shown.values, dtype=float)).count() == 0:
+        raise InputError(
+            f"map: no case of this selection has a {shown.name}; run the study first, or select others"
+        )
+    if everything.count() == 0:
+        raise InputError(f"map: {shown.name} is nowhere positive; draw it without --log")
+    limits = float(everything.min()), float(everything.max())
+    norm = LogNorm(*limits) if log else Normalize(*limits)
+    return Paint(cells, norm, "cividis", scale.label(short_name(shown)))
+
+
+def _category_paint(shown: xr.DataArray) -> Paint:
+    from matplotlib.colors import ListedColormap, Normalize
+
+    def coded(values: NDArray[Any]) -> NDArray[np.int64]:
+        codes: NDArray[np.int64] = np.nan_to_num(np.asarray(values, dtype=float), nan=-1).astype(np.int64)
+        return codes
+
+    known = categories(str(shown.name), coded(shown.values))
+    if not known:
+        return Paint(
+            lambda values: np.ma.masked_where(coded(values) < 0, values),
+            None,
+            "Greys",
+            short_name(shown),
+            [],
+            [],
+        )
+    present = list(known)
+
+    def cells(values: NDArray[Any]) -> np.ma.MaskedArray[Any, Any]:
+        codes = coded(values)
+        return np.ma.masked_where(codes < 0, np.searchsorted(present, codes).clip(max=len(present) - 1))
+
+    return Paint(
+        cells,
+        Normalize(-0.5, len(present) - 0.5),
+        ListedColormap([color for _, color in known.values()]),
+        short_name(shown),
+        list(range(len(present))),
+        [name for name, _ in known.values()],
+    )

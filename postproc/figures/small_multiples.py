@@ -1,0 +1,66 @@
+"""Panels of small multiples: their titles and labels, and the colour bar and legend that they share."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postproc.store.units import written_value
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.colorbar import Colorbar
+
+    from postproc.figures.palette import Paint
+
+_TITLE_WIDTH = 90  # characters of the titles of a row of panels
+_LEGEND_WIDTH = 64  # characters that fit a column of a page, 6 of them taken by each handle
+
+
+def color_bar(axes: Sequence[Axes], mesh: Any, paint: Paint) -> Colorbar:
+    """Draw the scale of colours beside all panels."""
+    bar = axes[0].figure.colorbar(mesh, ax=list(axes), pad=0.02, aspect=25, ticks=paint.ticks)
+    bar.set_label(paint.label)
+    if paint.names:
+        bar.ax.set_yticklabels(paint.names)
+        bar.ax.tick_params(which="both", length=0)
+    return bar
+
+
+def name_facets(
+    axes: Sequence[Axes], data: xr.Dataset, facets: Sequence[str], x_label: str, y_label: str
+) -> None:
+    """Label the outer axes, and each panel with its values of the facets."""
+    n_column = data.sizes[facets[-1]] if facets else 1
+    n_row = len(axes) // n_column
+    for i, ax in enumerate(axes):
+        row, column = divmod(i, n_column)
+        if row == n_row - 1:
+            ax.set_xlabel(x_label)
+        if column == 0:
+            ax.set_ylabel(y_label)
+        places = (row, column)[-len(facets) :] if facets else ()
+        names = [written_value(data[f][place]) for f, place in zip(facets, places, strict=True)]
+        ax.set_title(textwrap.fill(", ".join(names), _TITLE_WIDTH // n_column), fontsize=7)
+
+
+def legend_below(ax: Axes, handles: list[Artist]) -> None:
+    """Name what is marked, below all panels, in as many columns as fit."""
+    if handles:
+        n_column = _columns([len(str(handle.get_label())) for handle in handles])
+        ax.figure.legend(handles=handles, loc="outside lower center", ncols=n_column, fontsize=6.5)
+
+
+def _columns(lengths: list[int]) -> int:
+    """Return the most columns in which a legend of labels of these lengths fits; it fills by column."""
+    for n_column in range(len(lengths), 1, -1):
+        columns = np.array_split(lengths, n_column)
+        if sum(6 + int(column.max()) for column in columns) <= _LEGEND_WIDTH:
+            return n_column
+    return 1

@@ -1,0 +1,37 @@
+"""The option `--select`, and the cases of a store that it leaves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from rubhpc.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+SELECT = click.option(
+    "--select",
+    "selection",
+    multiple=True,
+    metavar="AXIS=VALUE",
+    help='Such as speed_ratio=1.7, clearance="84 um", friction=0.1,0.3 or speed_ratio=1..2.',
+)
+
+
+def open_cases(store: str, selection: tuple[str, ...]) -> xr.Dataset:
+    """Return the cases of a store that the command line selects."""
+    from postproc.store.open import open_store
+    from postproc.store.select import select
+
+    return select(open_store(store), dict(pairs(selection, "--select")))
+
+
+def pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, str]]:
+    """Return the NAME=VALUE texts of an option as pairs."""
+    for text in texts:
+        if not all(part.strip() for part in text.partition("=")):
+            raise InputError(f'{option}: "{text}" is no pair; write NAME=VALUE')
+    return [(name.strip(), value.strip()) for name, _, value in (text.partition("=") for text in texts)]
