@@ -48,7 +48,7 @@ def test_chosen_cases_and_variables(synthetic_path, run):
     ("words", "told"),
     [
         (["--value", "peak_contact_fore"], "did you mean peak_contact_force"),
-        (["--output", "a.mat"], "written as"),
+        (["--output", "a.mat"], "unknown format"),
         (["--output", "a.csv"], "an export is HDF5; name it a.h5"),
         (["--output", "nowhere/a.h5"], "no directory nowhere"),
         (["--select", "speed_ratio=77"], "speed_ratio"),
