@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from postproc.accessor import open  # noqa: A004 - the public name
     from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
     from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.linear_design import linear_design
     from rubhpc.integrate.record import Record, State
     from rubhpc.rig.forces import Load, Unbalance
     from rubhpc.rig.reading import read_rig
@@ -42,6 +43,7 @@ __all__ = [
     "Summary",
     "Unbalance",
     "assemble",
+    "linear_design",
     "open",
     "read_rig",
     "read_study",
@@ -66,6 +68,7 @@ _HOMES = {
     "Summary": "rubhpc.storage.summary:Summary",
     "Unbalance": "rubhpc.rig.forces:Unbalance",
     "assemble": "rubhpc.fem.assemble:assemble",
+    "linear_design": "rubhpc.fem.linear_design:linear_design",
     "open": "postproc.accessor:open",
     "read_rig": "rubhpc.rig.reading:read_rig",
     "read_study": "rubhpc.study.study:read_study",

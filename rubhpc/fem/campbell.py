@@ -20,7 +20,11 @@ if TYPE_CHECKING:
     from rubhpc.fem.modes import Mode
 
 
-def campbell(body: Body, speeds: Sequence[float] | NDArray[np.float64]) -> xr.Dataset:
+def campbell(
+    body: Body,
+    speeds: Sequence[float] | NDArray[np.float64],
+    tracks: Sequence[tuple[Mode, ...]] | None = None,
+) -> xr.Dataset:
     """Follow every mode of a body from speed to speed.
 
     From one speed to the next, modes of one kind are paired so that, all together, shapes and
@@ -31,6 +35,8 @@ def campbell(body: Body, speeds: Sequence[float] | NDArray[np.float64]) -> xr.Da
     body : Body
     speeds : (n_speed,)
         Spin, rad/s, in order.
+    tracks : sequence of tuple of Mode, optional
+        What `follow_modes` returned for these speeds, if it is known.
 
     Returns
     -------
@@ -38,7 +44,7 @@ def campbell(body: Body, speeds: Sequence[float] | NDArray[np.float64]) -> xr.Da
         `frequency` (Hz), `damping_ratio` and `whirl` (mode, speed), with the coordinates `kind` (mode) and
         `speed` (rad/s). Modes are numbered by their natural frequency at the first speed.
     """
-    tracks = follow_modes(body, speeds)
+    tracks = follow_modes(body, speeds) if tracks is None else tracks
     return xr.Dataset(
         {
             "frequency": (

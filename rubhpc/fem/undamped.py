@@ -36,6 +36,8 @@ def undamped_modes(mass: Matrix, stiffness: Matrix) -> tuple[Matrix, Matrix]:
     `(M, K)` are 1/w^2, exact for the lowest, and inexact only for frequencies some 1e7 times as high.
     """
     rigid = _rigid_shapes(mass, stiffness)
+    if rigid.shape[1] == len(mass):
+        return np.zeros(len(mass)), rigid
     complement = null_space((mass @ rigid).T) if rigid.size else np.eye(len(mass))
     M, K = (complement.T @ matrix @ complement for matrix in (mass, stiffness))
     try:

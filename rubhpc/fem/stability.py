@@ -1,0 +1,94 @@
+"""Linear stability of a spinning body: growth rates, logarithmic decrement, threshold speed."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rubhpc.fem.modes import modes
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Body, Model
+    from rubhpc.fem.modes import Mode
+
+# Growth, as a share of the mode's own eigenvalue and of the greatest one, that is rounding.
+_ROUNDING = 1e-8
+_ROUNDING_OF_GREATEST = 1e-12
+_RESOLUTION = 1e-6  # of a threshold speed
+
+
+def logarithmic_decrement(mode: Mode) -> float:
+    """Logarithm of the ratio of two successive amplitudes of a free oscillation, negative where it grows.
+
+    Infinite for a mode that does not oscillate; NaN for a rigid-body mode, which does neither.
+    """
+    if mode.frequency == 0.0:
+        return math.nan
+    decay, oscillation = -mode.eigenvalue.real, mode.eigenvalue.imag
+    if oscillation == 0.0:
+        return math.copysign(math.inf, mode.damping_ratio)
+    return 2 * math.pi * decay / oscillation
+
+
+def unstable_modes(body: Body, spin: float = 0.0) -> list[Mode]:
+    """Return the modes of a body that grow at a spin (rad/s), the fastest to grow first.
+
+    Growth is `mode.eigenvalue.real`, 1/s.
+    """
+    return growing_modes(modes(body, spin))
+
+
+def growing_modes(found: Sequence[Mode]) -> list[Mode]:
+    """Return those of all modes of a body that grow, the fastest to grow first."""
+    limit = _ROUNDING_OF_GREATEST * max((abs(mode.eigenvalue) for mode in found), default=0.0)
+    growing = [m for m in found if m.eigenvalue.real > limit + _ROUNDING * abs(m.eigenvalue)]
+    return sorted(growing, key=lambda mode: -mode.eigenvalue.real)
+
+
+def threshold_speed(
+    body: Body,
+    speeds: Sequence[float] | NDArray[np.float64],
+    tracks: Sequence[tuple[Mode, ...]] | None = None,
+) -> float:
+    """Lowest spin of a range at which the body begins to be unstable, rad/s; NaN where it is stable.
+
+    Parameters
+    ----------
+    body : Body
+    speeds : (n_speed,)
+        Rising, rad/s: where growth is looked for. The threshold between two of them is found by bisection.
+    tracks : sequence of tuple of Mode, optional
+        What `follow_modes` returned for these speeds, if it is known.
+    """
+    before = None
+    for i, speed in enumerate(map(float, speeds)):
+        if growing_modes([track[i] for track in tracks]) if tracks else unstable_modes(body, speed):
+            if before is None:
+                return speed
+            while speed - before > _RESOLUTION * abs(speed):
+                middle = (before + speed) / 2
+                before, speed = (before, middle) if unstable_modes(body, middle) else (middle, speed)
+            return speed
+        before = speed
+    return math.nan
+
+
+def instability_message(model: Model, spin: float) -> str:
+    """Return one line that says how the rotor is unstable at a spin (rad/s); "" where it is stable."""
+    grows = unstable_modes(model.rotor, spin)
+    if not grows:
+        return ""
+    mode = grows[0]
+    rate = mode.eigenvalue.real
+    kind = mode.whirl if mode.kind == "lateral" and mode.whirl != "none" else mode.kind
+    decrement = logarithmic_decrement(mode)
+    shrinks = f", logarithmic decrement {decrement:.3g}" if math.isfinite(decrement) else ""
+    return (
+        f"the rotor is unstable at {spin * 30 / math.pi:.6g} rpm: its {kind} mode of "
+        f"{mode.damped_frequency:.4g} Hz grows by {rate:.3g} 1/s{shrinks}; no steady motion is reached"
+    )
