@@ -51,7 +51,7 @@ __all__ = [
     "simulate",
 ]
 
-# Where each name comes from; imported when it is first asked for, so that `import rubhpc` takes no time.
+# Module of each name; imported at first use, so that `import rubhpc` is fast.
 _HOMES = {
     "InputError": "rubhpc.errors:InputError",
     "Load": "rubhpc.rig.forces:Load",

@@ -1,14 +1,14 @@
-"""Errors that reach the user: one line saying what, where and the mend; each has its exit code."""
+"""Errors that reach the user: one line with where, what is wrong and how to fix it, and an exit code."""
 
 
 class RubError(Exception):
-    """Anything the user can mend; its text is one line."""
+    """Anything the user can fix; its text is one line."""
 
     exit_code = 1
 
 
 class InputError(RubError):
-    """A study, a rig or an argument that cannot be used as it stands."""
+    """A study, a rig or an argument that is invalid."""
 
     exit_code = 2
 
@@ -19,7 +19,7 @@ class StoreError(RubError):
     exit_code = 3
 
 
-class StoppedEarly(RubError):  # noqa: N818 - it is a state, not a fault
-    """A run that stopped on request before its end; the same command goes on."""
+class StoppedEarly(RubError):  # noqa: N818 - it is a state, not an error
+    """A run that stopped on request before its end; the same command resumes it."""
 
     exit_code = 75

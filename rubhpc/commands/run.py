@@ -22,7 +22,7 @@ _TRUST = click.option(
 @click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
 @_OUTPUT
 @_TRUST
-@click.option("--retry-failed", is_flag=True, help="Compute the cases anew that have failed before.")
+@click.option("--retry-failed", is_flag=True, help="Compute failed cases again.")
 @click.option(
     "--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more than N cases fail."
 )
@@ -30,7 +30,7 @@ _TRUST = click.option(
 @click.option(
     "--accept-version",
     is_flag=True,
-    help="Keep the cases that another version of the physics has computed, and go on.",
+    help="Keep the cases that another version of the physics has computed, and continue.",
 )
 @click.option(
     "--only",
@@ -51,15 +51,15 @@ def run(
 ) -> int:
     """Run STUDY.toml, or what is left of it; under mpirun, on all its ranks.
 
-    It stops in order, with code 75, on SIGTERM, SIGINT or SIGUSR1, at its time limit, or when a file STOP is
-    made in the store; the same command goes on.
+    It stops cleanly, with code 75, on SIGTERM, SIGINT or SIGUSR1, at its time limit, or when a file STOP is
+    created in the store; the same command resumes it.
     """
     if only is not None:
         return _reproduce(study, output, only, trust_rig=trust_rig)
     from rubhpc.running.stopping import Stopping
 
     end_with_launcher()
-    with Stopping() as stopping:  # signals are answered from here on, whatever the imports below take
+    with Stopping() as stopping:  # signals are handled from here on, however long the imports below take
         from rubhpc.running.driver import run as run_study
 
         summary = run_study(
@@ -96,7 +96,7 @@ def _reproduce(study: Path, output: Path | None, name: str, *, trust_rig: bool) 
 @_OUTPUT
 @_TRUST
 def plan(study: Path, output: Path | None, trust_rig: bool) -> int:
-    """Tell what STUDY.toml takes and what of it is done; writes nothing.
+    """Estimate the cost of STUDY.toml and show what is done; writes nothing.
 
     Core-hours come from a few short pilot cases, timed on this machine and scaled by the predicted steps.
     """
@@ -110,7 +110,7 @@ def plan(study: Path, output: Path | None, trust_rig: bool) -> int:
 @click.command()
 @click.argument("store", type=click.Path(path_type=Path))
 def status(store: Path) -> int:
-    """Tell how far STORE is, and what failed in it; works while a run is on."""
+    """Show the progress of STORE and its failed cases; works during a run."""
     from rubhpc.storage.status import read_status
 
     click.echo(read_status(store).text())
@@ -125,7 +125,7 @@ def verify(store: Path) -> int:
 
     damage = verify_store(store)
     if not damage:
-        click.echo(f"{damage.n_checked} cases checked, all sound")
+        click.echo(f"{damage.n_checked} cases checked, no damage")
         return 0
     for line in damage.lines():
         click.echo(line)

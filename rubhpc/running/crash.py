@@ -1,4 +1,4 @@
-"""An error that is the program's own: its traceback goes into a log, and one line tells of it."""
+"""Errors of the program itself: the traceback goes into a log file, the user gets one line."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rubhpc.errors import RubError
 from rubhpc.running.launch import launch
 
 
-class Crashed(RubError):  # noqa: N818 - the error that caused it stands in its log
+class Crashed(RubError):  # noqa: N818 - the error that caused it is in the log
     """An error that is the program's own."""
 
     exit_code = 70

@@ -63,19 +63,19 @@ def run(
     output : path, optional
         The store, instead of the study's.
     retry_failed : bool
-        Compute the cases anew that have failed before.
+        Compute failed cases again.
     max_failures : int, optional
         Stop when more cases than this have failed in this run; overrides the study's.
     time_limit : float, optional
         Stop after so many seconds; overrides the study's.
     accept_version : bool
-        Keep the cases of a store that another version of the physics has computed, and go on.
+        Keep the cases of a store that another version of the physics has computed, and continue.
     trust_rig : bool
         Whether a rig that is Python code, `rig = "my_rig.py:build"`, may be run.
     quiet : bool
         Print no progress.
     stopping : Stopping, optional
-        Signals that are being answered already.
+        A stop request that is already being handled.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def run(
                 held=held,
             )
             summary = _run(request, pool)
-    except RankLost as error:  # and nobody can go on
+    except RankLost as error:  # and no rank can continue
         pool.abort(error.exit_code)
     except RubError:  # raised on all ranks alike
         pool.close()
@@ -151,8 +151,8 @@ def _round(request: RunRequest, pool: Pool, began: float) -> Summary:
     request.token = job.token
     _together(pool, lambda: _compute(job, pool, request))
     if job.suspect and not request.stopping.look():
-        _together(pool, lambda: _try_doubtful(job, pool, request.stopping))
-    reason = next((told for told in pool.gather(request.stopping.verdict) if told), "")
+        _together(pool, lambda: _try_suspects(job, pool, request.stopping))
+    reason = next((reason for reason in pool.gather(request.stopping.verdict) if reason), "")
     summary = pool.from_first(lambda: _finish(job, pool.totals().n_case, time.monotonic() - began))
     n_missing = summary.counts[MISSING]
     if n_missing and reason:
@@ -188,7 +188,7 @@ def _compute(job: Job, pool: Pool, request: RunRequest) -> None:
     quiet = request.quiet or pool.rank > 0
     with (
         _progress(job, grid, sequences, quiet=quiet, has_bar=pool.size == 1) as progress,
-        _desk(job, pool, grid, store, stopping, "rank", progress) as worker,
+        _open_worker(job, pool, grid, store, stopping, "rank", progress) as worker,
     ):
         next_packing = time.monotonic() + _PACKING_GAP
         for block in _claimed(job, grid, sequences, pool, stopping):
@@ -201,16 +201,16 @@ def _compute(job: Job, pool: Pool, request: RunRequest) -> None:
         pool.add(Totals(stop=1))
 
 
-def _try_doubtful(job: Job, pool: Pool, stopping: Stopping) -> None:
-    """Compute the cases that were in hand when ranks died: last, and each stored before the next begins.
+def _try_suspects(job: Job, pool: Pool, stopping: Stopping) -> None:
+    """Compute the cases during which ranks died: last, and each stored before the next begins.
 
-    Those that have seen the fewest deaths come first, so that the failed ones end up alone.
+    Those with the fewest deaths come first, so that a case that kills its rank ends up alone.
     """
     grid = CaseGrid(job.study, chunk=job.chunk)
     store = Store(job.study.output)
     job = replace(job, ledger=store.replay(with_measures=False))
     blocks = {block.start: (n, block) for n, sequence in enumerate(grid.sequences()) for block in sequence}
-    with _desk(job, pool, grid, store, stopping, "tail") as worker:
+    with _open_worker(job, pool, grid, store, stopping, "tail") as worker:
         for flat in sorted(job.suspect, key=lambda i: job.suspect[i]):
             n_sequence, block = blocks[store.start_of(flat)]
             if n_sequence % pool.size == pool.rank and not stopping.look():  # a block has one writer
@@ -219,7 +219,7 @@ def _try_doubtful(job: Job, pool: Pool, stopping: Stopping) -> None:
 
 
 @contextmanager
-def _desk(
+def _open_worker(
     job: Job,
     pool: Pool,
     grid: CaseGrid,
@@ -228,7 +228,7 @@ def _desk(
     kind: str,
     progress: Progress | None = None,
 ) -> Iterator[Worker]:
-    """A worker with its journal and its record of the case in hand; all is on the disk at the end."""
+    """A worker with its journal and its in-progress record; all is on the disk at the end."""
 
     def attend() -> None:
         if pool.rank == 0 and progress is not None:
@@ -236,10 +236,10 @@ def _desk(
 
     writer = f"{kind}{pool.rank:05d}"
     with disk_errors(store.path):
-        hand = InProgress(store.in_progress_directory, job.run, writer)
+        current = InProgress(store.in_progress_directory, job.run, writer)
     with (
-        hand,
-        Watchdog(job.study.run.case_time_limit, hand) as watch,
+        current,
+        Watchdog(job.study.run.case_time_limit, current) as watch,
         store.journal(job.run, writer) as journal,
     ):
         worker = Worker(grid, store, job.ledger, job.missing, journal, watch, stopping, pool.add, attend)
@@ -250,7 +250,7 @@ def _desk(
 def _claimed(
     job: Job, grid: CaseGrid, sequences: list[list[Block]], pool: Pool, stopping: Stopping
 ) -> Iterator[Block]:
-    """The blocks this rank is to compute, one chain after another, until there is none, or reason to stop."""
+    """The blocks this rank is to compute, one sequence after another, until none is left or the run stops."""
     most_failures = job.study.run.max_failures
     missing = job.missing.reshape(grid.shape)
 
@@ -283,7 +283,7 @@ def _progress(
 
 
 def _finish(job: Job, computed: int, seconds: float) -> Summary:
-    """Pack what the journals tell, and count it: the first rank's part."""
+    """Pack the journals into arrays and count the cases: the first rank's part."""
     store = Store(job.study.output)
     ledger = store.replay()
     store.pack(ledger)

@@ -1,4 +1,4 @@
-"""Where the cases of a chain start: the final state of the one before, from memory or the store, or rest."""
+"""Initial states in a continuation: the final state of the predecessor, from memory or the store, or rest."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Start:
+class InitialState:
     """Where a case starts.
 
     Attributes
@@ -42,41 +42,43 @@ class Start:
 
 
 class InitialStates:
-    """The final states of the cases that others go on from.
+    """The final states from which other cases start.
 
     Parameters
     ----------
-    mend : callable
-        Computes again what is damaged of the block that begins at an index.
+    repair : callable
+        Computes damaged cases of the block that begins at an index again.
     """
 
-    def __init__(self, grid: CaseGrid, store: Store, ledger: Ledger, mend: Callable[[Index], None]) -> None:
-        self._grid, self._store, self._ledger, self._mend = grid, store, ledger, mend
+    def __init__(self, grid: CaseGrid, store: Store, ledger: Ledger, repair: Callable[[Index], None]) -> None:
+        self._grid, self._store, self._ledger, self._repair = grid, store, ledger, repair
         self._held: dict[int, NDArray[np.float64]] = {}  # of one block, by flat index
 
-    def start_of(self, case: Case, flat: NDArray[np.int64], data: Arrays, entries: Sequence[Entry]) -> Start:
+    def start_of(
+        self, case: Case, flat: NDArray[np.int64], data: Arrays, entries: Sequence[Entry]
+    ) -> InitialState:
         """Where a case of a block starts: `flat` and `data` are the block's, `entries` what it has computed.
 
         Raises
         ------
         Stopped
-            The case before it has no outcome yet.
+            Its predecessor has no outcome yet.
         """
         index = self._grid.predecessor(case.index)
         if index is None:
-            return Start()
+            return InitialState()
         before = int(np.ravel_multi_index(index, self._grid.shape))
         entered = [entry.status for entry in entries if entry.flat == before]
         if not entered and before not in flat and self._ledger.status[before] == DONE:
             self._fetch(before)
         status = entered[0] if entered else int(self._ledger.status[before])
         if status == DONE and before in flat:
-            return Start(state=data[FINAL_STATE][np.searchsorted(flat, before)])
+            return InitialState(state=data[FINAL_STATE][np.searchsorted(flat, before)])
         if status == DONE and before in self._held:
-            return Start(state=self._held[before])
+            return InitialState(state=self._held[before])
         if status in (DONE, MISSING):  # it could not be computed again before the run was stopped
             raise Stopped
-        return Start(note=rest_note(self._grid, index, status))
+        return InitialState(note=rest_note(self._grid, index, status))
 
     def remember(self, flat: NDArray[np.int64], data: Arrays) -> None:
         """Keep where the cases of a block have ended, and forget those of the block before."""
@@ -89,19 +91,19 @@ class InitialStates:
             return
         start = self._store.start_of(flat)
         stored = self._store.read_block(start)
-        if stored is not None and is_sound(self._store, self._ledger, start, flat, stored):
+        if stored is not None and is_intact(self._store, self._ledger, start, flat, stored):
             self.remember(self._store.flat(start), stored)
         else:
-            self._mend(start)
+            self._repair(start)
 
 
-def is_sound(store: Store, ledger: Ledger, start: Index, flat: int, stored: Arrays) -> bool:
-    """Whether what is stored of a case, in the block that begins at `start`, is what its line vouches for."""
+def is_intact(store: Store, ledger: Ledger, start: Index, flat: int, stored: Arrays) -> bool:
+    """Whether the stored arrays of a case, in the block that begins at `start`, match its checksum."""
     return case_checksum(stored, int(np.searchsorted(store.flat(start), flat))) == int(ledger.checksum[flat])
 
 
 def rest_note(grid: CaseGrid, before: Index, status: int) -> str:
-    """Why a case of a chain starts at rest: the one before it, at an index, has not been done."""
+    """Why a case starts at rest: its predecessor, at an index, has no result."""
     assert grid.continuation is not None
     axis = grid.study.axes[grid.continuation.axis]
     value = axis.values[before[grid.continuation.axis]]

@@ -1,4 +1,4 @@
-"""What a run is to compute: the first rank finds or makes the store, locks it, and sees what is missing."""
+"""Preparing a run: the first rank finds or creates the store, locks it, and determines what is missing."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class RunRequest:
-    """What was asked for, and the lock that outlives the loss of a rank.
+    """What the caller requested, and the lock, which survives the loss of a rank.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class RunRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """What the first rank tells the others.
+    """What the first rank sends to the others.
 
     Attributes
     ----------
@@ -58,8 +58,8 @@ class Job:
     pending : (n,) int
         Positions in `CaseGrid.sequences()` of those that hold one.
     suspect : dict
-        Flat index -> deaths of ranks in this case, or in one before it in its chain; these come last, each by
-        itself, those of a chain in their order.
+        Flat index -> deaths of ranks in this case or one of its predecessors; these cases come last, each by
+        itself, those of a sweep in order.
     token : str
         Of the lock on the store.
     """
@@ -97,10 +97,10 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
         if request.retry_failed:
             failed = np.flatnonzero(ledger.status == FAILED).tolist()
             store.mark_missing(
-                ledger, _with_those_behind(grid, failed), run, "anew"
+                ledger, _with_dependants(grid, failed), run, "anew"
             )  # a name that comes before those of ranks
             missing = (ledger.status == MISSING) | (ledger.status == FAILED)
-        suspect = _with_followers(grid, _judge(store, ledger, missing, run), missing)
+        suspect = _with_followers(grid, _fail_killers(store, ledger, missing, run), missing)
     missing[list(suspect)] = False
     sequences = grid.sequences()
     is_missing = missing.reshape(grid.shape)
@@ -123,11 +123,11 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
     )
 
 
-def _judge(store: Store, ledger: Ledger, missing: NDArray[np.bool_], run: int) -> dict[int, int]:
-    """Have the cases fail that kill their ranks; returns the doubtful ones with their deaths."""
+def _fail_killers(store: Store, ledger: Ledger, missing: NDArray[np.bool_], run: int) -> dict[int, int]:
+    """Mark the cases as failed that kill their ranks; returns the suspect ones with their deaths."""
     suspects = read_deaths(store.in_progress_directory, store.manifest, missing)
     if suspects.failed:
-        with store.journal(run, "hand") as journal:
+        with store.journal(run, "killed") as journal:
             journal.write(
                 Entry(flat, store.manifest.case_id(flat), FAILED, reason=reason)
                 for flat, reason in suspects.failed.items()
@@ -141,8 +141,8 @@ def _judge(store: Store, ledger: Ledger, missing: NDArray[np.bool_], run: int) -
     return suspects.suspect
 
 
-def _with_those_behind(grid: CaseGrid, cases: list[int]) -> list[int]:
-    """Cases, by their flat index, and all that go on from them, near or far; none without chains."""
+def _with_dependants(grid: CaseGrid, cases: list[int]) -> list[int]:
+    """Cases and all that depend on them, by flat index; none without a continuation."""
     if grid.continuation is None:
         return []
     marked = np.zeros(grid.n_case, bool)
@@ -151,7 +151,7 @@ def _with_those_behind(grid: CaseGrid, cases: list[int]) -> list[int]:
 
 
 def _with_followers(grid: CaseGrid, suspect: dict[int, int], missing: NDArray[np.bool_]) -> dict[int, int]:
-    """Doubtful cases, and those that have to wait for them; of one chain in the order of the continuation."""
+    """Suspect cases and those that depend on them, those of a sweep in order."""
     continuation = grid.continuation
     if continuation is None or not suspect:
         return suspect

@@ -1,4 +1,4 @@
-"""What a launcher such as mpirun or srun told this process; read from the environment, without MPI."""
+"""Rank and size that a launcher such as mpirun gave this process, from the environment, without MPI."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-# Rank and number of ranks. Slurm's own count comes last: inside `mpirun` it tells of the launcher's daemons.
+# Rank and number of ranks. Slurm's own count comes last: inside `mpirun` it counts the launcher's daemons.
 _VARIABLES = (
     ("PMI_RANK", "PMI_SIZE"),
     ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"),
@@ -40,7 +40,7 @@ _ORPHANED = 75  # exit code of a rank whose launcher is gone: run the same comma
 
 
 def launch() -> Launch:
-    """What the environment says, or where this process stands since; rank 0 of 1 without a launcher."""
+    """Place of this process from the environment, or since `move_to`; rank 0 of 1 without a launcher."""
     if _moved:
         return _moved[-1]
     for rank, size in _VARIABLES:
@@ -50,7 +50,7 @@ def launch() -> Launch:
 
 
 def move_to(rank: int, size: int) -> None:
-    """Have `launch` tell this place from now on: other ranks were lost, and the first one may be another."""
+    """Have `launch` return this place from now on: ranks were lost, and another rank may be the first."""
     _moved.append(launch()._replace(rank=rank, size=size))
 
 

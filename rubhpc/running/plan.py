@@ -1,4 +1,4 @@
-"""What a study will take, and what of it is done: counted, and timed on a few short pilot cases."""
+"""The cost of a study and what of it is done: cases are counted, and a few short pilot cases are timed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rubhpc.study.cases import Block, CaseGrid
     from rubhpc.study.study import Recording, Study
 
-_PILOTS, _FEW_PILOTS, _ENOUGH = 9, 3, 20.0  # asked; asked even where they take more than so many seconds
+_PILOTS, _FEW_PILOTS, _ENOUGH = 9, 3, 20.0  # cases; run even if slow; seconds after which no more are started
 _FIRST_STEPS, _PILOT_TIME = 50_000, 1.0  # predicted, of a pilot's first try; seconds of its longest, about
 _SECTION = 0.618  # golden: shares k * _SECTION (mod 1) spread evenly, however many
 _LINE = 400  # bytes of a case in a journal, about, for one stator
@@ -35,14 +35,14 @@ _FIXED_FILES = 85  # metadata, packed arrays and coordinates
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What a study takes.
+    """The cost of a study.
 
     Attributes
     ----------
     counts : tuple of int
         Cases that are missing, done, failed and diverged, in this order.
     n_sequence, n_block, n_per_block, n_file : int
-        Chains and blocks of the whole grid, and cases in a block; files of the finished store, about.
+        Sequences and blocks of the whole grid, and cases in a block; files of the finished store, about.
     n_byte : int
         Of the finished store before compression, about.
     steps : int
@@ -70,7 +70,8 @@ class Plan:
     def _idle(self) -> str:
         if self.n_sequence == self.n_block:
             return "more ranks would idle"
-        return f"in {self.n_sequence} chain{'s' * (self.n_sequence > 1)}: more ranks than that would idle"
+        sweeps = f"{self.n_sequence} sequential sweep{'s' * (self.n_sequence > 1)}"
+        return f"in {sweeps}: more ranks than that would idle"
 
     def text(self) -> str:
         """The plan for people, a few lines."""
@@ -120,14 +121,14 @@ def make_plan(study: Study) -> Plan:
     steps = sum(block.cost * share for block, share in left)
     pace, failures = _pace(grid, manifest, [block for block, _ in left])
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
-    told = {axis.coordinate: axis.name for axis in study.axes}  # a dimension as the study names its axis
+    names = {axis.coordinate: axis.name for axis in study.axes}  # a dimension as the study names its axis
     if study.sample is not None:
         n_range = sum(axis.drawn_from is not None for axis in study.axes)
-        told[CASE] = f"{CASE} ({study.sample.n} points of {n_range} ranges)"
+        names[CASE] = f"{CASE} ({study.sample.n} points of {n_range} ranges)"
     return Plan(
         title=study.title,
         store=study.output,
-        shape=dict(zip((told.get(dim, dim) for dim in grid.dims), grid.shape, strict=True)),
+        shape=dict(zip((names.get(dim, dim) for dim in grid.dims), grid.shape, strict=True)),
         counts=count(status),
         n_sequence=len(grid.sequences()),
         n_block=len(blocks),
@@ -158,7 +159,7 @@ def _pace(grid: CaseGrid, manifest: Manifest, blocks: list[Block]) -> tuple[floa
         index = tuple(int(start + step) for start, step in zip(block.start, box, strict=True))
         try:
             paces.append(_pilot(grid, index, block.cost / math.prod(block.shape)))
-        except Exception as error:  # whatever is wrong with the case: the others are asked all the same
+        except Exception as error:  # whatever is wrong with the case: the others are timed all the same
             where = manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))
             failures.append(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}")
     return (float(np.mean(paces)) if paces else math.nan), failures

@@ -46,7 +46,7 @@ class Totals(NamedTuple):
 
 
 class RankLost(RubError):  # noqa: N818 - it is news, and most runs go on
-    """A rank has died, and the others may go on without it."""
+    """A rank has died; the others may continue without it."""
 
     exit_code = 71
 
@@ -58,7 +58,7 @@ class Pool(Protocol):
     size: int
 
     def from_first(self, make: Callable[[], T]) -> T:
-        """What `make` returns, or raises of RubErrors, on the first rank, on all of them."""
+        """What `make` returns on the first rank, on all ranks; a RubError it raises is raised on all."""
 
     def claim(self) -> Totals:
         """Claim the next block, whose position is `claimed` in the sums as they were before."""
@@ -67,13 +67,13 @@ class Pool(Protocol):
         """Add to the sums."""
 
     def totals(self) -> Totals:
-        """The sums as they are; for the first rank, which has them at hand."""
+        """The current sums; cheap on the first rank, which holds them."""
 
     def gather(self, value: T) -> list[T]:
         """The values of all ranks, on all of them."""
 
     def leave_lost(self) -> None:
-        """Go on without the ranks that were lost; ranks, size and sums begin anew."""
+        """Continue without the lost ranks; ranks, size and sums are reset."""
 
     def close(self) -> None:
         """End the run together with all ranks."""
@@ -152,19 +152,19 @@ class Ranks:
 
     def from_first(self, make: Callable[[], T]) -> T:
         """See Pool."""
-        told: tuple[T | None, RubError | None] = (None, None)
+        result: tuple[T | None, RubError | None] = (None, None)
         if self.rank == 0:
             try:
-                told = (make(), None)
+                result = (make(), None)
             except RubError as error:
-                told = (None, error)
+                result = (None, error)
         self._meet()
         with self._losses():
-            value, trouble = self._comm.bcast(told)
+            value, trouble = self._comm.bcast(result)
         if trouble is not None:
             raise trouble
-        result: T = value
-        return result
+        made: T = value
+        return made
 
     def claim(self) -> Totals:
         """See Pool."""
@@ -239,7 +239,7 @@ def connect() -> Pool:
     Raises
     ------
     InputError
-        The launcher started several processes, but they do not find each other; the text names the mend.
+        The launcher started several processes, but MPI does not connect them; the text says how to fix it.
     """
     given = launch()
     end_with_launcher()

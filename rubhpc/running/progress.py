@@ -1,4 +1,4 @@
-"""How far a run is: a bar on a terminal, a line now and then elsewhere."""
+"""Progress of a run: a bar on a terminal, an occasional line elsewhere."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _FIRST_LINE, _LONGEST_GAP = 10.0, 300.0  # s between lines: they grow rarer as a
 
 
 class Progress:
-    """Tells how many cases have ended, how fast, and when the rest will have.
+    """Reports how many cases have ended, how fast, and the time left.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Progress:
     cost : float
         Predicted steps of what is missing.
     quiet : bool
-        Tell nothing.
+        Report nothing.
     has_bar : bool
         Draw a bar, where the output is a terminal. Under a launcher it is none: Open MPI's pretends to be one
         even when it writes to a file.
@@ -39,7 +39,7 @@ class Progress:
         self._n_case, self._cost, self._n_done = n_case, max(cost, 1.0), n_done
         self._quiet = quiet or n_done == n_case
         self._has_bar = has_bar and sys.stdout.isatty()
-        self._began = self._told = time.monotonic()
+        self._began = self._shown = time.monotonic()
         self._gap = _FIRST_LINE
         self._bar: Bar | None = None
 
@@ -69,9 +69,9 @@ class Progress:
     def update(self, sums: Totals) -> None:
         """Show the sums of all ranks, unless that was done a moment ago."""
         now = time.monotonic()
-        if self._quiet or now - self._told < (_REDRAW if self._has_bar else self._gap):
+        if self._quiet or now - self._shown < (_REDRAW if self._has_bar else self._gap):
             return
-        self._told = now
+        self._shown = now
         n_ended = self._n_done + sums.n_case
         if self._bar is None:
             print(f"{n_ended}/{self._n_case} cases; {self._rest(sums)}", flush=True)

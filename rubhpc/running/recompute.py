@@ -1,4 +1,4 @@
-"""Computes one case of a study again and holds it against the store, which it leaves as it is."""
+"""Recomputes one case of a study and compares it with the store, which is not changed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
-from rubhpc.running.initial_states import is_sound
+from rubhpc.running.initial_states import is_intact
 from rubhpc.running.worker import packed_measures, put, set_up
 from rubhpc.schema import DONE, FINAL_STATE, MISSING, STATUS
 from rubhpc.storage.manifest import Manifest
@@ -51,15 +51,15 @@ class Reproduction:
 
     def text(self) -> str:
         """All of it for people, a line each."""
-        told = {
+        lines = {
             "case": self.id,
             "at": self.case,
             "status": self.status,
             **self.measures,
             "store": self.verdict,
         }
-        width = max(map(len, told))
-        return "\n".join(f"{name:{width}}  {value}" for name, value in told.items())
+        width = max(map(len, lines))
+        return "\n".join(f"{name:{width}}  {value}" for name, value in lines.items())
 
 
 def reproduce(study: Study, name: str) -> Reproduction:
@@ -78,20 +78,20 @@ def reproduce(study: Study, name: str) -> Reproduction:
     manifest = Manifest.of(grid)
     flat = _find(grid, name.lower())
     case = grid.case([int(i) for i in np.unravel_index(flat, grid.shape)])
-    told = manifest.name_case(flat)
+    at = manifest.name_case(flat)
     try:
         record = _compute(grid, case)
         data = {v.name: np.full((1, *manifest.extent(v)), np.nan, v.dtype) for v in manifest.variables}
         put(record, data, 0)
     except Exception as error:
         text = " ".join(str(error).split())
-        raise RubError(f"case {case.id}, {told}: {type(error).__name__}: {text}") from error
+        raise RubError(f"case {case.id}, {at}: {type(error).__name__}: {text}") from error
     row = packed_measures(record, manifest.header.record_type)
     status = STATUS[record.status] + (f": {record.remark}" if record.remark else "")
     measures = {n: row[n].tolist() for n in row.dtype.names or ()}
     return Reproduction(
         id=case.id,
-        case=told,
+        case=at,
         status=status,
         measures=measures,
         verdict=_compare(study, case, record.status, data, row),
@@ -99,7 +99,7 @@ def reproduce(study: Study, name: str) -> Reproduction:
 
 
 def _compute(grid: CaseGrid, case: Case) -> Record:
-    """The record of a case; those before it in its chain are read from the store, or computed on the way."""
+    """The record of a case; its predecessors are read from the store, or computed first."""
     study, behind, state = grid.study, [case], None
     while (index := grid.predecessor(behind[-1].index)) is not None:
         before = grid.case(index)
@@ -132,13 +132,13 @@ def _stored_end(study: Study, case: Case) -> tuple[int, NDArray[np.float64] | No
         return (MISSING if flat is None else int(ledger.status[flat])), None
     start = store.start_of(flat)
     stored = store.read_block(start)
-    if stored is None or not is_sound(store, ledger, start, flat, stored):
+    if stored is None or not is_intact(store, ledger, start, flat, stored):
         return MISSING, None
     return DONE, stored[FINAL_STATE][np.searchsorted(store.flat(start), flat)]
 
 
 def _locate(store: Store, study: Study, case: Case) -> int | None:
-    """Flat index of a case in the store's grid; None where it is not there, or in another chain."""
+    """Flat index of a case in the store's grid; None where it is absent, or has other predecessors."""
     mine, theirs = Points(study.axes), store.manifest.points
     try:
         index = [
@@ -192,6 +192,6 @@ def _compare(
     if differing:
         raise StoreError(
             f"{study.output}: case {case.id} differs from what is stored in {', '.join(differing)}; "
-            "rubhpc verify tells whether the store is damaged"
+            "rubhpc verify checks whether the store is damaged"
         )
     return f"{study.output} holds the same, bit for bit (checksum {case_checksum(data, 0):08x})"

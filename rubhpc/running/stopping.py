@@ -1,4 +1,4 @@
-"""When a run is to stop: a signal, a file STOP in the store, or the end of its time."""
+"""Requests to stop a run: a signal, a file STOP in the store, or the time limit."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _LOOK = 0.5  # s between looks for the file STOP
 SLURM_MARGIN = 30.0  # s kept free before Slurm ends the job: a block's files, the packing, and slow disks
 
 
-class Stopped(Exception):  # noqa: N818 - it drops the case in hand, and is no fault
+class Stopped(Exception):  # noqa: N818 - it drops the current case and is not an error
     """Raised inside a case to drop it."""
 
 
 class Stopping:
-    """Whether to stop, and why; as a context it answers the signals that ask for it."""
+    """Whether to stop, and why; as a context it handles the signals that request it."""
 
     def __init__(self) -> None:
         self.reason = ""
@@ -48,7 +48,7 @@ class Stopping:
         self._handlers = {}
 
     def watch(self, stop_file: Path, time_limit: float | None) -> None:
-        """Heed a file, a time limit (s from when this object was made) and the end of a Slurm job."""
+        """Watch a file, a time limit (s from when this object was made) and the end of a Slurm job."""
         self._stop_file = stop_file
         if time_limit is not None:
             self._deadline = self._began + time_limit
@@ -61,7 +61,7 @@ class Stopping:
             self._deadline = min(self._deadline, time.monotonic() + left - SLURM_MARGIN)
 
     def look(self) -> str:
-        """Why to stop now; empty to go on."""
+        """Why to stop now; empty to continue."""
         now = time.monotonic()
         if not self.reason and now >= self._deadline:
             self.reason = "the time limit"
@@ -89,6 +89,6 @@ class Stopping:
     def _note(self, number: int, frame: FrameType | None) -> None:
         if (
             number == signal.SIGINT and self.reason == "SIGINT"
-        ):  # asked twice: do not even finish what is in hand
+        ):  # a second SIGINT: do not even store the finished cases of this block
             raise KeyboardInterrupt
         self.ask(signal.Signals(number).name)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.in_progress import InProgress
 
-PATIENCE = 10.0  # s over its limit that a case may take to be asked: a kernel call lasts 0.25 s
+PATIENCE = 10.0  # s over its limit until a case checks its limit: a kernel call lasts 0.25 s
 _LOOK = 0.5  # s between looks
 _STOPPED = 75  # exit code: run the same command again
 
@@ -23,18 +23,18 @@ _STOPPED = 75  # exit code: run the same command again
 class Watchdog:
     """Watches the cases of a rank, as a context; without a limit (s) it watches nothing.
 
-    A kernel that does not return cannot be interrupted. So the rank leaves word of its case for the next run,
-    which has it fail and goes on, and ends; the launcher ends the others.
+    A kernel that does not return cannot be interrupted. The rank therefore records its case as overrun and
+    exits, and the launcher ends the other ranks; the next run marks the case as failed and continues.
     """
 
-    def __init__(self, limit: float | None, hand: InProgress) -> None:
-        self.limit, self._hand = limit, hand
+    def __init__(self, limit: float | None, record: InProgress) -> None:
+        self.limit, self._record = limit, record
         self._deadline = float("inf")
         self._ended = threading.Event()
 
     def begin(self, flat: int, name: str) -> None:
-        """A case is in hand from now on."""
-        self._hand.take(flat, name)
+        """A case begins."""
+        self._record.take(flat, name)
         if self.limit is not None:
             self._deadline = time.monotonic() + self.limit + PATIENCE
 
@@ -56,7 +56,7 @@ class Watchdog:
         while time.monotonic() < self._deadline:
             if self._ended.wait(_LOOK):
                 return
-        self._hand.note_overrun(limit)
+        self._record.note_overrun(limit)
         print(
             f"rubhpc: rank {launch().rank}: a case is over its time limit of {limit:g} s and cannot be "
             "interrupted; run the same command again, it leaves this case out",

@@ -12,7 +12,7 @@ import numpy as np
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
-from rubhpc.running.initial_states import InitialStates, Start
+from rubhpc.running.initial_states import InitialState, InitialStates
 from rubhpc.running.pool import Totals
 from rubhpc.running.stopping import Stopped
 from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING
@@ -70,7 +70,7 @@ class Worker:
     missing : (n_case,) bool
         Which cases are to be computed.
     report : callable
-        Told of every case that has ended.
+        Called with every case that has ended.
     attend : callable
         Called several times a second while a case is computed.
     """
@@ -88,7 +88,7 @@ class Worker:
     def __post_init__(self) -> None:
         self._record_type = self.store.manifest.header.record_type
         self._setups: OrderedDict[tuple[int, float], tuple[Rig, Setup]] = OrderedDict()
-        self._ends = InitialStates(self.grid, self.store, self.ledger, self._mend)
+        self._initial_states = InitialStates(self.grid, self.store, self.ledger, self._repair)
         self._unsynced: list[Path] = []
         self._next_sync = time.monotonic() + _SYNC_GAP
         self._seconds, self._cost = 0.0, 0.0
@@ -96,7 +96,7 @@ class Worker:
     def work(self, block: Block) -> None:
         """Compute, store and journal what is missing of a block; what is finished when a stop comes is kept.
 
-        A case of a chain goes on from where the one before it has ended, in this block or another.
+        In a continuation a case starts from the final state of its predecessor, in this block or another.
 
         Raises
         ------
@@ -108,13 +108,13 @@ class Worker:
         if not self.stopping.fits(cost * self._pace):
             return
         wanted = self.missing[flat]
-        data, spoiled = self._kept(block, flat, wanted)
-        wanted |= spoiled
+        data, damaged = self._kept(block, flat, wanted)
+        wanted |= damaged
         entries: list[Entry] = []
         try:
             cases = self.grid.cases(block)
         except Exception as error:
-            cases, reason = [], _told(error)
+            cases, reason = [], _reason(error)
             ids = self.grid.case_ids(block)
             entries = [Entry(int(flat[i]), ids[i], FAILED, reason=reason) for i in np.flatnonzero(wanted)]
             self.report(Totals(failed=len(entries), cost=round(cost * len(entries))))
@@ -125,7 +125,7 @@ class Worker:
                 break
             began = time.perf_counter()
             try:
-                start = self._ends.start_of(cases[i_case], flat, data, entries)
+                start = self._initial_states.start_of(cases[i_case], flat, data, entries)
                 entry = self._enter(cases[i_case], int(flat[i_case]), data, i_case, start)
             except Stopped:
                 break
@@ -141,7 +141,7 @@ class Worker:
                 )
             )
         if entries:
-            lost = set(flat[spoiled].tolist()) - {entry.flat for entry in entries}
+            lost = set(flat[damaged].tolist()) - {entry.flat for entry in entries}
             entries += [Entry(i, self.store.manifest.case_id(i), MISSING) for i in lost]
             self.store.write_block(block.start, data)
             with disk_errors(self.store.path):
@@ -149,13 +149,13 @@ class Worker:
             for entry in entries:
                 self.ledger.status[entry.flat] = entry.status
                 self.ledger.checksum[entry.flat] = entry.checksum
-            self._ends.remember(flat, data)
+            self._initial_states.remember(flat, data)
             self._unsynced += self.store.chunk_files(block.start)
             if time.monotonic() > self._next_sync:
                 self.sync()
 
     def sync(self) -> None:
-        """Return once what has been stored would outlive a power cut, the arrays before their lines.
+        """Return once what has been stored would survive a power failure, the arrays before their lines.
 
         A process that is killed loses nothing without it.
         """
@@ -178,25 +178,25 @@ class Worker:
     ) -> tuple[Arrays, NDArray[np.bool_]]:
         """Arrays of the block with the cases that are there already, and which of those are damaged."""
         data = self.store.empty_block(block.start)
-        spoiled = np.zeros_like(wanted)
+        damaged = np.zeros_like(wanted)
         status = self.ledger.status[flat]
         kept = np.flatnonzero(~wanted & ((status == DONE) | (status == DIVERGED)))
         if not len(kept):
-            return data, spoiled
+            return data, damaged
         stored = self.store.read_block(block.start)
         for i_case in kept.tolist():
             if stored is None or case_checksum(stored, i_case) != self.ledger.checksum[flat[i_case]]:
-                spoiled[i_case] = True
+                damaged[i_case] = True
                 continue
             for name, values in stored.items():
                 data[name][i_case] = values[i_case]
-        return data, spoiled
+        return data, damaged
 
-    def _mend(self, start: tuple[int, ...]) -> None:
-        """Compute again what is damaged of a block, which another goes on from."""
+    def _repair(self, start: tuple[int, ...]) -> None:
+        """Recompute the damaged cases of a block on which another depends."""
         self.work(next(block for block in self.grid.blocks() if block.start == start))
 
-    def _enter(self, case: Case, flat: int, data: Arrays, i_case: int, start: Start) -> Entry:
+    def _enter(self, case: Case, flat: int, data: Arrays, i_case: int, start: InitialState) -> Entry:
         """Compute a case and put its arrays in the block's; what goes wrong in it is its reason to fail."""
         self.watch.begin(flat, case.id)
         try:
@@ -208,13 +208,13 @@ class Worker:
         except Exception as error:
             for values in data.values():
                 values[i_case] = np.nan
-            return Entry(flat, case.id, FAILED, reason=_told(error))
+            return Entry(flat, case.id, FAILED, reason=_reason(error))
         finally:
             self.watch.end()
         remark = "; ".join(text for text in (start.note, record.remark) if text)
         return Entry(flat, case.id, record.status, case_checksum(data, i_case), measures, remark)
 
-    def _compute(self, case: Case, start: Start) -> Record:
+    def _compute(self, case: Case, start: InitialState) -> Record:
         study = self.grid.study
         key = (
             id(case.rig),
@@ -258,13 +258,13 @@ def put(record: Record, data: Arrays, i_case: int) -> None:
     """
     if record.status != DONE:
         return
-    told = {**record.signals, **record.spectra, **record.sections}
+    arrays = {**record.signals, **record.spectra, **record.sections}
     if FINAL_STATE in data:
-        told[FINAL_STATE] = record.final.packed()
+        arrays[FINAL_STATE] = record.final.packed()
     for name, values in data.items():
-        if not np.isfinite(told[name]).all():
+        if not np.isfinite(arrays[name]).all():
             raise FloatingPointError(f"{name} is not finite")
-        values[i_case] = told[name]
+        values[i_case] = arrays[name]
 
 
 def packed_measures(record: Record, kind: np.dtype[np.void]) -> NDArray[np.void]:
@@ -275,7 +275,7 @@ def packed_measures(record: Record, kind: np.dtype[np.void]) -> NDArray[np.void]
     return row
 
 
-def _told(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     """An error as the reason of a failed case, in one line."""
     text = " ".join(str(error).split())
     return text if isinstance(error, _OverTime) else f"{type(error).__name__}: {text}"

@@ -14,23 +14,23 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-_MEND = {
+_ADVICE = {
     errno.ENOSPC: "the disk is full; free some space and run the same command again",
     errno.EDQUOT: "the disk quota is used up; free some space and run the same command again",
     errno.EFBIG: "the file size limit is reached; raise it (ulimit -f) and run the same command again",
     errno.EROFS: "the file system is read-only; choose another place with --output",
-    errno.EACCES: "permission denied; mend the permissions or choose another place with --output",
-    errno.EPERM: "not permitted; mend the permissions or choose another place with --output",
+    errno.EACCES: "permission denied; change the permissions or choose another place with --output",
+    errno.EPERM: "not permitted; change the permissions or choose another place with --output",
     errno.ENOTDIR: "its parent is not a directory; choose another place with --output",
-    errno.EEXIST: "a file stands in its way; move that away or choose another place with --output",
+    errno.EEXIST: "a file of that name exists; move it away or choose another place with --output",
     errno.ENOENT: "part of its path is missing and cannot be made; choose another place with --output",
-    errno.EIO: "the disk reports an input/output error; verify the store once it is mended",
+    errno.EIO: "the disk reports an input/output error; repair it, then run rubhpc verify on the store",
 }
 
 
 @contextmanager
 def disk_errors(place: Path) -> Iterator[None]:
-    """Turn an OSError met while working on `place` into a StoreError that names the mend.
+    """Turn an OSError raised while working on `place` into a StoreError that says how to fix it.
 
     Raises
     ------
@@ -40,14 +40,14 @@ def disk_errors(place: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        text = _MEND.get(error.errno or 0) or str(error.strerror or error).lower()
+        text = _ADVICE.get(error.errno or 0) or str(error.strerror or error).lower()
         raise StoreError(f"{place}: {text}") from error
 
 
 def write_whole(path: Path, data: bytes, *, is_synced: bool = True) -> None:
-    """Put `data` in `path` such that a reader, or the next run after a crash, finds all of it or the old.
+    """Write `data` to `path` such that a reader, or the next run after a crash, finds all of it or the old.
 
-    Where `is_synced`, the data outlive a power cut too.
+    With `is_synced` the data also survive a power failure.
     """
     if not path.parent.is_dir():
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -65,7 +65,7 @@ def write_whole(path: Path, data: bytes, *, is_synced: bool = True) -> None:
 
 
 def flush_to_disk(path: Path) -> None:
-    """Return once the file's content is on the disk, so that what is journalled later vouches for it."""
+    """Return once the file's content is on the disk, so that it is there before it is journalled."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -1,9 +1,9 @@
-"""Grows a store to other values on its axes, wherever they stand: all of it happens, or nothing.
+"""Grows a store to more values on its axes, at any position, and to new measures, atomically.
 
-What changes is put together in a directory of its own: metadata, coordinates, and every block whose cases
-move. One rename of that directory decides on the growth; from then on the manifest in it is the store's, and
-whoever next holds the lock moves its files to their places. A kill before the rename leaves the old store, a
-kill after it leaves the rest of the moving to be done.
+All that changes is first written to a directory of its own: metadata, coordinates, and every block whose
+cases move. Renaming that directory commits the growth: from then on its manifest is the store's, and the next
+holder of the lock moves the files to their places. A kill before the rename leaves the old store; after a
+later kill the next run moves the remaining files.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ if TYPE_CHECKING:
     from rubhpc.storage.journal import Ledger
     from rubhpc.study.cases import CaseGrid
 
-_HELD = 64  # blocks of the old grid kept in memory: neighbours in the new one come from few of them
+_HELD = 64  # blocks of the old grid kept in memory: a new block is made of few old ones
 
 
 def origins(before: Manifest, after: Manifest) -> NDArray[np.int64]:
     """Flat index in the grid of `before` of every case of `after`, (n_case,); -1 for a new one.
 
-    A case of a chain is new wherever one of those before it is.
+    In a continuation a case is new if any of its predecessors is.
     """
     origin, is_new = np.zeros((), np.int64), np.zeros((), bool)
     for dim, n in zip(before.dims, before.shape, strict=True):
@@ -72,7 +72,7 @@ def grow(store: Store, grid: CaseGrid) -> None:
         shutil.rmtree(draft, ignore_errors=True)
         try:
             _put_together(draft, store, grid)
-            os.sync()  # all of it is on the disk before it counts
+            os.sync()  # everything is on the disk before it counts
             draft.rename(store.private / GROWTH)
             flush_to_disk(store.private)
         finally:
@@ -82,7 +82,7 @@ def grow(store: Store, grid: CaseGrid) -> None:
 
 
 def finish_growth(path: Path) -> None:
-    """Finish a growth that was decided on, if there is one; needs the store's lock."""
+    """Finish a committed growth, if there is one; needs the store's lock."""
     growth = path / PRIVATE / GROWTH
     if not growth.is_dir():
         return
@@ -110,7 +110,7 @@ def _move(file: Path, target: Path) -> None:
 
 
 def _put_together(draft: Path, store: Store, grid: CaseGrid) -> None:
-    """Make in `draft` all that is to change in the store, and a journal of all cases in the new grid."""
+    """Write to `draft` all that changes in the store, and a journal of all cases in the new grid."""
     before, ledger = store.manifest, store.replay()
     accepted = before.accepted
     if before.parts["physics"] != grid.identity_parts["physics"]:
@@ -135,14 +135,14 @@ def _put_together(draft: Path, store: Store, grid: CaseGrid) -> None:
         store.journal_directory, next_run(store.journal_directory), "growth", after.header
     ) as journal:
         journal.write(
-            _carried(ledger, int(origin[flat]), flat, after.case_id(flat), is_lost=flat in lost)
+            _moved(ledger, int(origin[flat]), flat, after.case_id(flat), is_lost=flat in lost)
             for flat in np.flatnonzero((origin >= 0) & ledger.is_known[origin]).tolist()
         )
         journal.sync()
 
 
-def _carried(ledger: Ledger, origin: int, flat: int, name: str, *, is_lost: bool) -> Entry:
-    """What the journals say of a case, for its place in the new grid."""
+def _moved(ledger: Ledger, origin: int, flat: int, name: str, *, is_lost: bool) -> Entry:
+    """Journal entry of a known case at its place in the new grid."""
     status = int(ledger.status[origin])
     if is_lost or status == MISSING:
         return Entry(flat, name, MISSING)
@@ -153,7 +153,7 @@ def _carried(ledger: Ledger, origin: int, flat: int, name: str, *, is_lost: bool
 
 
 def _stage_blocks(new: Store, old: Store, ledger: Ledger, origin: NDArray[np.int64]) -> set[int]:
-    """Write the blocks of the new grid that are not as they stand in the old; cases found damaged."""
+    """Write the blocks of the new grid that differ from the old one; returns the cases found damaged."""
     read = lru_cache(maxsize=_HELD)(old.read_block)
     is_stored = np.isin(ledger.status, (DONE, DIVERGED))
     shape, chunk = old.manifest.shape, old.manifest.chunk

@@ -1,7 +1,7 @@
-"""Which case each rank has in hand, so that a case that kills its rank is found out and left alone.
+"""The in-progress record of each rank, from which a case that kills its rank is identified.
 
-A rank keeps a small file while it computes: the case in hand, and after it what a fatal signal or an overrun
-leaves behind as evidence. A rank that ends in order removes its file; those that stay tell of deaths.
+While a rank computes it keeps a small file: the current case, followed by what a fatal signal or an overrun
+writes as evidence. A rank that ends normally removes its file, so each file that remains stands for a death.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.manifest import Manifest
 
-_RECORD = 64  # bytes of the case in hand; the evidence follows
-_CRASHES = 2  # deaths by a fatal signal or for want of memory after which a case has failed
+_RECORD = 64  # bytes of the current case; the evidence follows
+_CRASHES = 2  # deaths by a fatal signal or for lack of memory after which a case has failed
 _DEATHS = 5  # deaths of unknown cause: the launcher may have been killed, or the power cut
 _OVERRUN = "over its time limit"
 
 
 class InProgress:
-    """A rank's record of the case in hand, as a context."""
+    """The record of the case that a rank computes, as a context."""
 
     def __init__(self, directory: Path, run: int, writer: str) -> None:
         directory.mkdir(exist_ok=True)
@@ -45,11 +45,11 @@ class InProgress:
             faulthandler.enable(self._handle)
 
     def take(self, flat: int, name: str) -> None:
-        """Note the case that is computed from now on; it outlives this process, at 1 us."""
+        """Note the case that is computed from now on; it survives this process, and takes 1 us."""
         os.pwrite(self._handle, f"{flat} {name}".ljust(_RECORD - 1).encode(), 0)
 
     def note_overrun(self, seconds: float) -> None:
-        """Leave it as evidence that the case in hand does not end; from any thread."""
+        """Record as evidence that the current case does not end; from any thread."""
         os.write(self._handle, f"{_OVERRUN} of {seconds:g} s, in a single step of it\n".encode())
 
     def __enter__(self) -> Self:
@@ -66,7 +66,7 @@ class InProgress:
 
 @dataclass(frozen=True)
 class RankDeaths:
-    """Cases that were in hand when ranks died.
+    """Cases that were being computed when ranks died.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class RankDeaths:
 
 
 def read_deaths(directory: Path, manifest: Manifest, is_missing: NDArray[np.bool_]) -> RankDeaths:
-    """Which missing cases were in hand when ranks died; records of the others are removed."""
+    """Missing cases that were being computed when ranks died; records of other cases are removed."""
     crashes: Counter[int] = Counter()
     deaths: Counter[int] = Counter()
     causes: dict[int, str] = {}
@@ -120,13 +120,13 @@ def _is_open(flat: int, name: str, manifest: Manifest, is_missing: NDArray[np.bo
 
 
 def _read(record: Path) -> tuple[int, str, str] | None:
-    """Flat index and id of the case in hand, and the evidence of what befell it; None where there is none."""
+    """Flat index and id of the recorded case, and the evidence of its death; None without a case."""
     data = record.read_bytes()
     found = re.fullmatch(r"(\d+) ([0-9a-f]{32})", data[:_RECORD].decode(errors="replace").strip())
     if found is None:
         return None
     where, _, evidence = data[_RECORD:].decode(errors="replace").partition("\n")
-    return int(found[1]), found[2], _cause(evidence) or _want_of_memory(where)
+    return int(found[1]), found[2], _cause(evidence) or _out_of_memory(where)
 
 
 def _cause(evidence: str) -> str:
@@ -134,14 +134,14 @@ def _cause(evidence: str) -> str:
     return line.removeprefix("Fatal Python error: ").lower() if line.startswith("Fatal") else line
 
 
-def _want_of_memory(where: str) -> str:
+def _out_of_memory(where: str) -> str:
     host, _, n_kill = where.partition(" ")
     is_here = host == socket.gethostname() and n_kill.isdigit()
     return "killed, as the machine had no memory left" if is_here and _oom_kills() > int(n_kill) else ""
 
 
 def _oom_kills() -> int:
-    """Processes this machine has killed for want of memory since it started; 0 where it does not tell."""
+    """Processes this machine has killed for lack of memory since it started; 0 where that is unknown."""
     try:
         lines = Path("/proc/vmstat").read_text().splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""What has been computed: append-only journals, one a run and rank, one line a case.
+"""Append-only journals of what has been computed: one a run and rank, one line a case.
 
 A line is `crc flat id status checksum measures reason`: the CRC-32 of the rest of the line, the case's flat
 index in the grid of the file's header, its id, its status, the CRC-32 of its stored arrays, its measures
@@ -130,7 +130,7 @@ class Journal:
         self._handle: int | None = None
 
     def write(self, entries: Iterable[Entry]) -> None:
-        """Append the entries: they outlive this process, and a power cut once `sync` has returned."""
+        """Append the entries: they survive this process, and a power failure once `sync` has returned."""
         data = b"".join(entry.line() for entry in entries)
         if self._handle is None:
             self._handle = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o666)
@@ -161,7 +161,7 @@ class Journal:
 
 @dataclass(kw_only=True)
 class Ledger:
-    """What the journals say of every case of a grid.
+    """State of every case of a grid, from the journals.
 
     Attributes
     ----------
@@ -170,13 +170,13 @@ class Ledger:
     checksum : (n_case,) uint32
         CRC-32 of the stored arrays of each case.
     is_known : (n_case,) bool
-        Whether any valid line tells of the case, be it that it is missing.
+        Whether any valid line is about the case, even one that marks it as missing.
     measures : (n_case,) record or None
-        Metrics of the cases that have any; None where the replay was asked to leave them out.
+        Measures of the cases, missing (NaN, -1) where a case has none; None where the replay left them out.
     reasons : dict
         Flat index -> why a case failed or diverged.
     n_damaged : int
-        Lines that were passed over because they are damaged or cut short.
+        Lines that were skipped because they are damaged or truncated.
     damaged_cases : set
         Flat indices that can still be read in such lines.
     n_recent : int
@@ -210,7 +210,7 @@ def next_run(directory: Path) -> int:
 
 
 def replay(directory: Path, header: Header, *, with_measures: bool = True) -> Ledger:
-    """Read every journal in turn; damaged lines and journals of other identities or grids are passed over."""
+    """Read every journal in turn; damaged lines and journals of other identities or grids are skipped."""
     n_case = header.points.n_case
     measures = blank_records(n_case, header.record_type) if with_measures else None
     ledger = Ledger(

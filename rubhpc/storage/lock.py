@@ -1,4 +1,4 @@
-"""One run at a time on a store: a lock that tells who holds it and is reclaimed when its holder is dead.
+"""One run at a time on a store: a lock that names its holder and is reclaimed when the holder is dead.
 
 The lock is a file that comes into being whole (a hard link of a finished one). Its holder touches it every
 few seconds. On the holder's own host a dead process gives it away; elsewhere, a heartbeat that has stopped.
@@ -33,7 +33,7 @@ ORPHAN_PATIENCE = 15.0  # s to wait for a holder whose launcher is gone: it is a
 
 @dataclass(frozen=True)
 class Holder:
-    """The process that holds a lock; `born` and `parent` tell it from a later one with the same number."""
+    """The process that holds a lock; `born` and `parent` identify it among others with its number."""
 
     host: str
     pid: int
@@ -48,7 +48,7 @@ class Holder:
 
     @classmethod
     def myself(cls) -> Self:
-        """Return what tells of this process."""
+        """Return the description of this process."""
         pid = os.getpid()
         state = process_state(pid)
         return cls(
@@ -66,7 +66,7 @@ def process_state(pid: int) -> tuple[str, int, str] | None:
     try:
         text = Path(f"/proc/{pid}/stat").read_text()
     except OSError:
-        # Without a /proc only existence can be asked for.
+        # Without /proc only existence can be checked.
         try:
             os.kill(pid, 0)
         except ProcessLookupError:
@@ -149,7 +149,7 @@ class Lock:
 
     @property
     def token(self) -> str:
-        """What tells this lock from any other."""
+        """Identifies this lock."""
         return self._me.token
 
     def _is_mine(self) -> bool:

@@ -121,7 +121,7 @@ class Manifest:
 
     @cached_property
     def continuation(self) -> Continuation | None:
-        """How the motion is carried from case to case; None where each starts at rest."""
+        """From which case each one starts; None where all start at rest."""
         return continuation_of(self.axes)
 
     @cached_property
@@ -186,15 +186,15 @@ class Manifest:
 
     def write(self, store: Path) -> None:
         """Put the manifest into a store, twice."""
-        told = {f.name: getattr(self, f.name) for f in fields(self)}
+        content = {f.name: getattr(self, f.name) for f in fields(self)}
         axes = [{f.name: getattr(axis, f.name) for f in fields(axis)} for axis in self.axes]
-        text = json.dumps(told | {"axes": axes, "measures": to_json(self.measures)}).encode()
+        text = json.dumps(content | {"axes": axes, "measures": to_json(self.measures)}).encode()
         for name in _NAMES:
             write_whole(store / PRIVATE / name, b"rubhpc %d %08x\n%s" % (_FORMAT, crc32(text), text))
 
     @classmethod
     def read(cls, store: Path) -> Self:
-        """The manifest of a store, as it is once a growth that was decided on has been finished.
+        """The manifest of a store, with a committed growth applied.
 
         Raises
         ------
@@ -205,7 +205,7 @@ class Manifest:
         for place in manifests(store):
             try:
                 text = _vouched(place)
-                told = json.loads(text)
+                content = json.loads(text)
             except (FileNotFoundError, NotADirectoryError):
                 continue
             except _OtherFormat:
@@ -214,10 +214,10 @@ class Manifest:
             except (ValueError, OSError) as error:
                 damaged = error
                 continue
-            axes = (AxisRecord(**{**axis, "values": tuple(axis["values"])}) for axis in told["axes"])
-            tuples = {name: tuple(told.get(name, ())) for name in ("chunk", "keep", "added", "accepted")}
-            measures = from_json(told["measures"]) if "measures" in told else unlisted_measures()
-            return cls(**{**told, **tuples, "axes": tuple(axes), "measures": measures})
+            axes = (AxisRecord(**{**axis, "values": tuple(axis["values"])}) for axis in content["axes"])
+            tuples = {name: tuple(content.get(name, ())) for name in ("chunk", "keep", "added", "accepted")}
+            measures = from_json(content["measures"]) if "measures" in content else unlisted_measures()
+            return cls(**{**content, **tuples, "axes": tuple(axes), "measures": measures})
         if is_other:
             raise StoreError(f"{store}: made by another version of rubhpc; use that one or another --output")
         if damaged is not None:
@@ -258,8 +258,8 @@ class Manifest:
             names = [axis.name for axis in self.axes if axis.dimension == dim]
             if lost and len(names) == 1:
                 rest = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
-                told = ", ".join(f"{value:.12g}" for (value,) in lost[:3])
-                found.append(f"axis {names[0]} lacks {told}{rest}, which is stored")
+                values = ", ".join(f"{value:.12g}" for (value,) in lost[:3])
+                found.append(f"axis {names[0]} lacks {values}{rest}, which is stored")
             elif lost:
                 n_mine, n_yours = (dict(zip(m.dims, m.shape, strict=True))[dim] for m in (self, other))
                 why = "n can only grow" if n_yours < n_mine else "this SALib or SciPy draws other points"

@@ -1,4 +1,4 @@
-"""What a study finds in its store, and what is left to do."""
+"""Resuming a study in its store: what it can use, and what is left to compute."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 
 def is_store(path: Path) -> bool:
-    """Whether a store of this program stands at `path`."""
+    """Whether `path` is a store of this program."""
     return any(os.path.isfile(place) for place in manifests(path))  # a name too long is none
 
 
 def grid_for(study: Study, *, accept_version: bool = False) -> CaseGrid:
-    """The study's grid, with the blocks of the store it goes on with.
+    """The study's grid, with the blocks of the store it resumes.
 
     Raises
     ------
@@ -53,13 +53,13 @@ def _refuse_other(mine: Manifest, yours: Manifest, path: Path, *, accept_version
     is_version = mine.is_other_version(yours)
     if not differences or (is_version and accept_version):
         return
-    told = "; ".join(differences)
+    listed = "; ".join(differences)
     if is_version:
         raise StoreError(
-            f"{path}: was computed by another version of the physics: {told}; "
-            "--accept-version keeps its cases and goes on, another --output starts anew"
+            f"{path}: was computed by another version of the physics: {listed}; "
+            "--accept-version keeps its cases and continues, another --output starts a new store"
         )
-    raise StoreError(f"{path}: is the store of another study: {told}; choose another --output")
+    raise StoreError(f"{path}: is the store of another study: {listed}; choose another --output")
 
 
 def open_store(grid: CaseGrid) -> Store:

@@ -1,4 +1,4 @@
-"""What machine each run of a study was on: a small file a run, beside its journals."""
+"""The machine of each run of a study: one small file a run, next to its journals."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def record_run(store: Path, number: int, n_rank: int) -> None:
 
 
 def read_runs(store: Path) -> list[Run]:
-    """Return the runs that put a case down, in their order; what is damaged is passed over."""
+    """Return the runs that put a case down, in their order; damaged files are skipped."""
     wrote: dict[int, float] = {}
     for path in journals(store / PRIVATE / "journal"):
         number = int(path.name[3:9])
@@ -64,11 +64,11 @@ def read_runs(store: Path) -> list[Run]:
     runs = []
     for path in sorted((store / PRIVATE / "runs").glob("run*.json")):
         try:
-            told = Run(**json.loads(path.read_bytes()))
+            run = Run(**json.loads(path.read_bytes()))
         except (ValueError, TypeError):
             continue
-        if told.number in wrote:
-            runs.append(Run(**asdict(told) | {"wrote": wrote[told.number]}))
+        if run.number in wrote:
+            runs.append(Run(**asdict(run) | {"wrote": wrote[run.number]}))
     return runs
 
 

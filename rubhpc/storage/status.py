@@ -1,4 +1,4 @@
-"""How a store stands, told from its manifest, journals and lock alone; works while a run is on."""
+"""Status of a store from its manifest, journals and lock; works during a run."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ class StoreStatus:
                 + (f", {duration(left)} left" if left is not None else "")
             )
         elif self.counts[MISSING]:
-            lines.append("no run is on; run the study again to compute what is missing")
+            lines.append("no run is active; run the study again to compute what is missing")
         if self.n_damaged:
-            lines.append(f"{self.n_damaged} damaged lines in the journals were passed over")
+            lines.append(f"{self.n_damaged} damaged lines in the journals were skipped")
         lines += [f"  {case}: {reason}" for case, reason in self.failures[:_SHOWN]]
         if len(self.failures) > _SHOWN:
             lines.append(f"  and {len(self.failures) - _SHOWN} more")

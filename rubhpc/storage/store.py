@@ -50,12 +50,12 @@ class Store:
 
     @classmethod
     def create(cls, path: Path, grid: CaseGrid) -> Self:
-        """Make a store for `grid` at `path`: built beside it, then renamed, so that it is never half made.
+        """Make a store for `grid` at `path`: built next to it and renamed, so that it is never incomplete.
 
         Raises
         ------
         StoreError
-            Something stands there already, or it cannot be written.
+            The path exists already, or cannot be written.
         """
         with disk_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -92,8 +92,8 @@ class Store:
 
     @property
     def in_progress_directory(self) -> Path:
-        """Where each rank notes the case it has in hand."""
-        return self.private / "hand"
+        """Where each rank records the case it computes."""
+        return self.private / "in_progress"
 
     def lock(self, on_loss: Callable[[], None] = lambda: None, heir_of: str = "") -> Lock:
         """Exclusive use of the store, as a context."""
@@ -117,7 +117,7 @@ class Store:
                 journal.sync()
 
     def damaged_files(self) -> list[str]:
-        """Paths of the metadata, coordinates and settings that are not what the manifest vouches for."""
+        """Paths of the metadata, coordinates and settings whose checksum differs from the manifest's."""
         damaged = []
         for name, check in self.manifest.files.items():
             try:
@@ -129,7 +129,7 @@ class Store:
         return damaged
 
     def repair_files(self, grid: CaseGrid) -> None:
-        """Write metadata, coordinates and settings anew where they are damaged, and the manifest."""
+        """Rewrite damaged metadata, coordinates and settings, and the manifest."""
         damaged = self.damaged_files()
         if not damaged and not self.manifest.damaged_copies(self.path):
             return
@@ -151,7 +151,7 @@ class Store:
             return {name: layout.get_array(group, name) for name in names}
         except (KeyError, ValueError, TypeError, OSError) as error:
             raise StoreError(
-                f"{self.path}: its metadata is damaged ({error}); run its study again to mend it"
+                f"{self.path}: its metadata is damaged ({error}); run its study again to repair it"
             ) from None
 
     def blocks(self) -> Iterator[tuple[int, ...]]:
@@ -229,14 +229,14 @@ class Store:
                 write_whole(path, layout.encode(values), is_synced=False)
 
     def remove_partial_files(self) -> None:
-        """Remove what writers that were killed left half written."""
+        """Remove unfinished files of killed writers."""
         for directory, _, names in os.walk(self.path):
             for name in names:
                 if name.endswith(".partial"):
                     Path(directory, name).unlink(missing_ok=True)
 
     def pack(self, ledger: Ledger) -> None:
-        """Write status and measures of every case as arrays, unless the journals tell nothing new."""
+        """Write status and measures of every case as arrays, unless nothing has been journalled since."""
         with disk_errors(self.path):
             if not self.is_packed():
                 state = self._journal_state()
@@ -258,14 +258,14 @@ class Store:
         return packed
 
     def is_packed(self) -> bool:
-        """Whether the packed arrays tell all that the journals do."""
+        """Whether the packed arrays are up to date with the journals."""
         try:
             return (self.private / "packed.json").read_text() == self._journal_state()
         except FileNotFoundError:
             return False
 
     def forget_packing(self) -> None:
-        """Have the next run pack anew."""
+        """Have the next run pack again."""
         (self.private / "packed.json").unlink(missing_ok=True)
 
     def _journal_state(self) -> str:
@@ -281,7 +281,7 @@ def case_checksum(data: dict[str, NDArray[Any]], i_case: int) -> int:
 
 
 def _remove_drafts(path: Path) -> None:
-    """Remove what creations of this store on this host left behind when they were killed."""
+    """Remove drafts of this store that killed processes of this host left."""
     prefix, host = f".{path.name}.", socket.gethostname()
     for name in os.listdir(path.parent):  # no pattern: a store's name may hold anything
         if name.startswith(f"{prefix}{host}.") and name.endswith(".draft"):

@@ -30,9 +30,9 @@ class Summary:
     reasons : tuple of (str, str)
         Coordinates and reason of each failed case, the first hundred.
     flawed : int
-        Cases that are done with a remark: their energy balance is off, or they broke a chain of a sweep.
+        Cases that are done with a remark: a poor energy balance, or a start at rest within a sweep.
     lost : int
-        Ranks that died on the way; the others have done their work.
+        Ranks that died during the run; the others did their work.
     """
 
     store: Path
@@ -51,12 +51,12 @@ class Summary:
     def text(self) -> str:
         """The summary in a line."""
         states = [i for i in (DONE, FAILED, DIVERGED, MISSING) if self.counts[i]]
-        told = ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in states)
+        counts = ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in states)
         flaw = f"; {self.flawed} done with a remark, rubhpc status names them" if self.flawed else ""
-        return f"{self.store}: {told}; {self.computed} computed in {duration(self.seconds)}{flaw}"
+        return f"{self.store}: {counts}; {self.computed} computed in {duration(self.seconds)}{flaw}"
 
     def complaint(self) -> str:
-        """What failed, in a line with the mend."""
+        """What failed and how to proceed, in one line."""
         if not self.counts[FAILED]:
             lost = "a rank was lost" if self.lost == 1 else f"{self.lost} ranks were lost"
             return (
@@ -68,5 +68,5 @@ class Summary:
         )
         return (
             f"{self.store}: {self.counts[FAILED]} of {sum(self.counts)} cases failed{rest}; "
-            f"the first, {case}: {reason}; rubhpc status lists them, --retry-failed computes them anew"
+            f"the first, {case}: {reason}; rubhpc status lists them, --retry-failed computes them again"
         )

@@ -1,4 +1,4 @@
-"""Checks every stored case against its checksum, and has the next run compute again what is damaged."""
+"""Checks every stored case against its checksum and marks damaged ones for the next run."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Damage:
-    """What is not as it was written.
+    """Differences between a store and its checksums.
 
     Attributes
     ----------
     cases : dict
         Flat index -> the case's index and coordinates, and what is wrong with it.
     arrays : tuple of str
-        Metadata, coordinates, settings and packed arrays; the next run writes them anew without computing.
+        Metadata, coordinates, settings and packed arrays; the next run rewrites them without computing.
     n_checked : int
         Cases that have been compared with their checksum.
     note : str
@@ -51,13 +51,15 @@ class Damage:
     def lines(self) -> list[str]:
         """What is damaged, a line each."""
         return [f"damaged: case {text}" for text in self.cases.values()] + [
-            f"damaged: {name}; the next run writes it anew" for name in self.arrays
+            f"damaged: {name}; the next run rewrites it" for name in self.arrays
         ]
 
     def complaint(self) -> str:
-        """All of it in one line, with the mend."""
-        mend = f"not marked for the next run: {self.note}" if self.note else "run its study again to mend it"
-        return f"{self.store}: damage in {len(self.cases)} cases and {len(self.arrays)} arrays; {mend}"
+        """All of it in one line, with what to do."""
+        advice = (
+            f"not marked for the next run: {self.note}" if self.note else "run its study again to repair it"
+        )
+        return f"{self.store}: damage in {len(self.cases)} cases and {len(self.arrays)} arrays; {advice}"
 
 
 def verify(path: Path) -> Damage:
@@ -69,22 +71,22 @@ def verify(path: Path) -> Damage:
             finish_growth(path)
         store.reopen()
     ledger = store.replay()
-    spoiled = _spoiled_cases(store, ledger)
+    damaged = _damaged_cases(store, ledger)
     lost = _lost_lines(store, ledger)
     packed = _damaged_packed(store, ledger)
     files = dict.fromkeys(_named(name) for name in store.damaged_files())
     n_checked = int(np.isin(ledger.status, (DONE, DIVERGED)).sum())
-    if spoiled or packed:
+    if damaged or packed:
         try:
             with store.lock():
                 if packed:
                     store.forget_packing()
-                store.mark_missing(ledger, sorted(spoiled), next_run(store.journal_directory), "verify")
+                store.mark_missing(ledger, sorted(damaged), next_run(store.journal_directory), "verify")
         except (StoreError, OSError) as error:
             note = str(error)
     return Damage(
         store=path,
-        cases={i: f"{_name(store, i)}: {text}" for i, text in sorted((spoiled | lost).items())},
+        cases={i: f"{_name(store, i)}: {text}" for i, text in sorted((damaged | lost).items())},
         arrays=(*files, *packed, *store.manifest.damaged_copies(path)),
         n_checked=n_checked,
         note=note,
@@ -104,9 +106,9 @@ def _name(store: Store, flat: int) -> str:
     return f"({index}) {store.manifest.name_case(flat)}"
 
 
-def _spoiled_cases(store: Store, ledger: Ledger) -> dict[int, str]:
+def _damaged_cases(store: Store, ledger: Ledger) -> dict[int, str]:
     """Cases whose arrays are gone, cannot be decoded, or have changed."""
-    spoiled = {}
+    damaged = {}
     for start in store.blocks():
         flat = store.flat(start)
         there = np.flatnonzero(np.isin(ledger.status[flat], (DONE, DIVERGED)))
@@ -115,12 +117,12 @@ def _spoiled_cases(store: Store, ledger: Ledger) -> dict[int, str]:
         data = store.read_block(start)
         for i_case in there.tolist():
             if data is None:
-                spoiled[int(flat[i_case])] = (
+                damaged[int(flat[i_case])] = (
                     "a file is gone" if not store.has_files(start) else "a chunk is garbled"
                 )
             elif case_checksum(data, i_case) != ledger.checksum[flat[i_case]]:
-                spoiled[int(flat[i_case])] = "its arrays have changed"
-    return spoiled
+                damaged[int(flat[i_case])] = "its arrays have changed"
+    return damaged
 
 
 def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:

@@ -45,9 +45,9 @@ CLEARANCE_AXES = ("clearance_ratio", "clearance")
 _TABLE_KEYS = ("values", *RANGE_KEYS, "sweep")
 SWEEPS = ("from_rest", "up", "down", "both")
 FROM_REST, UP, DOWN, BOTH = SWEEPS
-DIRECTION = "direction"  # the axis that a sweep both ways adds
+DIRECTION = "direction"  # the axis that a sweep in both directions adds
 DIRECTIONS = (UP, DOWN)  # meanings of 0 and 1 on it
-NO_NEIGHBOURS = "the cases of a sample have no neighbours to carry a motion to; leave out sweep or [sample]"
+NO_NEIGHBOURS = "the cases of a sample have no neighbours to start from; remove sweep or [sample]"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +106,7 @@ class Axis:
 
 
 def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
-    """Return an axis from what stands for it in a file: a list, a range or a single value.
+    """Return an axis from its entry in a file: a list, a range or a single value.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     Raises
     ------
     InputError
-        When the name is unknown, or a value is not what the axis holds, or stands twice.
+        When the name is unknown, or a value is invalid or duplicated.
     """
     where = place(file, "grid", name)
     declared = _declared(name, rig, where)
@@ -134,7 +134,7 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
 
 
 def direction_axis() -> Axis:
-    """Return the axis that tells the two runs of a sweep both ways apart."""
+    """Return the axis that separates the two directions of a sweep."""
     return Axis(
         name=DIRECTION, dimension=DIRECTION, unit="1", values=(0.0, 1.0), long_name="direction of the sweep"
     )
@@ -158,8 +158,10 @@ def make_range(name: str, table: Mapping[str, object], rig: Rig, file: str = "")
         raise InputError(f"{where}: none but a quantity is drawn from a range; write a list of values")
     ends = read_ends(table, declared.metadata["unit"], where)
     if name in SPEED_AXES and ends.start * ends.stop < 0:
-        told = f"from {ends.start:g} to {ends.stop:g}"
-        raise InputError(f"{where}: the range {told} holds 0, which is no speed; take one side of it")
+        span = f"from {ends.start:g} to {ends.stop:g}"
+        raise InputError(
+            f"{where}: the range {span} contains 0, which is not a valid speed; use one sign only"
+        )
     return replace(_axis(name, declared, (ends.start, ends.stop), where), drawn_from=ends)
 
 
@@ -195,7 +197,7 @@ def _long_name(name: str) -> str:
 
 
 def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
-    """Return dotted keys and values of a table in which `stator.angle = 0` may stand without quotes."""
+    """Return dotted keys and values of a table in which `stator.angle = 0` may be written without quotes."""
     pairs: list[tuple[str, Any]] = []
     for key, value in table.items():
         is_table = isinstance(value, dict) and value and not set(value) & set(_TABLE_KEYS)
@@ -210,9 +212,9 @@ def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
     try:
         return find_key(rig, name)
     except InputError as error:
-        mend = nearest(name, _OWN)
-        if "." not in name and "?" in mend:
-            raise InputError(f"{where}: unknown axis; {mend}") from None
+        hint = nearest(name, _OWN)
+        if "." not in name and "?" in hint:
+            raise InputError(f"{where}: unknown axis; {hint}") from None
         if str(error).startswith("unknown key") and "?" not in str(error):
             raise InputError(
                 f"{where}: unknown axis; there is {', '.join(_OWN)} and any key of the rig"
@@ -221,7 +223,7 @@ def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
 
 
 def _read_table(table: Mapping[str, object], where: str) -> tuple[object, str]:
-    """What stands for the values in `{values, sweep}` or a range with a sweep, and how they are swept."""
+    """The values in `{values, sweep}` or a range with a sweep, and how they are swept."""
     for key in table:
         if key not in _TABLE_KEYS:
             raise InputError(f"{where}: unknown key {brief(key)} in a range; {nearest(key, _TABLE_KEYS)}")
@@ -233,7 +235,7 @@ def _read_table(table: Mapping[str, object], where: str) -> tuple[object, str]:
         return rest, str(sweep)
     if len(rest) > 1:
         other = next(key for key in rest if key != "values")
-        raise InputError(f"{where}: {other} stands beside values; give a range or values, one of the two")
+        raise InputError(f"{where}: {other} conflicts with values; give either a range or values")
     if isinstance(rest["values"], dict):
         raise InputError(f"{where}: values: {brief(rest['values'])} is no list; write values = [...]")
     return rest["values"], str(sweep)
@@ -268,7 +270,7 @@ def _problem(name: str, values: tuple[float, ...], *, is_drawn: bool = False) ->
     if not is_drawn and len(set(values)) < len(values):
         ordered = sorted(values)
         twice = next(v for v, following in itertools.pairwise(ordered) if v == following)
-        return f"{twice:.12g} stands twice; leave one out"
+        return f"{twice:.12g} is duplicated; remove one"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""What the axes of a study amount to, case by case: rig, spin speed, clearance, free amplitude, steps."""
+"""Operating points: rig, spin speed, clearance, contact-free amplitude and predicted steps of each case."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
 _EVENT_STEPS = 60  # that the modal scheme takes a revolution, samples apart
 _TOUCHING = 0.15  # share of the time in contact, where it takes short steps there
-_MOST_RIGS = 256  # asked for their step, 1 ms each; of more, the first stands for all
+_MOST_RIGS = 256  # whose time step is determined, 1 ms each; with more, that of the first is used for all
 
 
 class OperatingPoints:
-    """Values on the axes, resolved: ratios to SI units, keys to rigs. What is costly is kept for reuse.
+    """Values on the axes, resolved: ratios to SI units, keys to rigs. Expensive results are cached.
 
     Parameters
     ----------
@@ -44,13 +44,13 @@ class OperatingPoints:
     points : Points
         Where the cases lie; an index here is one along its dimensions.
     costly_dims : list of int
-        The dimensions along which speed or rig change: cases apart on them share no setup.
+        The dimensions along which speed or rig change: cases that differ there share no setup.
 
     Raises
     ------
     InputError
-        When the step asked for is above the stability limit of a rig, or nothing holds a rig that the modal
-        scheme is to solve.
+        When the time step exceeds the stability limit of a rig, or the modal scheme meets a rig with a
+        rigid-body mode.
     """
 
     def __init__(self, study: Study) -> None:
@@ -59,21 +59,21 @@ class OperatingPoints:
         self._values = [axis.values for axis in study.axes]
         names = [axis.name for axis in study.axes]
         self._speed_axis, self._clearance_axis, self._friction_axis = (
-            next(i for i, name in enumerate(names) if name in ways)
-            for ways in (SPEED_AXES, CLEARANCE_AXES, ("friction",))
+            next(i for i, name in enumerate(names) if name in options)
+            for options in (SPEED_AXES, CLEARANCE_AXES, ("friction",))
         )
         self._is_speed_ratio = names[self._speed_axis] == "speed_ratio"
         self._is_clearance_ratio = names[self._clearance_axis] == "clearance_ratio"
         self._rig_axes = [i for i, axis in enumerate(study.axes) if axis.is_rig_key]
         rotor_axes = [i for i in self._rig_axes if names[i].startswith("rotor.")]
-        # The contact-free response knows the rotor, and of the stators the node at which it is read.
+        # The contact-free response depends on the rotor, and on the stator's node, at which it is evaluated.
         node_axes = [
             i for i in self._rig_axes if names[i].startswith("stator.") and names[i].endswith(".node")
         ]
         self._response_axes = sorted(rotor_axes + node_axes)
         self._speed_setters = [*(rotor_axes if self._is_speed_ratio else ()), self._speed_axis]
         self.costly_dims = self._dims(self._speed_axis, *self._rig_axes)
-        # All are kept by values, not by places: where axes share a dimension, few of them may matter here.
+        # Cached by value, not by index: of axes that share a dimension only some may matter here.
         self._rig_at = lru_cache(maxsize=256)(self._make_rig)
         self._model_at = lru_cache(maxsize=4)(self._make_model)
         self._unit_speed_at = lru_cache(maxsize=65536)(self._make_unit_speed)
@@ -161,7 +161,7 @@ class OperatingPoints:
 
     @property
     def _is_few(self) -> bool:
-        """Whether every rig of the study can be asked before the run."""
+        """Whether every rig of the study can be assembled before the run."""
         return math.prod(self.points.shape[dim] for dim in self._dims(*self._rig_axes)) <= _MOST_RIGS
 
     def _dims(self, *axes: int) -> list[int]:

@@ -2,7 +2,7 @@
 
 The points are Saltelli's: a and b from one point of a scrambled Sobol' sequence, and between them a with one
 value after the other taken from b (A. Saltelli et al., Comput. Phys. Commun. 181, 2010). The cases of a point
-follow one another, and a longer sequence goes on where a shorter one ends.
+follow one another, and a longer sequence continues a shorter one.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rubhpc.study.tables import Sample
 
 CASE = "case"  # the dimension of all that is drawn
-MOST_DRAWN = 2_000_000  # cases; beyond, a slip of the pen fills the memory
+MOST_DRAWN = 2_000_000  # cases; a larger number is taken for a mistake: it would fill the memory
 
 
 def cases_per_point(n_range: int) -> int:
@@ -48,8 +48,8 @@ def draw(axes: Sequence[Axis], sample: Sample) -> tuple[Axis, ...]:
         raise InputError(f"[sample]: {what}; write two {{ start, stop }} at least, or leave [sample] out")
     n_case = sample.n * cases_per_point(len(ranges))
     if n_case > MOST_DRAWN:
-        told = f"{sample.n} points of {len(ranges)} ranges make {n_case} cases"
-        raise InputError(f"[sample] n: {told}, too many; at most {MOST_DRAWN}, take a smaller n")
+        size = f"{sample.n} points of {len(ranges)} ranges make {n_case} cases"
+        raise InputError(f"[sample] n: {size}, too many; the limit is {MOST_DRAWN}, use a smaller n")
     # Of the unit cube: what SALib would make of ranges may change with its version.
     shares = iter(_design(len(ranges), sample).T)
     return tuple(

@@ -78,7 +78,7 @@ class Study:
         With the study's overrides applied.
     axes : tuple of Axis
         The cases are the Cartesian product of their dimensions, the last one running fastest. An axis that is
-        swept both ways brings a last one, `direction`.
+        swept in both directions adds a last one, `direction`.
     sample : Sample or None
         How some of the axes have been drawn (`rubhpc.study.sampling.draw`).
     output : Path
@@ -152,7 +152,7 @@ def read_study(
     Raises
     ------
     InputError
-        When the file or its rig cannot be used as it stands; one line with file, table, key and mend.
+        When the file or its rig is invalid; one line with file, table, key and how to fix it.
     """
     source = Path(path)
     file = str(source)
@@ -217,7 +217,7 @@ def _read_axes(table: dict[str, Any], rig: Rig, sample: Sample | None, file: str
     names = [name for name, _ in pairs]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"{place(file, 'grid', name)}: stands twice; leave one out")
+            raise InputError(f"{place(file, 'grid', name)}: is duplicated; remove one")
     if sample is None:
         return tuple(make_axis(name, values, rig, file) for name, values in pairs)
     axes = [(make_range if isinstance(v, dict) else make_axis)(name, v, rig, file) for name, v in pairs]
@@ -229,16 +229,16 @@ def _read_axes(table: dict[str, Any], rig: Rig, sample: Sample | None, file: str
 
 def _check_axes(axes: tuple[Axis, ...]) -> None:
     names = [axis.name for axis in axes]
-    for ways, example in (
+    for options, example in (
         (SPEED_AXES, "speed_ratio = [0.75, 1.5]"),
         (CLEARANCE_AXES, "clearance_ratio = 0.7"),
         (("friction",), "friction = 0.3"),
     ):
-        given = [name for name in names if name in ways]
+        given = [name for name in names if name in options]
         if not given:
-            raise InputError(f"[grid] {ways[0]}: missing; add {' or '.join(ways)}, such as {example}")
+            raise InputError(f"[grid] {options[0]}: missing; add {' or '.join(options)}, such as {example}")
         if len(given) > 1:
-            raise InputError(f"[grid] {given[1]}: stands beside {given[0]}; give one of them")
+            raise InputError(f"[grid] {given[1]}: conflicts with {given[0]}; give only one of them")
     swept = [axis.name for axis in axes if axis.sweep != FROM_REST]
     if len(swept) > 1:
         raise InputError(f"[grid] {swept[1]}: sweep: {swept[0]} is swept already; leave one of the two out")
@@ -247,8 +247,8 @@ def _check_axes(axes: tuple[Axis, ...]) -> None:
     taken: dict[str, str] = {}
     for axis in axes:
         if axis.coordinate in _RESERVED:
-            mend = "name one stator, such as stator.1.lateral" if axis.is_rig_key else "leave it out"
-            raise InputError(f"[grid] {axis.name}: a store has another {axis.coordinate}; {mend}")
+            fix = "name one stator, such as stator.1.lateral" if axis.is_rig_key else "remove it"
+            raise InputError(f"[grid] {axis.name}: {axis.coordinate} is another variable of a store; {fix}")
         if axis.coordinate in taken:
             raise InputError(
                 f"[grid] {axis.name}: is the same dimension as {taken[axis.coordinate]}; leave one out"
@@ -278,8 +278,8 @@ def _check_rigs(rig: Rig, rig_axes: list[Axis], axes: tuple[Axis, ...]) -> None:
         except InputError as error:
             if not case:
                 raise
-            told = ", ".join(f"{name} = {value:g}" for name, value in case.items())
-            raise InputError(f"[grid] {told}: the rig cannot be so: {error}") from None
+            values_text = ", ".join(f"{name} = {value:g}" for name, value in case.items())
+            raise InputError(f"[grid] {values_text}: invalid rig: {error}") from None
 
 
 def _check_rig(rig: Rig, axes: tuple[Axis, ...]) -> None:

@@ -164,7 +164,7 @@ def test_plan_run_status_verify(capsys, tmp_path):
     assert out.splitlines() == ["tiny", "12 cases: 12 done, 0 failed, 0 diverged, 0 missing"]
 
     code, out, err = call(capsys, "verify", store)
-    assert (code, out, err) == (0, "12 cases checked, all sound\n", "")
+    assert (code, out, err) == (0, "12 cases checked, no damage\n", "")
 
 
 def test_plan_foresees_what_the_store_holds(capsys, tmp_path):

@@ -129,5 +129,5 @@ def test_the_command_names_the_damage_though_the_store_is_in_use(store):
     assert line.startswith(f"rubhpc: {store}: damage in 2 cases and 0 arrays; not marked for the next run: ")
     again = run("verify", store)
     assert (
-        again.stderr == f"rubhpc: {store}: damage in 2 cases and 0 arrays; run its study again to mend it\n"
+        again.stderr == f"rubhpc: {store}: damage in 2 cases and 0 arrays; run its study again to repair it\n"
     )

@@ -35,7 +35,7 @@ def check_outcome(store: Path, reason: str) -> None:
     assert {flat for flat in range(6) if ledger.status[flat] == FAILED} == {1, 4}
     assert len(ledger.reasons) == GUILTY
     assert all(reason in text for text in ledger.reasons.values()), ledger.reasons
-    assert list((store / ".rubhpc" / "hand").iterdir()) == []
+    assert list((store / ".rubhpc" / "in_progress").iterdir()) == []
 
 
 @each_launcher

@@ -39,8 +39,8 @@ def seconds_until_gone(store: Path) -> float:
 
 def wait_until_computing(job: subprocess.Popen[str], store: Path) -> None:
     """Return once a rank has a case in hand, or all is done."""
-    before = set((store / ".rubhpc" / "hand").glob("*"))
-    while job.poll() is None and set((store / ".rubhpc" / "hand").glob("*")) <= before:
+    before = set((store / ".rubhpc" / "in_progress").glob("*"))
+    while job.poll() is None and set((store / ".rubhpc" / "in_progress").glob("*")) <= before:
         time.sleep(0.01)
 
 
@@ -75,7 +75,7 @@ def storm(folder: Path, launcher: Launcher, n_kill: int, n_friction: int, seed: 
     again = len(count.read_text().splitlines()) - n_case
     assert 0 <= again <= n_kill * RANKS * BLOCK
     assert not (Store(store).replay().status == MISSING).any()
-    assert list((store / ".rubhpc" / "hand").iterdir()) == []
+    assert list((store / ".rubhpc" / "in_progress").iterdir()) == []
     print(
         f"\n{launcher.name}: {n_kill - n_finished} kills of mpirun with {RANKS} ranks: {again} of {n_case} "
         f"cases computed twice (at most {n_kill * RANKS * BLOCK}), last process gone after {slowest:.1f} s"

@@ -294,7 +294,7 @@ def test_a_sweep_is_part_of_what_a_study_is(finished, tmp_path):
 
 def test_the_plan_tells_how_many_ranks_have_work(finished):
     plan = make_plan(finished)
-    assert "12, at most 2 cases each; in 4 chains: more ranks than that would idle" in plan.text()
+    assert "12, at most 2 cases each; in 4 sequential sweeps: more ranks than that would idle" in plan.text()
     assert plan.counts[DONE] == 20
 
 

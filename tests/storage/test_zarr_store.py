@@ -379,6 +379,6 @@ def test_a_file_on_the_way_to_a_store_is_told_with_the_mend(tmp_path):
     store = tmp_path / "taken" / "study.zarr"
     with pytest.raises(StoreError, match="--output"), disk_errors(store):
         store.mkdir(parents=True)
-    with pytest.raises(StoreError, match="a file stands in its way"), disk_errors(store):
+    with pytest.raises(StoreError, match="a file of that name exists"), disk_errors(store):
         store.parent.mkdir(parents=True)
     assert (tmp_path / "taken").read_text() == "mine"

@@ -45,11 +45,11 @@ def test_a_swept_axis_rises_whatever_the_order_it_is_written_in(name, given, val
         ({"values": [0.1], "sweep": "sideways"}, "choose one of from_rest, up, down, both"),
         ({"values": [0.1], "sweep": 3}, "sweep: 3 is unknown; choose one of from_rest, up, down, both"),
         ({"values": [0.1], "swep": "up"}, 'unknown key "swep" in a range; did you mean sweep'),
-        ({"values": [0.1], "start": 1.0}, "start stands beside values; give a range or values"),
+        ({"values": [0.1], "start": 1.0}, "start conflicts with values; give either a range or values"),
         ({"values": {"start": 0.1, "stop": 0.2, "num": 2}}, r"write values = \[...\]"),
         ({"sweep": "up"}, "a range needs start"),
         ({"values": [], "sweep": "up"}, "empty; give at least one value"),
-        ({"values": [0.1, 0.1], "sweep": "up"}, "0.1 stands twice"),
+        ({"values": [0.1, 0.1], "sweep": "up"}, "0.1 is duplicated"),
     ],
 )
 def test_what_cannot_be_swept_is_refused_in_a_line(given, told):

@@ -138,7 +138,7 @@ def test_a_store_tells_its_sample(tmp_path):
     [
         ("n = 8", "n = 12", "[sample] n: 12 is no power of two"),
         ("n = 8", "n = 4", "[sample] n: 4 is out of range; it must be at least 8"),
-        ("n = 8", "n = 1048576", "4194304 cases, too many; at most 2000000, take a smaller n"),
+        ("n = 8", "n = 1048576", "4194304 cases, too many; the limit is 2000000, use a smaller n"),
         ("n = 8", "", "[sample] n: missing; add n = 1024"),
         (
             "n = 8",
@@ -156,7 +156,7 @@ def test_a_store_tells_its_sample(tmp_path):
         ),
         ("stop = 2.4", 'stop = 2.4, sweep = "up"', "sweep: the cases of a sample have no neighbours"),
         ("stop = 2.4", "stpo = 2.4", 'unknown key "stpo" in a range; did you mean stop?'),
-        ("start = 1.2", "start = -1.2", "holds 0, which is no speed"),
+        ("start = 1.2", "start = -1.2", "contains 0, which is not a valid speed"),
         ("start = 0.05", "start = 0", "a logarithmic range from 0 to 0.5"),
         ('"log"', '"loog"', 'scale "loog" is unknown'),
         ("{ start = 1.2, stop = 2.4 }", "1.7", "friction is the only range; write two"),
@@ -165,7 +165,7 @@ def test_a_store_tells_its_sample(tmp_path):
         (
             "[integrator]",
             '"rotor.shaft.inner_diameter" = { start = "1 mm", stop = "3 cm" }\n[integrator]',
-            "rotor.shaft.inner_diameter = 0.03: the rig cannot be so",
+            "rotor.shaft.inner_diameter = 0.03: invalid rig",
         ),
     ],
 )

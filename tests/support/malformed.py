@@ -105,12 +105,15 @@ CASES = [
     _study("no friction", _FRICTION, "", "[grid] friction: missing"),
     _study("no speed", _SPEED, "", "[grid] speed_ratio: missing", "speed"),
     _study("no clearance", _GAP, "", "[grid] clearance_ratio: missing", "clearance"),
-    _study("two speeds", _SPEED, f"{_SPEED}\nspeed = 100", "[grid] speed: stands beside speed_ratio"),
-    _study("two clearances", _GAP, f"{_GAP}\nclearance = 1e-4", "[grid] clearance: stands beside"),
+    _study("two speeds", _SPEED, f"{_SPEED}\nspeed = 100", "[grid] speed: conflicts with speed_ratio"),
+    _study("two clearances", _GAP, f"{_GAP}\nclearance = 1e-4", "[grid] clearance: conflicts with"),
     _study("axis empty", _FRICTION, "friction = []", "[grid] friction: empty"),
-    _study("value twice", _FRICTION, "friction = [0.1, 0.3, 0.1]", "[grid] friction: 0.1 stands twice"),
+    _study("value twice", _FRICTION, "friction = [0.1, 0.3, 0.1]", "[grid] friction: 0.1 is duplicated"),
     _study(
-        "value twice, units apart", _FRICTION, 'friction = [0.1, "10 %"]', "[grid] friction: 0.1 stands twice"
+        "value twice, units apart",
+        _FRICTION,
+        'friction = [0.1, "10 %"]',
+        "[grid] friction: 0.1 is duplicated",
     ),
     _study("not a number", _FRICTION, "friction = nan", "[grid] friction: nan is not finite"),
     _study("infinite", _SPEED, "speed_ratio = [1, inf]", "[grid] speed_ratio: inf is not finite"),
@@ -179,7 +182,7 @@ CASES = [
         "axis twice",
         _FRICTION,
         f'{_FRICTION}\n"stator.angle" = 0\nstator.angle = 1',
-        "stator.angle: stands twice",
+        "stator.angle: is duplicated",
     ),
     # the other tables
     _study("override unknown", "stator.length", "stator.lengths", "[override] stator.lengths: unknown key"),
