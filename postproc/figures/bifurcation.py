@@ -97,7 +97,7 @@ def default_coloring(store: xr.Dataset, color: str | None = None) -> str:
     ways = store.sizes.get(DIRECTION, 1)
     if color == DIRECTION and ways < 2:
         raise InputError(
-            f'{source(store)}: color: no two directions to tell apart; sweep an axis "both" ways, '
+            f'{source(store)}: color: the store has one direction; sweep an axis "both" ways, '
             'or color by "regime"'
         )
     return color or (DIRECTION if ways > 1 else "regime")

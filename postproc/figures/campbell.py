@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-# Colour and dashes of each motion, told apart without colour as well.
+# Colour and dashes of each motion, distinct without colour as well.
 STYLES: dict[str, dict[str, Any]] = {
     "forward": {"color": "C1", "linestyle": "-"},
     "backward": {"color": "C0", "linestyle": (0, (4, 4)), "zorder": 2.5},  # a forward mode shows between

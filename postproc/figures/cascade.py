@@ -170,7 +170,7 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
 
 
 def default_limit(spectra: xr.DataArray, frequencies: Mapping[str, xr.DataArray | float]) -> float:
-    """Return where a cascade ends unless told, Hz: past the modes named and the highest spin speed."""
+    """Return the default end of a cascade, Hz: past the modes named and the highest spin speed."""
     modes = [2 * float(np.max(f)) for f in frequencies.values()]
     fastest = float(np.nanmax(spectra["spin_speed"].values)) / (2 * math.pi)
     limit = max(*modes, 1.25 * fastest) if modes else 4 * fastest

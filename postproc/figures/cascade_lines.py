@@ -62,7 +62,7 @@ def draw_frequencies(
     abscissa: str = "frequency",
     color: str = "C1",
 ) -> Axes:
-    """Add natural frequencies (Hz) as dashed lines named beside; they may vary along it.
+    """Add natural frequencies (Hz) as dashed, named lines; they may vary along the axis.
 
     In full spectra each has its twin, without a name, on the backward side.
     """
@@ -70,7 +70,7 @@ def draw_frequencies(
     left, right = ax.get_xlim()
     ends = ax.get_ylim()
     style: dict[str, Any] = {"color": color, "linewidth": 0.7, "linestyle": "--", "zorder": 5}
-    named: list[tuple[float, float]] = []  # ends of the names that stand above the axes
+    named: list[tuple[float, float]] = []  # ends of the names above the axes
     for name, frequency in frequencies.items():
         values = np.broadcast_to(np.asarray(frequency, dtype=float), rows.shape)
         x = values if abscissa == "frequency" else values / rate
@@ -98,7 +98,7 @@ def draw_frequencies(
 
 
 def ordinate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], str]:
-    """Return where the rows stand, and the label; the logarithm of values that are spaced by a ratio."""
+    """Return the ordinates of the rows and the label; the logarithm of values that are spaced by a ratio."""
     rows, label = displayed(spectra[spectra.dims[0]])
     return np.log10(rows) if is_geometric(np.sort(rows)) else rows, label
 

@@ -42,7 +42,7 @@ def orbit(cases: xr.Dataset, *, revolutions: Count | None = None, over: Axis | N
 def draw_orbit(data: xr.Dataset, ax: Axes) -> Axes:
     """Draw an orbit, or those along one axis over one another; positive spin turns clockwise.
 
-    One case also shows the clearance circle, where its stators stand, the first sample (ring), one point a
+    One case also shows the clearance circle, its stators, the first sample (ring), one point a
     revolution (dots) and the sense of whirl (arrow).
     """
     vertical, horizontal = data["vertical"].load(), data["horizontal"].load()
@@ -66,7 +66,7 @@ def draw_orbit(data: xr.Dataset, ax: Axes) -> Axes:
 def _draw_one(vertical: xr.DataArray, horizontal: xr.DataArray, ax: Axes, factor: float) -> None:
     n = samples_per_revolution(vertical)
     y, z = vertical.values * factor, horizontal.values * factor
-    # A closed orbit is drawn closed: the last sample stands one interval short of the first.
+    # A closed orbit is drawn closed: the last sample is one interval before the first.
     is_closed = np.hypot(y[-1] - y[0], z[-1] - z[0]) < 3 * np.hypot(y[1] - y[0], z[1] - z[0])
     path = np.append(np.arange(y.size), 0) if is_closed else np.arange(y.size)
     ax.plot(z[path], y[path], color="C0", linewidth=0.5, zorder=3)

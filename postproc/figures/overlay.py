@@ -21,13 +21,13 @@ def overlaid(data: xr.DataArray, own: str) -> list[tuple[str | None, xr.DataArra
     Raises
     ------
     InputError
-        There are more curves than can be told apart.
+        There are more curves than can be distinguished.
     """
     over = next((d for d in data.dims if d != own), None)
     if over is None:
         return [(None, data)]
     n_curve = data.sizes[over]
     if n_curve > MOST:
-        mend = f"keep at most {MOST}, as in --select {over}=VALUE,VALUE"
-        raise InputError(f"{over}: {n_curve} curves over one another cannot be told apart; {mend}")
+        hint = f"keep at most {MOST}, as in --select {over}=VALUE,VALUE"
+        raise InputError(f"{over}: {n_curve} curves over one another cannot be distinguished; {hint}")
     return [(written_value(data[over][i]), data.isel({over: i})) for i in range(n_curve)]

@@ -58,7 +58,7 @@ def categories(variable: str, codes: NDArray[np.integer]) -> dict[int, tuple[str
 
     present = [int(c) for c in np.unique(codes) if c >= 0]
     if variable == "period":
-        # The short ones have colours of their own, the longer ones darken, and 0, none, stands apart.
+        # The short ones have colours of their own, the longer ones darken, and 0, none, is distinct.
         longer = [c for c in present if c >= len(PERIOD_COLORS)]
         ramp = matplotlib.colormaps["Greys"](np.linspace(0.45, 1.0, max(len(longer), 2)))
         colors = {**dict(enumerate(PERIOD_COLORS)), **dict(zip(longer, ramp, strict=False))}

@@ -124,7 +124,7 @@ def draw_spectrum(
 
 
 def default_limit(amplitude: xr.DataArray, abscissa: str = "frequency") -> float:
-    """Return where the abscissa ends unless told: beyond the strongest lines, and not before 4X."""
+    """Return the default end of the abscissa: beyond the strongest lines, and not before 4X."""
     ends: list[float] = []
     for _, curve in overlaid(amplitude, "order"):
         first = float(curve[abscissa].values[-1] / curve["order"].values[-1])  # 1X
@@ -142,7 +142,7 @@ def _name_lines(ax: Axes, lines: xr.Dataset, factor: float, abscissa: str) -> No
     for i in range(lines.sizes["line"]):
         x, y = float(lines[abscissa].values[i]), float(lines["amplitude"].values[i]) * factor
         across, up = to_axes.transform((x, y))
-        # Names of backward and forward lines stand on their outer sides, clear of one another.
+        # Names of backward and forward lines are on their outer sides, clear of one another.
         across += 0.045 * np.sign(x) if is_full else 0.0
         if not 0 <= across <= 1 or any(abs(across - a) < 0.09 and abs(up - b) < 0.08 for a, b in taken):
             continue

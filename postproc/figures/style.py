@@ -54,7 +54,7 @@ def figure_size(n_panel: int, height: float | None, width: float | None) -> tupl
 
 
 def check_figure_path(path: str | Path) -> Path:
-    """Return `path` where a figure can be written to it; InputError with the mend where not."""
+    """Return `path` where a figure can be written to it; InputError where it cannot."""
     path = Path(path)
     if path.suffix.lstrip(".").lower() not in FORMATS:
         raise InputError(

@@ -61,7 +61,7 @@ def test_a_diagram_tells_the_directions_apart_unless_one_is_chosen(store):
     assert default_coloring(store) == "direction"
     one = select(store, {"direction": "up", "clearance_ratio": 0.7})
     assert default_coloring(one) == "regime"
-    with pytest.raises(InputError, match='no two directions to tell apart; sweep an axis "both" ways'):
+    with pytest.raises(InputError, match='the store has one direction; sweep an axis "both" ways'):
         default_coloring(one, "direction")
     data = sections_along(select(store, {"clearance_ratio": 0.7}), "vertical", "speed_ratio", "direction")
     ax = draw_bifurcation(data, "vertical", Figure(layout="constrained").add_subplot(), "direction")

@@ -88,7 +88,7 @@ def test_each_value_of_a_list_has_its_panel(cases):
             "friction: is an axis: name it with --facet; the sample has speed_ratio, stator_",
         ),
         ({"x": "speed"}, "speed: was not drawn; the sample has speed_ratio"),
-        ({"x": "speed_ratio", "y": "speed_ratio"}, "speed_ratio stands on both axes"),
+        ({"x": "speed_ratio", "y": "speed_ratio"}, "speed_ratio is on both axes"),
         ({"contours": 3}, "points of a sample have no contours"),
     ],
 )
