@@ -18,7 +18,7 @@ from rubhpc.running.stopping import Stopped
 from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING
 from rubhpc.storage.disk import disk_errors, flush_to_disk
 from rubhpc.storage.journal import Entry
-from rubhpc.storage.measures import blank_records
+from rubhpc.storage.measures import missing_value
 from rubhpc.storage.store import case_checksum
 
 if TYPE_CHECKING:
@@ -269,9 +269,9 @@ def put(record: Record, data: Arrays, i_case: int) -> None:
 
 def packed_measures(record: Record, kind: np.dtype[np.void]) -> NDArray[np.void]:
     """The measures of a record, packed; one that this version does not know is missing."""
-    row = blank_records((), kind)
-    for name in set(kind.names or ()) & set(record.measures):
-        row[name] = record.measures[name]
+    row = np.zeros((), kind)
+    for name in kind.names or ():
+        row[name] = record.measures[name] if name in record.measures else missing_value(kind[name])
     return row
 
 

@@ -86,11 +86,16 @@ def measures_type(measures: Measures, n_stator: int) -> np.dtype[np.void]:
     return record_type(columns(measures, n_stator))
 
 
+def missing_value(kind: np.dtype[Any]) -> float:
+    """Value of a measure that a case does not have: NaN, or -1 in integers."""
+    return np.nan if kind.base.kind == "f" else -1
+
+
 def blank_records(shape: int | tuple[int, ...], kind: np.dtype[np.void]) -> NDArray[np.void]:
     """Records in which every measure is missing: NaN, or -1 in integers."""
     records = np.zeros(shape, kind)
     for name in kind.names or ():
-        records[name] = np.nan if kind[name].base.kind == "f" else -1
+        records[name] = missing_value(kind[name])
     return records
 
 
