@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
 # Colour and dashes of each motion, distinct without colour as well.
 STYLES: dict[str, dict[str, Any]] = {
@@ -23,6 +24,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "axial": {"color": "C3", "linestyle": (0, (1, 1.2))},
 }
 ORDERS = (1, 2)
+_NEAR = 0.03  # of the abscissa: critical speeds closer than this share a number
 _CRITICAL: dict[str, Any] = {
     "linestyle": "", "marker": "o", "markersize": 3, "color": "k", "markerfacecolor": "white", "zorder": 3,
 }  # fmt: skip
@@ -61,6 +63,7 @@ def campbell_diagram(
     if critical:
         speeds = np.array([speed for _, speed in critical])
         ax.plot(30 / math.pi * speeds, speeds / (2 * math.pi), **_CRITICAL)
+        _number(ax, speeds)
     ax.set(xlabel="Spin speed (rpm)", ylabel="Natural frequency (Hz)")
     ax.ticklabel_format(style="plain")
     ax.locator_params(axis="x", nbins=6)  # six digits of rpm take their room
@@ -81,6 +84,26 @@ def _stretches(words: list[str]) -> Iterator[tuple[str, slice]]:
     starts = [0, *(i for i in range(1, len(words)) if words[i] != words[i - 1]), len(words)]
     for start, end in pairwise(starts):
         yield words[start], slice(start, end + 1)
+
+
+def _number(ax: Axes, speeds: NDArray[np.float64]) -> None:
+    """Write each critical speed, rpm, below its marker; of those that nearly coincide only the first."""
+    right = ax.get_xlim()[1]
+    last = -math.inf
+    for rpm in sorted(30 / math.pi * speeds):
+        if not last < rpm - _NEAR * right or rpm > right:
+            continue
+        last = rpm
+        is_right = rpm > (1 - _NEAR) * right
+        ax.annotate(
+            f"{rpm:.0f}",
+            (rpm, rpm / 60),
+            xytext=(-3 if is_right else 3, -2),
+            textcoords="offset points",
+            ha="right" if is_right else "left",
+            va="top",
+            fontsize=6,
+        )
 
 
 def _draw_order(ax: Axes, order: int) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rubhpc.commands.quantity import quantity
+from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,15 +26,46 @@ N_SPEED = 61  # of a Campbell diagram: curves are smooth, and each speed is an e
     "--speed", "speeds", multiple=True, metavar="SPEED", help='"1800 rpm", or rad/s; may be repeated.'
 )
 @click.option("--count", type=click.IntRange(min=1), help="Show only the lowest COUNT modes of each body.")
+@click.option(
+    "--range",
+    "speed_range",
+    nargs=2,
+    metavar="LOW HIGH",
+    help="Critical speeds, unbalance response, sag and stability from LOW to HIGH.",
+)
+@click.option(
+    "--operating", nargs=2, metavar="LOW HIGH", help="Operating speeds, for separation margins (API 617)."
+)
+@click.option(
+    "--response",
+    "nodes",
+    type=int,
+    multiple=True,
+    metavar="NODE",
+    help="Unbalance response at NODE; may be repeated. With --figure, draw it at the first.",
+)
+@click.option("--shapes", is_flag=True, help="With --figure, draw the mode shapes at the critical speeds.")
+@click.option(
+    "--data",
+    metavar="FILE",
+    help="Write the data of --response or --shapes (.csv, .json, .zarr, .nc), or else all of the design.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 @click.option(
-    "--figure", type=click.Path(dir_okay=False), help="Draw a Campbell diagram up to the highest speed."
+    "--figure",
+    type=click.Path(dir_okay=False),
+    help="Draw a Campbell diagram up to the highest speed, or what --response or --shapes names.",
 )
 @click.option("--trust-rig", is_flag=True, help="Run the Python code of a RIG that is FILE.py:FUNCTION.")
 def modes(
     rig: str,
     speeds: tuple[str, ...],
     count: int | None,
+    speed_range: tuple[str, str] | None,
+    operating: tuple[str, str] | None,
+    nodes: tuple[int, ...],
+    shapes: bool,
+    data: str | None,
     as_json: bool,
     figure: str | None,
     trust_rig: bool,
@@ -41,29 +73,69 @@ def modes(
     """Natural frequencies, damping ratios, kind and whirl of the modes of RIG.
 
     RIG is the name of a packaged rig, the path of a rig file, or FILE.py:FUNCTION. Without --speed the rotor
-    stands still.
+    stands still. --range, --operating, --response, --shapes or --data add a linear design: critical speeds,
+    peaks of the unbalance response with amplification factor and separation margin, static sag, stability.
     """
+    from postproc.figures.linear_design import mode_shapes, unbalance_response
     from postproc.figures.style import check_figure_path
+    from postproc.store.export import check_data_path, write_data
+    from rubhpc.commands.design import plain_design, print_design
     from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.linear_design import linear_design
     from rubhpc.fem.modes import modes as find_modes
+    from rubhpc.fem.stability import instability_message
     from rubhpc.rig.reading import read_rig
 
+    if nodes and shapes:
+        raise InputError("--shapes: conflicts with --response; give one of them")
+    if data and not (nodes or shapes) and check_data_path(data).suffix == ".csv":
+        raise InputError(
+            f"--data {data}: a whole design is no table; add --response or --shapes, or name it .nc"
+        )
     spins = [quantity(speed, "rad/s", "--speed") for speed in speeds] or [0.0]
     path = check_figure_path(figure) if figure else None
-    model = assemble(read_rig(rig, trust_rig=trust_rig))
+    read = read_rig(rig, trust_rig=trust_rig)
+    model = assemble(read)
     # stators do not spin: their modes hold at every speed
     stators = [find_modes(stator.body)[:count] for stator in model.stators]
     found = [(spin, find_modes(model.rotor, spin)[:count]) for spin in spins]
+    for spin in spins:
+        if message := instability_message(model, spin):
+            click.echo(f"warning: {message}", err=True)
+    design = None
+    if speed_range or operating or nodes or shapes or data:
+        design = linear_design(
+            read,
+            _ends(speed_range, "--range"),
+            operating=_ends(operating, "--operating"),
+            nodes=list(nodes) or None,
+        )
     if as_json:
         standing = [[_plain(mode) for mode in stator] for stator in stators]
         points = [
             {"speed": spin, "rotor": [_plain(m) for m in rotor], "stators": standing} for spin, rotor in found
         ]
-        click.echo(json.dumps({"speeds": points}))
+        added = plain_design(design, list(nodes)) if design is not None else {}
+        click.echo(json.dumps({"speeds": points} | added))
     else:
         _print_tables(found, stators, count or N_TABLE)
-    if path:
-        _draw(model, max(abs(spin) for spin in spins), count, path)
+        if design is not None:
+            print_design(design)
+    drawing = None
+    if design is not None and (nodes or shapes):
+        drawing = mode_shapes(design) if shapes else unbalance_response(design, nodes[0])
+    if data and design is not None:
+        click.echo(f"wrote {write_data(drawing.shown if drawing else design, data)}", err=True)
+    if path and drawing:
+        drawing.save(path)
+    elif path:
+        top_speed = design.attrs["speed_range"][1] if design is not None else max(abs(spin) for spin in spins)
+        _draw(model, top_speed, count, path)
+
+
+def _ends(pair: tuple[str, str] | None, option: str) -> tuple[float, float] | None:
+    """Both ends of a range of speeds, rad/s."""
+    return (quantity(pair[0], "rad/s", option), quantity(pair[1], "rad/s", option)) if pair else None
 
 
 def _plain(mode: Mode) -> dict[str, Any]:
@@ -106,14 +178,15 @@ def _draw(model: Model, top_speed: float, count: int | None, path: Path) -> None
     from postproc.figures.campbell import campbell_diagram
     from postproc.figures.style import house_style, new_figure, save
     from rubhpc.fem.campbell import campbell, critical_speeds
-    from rubhpc.fem.response import first_lateral_frequency
+    from rubhpc.fem.linear_design import checked_range
 
-    top_speed = top_speed or 6 * first_lateral_frequency(model)
-    curves = campbell(model.rotor, np.linspace(0.0, top_speed, N_SPEED))
+    low, high = checked_range(model, None)
+    low, high = (low, high) if not top_speed else (low if model.rotor.by_speed else 0.0, top_speed)
+    curves = campbell(model.rotor, np.linspace(low, high, N_SPEED))
     lowest = curves["frequency"].min("speed")
     limit = None
     if count is None:
-        limit = 1.02 * max(top_speed / math.pi, 1.1 * float(lowest[:4].max()))
+        limit = 1.02 * max(high / math.pi, 1.1 * float(lowest[:4].max()))
         curves = curves.isel(mode=(lowest < limit).values)
     else:
         curves = curves.isel(mode=slice(count))

@@ -16,6 +16,7 @@ from rubhpc.fem.response import first_lateral_frequency
 from rubhpc.fem.separation_margin import amplitude_over_speed, grid_through, response_peaks
 from rubhpc.fem.stability import logarithmic_decrement, threshold_speed
 from rubhpc.fem.unbalance_response import check_response_node, response_nodes, unbalance_response
+from rubhpc.rig.rotors import Rotor
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,7 +61,8 @@ def linear_design(
     -------
     xarray.Dataset
         Over (mode, speed): `frequency` and `damped_frequency` (Hz), `damping_ratio`, `logarithmic_decrement`,
-        `growth_rate` (1/s, positive where a motion grows), `whirl`; `kind` over mode.
+        `growth_rate` (1/s, positive where a motion grows), `whirl`; over mode: `kind`; over node:
+        `position` (m).
 
         Over (response_speed, node): what `unbalance_response` returns. Over (speed, node): `sag_vertical` and
         `sag_horizontal` (m), under gravity and constant loads.
@@ -94,6 +96,7 @@ def linear_design(
     design = xr.merge(
         [
             _modes(model, speeds, tracks),
+            _positions(rig, model),
             response,
             _sag(model, speeds),
             _critical(model, critical),
@@ -145,6 +148,17 @@ def _modes(model: Model, speeds: NDArray[np.float64], tracks: Sequence[tuple[Mod
         values = [[value(mode) for mode in track] for track in tracks]
         curves[name] = (("mode", "speed"), values, _unit(unit, title))
     return curves.assign_coords(mode=("mode", np.arange(1, len(tracks) + 1), {"long_name": "Mode"}))
+
+
+def _positions(rig: Rig, model: Model) -> xr.Dataset:
+    """Place of every node along the shaft, m; NaN for a rotor of matrices, which does not say."""
+    nodes = response_nodes(model)
+    positions = np.full(len(nodes), np.nan)
+    if isinstance(rig.rotor, Rotor):
+        lengths = [s.length / s.elements for s in rig.rotor.shaft for _ in range(s.elements)]
+        positions = np.concatenate([[0.0], np.cumsum(lengths)])[np.array(nodes) - 1]
+    place = ("node", positions, _unit("m", "Position along the shaft"))
+    return xr.Dataset(coords={"node": nodes, "position": place})
 
 
 def _sag(model: Model, speeds: NDArray[np.float64]) -> xr.Dataset:

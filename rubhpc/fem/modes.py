@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -114,6 +115,7 @@ def _groups(body: Body) -> list[list[int]]:
     return [np.flatnonzero(label == value).tolist() for value in np.unique(label)]
 
 
+@cache
 def _kind_of(name: str) -> str:
     return next((kind for kind, names in KINDS.items() if name in names), OTHER)
 
@@ -121,6 +123,8 @@ def _kind_of(name: str) -> str:
 def _kind(shape: Vector, mass: NDArray[np.float64], names: list[str]) -> str:
     """Kind of motion that has most of the kinetic energy."""
     kinds = [_kind_of(name) for name in names]
+    if kinds.count(kinds[0]) == len(kinds):
+        return kinds[0]
     share = np.real(shape.conj() * (mass @ shape))
     return max(dict.fromkeys(kinds), key=lambda kind: sum(share[[k == kind for k in kinds]]))
 

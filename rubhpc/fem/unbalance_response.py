@@ -56,7 +56,8 @@ def unbalance_response(
         Over (speed, node): `major_axis` and `minor_axis`, the semi-axes of the orbit, m; the minor one is
         negative where the orbit turns against the spin. Over (speed, node, probe): `amplitude`, m, zero to
         peak, and `phase`, rad, by which the displacement at the probe leads the shaft's angle, unwrapped
-        along the speed. Its displacement is `amplitude cos(spin t + phase)`; a lag counts negative.
+        along the speed, NaN at standstill. The displacement is `amplitude cos(spin t + phase)`; a lag is
+        negative.
 
     Raises
     ------
@@ -77,8 +78,9 @@ def unbalance_response(
     v, w = np.moveaxis(np.where(rows >= 0, response[:, rows], 0.0), -1, 0)
     forward, backward = np.abs(v + 1j * w) / 2, np.abs(v - 1j * w) / 2
     seen = np.stack([v * math.cos(angle) + w * math.sin(angle) for angle in probes], axis=-1)
-    phase = np.unwrap(np.angle(seen), axis=0)
-    phase -= 2 * math.pi * np.round(phase[:1] / (2 * math.pi))
+    phase = np.full(seen.shape, np.nan)  # where nothing moves there is none
+    moves = np.asarray(speeds) != 0.0
+    phase[moves] = np.unwrap(np.angle(seen[moves]), axis=0)
     over = ("speed", "node")
     return xr.Dataset(
         {

@@ -96,3 +96,59 @@ def test_help_loads_nothing_heavy():
     )
     output = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert output.rstrip().endswith("[]")
+
+
+RANGE = ("--range", "0 rpm", "3000 rpm")
+
+
+def test_design_is_printed_and_put_into_json():
+    output = run("mokhtar2017", "--count", "1", *RANGE, "--operating", "2400 rpm", "2800 rpm")
+    assert "Critical speeds from 0 to 3000 rpm" in output
+    rows = [line.split() for line in output.splitlines() if line.endswith("excites")]
+    assert [float(row[0]) for row in rows] == pytest.approx([1893.74], abs=0.01)
+    assert "Static sag: none" in output
+    assert "Stability: stable throughout; least logarithmic decrement of the modes reached 0.5038" in output
+    document = json.loads(run("mokhtar2017", "--json", *RANGE, "--response", "8", "--response", "2"))
+    assert [c["whirl"] for c in document["critical_speeds"]] == ["backward", "forward"]
+    assert [c["is_excited"] for c in document["critical_speeds"]] == [False, True]
+    assert [r["node"] for r in document["response"]] == [8, 2]
+    assert len(document["response"][0]["speed"]) == len(document["response"][0]["probes"][1]["phase"])
+    assert {peak["node"] for peak in document["peaks"]} == {2, 8}
+    assert document["peaks"][0]["amplification_factor"] == pytest.approx(6.09, abs=0.01)
+    assert document["threshold_speed"] is None
+    assert len(document["static_sag"]) == 15
+
+
+def test_response_and_shapes_are_drawn_and_written(tmp_path):
+    figure, table = tmp_path / "a.png", tmp_path / "a.csv"
+    run("mokhtar2017", *RANGE, "--response", "8", "--figure", str(figure), "--data", str(table))
+    assert figure.stat().st_size > 10_000
+    assert "major_axis (m)" in table.read_text().splitlines()[0]
+    run("mokhtar2017", *RANGE, "--shapes", "--figure", str(figure), "--data", str(tmp_path / "b.nc"))
+    run("mokhtar2017", *RANGE, "--data", str(tmp_path / "c.nc"))
+    assert (tmp_path / "c.nc").stat().st_size > 10_000
+
+
+def test_wrong_designs_are_refused(tmp_path):
+    with pytest.raises(InputError, match="--shapes: conflicts with --response"):
+        run("mokhtar2017", "--shapes", "--response", "8")
+    with pytest.raises(InputError, match="a whole design is no table"):
+        run("mokhtar2017", *RANGE, "--data", str(tmp_path / "a.csv"))
+    with pytest.raises(InputError, match="node: 99 does not move sideways; nodes 1 to 15 do"):
+        run("mokhtar2017", *RANGE, "--response", "99")
+    with pytest.raises(InputError, match=r"range: 314.159 to 104.72 rad/s is not a range"):
+        run("mokhtar2017", "--range", "3000 rpm", "1000 rpm")
+
+
+def test_an_unstable_rotor_is_warned_of(tmp_path):
+    path = tmp_path / "seal.toml"
+    path.write_text(
+        (PACKAGED / "mokhtar2017.toml").read_text()
+        + "\n[[rotor.bearing]]\nnode = 8\nspeed = [0.0, 500.0]\nkyy = 0.0\nkzz = 0.0\n"
+        "kyz = [0.0, 1e5]\nkzy = [0.0, -1e5]\n"
+    )
+    result = CliRunner().invoke(modes, [str(path), "--speed", "100", "--speed", "400", "--count", "1"])
+    warnings = [line for line in result.output.splitlines() if line.startswith("warning:")]
+    assert len(warnings) == 1
+    assert "the rotor is unstable at 3819.72 rpm: its forward mode of 3" in warnings[0]
+    assert "unstable from" in run(str(path), "--range", "0", "400", "--count", "1")

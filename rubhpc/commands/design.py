@@ -1,0 +1,160 @@
+"""What `rubhpc modes` prints of a linear design: critical speeds, peaks and margins, sag, stability."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_RPM = 30 / math.pi
+
+
+def print_design(design: xr.Dataset) -> None:
+    """Print the tables of a linear design."""
+    low, high = (_RPM * speed for speed in design.attrs["speed_range"])
+    click.echo(f"\nCritical speeds from {low:.6g} to {high:.6g} rpm")
+    if design.sizes["critical"]:
+        click.echo(
+            f"{'rpm':>12} {'Hz':>12} {'mode':>5} {'damping':>9} {'log dec':>9}  {'whirl':<9} unbalance"
+        )
+    for i in range(design.sizes["critical"]):
+        one = design.isel(critical=i)
+        ratio = float(one["critical_damping_ratio"])
+        excited = "excites" if bool(one["is_excited"]) else "does not excite"
+        speed = float(one["critical_speed"])
+        click.echo(
+            f"{_RPM * speed:12.2f} {speed / (2 * math.pi):12.4f} {int(one['critical_mode']):5d} {ratio:9.5f} "
+            f"{_decrement(ratio):9.4f}  {one['critical_whirl'].item():<9} {excited}"
+        )
+    if not design.sizes["critical"]:
+        click.echo("none")
+    _print_peaks(design)
+    _print_sag(design)
+    threshold = float(design["threshold_speed"])
+    stable = (
+        f"unstable from {_RPM * threshold:.6g} rpm on" if math.isfinite(threshold) else "stable throughout"
+    )
+    click.echo(f"\nStability: {stable}{_least(design)}")
+
+
+def plain_design(design: xr.Dataset, nodes: list[int]) -> dict[str, Any]:
+    """Return a linear design for JSON, SI units; the response at some nodes."""
+    critical = [
+        {
+            "speed": float(one["critical_speed"]),
+            "mode": int(one["critical_mode"]),
+            "whirl": one["critical_whirl"].item(),
+            "damping_ratio": float(one["critical_damping_ratio"]),
+            "is_excited": bool(one["is_excited"]),
+        }
+        for one in (design.isel(critical=i) for i in range(design.sizes["critical"]))
+    ]
+    names = ("speed", "amplitude", "node")
+    keys = {f"peak_{name}": name for name in names} | {
+        name: name
+        for name in (
+            "lower_half_power_speed",
+            "upper_half_power_speed",
+            "amplification_factor",
+            "separation_margin",
+            "required_margin",
+            "is_separated",
+        )
+        if name in design
+    }
+    peaks = [
+        {name: _number(design[key].values[i]) for key, name in keys.items()}
+        for i in range(design.sizes["peak"])
+    ]
+    sag = design.isel(speed=0)
+    response = [
+        {
+            "node": node,
+            "speed": design["response_speed"].values.tolist(),
+            "major_axis": design["major_axis"].sel(node=node).values.tolist(),
+            "minor_axis": design["minor_axis"].sel(node=node).values.tolist(),
+            "probes": [
+                {
+                    "angle": float(angle),
+                    "amplitude": design["amplitude"].sel(node=node, probe=angle).values.tolist(),
+                    "phase": [_number(v) for v in design["phase"].sel(node=node, probe=angle).values],
+                }
+                for angle in design["probe"].values
+            ],
+        }
+        for node in nodes
+    ]
+    return {
+        "speed_range": design.attrs["speed_range"],
+        "operating": design.attrs.get("operating"),
+        "critical_speeds": critical,
+        "peaks": peaks,
+        "static_sag": [
+            {"node": int(node), "vertical": float(v), "horizontal": float(w)}
+            for node, v, w in zip(
+                sag["node"].values, sag["sag_vertical"].values, sag["sag_horizontal"].values, strict=True
+            )
+        ],
+        "threshold_speed": _number(design["threshold_speed"].values),
+        "response": response,
+    }
+
+
+def _print_peaks(design: xr.Dataset) -> None:
+    has_margin = "separation_margin" in design
+    click.echo("\nPeaks of the unbalance response" + (": none" if not design.sizes["peak"] else ""))
+    if not design.sizes["peak"]:
+        return
+    head = f"{'node':>5} {'rpm':>12} {'amplitude um':>13} {'AF':>9}"
+    click.echo(head + (f" {'margin %':>9} {'API 617':>9}  verdict" if has_margin else ""))
+    for i in range(design.sizes["peak"]):
+        one = design.isel(peak=i)
+        line = (
+            f"{int(one['peak_node']):5d} {_RPM * float(one['peak_speed']):12.2f} "
+            f"{1e6 * float(one['peak_amplitude']):13.4g} {float(one['amplification_factor']):9.3f}"
+        )
+        if has_margin:
+            margins = 100 * float(one["separation_margin"]), 100 * float(one["required_margin"])
+            verdict = "separated" if bool(one["is_separated"]) else "too close"
+            line += f" {margins[0]:9.2f} {margins[1]:9.2f}  {verdict}"
+        click.echo(line)
+
+
+def _print_sag(design: xr.Dataset) -> None:
+    sag = design.isel(speed=0)
+    size = abs(sag["sag_vertical"]) + abs(sag["sag_horizontal"])
+    if not float(size.max()):
+        click.echo("\nStatic sag: none, neither gravity nor a load acts")
+        return
+    click.echo(f"\nStatic sag at {_RPM * float(sag['speed']):.6g} rpm, um")
+    click.echo(f"{'node':>5} {'vertical':>12} {'horizontal':>12}")
+    for node in sag["node"].values:
+        one = sag.sel(node=node)
+        parts = (1e6 * float(one[f"sag_{direction}"]) for direction in ("vertical", "horizontal"))
+        click.echo(f"{int(node):5d} " + " ".join(f"{part:12.4f}" for part in parts))
+
+
+def _least(design: xr.Dataset) -> str:
+    """Least logarithmic decrement of the lateral modes that the spin reaches; "" where it reaches none."""
+    reached = design["frequency"] < design.attrs["speed_range"][1] / (2 * math.pi)
+    lateral = design["logarithmic_decrement"].where((design["kind"] == "lateral") & reached)
+    least = lateral.min("mode")
+    if not bool(least.notnull().any()):
+        return ""
+    at = int(least.fillna(math.inf).argmin("speed"))
+    rpm = _RPM * float(design["speed"][at])
+    return f"; least logarithmic decrement of the modes reached {float(least[at]):.4g}, at {rpm:.6g} rpm"
+
+
+def _decrement(ratio: float) -> float:
+    return 2 * math.pi * ratio / math.sqrt(1.0 - ratio**2)
+
+
+def _number(value: Any) -> Any:
+    """A number for JSON, None where it is none."""
+    plain = value.item()
+    return None if isinstance(plain, float) and not math.isfinite(plain) else plain
