@@ -14,6 +14,7 @@ import xarray as xr
 
 from postproc.store.axes import find_axis, source
 from postproc.store.select import narrow
+from rubhpc import spectra
 from rubhpc.errors import InputError
 from rubhpc.schema import SIGNAL_NAMES
 
@@ -47,7 +48,7 @@ def amplitude_spectrum(waveform: xr.DataArray) -> xr.DataArray:
     """
     n = waveform.sizes["sample"]
     orders = np.fft.rfftfreq(n, d=1 / samples_per_revolution(waveform))
-    spectrum = _over_orders(_single_sided, orders, waveform)
+    spectrum = _over_orders(spectra.amplitude_spectrum, orders, waveform)
     spectrum.name = f"spectrum_{waveform.name}"
     long_name = waveform.attrs.get("long_name", waveform.name)
     spectrum.attrs = {**waveform.attrs, "long_name": f"amplitude (zero to peak) of the {long_name}"}
@@ -167,18 +168,6 @@ def _over_orders(function: Any, orders: NDArray[np.floating[Any]], *waveforms: x
     return spectrum.assign_coords(
         order=("order", orders, {"units": "1", "long_name": "order (multiples of the spin speed)"}),
     )
-
-
-def _single_sided(waveform: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """(..., n_sample) -> (..., n_sample // 2 + 1), amplitudes."""
-    n = waveform.shape[-1]
-    lines = np.fft.rfft(waveform.astype(np.float64), axis=-1)
-    amplitude: NDArray[np.float64] = np.abs(lines) * (2 / n)
-    # The mean has no twin at a negative order, and neither has the last line of an even count.
-    amplitude[..., 0] /= 2
-    if n % 2 == 0:
-        amplitude[..., -1] /= 2
-    return amplitude
 
 
 def _two_sided(

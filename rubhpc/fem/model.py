@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -175,8 +176,21 @@ class Model:
     sag: NDArray[np.float64]  # (n_dof,), of the rotor under its constant loads, no stator touching, m or rad
     load: NDArray[np.float64]  # (n_dof,), constant loads on the rotor, N or N m
 
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Rotor, then stators: the order of every vector over all bodies."""
+        return (self.rotor, *(stator.body for stator in self.stators))
+
+    @property
+    def body_start(self) -> tuple[int, ...]:
+        """First row of each body among all degrees of freedom, and the number of all: (n_body + 1,)."""
+        return tuple(accumulate((body.n_dof for body in self.bodies), initial=0))
+
+    def split(self, values: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Views of a vector over all bodies, (n_all,), one for each body."""
+        return [values[first:end] for first, end in pairwise(self.body_start)]
+
 
 def state_size(model: Model) -> int:
     """Numbers in a state of motion: displacement and velocity of each degree; two of each contact."""
-    bodies = (model.rotor, *(stator.body for stator in model.stators))
-    return 2 * sum(body.n_dof for body in bodies) + 2 * len(model.stators)
+    return 2 * model.body_start[-1] + 2 * len(model.stators)

@@ -8,25 +8,25 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rubhpc.integrate.central_difference_march import CentralDifferenceMarch
-from rubhpc.integrate.contact_stepping_march import SteppedMarch
-from rubhpc.integrate.event_driven_march import ModalMarch, NoClosedForm
-from rubhpc.integrate.initial_state import at_rest, carried, with_overlap
+from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
+from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.initial_state import at_rest, fit_to_gaps, with_overlap
 from rubhpc.integrate.lyapunov import Marches, growth
 from rubhpc.integrate.measures import (
     add_sag,
     by_name,
     diverged_record,
     empty_samples,
-    empty_tally,
     measures_of,
+    new_accumulator,
 )
-from rubhpc.integrate.neighbour_motions import ModalNeighbours
-from rubhpc.integrate.orbit_measures import amplitude_spectrum
+from rubhpc.integrate.neighbour_motions import NeighbourMotions
 from rubhpc.integrate.record import Record, State
-from rubhpc.integrate.setup import CentralDifferenceSetup, ModalSetup
+from rubhpc.integrate.setup import ModalSetup, Scheme
 from rubhpc.integrate.transient import pass_transient
 from rubhpc.kernels.accumulators import IMPACT_STEPS
 from rubhpc.schema import DONE, SECTION_NAMES
+from rubhpc.spectra import amplitude_spectrum
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,6 +41,13 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
+
+
+MARCHES: dict[Scheme, Callable[..., March]] = {
+    Scheme.EVENT_DRIVEN: EventDrivenMarch,
+    Scheme.CONTACT_STEPPING: ContactSteppingMarch,
+    Scheme.CENTRAL_DIFFERENCE: CentralDifferenceMarch,
+}
 
 
 def run_case(
@@ -61,26 +68,22 @@ def run_case(
     friction : float
         Coefficient of friction.
     initial : State, optional
-        Where to start, with the unbalance at its phase 0; default at rest (`carry.at_rest`). Where another
-        case has ended is fitted to the gaps of this one (`carry.carried`).
+        Where to start, with the unbalance at its phase 0; default: at rest (`initial_state.at_rest`). The
+        final state of another case is fitted to the gaps of this one (`initial_state.fit_to_gaps`).
     check : callable, optional
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
     """
     began = time.perf_counter()
-    initial = at_rest(setup, clearance) if initial is None else carried(initial, setup, clearance)
+    initial = at_rest(setup, clearance) if initial is None else fit_to_gaps(initial, setup, clearance)
 
-    def start(state: State) -> March:
-        return _march(setup, clearance, friction, state, check)
-
-    def start_stepped(state: State) -> March:
-        assert isinstance(setup, ModalSetup)
-        return SteppedMarch(setup, clearance, friction, state, check)
+    def starter(scheme: Scheme) -> Callable[[State], March]:
+        return lambda state: MARCHES[scheme](setup, clearance, friction, state, check)
 
     try:
-        record = _integrate(start, initial, setup, clearance, recording)
+        record = _integrate(starter(setup.scheme), initial, setup, clearance, recording)
     except NoClosedForm:
         # Contacts that chatter, or too many sets of them, or slip that turns: short steps need no events.
-        record = _integrate(start_stepped, initial, setup, clearance, recording)
+        record = _integrate(starter(Scheme.CONTACT_STEPPING), initial, setup, clearance, recording)
     record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - began
     return record
@@ -97,15 +100,14 @@ def compile_kernels(
     """Compile all that cases of this set-up may call, on two revolutions, those of endless events too."""
     short = replace(recording, transient=1, revolutions=1)
     run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)
-    if isinstance(setup, ModalSetup):
+    if isinstance(setup, ModalSetup) and setup.scheme is Scheme.EVENT_DRIVEN:
 
         def start(state: State) -> March:
-            return SteppedMarch(setup, clearance, friction, state, check)
+            return ContactSteppingMarch(setup, clearance, friction, state, check)
 
-        _integrate(start, State.at_rest(setup.model), setup, clearance, short)
-        if not setup.is_stepped:
-            march = ModalMarch(setup, clearance, friction, State.at_rest(setup.model), check)
-            ModalNeighbours(march).part(1)
+        rest = State.at_rest(setup.model)
+        _integrate(start, rest, setup, clearance, short)
+        NeighbourMotions(EventDrivenMarch(setup, clearance, friction, rest, check)).part(1)
 
 
 def _integrate(
@@ -116,15 +118,15 @@ def _integrate(
     per_revolution = setup.samples_per_revolution
     n_stator = len(setup.model.stators)
     n_sample = recording.revolutions * per_revolution
-    samples, tally = empty_samples(n_stator, n_sample), empty_tally(n_stator)
+    samples, accumulator = empty_samples(n_stator, n_sample), new_accumulator(n_stator)
     settings = {"spin_speed": setup.spin, "clearance": clearance}
 
     reason, n_transient = pass_transient(march, recording)
     if reason is None:
         energy_before = march.energy()
-        tally.is_touching[:] = march.touching()  # a contact under way did not begin in the record
-        tally.age[tally.is_touching] = IMPACT_STEPS
-        reason = march.advance(0, n_sample, samples, tally, is_recorded=True)
+        accumulator.is_touching[:] = march.touching()  # a contact under way did not begin in the record
+        accumulator.age[accumulator.is_touching] = IMPACT_STEPS
+        reason = march.advance(0, n_sample, samples, accumulator, is_recorded=True)
     if reason is not None:
         seen = math.floor(n_transient + march.sample / per_revolution) + 1
         revolution = min(seen, n_transient + recording.revolutions)  # what ends the record was in it
@@ -132,7 +134,7 @@ def _integrate(
             f"{reason} in revolution {revolution}", n_stator, recording, settings, march.final()
         )
     else:
-        add_sag(samples, tally, setup.model)
+        add_sag(samples, accumulator, setup.model)
         signals, final = by_name(samples.whole), march.final()
         record = Record(
             status=DONE,
@@ -143,7 +145,7 @@ def _integrate(
             if "section" in recording.keep
             else {},
             measures=measures_of(
-                tally,
+                accumulator,
                 signals,
                 energy=(energy_before, march.energy()),
                 stators=setup.model.stators,
@@ -164,8 +166,8 @@ def _neighbours(
     march: March, start: Callable[[State], March], final: State, setup: Setup, recording: Recording
 ) -> Neighbours:
     """The motion from where a march has ended, and one beside it."""
-    if type(march) is ModalMarch:
-        return ModalNeighbours(march)
+    if isinstance(march, EventDrivenMarch):
+        return NeighbourMotions(march)
     return Marches(start, final, setup, recording)
 
 
@@ -173,14 +175,3 @@ def _spectra(samples: Samples) -> dict[str, Floats]:
     """Spectra of all signals, by their names in the schema."""
     spectra = by_name(amplitude_spectrum(samples.whole))
     return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items()}
-
-
-def _march(
-    setup: Setup, clearance: float, friction: float, initial: State, check: Callable[[], None] | None
-) -> March:
-    """Start the case with the integrator that its set-up is for."""
-    if isinstance(setup, CentralDifferenceSetup):
-        return CentralDifferenceMarch(setup, clearance, friction, initial, check)
-    if setup.is_stepped:
-        return SteppedMarch(setup, clearance, friction, initial, check)
-    return ModalMarch(setup, clearance, friction, initial, check)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.march import NO_FORCES, March
-from rubhpc.integrate.measures import empty_samples, empty_tally
+from rubhpc.integrate.measures import empty_samples, new_accumulator
 from rubhpc.integrate.packing import pairs_of
 from rubhpc.integrate.record import State
 from rubhpc.integrate.workspace import workspace
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.setup import CentralDifferenceSetup
-    from rubhpc.kernels.accumulators import Samples, Tally
+    from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.contact_pairs import Pairs, Workspace
 
     Floats = NDArray[np.float64]
@@ -45,7 +45,9 @@ class CentralDifferenceMarch(March):
         self._setup = setup
         self._pairs = pairs_of(
             setup.model,
-            setup.packed,
+            row=setup.packed.degree_row,
+            block=setup.packed.degree_block,
+            compliance=setup.packed.compliance,
             clearance=clearance,
             friction=friction,
             spin=setup.spin,
@@ -72,26 +74,21 @@ class CentralDifferenceMarch(March):
         """State at the last sample; a trial step gives the centred velocity and the force there."""
         setup, state = self._setup, self._state.copy()
         q = self._pairs.radius.size
-        self._kernel(state, self.sample + 1, 1, empty_samples(q, 0), empty_tally(q), is_recorded=False)
+        self._kernel(state, self.sample + 1, 1, empty_samples(q, 0), new_accumulator(q), is_recorded=False)
         velocity = 0.5 * (self._state[1] + state[1])
-        bodies = [setup.model.rotor, *(stator.body for stator in setup.model.stators)]
-        parts = np.split(setup.packed.row, np.cumsum([body.n_dof for body in bodies])[:-1])
-
-        def pick(values: Floats, row: NDArray[np.int64]) -> Floats:
-            return np.where(row >= 0, values[row], 0.0)
-
-        return State(
-            rotor_displacement=pick(self._state[0], parts[0]) + setup.model.sag,
-            rotor_velocity=pick(velocity, parts[0]),
-            stator_displacement=tuple(pick(self._state[0], part) for part in parts[1:]),
-            stator_velocity=tuple(pick(velocity, part) for part in parts[1:]),
-            contact_force=self._work.force.copy(),
+        row = setup.packed.row
+        displacement, velocity = (
+            np.where(row >= 0, values[row], 0.0) for values in (self._state[0], velocity)
         )
+        displacement[: setup.model.rotor.n_dof] += setup.model.sag
+        return State.of_bodies(setup.model, displacement, velocity, self._work.force.copy())
 
-    def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
+    def _call(
+        self, stop: int, samples: Samples, accumulator: Accumulator, *, is_recorded: bool
+    ) -> str | None:
         setup = self._setup
         outcome = self._kernel(
-            self._state, stop, setup.steps_per_sample, samples, tally, is_recorded=is_recorded
+            self._state, stop, setup.steps_per_sample, samples, accumulator, is_recorded=is_recorded
         )
         if outcome != kernel.FINISHED:
             self.n_step += (int(self._reached[0]) - self.sample) * setup.steps_per_sample
@@ -109,7 +106,7 @@ class CentralDifferenceMarch(March):
         stop: int,
         steps_per_sample: int,
         samples: Samples,
-        tally: Tally,
+        accumulator: Accumulator,
         *,
         is_recorded: bool,
     ) -> int:
@@ -130,7 +127,7 @@ class CentralDifferenceMarch(March):
             self._work,
             self._scratch,
             samples,
-            tally,
+            accumulator,
             self._reached,
         )
 
@@ -153,12 +150,14 @@ def _start(setup: CentralDifferenceSetup, initial: State, pairs: Pairs, work: Wo
     # The step's forces act along the normals at its free update, and that depends, if little, on them.
     for _ in range(N_START if setup.is_updated else 1):
         force = free_force.copy()
-        np.add.at(force, packed.degree_row[is_free], (work.pull * work.force[:, np.newaxis])[is_free])
+        np.add.at(
+            force, packed.degree_row[is_free], (work.force_direction * work.force[:, np.newaxis])[is_free]
+        )
         acceleration = np.linalg.solve(packed.mass, force)
         end = displacement + setup.step * (velocity + 0.5 * setup.step * acceleration)
-        pressed = np.einsum("iajb,jb,j->ia", pairs.compliance, work.pull, work.force)
+        pressed = np.einsum("iajb,jb,j->ia", pairs.compliance, work.force_direction, work.force)
         at = np.where(is_free, end[packed.degree_row], 0.0) - pressed
         for i in range(len(at)):
             ny, nz, _ = pair_normal_and_gap(pairs, i, at[i])
-            fill_directions(pairs, i, ny, nz, work.pull[i], work.push[i])
+            fill_directions(pairs, i, ny, nz, work.force_direction[i], work.gap_jacobian[i])
     return np.array([displacement, velocity - 0.5 * setup.step * acceleration])

@@ -24,7 +24,7 @@ WORST_CONDITION = 1e11  # of the eigenvectors; beyond it modes coincide and thei
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Phase:
+class ContactMode:
     """Motion with one set of pairs closed: `x = Re(motion @ z)`, x (2 n,) displacements, then velocities.
 
     To the m modes come the unbalance response, z = exp(i angle), and the clearances of the q pairs, z in m.
@@ -38,33 +38,29 @@ class Phase:
     switch: Complexes  # (q, m + 1 + q), gap of an open pair or force of a closed one
 
 
-def make_phase(reduced: ReducedModel, push: Floats, pull: Floats, mask: int) -> Phase:
+def solve_contact_mode(
+    reduced: ReducedModel, gap_jacobian: Floats, force_direction: Floats, mask: int
+) -> ContactMode:
     """Solve the linear system with the pairs of `mask` closed.
 
-    Closed gaps confine the motion to `x = x0 + T y` with `push T = 0`; the contact forces drop out of the
-    equations projected on L with `L^T pull^T = 0`, and follow from the accelerations of the gaps being zero
-    (the constraint of Eq. 18 of the paper, differentiated twice).
+    With J the gap Jacobian and F the contact-force directions of the closed pairs, closed gaps confine the
+    motion to `x = x0 + T y` with `J T = 0`; the contact forces drop out of the equations projected on L with
+    `L^T F^T = 0`, and follow from the accelerations of the gaps being zero (the constraint of Eq. 18 of the
+    paper, differentiated twice).
 
     Raises
     ------
     InputError
         Where eigenvectors coincide (rigid-body motion, exactly critical damping).
     """
-    n, q = reduced.stiffness.shape[0], push.shape[0]
+    n, q = reduced.stiffness.shape[0], gap_jacobian.shape[0]
     closed = np.array([i for i in range(q) if mask >> i & 1], dtype=int)
-    rate, force = push[closed], pull[closed].T
-    tangent, left = _null_space(rate), _null_space(force.T)
+    rate, force = gap_jacobian[closed], force_direction[closed].T
+    tangent, project, system = _confine(reduced, rate, force)
     offset = np.zeros((q, n))  # displacement that closes a unit clearance
     if closed.size:
         offset[closed] = -np.linalg.pinv(rate).T
     n_free = tangent.shape[1]
-    project = np.linalg.solve(left.T @ tangent, left.T)
-    system = np.block(
-        [
-            [np.zeros((n_free, n_free)), np.eye(n_free)],
-            [-project @ reduced.stiffness @ tangent, -project @ reduced.damping @ tangent],
-        ]
-    )
     exponent, shape, inverse = _modes(system)
     phasor = reduced.force[0] - 1j * reduced.force[1]
     lower = np.concatenate([np.zeros(n_free), project @ phasor])
@@ -77,13 +73,13 @@ def make_phase(reduced: ReducedModel, push: Floats, pull: Floats, mask: int) -> 
     still = constant @ expand.T + np.hstack([offset, np.zeros((q, n))])  # (q, 2 n)
     motion = np.hstack([expand @ shape, (expand @ response)[:, None], still.T])
     clear = np.hstack([np.zeros((q, exponent.size + 1)), np.eye(q)])
-    switch = push @ motion[:n] + clear
+    switch = gap_jacobian @ motion[:n] + clear
     if closed.size:
         reaction = np.linalg.solve(rate @ force, rate)
         switch[closed] = reaction @ (np.hstack([reduced.stiffness, reduced.damping]) @ motion)
         switch[closed, exponent.size] -= reaction @ phasor
     entry = constant + np.hstack([offset @ tangent, np.zeros((q, n_free))])
-    return Phase(
+    return ContactMode(
         mask=mask,
         exponent=np.concatenate([exponent, [1j * reduced.spin], np.zeros(q)]),
         motion=motion,
@@ -91,6 +87,35 @@ def make_phase(reduced: ReducedModel, push: Floats, pull: Floats, mask: int) -> 
         take_off=np.vstack([inverse @ response.real, -inverse @ response.imag, entry @ inverse.T]),
         switch=switch,
     )
+
+
+def count_coordinates(reduced: ReducedModel, gap_jacobian: Floats, force_direction: Floats, mask: int) -> int:
+    """Count the coordinates of the contact mode with the pairs of `mask` closed, m + 1 + q."""
+    closed = [i for i in range(len(gap_jacobian)) if mask >> i & 1]
+    _, _, system = _confine(reduced, gap_jacobian[closed], force_direction[closed].T)
+    n_mode = 0
+    for rows in _parts(system):
+        exponent = np.linalg.eigvals(system[np.ix_(rows, rows)]).astype(np.complex128)
+        n_mode += int(np.count_nonzero(_kept(exponent)[1]))
+    return n_mode + 1 + len(gap_jacobian)
+
+
+def _confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats, Floats, Floats]:
+    """Motions that keep gaps closed T (n, n_free), projection that no contact force passes, and the system.
+
+    `rate` (r, n) is the gap Jacobian of the closed pairs and `force` (n, r) their contact-force directions;
+    the system (2 n_free, 2 n_free) is that of the coordinates y and their rates.
+    """
+    tangent, left = _null_space(rate), _null_space(force.T)
+    n_free = tangent.shape[1]
+    project = np.asarray(np.linalg.solve(left.T @ tangent, left.T), dtype=np.float64)
+    system: Floats = np.block(
+        [
+            [np.zeros((n_free, n_free)), np.eye(n_free)],
+            [-project @ reduced.stiffness @ tangent, -project @ reduced.damping @ tangent],
+        ]
+    )
+    return tangent, project, system
 
 
 def _null_space(rows: Floats) -> Floats:
@@ -110,19 +135,16 @@ def _modes(system: Floats) -> tuple[Complexes, Complexes, Complexes]:
     What nothing couples is solved by itself: of a ring of stators only those that touch move with the rotor.
     """
     n_state = len(system)
-    _, part = connected_components(csr_array(system != 0.0), directed=False)
     exponents: list[Complexes] = [np.zeros(0, dtype=np.complex128)]  # a mass on a rigid wall has no modes
     shapes, inverses = [np.zeros((n_state, 0))], [np.zeros((0, n_state))]
-    for number in np.unique(part):
-        rows = np.flatnonzero(part == number)
+    for rows in _parts(system):
         exponent, shape = np.linalg.eig(system[np.ix_(rows, rows)])
         if np.linalg.cond(shape) > WORST_CONDITION:
             raise InputError(
-                "[integrator] method: modal cannot part the modes of this rig, some of which coincide (a "
+                "[integrator] method: modal cannot separate the modes of this rig, some of which coincide (a "
                 'free body, critical damping); take method = "central-difference"'
             )
-        is_real = np.abs(exponent.imag) <= 1e-12 * np.abs(exponent).max()
-        keep = is_real | (exponent.imag > 0.0)
+        is_real, keep = _kept(exponent)
         weight = np.where(is_real, 1.0, 2.0)
         wide, tall = np.zeros((2, n_state, np.count_nonzero(keep)), dtype=np.complex128)
         wide[rows], tall[rows] = (shape * weight)[:, keep], np.linalg.inv(shape)[keep].T
@@ -130,3 +152,15 @@ def _modes(system: Floats) -> tuple[Complexes, Complexes, Complexes]:
         shapes.append(wide)
         inverses.append(tall.T)
     return np.concatenate(exponents), np.hstack(shapes), np.vstack(inverses)
+
+
+def _parts(system: Floats) -> list[NDArray[np.int64]]:
+    """Rows of each part of a system that nothing couples to the rest."""
+    _, part = connected_components(csr_array(system != 0.0), directed=False)
+    return [np.flatnonzero(part == number) for number in np.unique(part)]
+
+
+def _kept(exponent: Complexes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which exponents of an uncoupled part are real, and which are kept: one of each conjugate pair."""
+    is_real = np.abs(exponent.imag) <= 1e-12 * np.abs(exponent).max()
+    return is_real, is_real | (exponent.imag > 0.0)

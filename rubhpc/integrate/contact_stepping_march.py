@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.fem.statics import sag_at_stators
-from rubhpc.integrate.event_driven_march import ModalMarch
 from rubhpc.integrate.march import NO_FORCES
+from rubhpc.integrate.modal_march import ModalMarch
+from rubhpc.integrate.packing import pairs_of
 from rubhpc.integrate.workspace import workspace
-from rubhpc.kernels.contact_kicks import Kicks, advance_stepped
-from rubhpc.kernels.contact_modes import CONTACT_UNSOLVED, FINISHED, N_STEP, TIME
-from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs
+from rubhpc.kernels.contact_pairs import N_DEGREE
+from rubhpc.kernels.stepping_loop import ContactImpulses, advance_by_steps
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,13 +20,13 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import ModalSetup
-    from rubhpc.kernels.accumulators import Samples, Tally
+    from rubhpc.kernels.accumulators import Accumulator, Samples
 
     Floats = NDArray[np.float64]
 
 
-class SteppedMarch(ModalMarch):
-    """Modal coordinates of the open system under way, kicked by the contact forces."""
+class ContactSteppingMarch(ModalMarch):
+    """A case in the modes of the open system, on which the contact forces act as impulses."""
 
     def __init__(
         self,
@@ -38,32 +36,29 @@ class SteppedMarch(ModalMarch):
         initial: State,
         check: Callable[[], None] | None,
     ) -> None:
-        """Start from `initial`."""
+        """Start from `initial`; the first step finds a contact under way."""
         super().__init__(setup, clearance, friction, initial, check)
-        self._kicks = self._make_kicks()
-        angle = np.array([stator.angle for stator in setup.model.stators])
-        q = angle.size
-        step = self.clock.tick * 2**self._kicks.level
-        phases = self.phases
-        place = phases.motion_re.shape[1] // 2
-        degree = setup.reduced.degree.reshape(q * N_DEGREE, place)
+        self._use(setup.open_tables(friction))
+        self._start(0)
+        self._impulses = self._make_impulses()
+        q = self._clearance.size
+        step = self.clock.tick * 2**self._impulses.level
+        degree = setup.reduced.degree.reshape(q * N_DEGREE, -1)
         # Displacement a contact step after a unit force has acted over it: an impulse, then drift.
         drifted = step * (
-            self._kicks.degree_re @ self._kicks.drifted_re.T
-            - self._kicks.degree_im @ self._kicks.drifted_im.T
+            self._impulses.degree_re @ self._impulses.drifted_re.T
+            - self._impulses.degree_im @ self._impulses.drifted_im.T
         )
-        held = ~np.any(degree != 0.0, axis=1)
-        row = np.where(held, -1, np.arange(q * N_DEGREE)).reshape(q, N_DEGREE)
-        self._pairs = Pairs(
+        is_constrained = ~np.any(degree != 0.0, axis=1)
+        row = np.where(is_constrained, -1, np.arange(q * N_DEGREE)).reshape(q, N_DEGREE)
+        self._pairs = pairs_of(
+            setup.model,
             row=row,
             block=row,
-            axis_y=np.cos(angle),
-            axis_z=np.sin(angle),
-            radius=np.array([stator.radius for stator in setup.model.stators]),
-            clearance=self._clearance,
-            aside=sag_at_stators(setup.model)[1],
-            friction=np.full(q, math.copysign(friction, setup.spin)),
             compliance=np.ascontiguousarray(drifted.reshape(q, N_DEGREE, q, N_DEGREE)),
+            clearance=clearance,
+            friction=friction,
+            spin=setup.spin,
             is_updated=setup.is_updated,
             law=setup.law,
         )
@@ -75,25 +70,24 @@ class SteppedMarch(ModalMarch):
         """Which pairs pressed in the last step, (q,)."""
         return self._work.force > 0.0
 
-    def _first_closed(self, initial: State) -> int:
-        """None: a contact under way is found by the first step."""
-        return 0
-
     def _contact_force(self) -> Floats:
         return self._work.force.copy()
 
-    def _make_kicks(self) -> Kicks:
-        """Displacements and kicks of every pair's degrees in the modes of the open system."""
-        setup, phases = self._setup, self.phases
-        n = phases.motion_re.shape[1] // 2
+    def _unsolved(self) -> str:
+        return NO_FORCES
+
+    def _make_impulses(self) -> ContactImpulses:
+        """Displacements of every pair's degrees, and impulses on them, in the modes of the open system."""
+        setup, tables = self._setup, self.tables
+        n = tables.motion_re.shape[1] // 2
         degree = setup.reduced.degree.reshape(-1, n)
-        motion = phases.motion_re[0] + 1j * phases.motion_im[0]
-        enter = phases.enter_re[0] + 1j * phases.enter_im[0]
-        level = setup.level_within(setup.kick_step)
-        power = phases.power_re[0, level] + 1j * phases.power_im[0, level]
+        motion = tables.motion_re[0] + 1j * tables.motion_im[0]
+        enter = tables.enter_re[0] + 1j * tables.enter_im[0]
+        level = setup.level_within(setup.contact_step)
+        power = tables.power_re[0, level] + 1j * tables.power_im[0, level]
         drifted, shifted = degree @ enter[n:] * power, degree @ enter[:n]
         positions, rates = degree @ motion[:n], degree @ motion[n:]
-        return Kicks(
+        return ContactImpulses(
             level=level,
             degree_re=np.ascontiguousarray(positions.real),
             degree_im=np.ascontiguousarray(positions.imag),
@@ -103,39 +97,24 @@ class SteppedMarch(ModalMarch):
             drifted_im=np.ascontiguousarray(drifted.imag),
             shifted_re=np.ascontiguousarray(shifted.real),
             shifted_im=np.ascontiguousarray(shifted.imag),
-            twist_answer=degree @ setup.reduced.output[2],
+            twist_response=degree @ setup.reduced.output[2],
         )
 
-    def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
-        per_sample = 1 << self.clock.sample_level
-        first = self._set_clock(samples, is_recorded=is_recorded)
-        while True:
-            outcome = advance_stepped(
-                self.phases,
-                self.bodies,
-                self.clock,
-                self._kicks,
-                self._pairs,
-                self._work,
-                first,
-                stop * per_sample,
-                is_recorded,
-                self._progress,
-                self._z,
-                self._z_next,
-                self._ends,
-                self._recorder,
-                samples,
-                tally,
-            )
-            self.n_step = int(self._progress[N_STEP])
-            first = int(self._progress[TIME])
-            self.sample = first >> self.clock.sample_level
-            if outcome == CONTACT_UNSOLVED:
-                return NO_FORCES
-            if self._has_diverged(tally):
-                return f"a displacement passed {self._setup.displacement_limit:.3g} m"
-            if outcome == FINISHED:
-                return None
-            if self.check is not None:
-                self.check()
+    def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        return advance_by_steps(
+            self.tables,
+            self.bodies,
+            self.clock,
+            self._impulses,
+            self._pairs,
+            self._work,
+            last_tick,
+            is_recorded,
+            self.progress,
+            self._z,
+            self._z_next,
+            self._ends,
+            self._recorder,
+            samples,
+            accumulator,
+        )

@@ -34,7 +34,7 @@ LEAST_FORCE = np.finfo(float).tiny  # N, of a contact that is closed, whatever p
 MOST_PASSES = 20  # for the curved gap of the updated normal; three or four are taken
 
 
-def carried(state: State, setup: Setup, clearance: float) -> State:
+def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
     """Return a state as the start of a case: no gap overlapped further than it was, and none pulled shut.
 
     Parameters
@@ -56,19 +56,18 @@ def carried(state: State, setup: Setup, clearance: float) -> State:
         )
     allowed = np.zeros_like(state.contact_force) if state.overlap is None else state.overlap
     displacement = _as_seen(state.displacement, setup)
-    gap, push = gaps(displacement, setup, clearance)
+    gap, gap_jacobian = gaps(displacement, setup, clearance)
     force = np.zeros_like(gap)
     if np.any(gap + allowed < -TOLERANCE):
         for _ in range(MOST_PASSES):
-            shape = _static_shapes(push.T, setup)
-            wanted = _least_forces(push @ shape, gap + allowed - push @ shape @ force)
+            shape = _static_shapes(gap_jacobian.T, setup)
+            wanted = _least_forces(gap_jacobian @ shape, gap + allowed - gap_jacobian @ shape @ force)
             displacement, force = displacement + shape @ (wanted - force), wanted
-            gap, push = gaps(displacement, setup, clearance)
+            gap, gap_jacobian = gaps(displacement, setup, clearance)
             excess = gap + allowed
             if np.all(excess >= -TOLERANCE) and np.all(excess[force > 0.0] <= TOLERANCE):
                 break
-        sizes = [setup.model.rotor.n_dof, *(stator.body.n_dof for stator in setup.model.stators)]
-        rotor, *stators = np.split(displacement, np.cumsum(sizes)[:-1])
+        rotor, *stators = setup.model.split(displacement)
         state = replace(state, rotor_displacement=rotor, stator_displacement=tuple(stators))
     is_closed = (state.contact_force > 0.0) & (gap <= PARTED)
     return replace(state, contact_force=np.where(is_closed, state.contact_force + force, 0.0))
@@ -83,7 +82,7 @@ def at_rest(setup: Setup, clearance: float) -> State:
     if not setup.model.sag.any():
         return state
     gap, _ = gaps(state.displacement, setup, clearance)
-    return carried(replace(state, contact_force=np.where(gap < 0.0, LEAST_FORCE, 0.0)), setup, clearance)
+    return fit_to_gaps(replace(state, contact_force=np.where(gap < 0.0, LEAST_FORCE, 0.0)), setup, clearance)
 
 
 def with_overlap(state: State, setup: Setup, clearance: float) -> State:
@@ -96,15 +95,15 @@ def gaps(displacement: Floats, setup: Setup, clearance: float) -> tuple[Floats, 
     """Gap of each pair (q,), m, and its change with each degree of the bodies (q, n_dof)."""
     model = setup.model
     degree = degrees_of(model)
-    gap, push = np.zeros(len(degree)), np.zeros((len(degree), displacement.size))
+    gap, gap_jacobian = np.zeros(len(degree)), np.zeros((len(degree), displacement.size))
     for i, (stator, rows) in enumerate(zip(model.stators, degree, strict=True)):
         at = np.where(rows >= 0, displacement[rows], 0.0)
         ey, ez = float(np.cos(stator.angle)), float(np.sin(stator.angle))
         reach = clearance + stator.clearance_offset
         ny, nz, gap[i] = normal_and_gap(ey, ez, stator.radius, reach, 0.0, setup.is_updated, at)
         change = np.array([-ny, -nz, 0.0, ny * ey + nz * ez, ny * -ez + nz * ey])
-        push[i, rows[rows >= 0]] = change[rows >= 0]
-    return gap, push
+        gap_jacobian[i, rows[rows >= 0]] = change[rows >= 0]
+    return gap, gap_jacobian
 
 
 def _as_seen(displacement: Floats, setup: Setup) -> Floats:

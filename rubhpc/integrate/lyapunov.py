@@ -115,21 +115,12 @@ class Marches:
 
     def _distance(self, one: State, other: State) -> float:
         model = self._model
-        bodies = (model.rotor, *(stator.body for stator in model.stators))
-        displacements, velocities = (
-            [b - a for a, b in zip(mine, theirs, strict=True)]
-            for mine, theirs in (
-                (
-                    (one.rotor_displacement, *one.stator_displacement),
-                    (other.rotor_displacement, *other.stator_displacement),
-                ),
-                ((one.rotor_velocity, *one.stator_velocity), (other.rotor_velocity, *other.stator_velocity)),
-            )
-        )
+        displacements = model.split(other.displacement - one.displacement)
+        velocities = model.split(other.velocity - one.velocity)
         return math.sqrt(
             sum(
                 v @ body.mass @ v + self._spin**2 * (u @ body.mass @ u)
-                for body, u, v in zip(bodies, displacements, velocities, strict=True)
+                for body, u, v in zip(model.bodies, displacements, velocities, strict=True)
             )
         )
 

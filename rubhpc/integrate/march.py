@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.record import State
-    from rubhpc.kernels.accumulators import Samples, Tally
+    from rubhpc.kernels.accumulators import Accumulator, Samples
 
-LONGEST_CALL = 0.15  # s; signals are answered between kernel calls
+LONGEST_CALL = 0.15  # s; stop signals are handled between kernel calls
 STEPS_A_SECOND = 5e5  # half of what every integrator does
 NO_FORCES = "no contact forces that obey the laws were found"  # why a case ends
 
@@ -30,7 +30,7 @@ class March(ABC):
         self._stride = max(1, first_stride)
 
     def advance(
-        self, first: int, last: int, samples: Samples, tally: Tally, *, is_recorded: bool
+        self, first: int, last: int, samples: Samples, accumulator: Accumulator, *, is_recorded: bool
     ) -> str | None:
         """Go on from sample `first` to `last`; returns None, or why the case cannot go on."""
         self.sample = first
@@ -39,7 +39,7 @@ class March(ABC):
                 self.check()
             before = self.n_step
             stop = min(self.sample + self._stride, last)
-            reason = self._call(stop, samples, tally, is_recorded=is_recorded)
+            reason = self._call(stop, samples, accumulator, is_recorded=is_recorded)
             if reason is not None:
                 return reason
             self.sample = stop
@@ -49,7 +49,9 @@ class March(ABC):
         return None
 
     @abstractmethod
-    def _call(self, stop: int, samples: Samples, tally: Tally, *, is_recorded: bool) -> str | None:
+    def _call(
+        self, stop: int, samples: Samples, accumulator: Accumulator, *, is_recorded: bool
+    ) -> str | None:
         """Advance from `self.sample` to sample `stop` in one kernel call."""
 
     @abstractmethod

@@ -20,8 +20,8 @@ from rubhpc.kernels.accumulators import (
     TWIST_ACCELERATION,
     UNBALANCE_WORK,
     VERTICAL,
+    Accumulator,
     Samples,
-    Tally,
 )
 from rubhpc.schema import DIVERGED, VARIABLES
 
@@ -46,9 +46,9 @@ def empty_samples(n_stator: int, n_sample: int) -> Samples:
     return Samples(rotor=whole[:4], axial=axial, lateral=lateral, force=force, whole=whole)
 
 
-def empty_tally(n_stator: int) -> Tally:
+def new_accumulator(n_stator: int) -> Accumulator:
     """Sums at zero, extrema at their neutral ends."""
-    return Tally(
+    return Accumulator(
         highest=np.full(3, -np.inf),
         lowest=np.full(3, np.inf),
         is_touching=np.zeros(n_stator, dtype=np.bool_),
@@ -66,15 +66,15 @@ def empty_tally(n_stator: int) -> Tally:
     )
 
 
-def add_sag(samples: Samples, tally: Tally, model: Model) -> None:
+def add_sag(samples: Samples, accumulator: Accumulator, model: Model) -> None:
     """Count the motion of the output node from the shaft without loads, not from where it sags to."""
     if not model.sag.any():
         return
     for k, row in enumerate(output_degrees(model)):
         sag = model.sag[row] if row >= 0 else 0.0
         samples.rotor[k] += sag
-        tally.highest[k] += sag
-        tally.lowest[k] += sag
+        accumulator.highest[k] += sag
+        accumulator.lowest[k] += sag
 
 
 def by_name(whole: Floats) -> dict[str, Floats]:
@@ -93,7 +93,7 @@ def by_name(whole: Floats) -> dict[str, Floats]:
 
 
 def measures_of(
-    tally: Tally,
+    accumulator: Accumulator,
     signals: dict[str, Floats],
     *,
     energy: tuple[float, float],
@@ -115,40 +115,40 @@ def measures_of(
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution
     duration = 2.0 * np.pi * n_revolution / abs(spin)
-    has_touched = tally.impulse > 0
-    n_contact = np.maximum(tally.n_contact, 1)  # one that lasts throughout never begins in the record
+    has_touched = accumulator.impulse > 0
+    n_contact = np.maximum(accumulator.n_contact, 1)  # one that lasts throughout never begins in the record
     orbit = signals["vertical"], signals["horizontal"], samples_per_revolution
     orbit_period = period(*orbit)
     flag, exponent = regime(*orbit, period=orbit_period, is_contact=bool(has_touched.any()), growth=growth)
     # Drive and friction exchange a hundred times what the vibration feels of them: only their difference
     # counts.
     flows = [
-        tally.energy[UNBALANCE_WORK],
-        tally.energy[DRIVE_WORK] - tally.energy[FRICTION_LOSS],
-        -tally.energy[DAMPING_LOSS],
-        -tally.energy[IMPACT_LOSS],
+        accumulator.energy[UNBALANCE_WORK],
+        accumulator.energy[DRIVE_WORK] - accumulator.energy[FRICTION_LOSS],
+        -accumulator.energy[DAMPING_LOSS],
+        -accumulator.energy[IMPACT_LOSS],
     ]
-    distance, moved = tally.residual.T
+    distance, moved = accumulator.residual.T
     exchanged = max(0.5 * np.abs(flows).sum(), LEAST_EXCHANGE * max(energy), np.finfo(float).tiny)
     return {
         "period": orbit_period,
         "regime": flag,
         "lyapunov_exponent": exponent,
         "whirl_ratio": whirl_ratio(*orbit, spin),
-        "contact_fraction": tally.contact_time / duration,
-        "contacts_per_revolution": tally.n_contact / n_revolution,
-        "contact_duration": np.where(has_touched, tally.contact_time / n_contact, 0.0),
-        "peak_contact_force": tally.peak_force,
-        "contact_impulse": tally.impulse / n_revolution,
-        "friction_work": tally.friction_work / n_revolution,
-        "minimum_slip_speed": np.where(np.isfinite(tally.least_slip), tally.least_slip, np.nan),
-        "force_over_euler_load": tally.peak_force / [stator.euler_load for stator in stators],
-        "tip_deflection_ratio": tally.peak_lateral / [stator.length for stator in stators],
-        "peak_torsion": float(max(tally.highest[TWIST], -tally.lowest[TWIST])),
-        "peak_to_peak_vertical": float(tally.highest[VERTICAL] - tally.lowest[VERTICAL]),
-        "peak_to_peak_horizontal": float(tally.highest[HORIZONTAL] - tally.lowest[HORIZONTAL]),
+        "contact_fraction": accumulator.contact_time / duration,
+        "contacts_per_revolution": accumulator.n_contact / n_revolution,
+        "contact_duration": np.where(has_touched, accumulator.contact_time / n_contact, 0.0),
+        "peak_contact_force": accumulator.peak_force,
+        "contact_impulse": accumulator.impulse / n_revolution,
+        "friction_work": accumulator.friction_work / n_revolution,
+        "minimum_slip_speed": np.where(np.isfinite(accumulator.least_slip), accumulator.least_slip, np.nan),
+        "force_over_euler_load": accumulator.peak_force / [stator.euler_load for stator in stators],
+        "tip_deflection_ratio": accumulator.peak_lateral / [stator.length for stator in stators],
+        "peak_torsion": float(max(accumulator.highest[TWIST], -accumulator.lowest[TWIST])),
+        "peak_to_peak_vertical": float(accumulator.highest[VERTICAL] - accumulator.lowest[VERTICAL]),
+        "peak_to_peak_horizontal": float(accumulator.highest[HORIZONTAL] - accumulator.lowest[HORIZONTAL]),
         "energy_residual": float(abs(sum(flows) - (energy[1] - energy[0])) / exchanged),
-        "contact_iterations": int(tally.pivots[0]),
+        "contact_iterations": int(accumulator.pivots[0]),
         "contact_residual": float(np.divide(distance, moved, out=np.zeros(3), where=moved > 0.0).max()),
     }
 

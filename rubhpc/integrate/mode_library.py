@@ -1,37 +1,31 @@
-"""Phases of a reduced model, one for each set of closed contacts, made as the exact integrator meets them."""
+"""The contact modes of a reduced model, solved and tabulated when the event-driven march first meets them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rubhpc.integrate.contact_mode import Phase, make_phase
-from rubhpc.integrate.mode_tables import Tables, tabulate
+from rubhpc.integrate.contact_mode import ContactMode, count_coordinates, solve_contact_mode
+from rubhpc.integrate.mode_tables import TableStack, tabulate
 from rubhpc.integrate.reduction import ReducedModel, directions
-from rubhpc.kernels import contact_modes as kernel
-from rubhpc.kernels.contact_pairs import MULTIPLIER
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Iterable
 
     from rubhpc.fem.model import Model
-    from rubhpc.kernels.contact_pairs import Law
+    from rubhpc.kernels import contact_modes as kernel
 
-    Floats = NDArray[np.float64]
-
-LANES = 8  # modes are padded to whole vectors
+LANES = 8  # coordinates are padded to whole vectors
 # Coordinates that a set of several contacts may have beyond any single one. The width is settled before the
 # first case: that of the tables decides in which order sums are taken, and so the last bits of every case.
 SPARE = 8
 
 
-class PhaseBook:
-    """Phases of one speed and friction, made when first met and shared by all cases.
+class ModeLibrary:
+    """Contact modes of one speed and friction, solved when first met and shared by all cases.
 
     Parameters
     ----------
-    opened : Phase
+    opened : ContactMode
         That with every pair open, which friction does not change.
     tick : float, s
     sample_level, n_level : int
@@ -45,88 +39,80 @@ class PhaseBook:
         model: Model,
         friction: float,
         *,
-        opened: Phase,
+        opened: ContactMode,
         tick: float,
         sample_level: int,
         n_level: int,
     ) -> None:
         """Start with every pair open, and with each closed alone."""
-        self.reduced, self.model = reduced, model
-        self.push, self.pull, self.slip = directions(reduced, model, friction)
-        self.friction = friction
+        self.reduced = reduced
+        self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self._opened = opened
-        phases = [opened, *(self._made(1 << i) for i in range(len(self.push)))]
-        widest = max(phase.exponent.size for phase in phases) + (SPARE if len(self.push) > 1 else 0)
-        self._width = -(-widest // LANES) * LANES
-        self._tables = Tables(len(phases))
-        self.masks = [phase.mask for phase in phases]
-        for phase in phases:
-            self._tabulate(phase)
+        modes = [opened, *(self._solved(1 << i) for i in range(len(self.gap_jacobian)))]
+        self.width = padded_width((mode.exponent.size for mode in modes), len(self.gap_jacobian))
+        self._tables = TableStack(len(modes))
+        self.masks = [mode.mask for mode in modes]
+        for mode in modes:
+            self._tabulate(mode)
 
     @property
     def n_most(self) -> int:
-        """Phases that there is room for."""
+        """Contact modes that there is room for."""
         return self._tables.n_most
 
     @property
     def is_full(self) -> bool:
-        """Whether there is no room for another phase."""
+        """Whether there is no room for another contact mode."""
         return len(self.masks) >= self.n_most
 
     def add(self, mask: int) -> bool:
-        """Make the phase with these pairs closed; returns whether the tables are wide enough for it."""
-        phase = self._made(mask)
-        if phase.exponent.size > self._width:
+        """Solve the mode with these pairs closed; returns whether the tables are wide enough for it."""
+        mode = self._solved(mask)
+        if mode.exponent.size > self.width:
             return False
         self.masks.append(mask)
-        self._tabulate(phase)
+        self._tabulate(mode)
         return True
 
     def forget(self) -> None:
-        """Make room: keep no phase but that with every pair open."""
+        """Make room: keep no mode but that with every pair open."""
         self._tables.clear()
         self.masks = [0]
         self._tabulate(self._opened)
 
-    def _made(self, mask: int) -> Phase:
-        return make_phase(self.reduced, self.push, self.pull, mask) if mask else self._opened
+    def tables(self) -> kernel.ModeTables:
+        """All contact modes as arrays."""
+        return self._tables.view()
 
-    def _tabulate(self, phase: Phase) -> None:
+    def _solved(self, mask: int) -> ContactMode:
+        if mask == 0:
+            return self._opened
+        return solve_contact_mode(self.reduced, self.gap_jacobian, self.force_direction, mask)
+
+    def _tabulate(self, mode: ContactMode) -> None:
         self._tables.add(
             tabulate(
-                phase,
+                mode,
                 self.reduced,
                 self.slip,
-                width=self._width,
+                width=self.width,
                 tick=self._tick,
                 sample_level=self._sample_level,
                 n_level=self._n_level,
             )
         )
 
-    def kernel_reduced(
-        self, clearance: Floats, law: Law = MULTIPLIER, displacement_limit: float = np.inf
-    ) -> kernel.Reduced:
-        """The reduced bodies as the kernel takes them, with a case's clearances (q,), m, law and limit, m."""
-        return kernel.Reduced(
-            stiffness=self.reduced.stiffness,
-            damping=self.reduced.damping,
-            force_cosine=self.reduced.force[0].copy(),
-            force_sine=self.reduced.force[1].copy(),
-            push=self.push,
-            pull=self.pull,
-            answer=self.push @ self.pull.T,
-            friction=np.full(self.push.shape[0], self.friction),
-            radius=np.array([stator.radius for stator in self.model.stators]),
-            slip=self.slip,
-            restitution=law.restitution,
-            clearance=clearance,
-            is_set_valued=law.is_set_valued,
-            translations=self.reduced.translations,
-            displacement_limit=displacement_limit,
-        )
 
-    def tables(self) -> kernel.Phases:
-        """All phases as arrays."""
-        return self._tables.view()
+def padded_width(sizes: Iterable[int], q: int) -> int:
+    """Width of tables for modes of these sizes: every pair open, and each of the q pairs closed alone."""
+    widest = max(sizes) + (SPARE if q > 1 else 0)
+    return -(-widest // LANES) * LANES
+
+
+def width_without_modes(reduced: ReducedModel, model: Model, friction: float) -> int:
+    """Return the width that the tables of a library would have, which solves no contact mode for it."""
+    gap_jacobian, force_direction, _ = directions(reduced, model, friction)
+    q = len(gap_jacobian)
+    masks = (0, *(1 << i for i in range(q)))
+    return padded_width((count_coordinates(reduced, gap_jacobian, force_direction, m) for m in masks), q)

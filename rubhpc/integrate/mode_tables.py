@@ -1,4 +1,4 @@
-"""A phase as the kernel takes it: its tables, and the room in which those of many phases stand."""
+"""A mode as the kernel takes it: its tables, and the room in which those of many contact modes stand."""
 
 from __future__ import annotations
 
@@ -12,62 +12,62 @@ from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.contact_mode import Phase
+    from rubhpc.integrate.contact_mode import ContactMode
     from rubhpc.integrate.reduction import ReducedModel
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-MOST_PHASES = 256  # sets of closed contacts of one speed and friction
+MOST_MODES = 256  # sets of closed contacts of one speed and friction
 MOST_BYTES = 2**30  # of their tables
 GONE = -40.0  # exponent of what has died away
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
 
 
-class Tables:
-    """Tables of phases of one width, one after the other.
+class TableStack:
+    """Tables of contact modes of one width, one after the other.
 
     Attributes
     ----------
     n_most : int
-        Phases that there is room for: those of every pair closed by itself, and of as many more sets as
-        `MOST_PHASES` and `MOST_BYTES` allow.
+        ModeTables that there is room for: those of every pair closed by itself, and of as many more sets as
+        `MOST_MODES` and `MOST_BYTES` allow.
     """
 
     def __init__(self, n_least: int) -> None:
-        self.n_most = max(n_least, MOST_PHASES)
-        self._n_least, self._n_phase = n_least, 0
+        self.n_most = max(n_least, MOST_MODES)
+        self._n_least, self._n_filled = n_least, 0
         self._room: list[Any] = []
-        self._view: kernel.Phases | None = None
+        self._view: kernel.ModeTables | None = None
 
-    def add(self, row: kernel.Phases) -> None:
-        """Take in the tables of a phase, (1, ...) each."""
+    def add(self, row: kernel.ModeTables) -> None:
+        """Take in the tables of a mode, (1, ...) each."""
         rows: list[Any] = list(row)
         if not self._room:
             n_bytes = sum(field.nbytes for field in rows)
-            self.n_most = max(self._n_least, min(MOST_PHASES, MOST_BYTES // n_bytes))
+            self.n_most = max(self._n_least, min(MOST_MODES, MOST_BYTES // n_bytes))
             self._room = [np.empty((self._n_least, *field.shape[1:]), field.dtype) for field in rows]
-        elif self._n_phase == len(self._room[0]):  # twice the room: most books never need it
-            n_room = min(2 * self._n_phase, self.n_most)
+        elif self._n_filled == len(self._room[0]):  # twice the room: most books never need it
+            n_room = min(2 * self._n_filled, self.n_most)
             self._room = [np.resize(field, (n_room, *field.shape[1:])) for field in self._room]
         for field, new in zip(self._room, rows, strict=True):
-            field[self._n_phase] = new[0]
-        self._n_phase += 1
+            field[self._n_filled] = new[0]
+        self._n_filled += 1
         self._view = None
 
     def clear(self) -> None:
-        """Give all room back to phases to come."""
-        self._n_phase, self._view = 0, None
+        """Give all room back to contact modes to come."""
+        self._n_filled, self._view = 0, None
 
-    def view(self) -> kernel.Phases:
-        """The tables of all phases."""
+    def view(self) -> kernel.ModeTables:
+        """The tables of all contact modes."""
         if self._view is None:
-            self._view = kernel.Phases(*(field[: self._n_phase] for field in self._room))
+            self._view = kernel.ModeTables(*(field[: self._n_filled] for field in self._room))
         return self._view
 
 
 def tabulate(
-    phase: Phase,
+    mode: ContactMode,
     reduced: ReducedModel,
     slip: Floats,
     *,
@@ -75,8 +75,8 @@ def tabulate(
     tick: float,
     sample_level: int,
     n_level: int,
-) -> kernel.Phases:
-    """Tables of one phase, (1, ...) each, its coordinates padded to `width`.
+) -> kernel.ModeTables:
+    """Tables of one mode, (1, ...) each, its coordinates padded to `width`.
 
     Parameters
     ----------
@@ -84,27 +84,27 @@ def tabulate(
         Slip speed of each pair with the motion.
     tick : float, s
     sample_level, n_level : int
-        As in `phases.PhaseBook`.
+        As in `mode_library.ModeLibrary`.
     """
     n, q, m = reduced.stiffness.shape[0], len(slip), width
-    end = phase.exponent.size
-    n_mode = end - 1 - q
+    end = mode.exponent.size
+    n_eigenmode = end - 1 - q
     exponent, used = np.zeros(m, dtype=complex), np.zeros(m, dtype=bool)
     motion, enter = np.zeros((2, 2 * n, m), dtype=complex)
     switch, take_off = np.zeros((q, m), dtype=complex), np.zeros((2 + q, m), dtype=complex)
-    exponent[:end], used[:end] = phase.exponent, True
-    motion[:, :end], switch[:, :end] = phase.motion, phase.switch
-    enter[:, :n_mode], take_off[:, :n_mode] = phase.enter.T, phase.take_off
+    exponent[:end], used[:end] = mode.exponent, True
+    motion[:, :end], switch[:, :end] = mode.motion, mode.switch
+    enter[:, :n_eigenmode], take_off[:, :n_eigenmode] = mode.enter.T, mode.take_off
     steps = tick * 2.0 ** np.arange(n_level)
     growth = np.exp(np.maximum(exponent.real, 0.0) * steps[-1])
     power = np.exp(exponent * steps[:, None]) * used
     rate = switch * exponent
     sliding = slip @ motion[n:]
-    loss, work, steady_power = _energies(reduced, exponent, motion, n_mode)
+    loss, work, steady_power = _energies(reduced, exponent, motion, n_eigenmode)
     halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q, 2, m)
-    row = kernel.Phases(
-        mask=np.array(phase.mask),
-        n_mode=np.array(n_mode),
+    row = kernel.ModeTables(
+        mask=np.array(mode.mask),
+        n_eigenmode=np.array(n_eigenmode),
         switch_re=switch.real,
         switch_im=switch.imag,
         rate_re=rate.real,
@@ -132,11 +132,11 @@ def tabulate(
         steady_power=steady_power,
     )
     fields: list[Any] = [np.array(field[None], order="C") for field in row]
-    return kernel.Phases(*fields)
+    return kernel.ModeTables(*fields)
 
 
 def _outputs(reduced: ReducedModel, exponent: Complexes, motion: Complexes, interval: float) -> Floats:
-    """Rows in the order of `kernels.phases`, at samples to come, `interval` (s) apart: (2 m, samples o)."""
+    """Output rows (`kernels.contact_modes`) at coming samples, `interval` (s) apart: (2 m, samples o)."""
     n = reduced.stiffness.shape[0]
     displacement, rate = reduced.output @ motion[:n], reduced.output @ motion[n:]
     rows = [displacement, rate, rate[2:] * exponent]
@@ -149,7 +149,7 @@ def _outputs(reduced: ReducedModel, exponent: Complexes, motion: Complexes, inte
 
 
 def _energies(
-    reduced: ReducedModel, exponent: Complexes, motion: Complexes, n_mode: int
+    reduced: ReducedModel, exponent: Complexes, motion: Complexes, n_eigenmode: int
 ) -> tuple[Floats, Complexes, Floats]:
     """Primitives of the powers of damping and unbalance: (2 m, 2 m), (2, m) and steady (2,), W.
 
@@ -179,8 +179,8 @@ def _energies(
             _primitive(phasor.conj() @ rate, exponent - turning),
         ]
     )
-    response = rate[:, n_mode]
-    steady = np.array([response @ resisting[:, n_mode].conj(), response @ phasor.conj()])
+    response = rate[:, n_eigenmode]
+    steady = np.array([response @ resisting[:, n_eigenmode].conj(), response @ phasor.conj()])
     return 0.5 * (loss + loss.T), work, 0.5 * steady.real
 
 

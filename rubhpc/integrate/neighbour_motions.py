@@ -9,39 +9,39 @@ import numpy as np
 
 from rubhpc.integrate.event_driven_march import NoClosedForm
 from rubhpc.integrate.lyapunov import N_ALIGNING
-from rubhpc.integrate.measures import empty_samples, empty_tally
+from rubhpc.integrate.measures import empty_samples, new_accumulator
 from rubhpc.integrate.regimes import N_MOST
-from rubhpc.kernels.contact_modes import (
+from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
     FINISHED,
-    N_PROGRESS,
-    PHASE,
-    PHASE_WANTED,
+    MODE_WANTED,
     SLIP_TURNED,
-    SPAN,
-    WANTED,
+    ask_for,
+    begin_in,
+    closed_pairs,
+    new_progress,
 )
 from rubhpc.kernels.measuring import recorder
 from rubhpc.kernels.separation import Pair, part
 
 if TYPE_CHECKING:
-    from rubhpc.integrate.event_driven_march import ModalMarch
+    from rubhpc.integrate.event_driven_march import EventDrivenMarch
 
 N_SPAN = 4  # passed by one kernel call
 
 
-class ModalNeighbours:
+class NeighbourMotions:
     """The motion of a march from where it stands on, and one beside it."""
 
-    def __init__(self, march: ModalMarch) -> None:
+    def __init__(self, march: EventDrivenMarch) -> None:
         """Start where `march` is, which itself stays there."""
         self.most_spans = N_ALIGNING + N_MOST
         self._march = march
-        n_coordinate, n_motion = march.phases.switch_re.shape[2], march.phases.motion_re.shape[1]
+        n_coordinate, n_motion = march.tables.switch_re.shape[2], march.tables.motion_re.shape[1]
         q = march.touching().size
         self._pair = Pair(
-            progress=np.zeros((2, N_PROGRESS), dtype=np.int64),
+            progress=new_progress(2),
             z=np.zeros((2, 2, n_coordinate)),
             z_next=np.zeros((2, n_coordinate)),
             motion=np.zeros((2, n_motion)),
@@ -50,9 +50,9 @@ class ModalNeighbours:
             n_done=np.full(1, N_SPAN),
         )
         self._n_read = N_SPAN
-        self._pair.progress[:, [WANTED, SPAN]] = -1
-        self._pair.progress[0, PHASE], self._pair.z[0] = march.place()
-        self._unrecorded = recorder(q), empty_samples(q, 0), empty_tally(q)
+        progress, self._pair.z[0] = march.place()
+        begin_in(self._pair.progress[0], progress.mode)
+        self._unrecorded = recorder(q), empty_samples(q, 0), new_accumulator(q)
 
     def part(self, n_revolution: int) -> float | None:
         """Go on with both; see `lyapunov.Neighbours`. Several spans are passed ahead, all of one length.
@@ -80,7 +80,7 @@ class ModalNeighbours:
         while outcome != FINISHED:
             if march.check is not None:
                 march.check()
-            outcome = part(march.phases, march.bodies, march.clock, n_tick, pair, *self._unrecorded)
+            outcome = part(march.tables, march.bodies, march.clock, n_tick, pair, *self._unrecorded)
             if outcome in (CONTACT_UNSOLVED, SLIP_TURNED):
                 raise NoClosedForm
             if outcome == DIVERGED:
@@ -88,21 +88,18 @@ class ModalNeighbours:
             if march.is_beyond(pair.motion[0]):
                 pair.n_done[0] = 0
                 return
-            if outcome == PHASE_WANTED:
+            if outcome == MODE_WANTED:
                 self._tabulate()
 
     def _tabulate(self) -> None:
-        """Have the phases tabulated that are wanted.
+        """Have the tables tabulated that are wanted.
 
-        A motion that is in a phase by now enters it anew: making room for another may move the tables.
+        A motion that is in a mode by now enters it anew: making room for another may move the tables.
         """
         march, pair = self._march, self._pair
-        for k in range(2):
-            if pair.progress[k, WANTED] < 0:
-                p = pair.progress[k, PHASE]
-                pair.motion[k] = (
-                    march.phases.motion_re[p] @ pair.z[k, 0] - march.phases.motion_im[p] @ pair.z[k, 1]
-                )
-                pair.progress[k, WANTED] = march.phases.mask[p]
-        for wanted in pair.progress[:, WANTED].tolist():
-            self._march.find(wanted)
+        for progress, z, motion in zip(pair.progress, pair.z, pair.motion, strict=True):
+            if progress.wanted < 0:
+                motion[:] = march.motion_of(progress, z)
+                ask_for(progress, closed_pairs(progress, march.tables))
+        for wanted in pair.progress.wanted.tolist():
+            march.find(wanted)

@@ -1,4 +1,4 @@
-"""Measures of recorded signals: spectra, period and sense of the whirl."""
+"""Measures of a recorded orbit: period and sense of the whirl."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.fft
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -15,27 +14,6 @@ if TYPE_CHECKING:
 
 LONGEST_PERIOD = 16  # revolutions
 PERIOD_TOLERANCE = 1e-2  # rms distance of whole cycles over the orbit's size
-
-
-def amplitude_spectrum(signal: Floats) -> Floats:
-    """Single-sided amplitude (zero to peak) of signals that span whole revolutions.
-
-    Parameters
-    ----------
-    signal : (..., n_sample)
-        n_sample even; no window is needed where the samples are locked to the shaft.
-
-    Returns
-    -------
-    (..., n_sample // 2 + 1)
-        In the signal's unit; line k is order k over the revolutions recorded, line 0 the size of the mean.
-    """
-    n_sample = signal.shape[-1]
-    spectrum: Floats = np.abs(scipy.fft.rfft(signal, axis=-1)) * (2.0 / n_sample)
-    spectrum[..., 0] *= 0.5
-    if n_sample % 2 == 0:
-        spectrum[..., -1] *= 0.5
-    return spectrum
 
 
 def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) -> int:

@@ -12,7 +12,8 @@ from scipy.sparse import csr_array, dia_array
 from scipy.sparse.csgraph import connected_components
 
 from rubhpc.fem.statics import sag_at_stators
-from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, MULTIPLIER, N_DEGREE, TORSION, Law, Pairs, V, W
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, N_DEGREE, TORSION, Pairs, V, W, rim_sense
+from rubhpc.kernels.laws import FRICTION_LAWS, MULTIPLIER, Law
 from rubhpc.kernels.linear import Linear
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def whole_system(model: Model, spin: float) -> tuple[Floats, Floats, Floats, Flo
 
     The force's rows go with the cosine and the sine of the shaft's angle; spin in rad/s.
     """
-    bodies = [model.rotor, *(stator.body for stator in model.stators)]
+    bodies = model.bodies
     mass = block_diag(*(body.mass for body in bodies))
     stiffness = block_diag(*(body.stiffness for body in bodies))
     damping = block_diag(*(body.damping + spin * body.gyroscopic for body in bodies))
@@ -109,7 +110,7 @@ def whole_system(model: Model, spin: float) -> tuple[Floats, Floats, Floats, Flo
 
 def degrees_of(model: Model) -> Ints:
     """Rows of each pair's degrees (q, 5) among all degrees, rotor first, then stators; -1 where held."""
-    first = np.cumsum([model.rotor.n_dof, *(stator.body.n_dof for stator in model.stators)])
+    first = model.body_start[1:]
     degree = np.full((len(model.stators), N_DEGREE), -1)
     for i, stator in enumerate(model.stators):
         degree[i, V], degree[i, W] = model.rotor.index(stator.node, "v"), model.rotor.index(stator.node, "w")
@@ -125,39 +126,50 @@ def output_degrees(model: Model) -> Ints:
 
 
 def law_of(contact: Contact) -> Law:
-    """Laws of a study as the kernels take them; what it leaves out is zero, or one."""
+    """Laws of a study as the kernels take them: what it leaves out keeps its default."""
+    given = {key: getattr(contact, key) for key in Law._fields if key != "friction_law"}
     return Law(
-        stiffness=contact.stiffness or 0.0,
-        damping=contact.damping or 0.0,
-        restitution=contact.restitution or 0.0,
-        is_set_valued=contact.friction_law == "coulomb",
-        static_ratio=contact.static_friction_ratio or 1.0,
+        friction_law=FRICTION_LAWS.index(contact.friction_law),
+        **{key: float(value) for key, value in given.items() if value is not None},
     )
 
 
 def pairs_of(
     model: Model,
-    packed: Packed,
     *,
+    row: Ints,
+    block: Ints,
+    compliance: Floats,
     clearance: float,
     friction: float,
     spin: float,
     is_updated: bool,
     law: Law = MULTIPLIER,
 ) -> Pairs:
-    """Contact pairs of a case; clearance in m, friction positive, spin (rad/s) gives its sense."""
+    """Contact pairs of a case.
+
+    Parameters
+    ----------
+    row, block : (q, 5)
+        Row and block of each degree in the state of the scheme; -1 where it is constrained or absent.
+    compliance : (q, 5, q, 5), m/N
+        Displacement of a degree for a unit force on another over a step.
+    clearance : float, m
+    friction : float
+        Coefficient, not negative; the spin (rad/s) gives it the sense of the rim.
+    """
     angle = np.array([stator.angle for stator in model.stators])
     nearer, aside = sag_at_stators(model)
     return Pairs(
-        row=packed.degree_row,
-        block=packed.degree_block,
+        row=row,
+        block=block,
         axis_y=np.cos(angle),
         axis_z=np.sin(angle),
         radius=np.array([stator.radius for stator in model.stators]),
         clearance=np.array([clearance + stator.clearance_offset for stator in model.stators]) - nearer,
         aside=aside,
-        friction=np.full(angle.size, np.copysign(friction, spin)),
-        compliance=packed.compliance,
+        friction=np.full(angle.size, rim_sense(spin) * friction),
+        compliance=compliance,
         is_updated=is_updated,
         law=law,
     )

@@ -60,30 +60,37 @@ class State:
     @classmethod
     def unpacked(cls, values: Floats, model: Model) -> State:
         """The state of a model that `packed` has put into one vector."""
-        sizes = [model.rotor.n_dof, *(stator.body.n_dof for stator in model.stators)]
-        n_stator = len(model.stators)
-        parts = np.split(values, np.cumsum([*sizes, *sizes, n_stator]))
-        n_body = len(sizes)
+        n_dof, n_stator = model.body_start[-1], len(model.stators)
+        parts = np.split(values, np.cumsum([n_dof, n_dof, n_stator]))
+        return cls.of_bodies(model, *parts)
+
+    @classmethod
+    def of_bodies(
+        cls,
+        model: Model,
+        displacement: Floats,
+        velocity: Floats,
+        contact_force: Floats,
+        overlap: Floats | None = None,
+    ) -> State:
+        """The state with these vectors over all bodies, (n_dof,), and over the contacts, (n_stator,)."""
+        u, v = model.split(displacement), model.split(velocity)
         return cls(
-            rotor_displacement=parts[0],
-            rotor_velocity=parts[n_body],
-            stator_displacement=tuple(parts[1:n_body]),
-            stator_velocity=tuple(parts[n_body + 1 : 2 * n_body]),
-            contact_force=parts[-2],
-            overlap=parts[-1],
+            rotor_displacement=u[0],
+            rotor_velocity=v[0],
+            stator_displacement=tuple(u[1:]),
+            stator_velocity=tuple(v[1:]),
+            contact_force=contact_force,
+            overlap=overlap,
         )
 
     @classmethod
     def at_rest(cls, model: Model) -> State:
         """Nothing moves but the steady spin; constant loads bend the shaft, and no stator touches."""
-        stators = tuple(stator.body for stator in model.stators)
-        return cls(
-            rotor_displacement=model.sag.copy(),
-            rotor_velocity=np.zeros(model.rotor.n_dof),
-            stator_displacement=tuple(np.zeros(body.n_dof) for body in stators),
-            stator_velocity=tuple(np.zeros(body.n_dof) for body in stators),
-            contact_force=np.zeros(len(stators)),
-        )
+        n_dof = model.body_start[-1]
+        displacement = np.zeros(n_dof)
+        displacement[: model.rotor.n_dof] = model.sag
+        return cls.of_bodies(model, displacement, np.zeros(n_dof), np.zeros(len(model.stators)))
 
 
 MOST_RESIDUAL = 0.01  # of the energy balance: more is told of

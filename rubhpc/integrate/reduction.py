@@ -1,4 +1,4 @@
-"""Galerkin reduction: each body in its lowest modes and its static answers to contact, with unit mass."""
+"""Galerkin reduction: the lowest modes of each body and residual attachment modes, with unit mass."""
 
 from __future__ import annotations
 
@@ -13,24 +13,27 @@ from scipy.sparse.csgraph import connected_components
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.packing import degrees_of, output_degrees, whole_system
-from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, N_DEGREE, V, W
+from rubhpc.kernels.contact_modes import Reduced
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, N_DEGREE, V, W, rim_sense
+from rubhpc.kernels.laws import is_set_valued
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
+    from rubhpc.kernels.laws import Law
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
 
 # Modes up to this multiple of the contact frequency (or the spin, where that is higher), times
-# (1e-3 / accuracy)^(1/4): what lies above answers by its static shape, whose error goes with the fourth
+# (1e-3 / accuracy)^(1/4): modes above are kept as static shapes, whose error goes with the fourth
 # power of the frequency ratio.
 CUTOFF_RATIO = 10.0
 FEWEST_MODES = 2  # kept of every part, whatever their frequency
-# Static answer to a damper, as a share of the mode that it slows, times sqrt(accuracy), that is left out: the
-# mode's exponent errs by the square.
-LEAST_ANSWER = 0.1
+# Static response to a damper, as a share of the mode that it slows, times sqrt(accuracy), that is left out:
+# the mode's exponent errs by the square.
+LEAST_RESPONSE = 0.1
 FREE = 1e-12  # square of a frequency over the greatest, below which a mode is free motion
 UNSEEN = 1e-9  # relative motion or coupling below which a mode is taken for unseen
 
@@ -79,9 +82,9 @@ class ReducedModel:
 def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     """Reduce a model so that contact and outputs are met to the accuracy asked for.
 
-    The basis of each uncoupled part holds its undamped modes at standstill up to a cutoff and its static
-    answers to a unit force on each degree that contact or outputs see (component modes with residual
-    attachment shapes), and to what dampers and cross-coupled springs draw from those modes; gyroscopic and
+    The basis of each uncoupled part holds its undamped modes at standstill up to a cutoff, and residual
+    attachment modes: the static responses of what lies above to a unit force on each degree that contact or
+    outputs see, and to what dampers and cross-coupled springs draw from the modes kept. Gyroscopic and
     damping terms are then projected. Modes that nothing sees are left out.
 
     Parameters
@@ -106,8 +109,8 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     kept = np.hstack([those.low for those in modes])
     frequency = np.concatenate([those.low_frequency for those in modes])
     drawn = np.hstack([0.5 * (damping + damping.T) @ kept, (stiffness - symmetric) @ (kept / frequency)])
-    least = LEAST_ANSWER * np.sqrt(accuracy)
-    basis = np.hstack([kept, *(_shapes(those, seen, drawn, least) for those in modes)])
+    least = LEAST_RESPONSE * np.sqrt(accuracy)
+    basis = np.hstack([kept, *(_attachment_modes(those, seen, drawn, least) for those in modes)])
     stiffness, damping = basis.T @ stiffness @ basis, basis.T @ damping @ basis
     keep = np.flatnonzero(_visible(basis[seen], stiffness, damping))
     basis, pick = basis[:, keep], np.ix_(keep, keep)
@@ -185,8 +188,8 @@ def _contact_frequency(parts: list[_Part], degree: Ints, model: Model) -> float:
             for row, share in ((v, np.cos(stator.angle)), (w, np.sin(stator.angle)))
             if row >= 0
         )
-        answer = along / square  # to a unit force, mode by mode
-        inertia = (answer @ answer) / (along @ answer) ** 2  # of that shape, as that of the first mode
+        response = along / square  # to a unit force, mode by mode
+        inertia = (response @ response) / (along @ response) ** 2  # of that shape, as that of the first mode
         compliance = mode[axial] @ (mode[axial] / square)
         highest = max(highest, 1.0 / np.sqrt(inertia * compliance))
     return float(highest)
@@ -197,7 +200,7 @@ class _Modes(NamedTuple):
 
     low: Floats  # (n_all, n_low), kept
     low_frequency: Floats  # (n_low,), rad/s
-    high: Floats  # (n_all, n_high), which answer by static shapes
+    high: Floats  # (n_all, n_high), which only static shapes represent
     high_frequency: Floats  # (n_high,), rad/s
 
 
@@ -210,18 +213,18 @@ def _parted(part: _Part, cutoff: float) -> _Modes:
     return _Modes(mode[:, :n_low], frequency[:n_low], mode[:, n_low:], frequency[n_low:])
 
 
-def _shapes(modes: _Modes, seen: Ints, drawn: Floats, least: float) -> Floats:
-    """Static answers of the modes above the cutoff, (n_all, n_shape), orthonormal in the mass.
+def _attachment_modes(modes: _Modes, seen: Ints, drawn: Floats, least: float) -> Floats:
+    """Residual attachment modes: static responses of the modes above the cutoff, (n_all, n_shape).
 
-    They answer a unit force on each degree seen, and those combinations of the forces `drawn`
-    (n_all, n_force) from modes at unit velocity whose strain energy is over `least`^2 of that mode's.
-    Proportional damping draws none: it keeps modes apart.
+    They are orthonormal in the mass, and respond to a unit force on each degree seen and to those
+    combinations of the forces `drawn` (n_all, n_force) from modes at unit velocity whose strain energy is
+    over `least`^2 of that mode's. Proportional damping draws none: it does not couple modes.
     """
     if not modes.high_frequency.size:
         return modes.high
-    answer = modes.high.T / modes.high_frequency[:, np.newaxis]  # its square is twice the strain energy
-    turn, size, _ = np.linalg.svd(answer @ drawn, full_matrices=False)
-    shape = np.hstack([answer[:, seen], turn[:, size > least]]) / modes.high_frequency[:, np.newaxis]
+    response = modes.high.T / modes.high_frequency[:, np.newaxis]  # its square is twice the strain energy
+    turn, size, _ = np.linalg.svd(response @ drawn, full_matrices=False)
+    shape = np.hstack([response[:, seen], turn[:, size > least]]) / modes.high_frequency[:, np.newaxis]
     length = np.linalg.norm(shape, axis=0)
     shape = shape[:, length > 0.0] / length[length > 0.0]
     size, mix = np.linalg.eigh(shape.T @ shape)
@@ -241,6 +244,35 @@ def _visible(seen: Floats, stiffness: Floats, damping: Floats) -> NDArray[np.boo
     return np.isin(group, group[moves])
 
 
+def kernel_bodies(
+    reduced: ReducedModel,
+    model: Model,
+    friction: float,
+    clearance: Floats,
+    law: Law,
+    displacement_limit: float,
+) -> Reduced:
+    """Return the reduced bodies of a case as kernels take them; clearance (q,) and limit in m."""
+    gap_jacobian, force_direction, slip = directions(reduced, model, friction)
+    return Reduced(
+        stiffness=reduced.stiffness,
+        damping=reduced.damping,
+        force_cosine=reduced.force[0].copy(),
+        force_sine=reduced.force[1].copy(),
+        gap_jacobian=gap_jacobian,
+        force_direction=force_direction,
+        delassus=gap_jacobian @ force_direction.T,
+        friction=np.full(clearance.size, friction),
+        radius=np.array([stator.radius for stator in model.stators]),
+        slip=slip,
+        restitution=law.restitution,
+        clearance=clearance,
+        is_set_valued=is_set_valued(law),
+        translations=reduced.translations,
+        displacement_limit=displacement_limit,
+    )
+
+
 def directions(reduced: ReducedModel, model: Model, friction: float) -> tuple[Floats, Floats, Floats]:
     """Rate of each gap, force of a unit contact, and slip, each (q, n), for the fixed normal.
 
@@ -252,7 +284,7 @@ def directions(reduced: ReducedModel, model: Model, friction: float) -> tuple[Fl
     radius = np.array([stator.radius for stator in model.stators])
     ey, ez = np.cos(angle)[:, None], np.sin(angle)[:, None]
     v, w, torsion, axial, lateral = (reduced.degree[:, a] for a in range(N_DEGREE))
-    push = axial - ey * v - ez * w
+    gap_jacobian = axial - ey * v - ez * w
     along = lateral + ez * v - ey * w - radius[:, None] * torsion
-    pull = push + np.copysign(friction, reduced.spin) * along
-    return push, pull, -np.sign(reduced.spin) * along
+    sense = rim_sense(reduced.spin)
+    return gap_jacobian, gap_jacobian + sense * friction * along, -sense * along

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.response import step_limit
-from rubhpc.integrate.contact_mode import Phase, make_phase
-from rubhpc.integrate.mode_library import PhaseBook
+from rubhpc.integrate.contact_mode import ContactMode, solve_contact_mode
+from rubhpc.integrate.mode_library import ModeLibrary, width_without_modes
+from rubhpc.integrate.mode_tables import tabulate
 from rubhpc.integrate.packing import Packed, law_of, pack
 from rubhpc.integrate.reduction import ReducedModel, directions, reduce_model
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
-from rubhpc.kernels.contact_pairs import MULTIPLIER
-from rubhpc.study.tables import BLIND_STEP
+from rubhpc.kernels.laws import MULTIPLIER
+from rubhpc.study.tables import SEARCH_STEP
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
-    from rubhpc.kernels.contact_pairs import Law
+    from rubhpc.kernels.contact_modes import ModeTables
+    from rubhpc.kernels.laws import Law
     from rubhpc.rig.rig import Rig
     from rubhpc.study.study import Contact, Integrator
 
@@ -28,10 +31,26 @@ FINEST_TICK = 1.5e-9  # s
 FEWEST_STEPS = 16  # a revolution: none is longer than the power of two below it
 
 
+class Scheme(Enum):
+    """How a case is integrated."""
+
+    EVENT_DRIVEN = "event-driven"  # closed-form motion from event to event
+    CONTACT_STEPPING = "contact-stepping"  # closed-form motion between short steps of contact
+    CENTRAL_DIFFERENCE = "central-difference"  # the paper's
+
+
+def scheme_of(contact: Contact, integrator: Integrator) -> Scheme:
+    """Return the scheme with which a case of a study begins."""
+    if integrator.method == "central-difference":
+        return Scheme.CENTRAL_DIFFERENCE
+    return Scheme.CONTACT_STEPPING if contact.closed_form == "never" else Scheme.EVENT_DRIVEN
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CentralDifferenceSetup:
     """All that the cases of one rig and speed share."""
 
+    scheme: ClassVar[Scheme] = Scheme.CENTRAL_DIFFERENCE
     model: Model
     packed: Packed
     spin: float  # rad/s
@@ -45,26 +64,20 @@ class CentralDifferenceSetup:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ModalSetup:
-    """All that the cases of one rig and speed share; phases are made as frictions and contacts come."""
+    """All that the cases of one rig and speed share; contact modes are solved when they are first met."""
 
+    scheme: Scheme = Scheme.EVENT_DRIVEN  # with which a case begins
     model: Model
     reduced: ReducedModel
     spin: float  # rad/s
     step: float  # s, up to which steps are taken without a bound
-    kick_step: float  # s, of contact where it has no closed form
+    contact_step: float  # s, of contact where it has no closed form
     samples_per_revolution: int
     is_updated: bool  # normal
     displacement_limit: float  # m
     law: Law = MULTIPLIER
-    _books: dict[float, PhaseBook] = field(default_factory=dict)
-
-    @property
-    def is_stepped(self) -> bool:
-        """Whether closed contacts have no closed form, so that contact is taken in short steps.
-
-        Set-valued friction has one until the slip turns.
-        """
-        return self.is_updated or self.law.stiffness > 0.0
+    _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
+    _open_tables: dict[float, ModeTables] = field(default_factory=dict)
 
     @cached_property
     def interval(self) -> float:
@@ -86,25 +99,45 @@ class ModalSetup:
         return max(0, min(self.sample_level, math.floor(math.log2(step / self.tick))))
 
     @cached_property
-    def _opened(self) -> Phase:
+    def _opened(self) -> ContactMode:
         """Motion with every pair open, whatever the friction."""
-        push, pull, _ = directions(self.reduced, self.model, 0.0)
-        return make_phase(self.reduced, push, pull, 0)
+        gap_jacobian, force_direction, _ = directions(self.reduced, self.model, 0.0)
+        return solve_contact_mode(self.reduced, gap_jacobian, force_direction, 0)
 
-    def book(self, friction: float) -> PhaseBook:
-        """Phases of a friction, shared by its cases."""
-        if friction not in self._books:
-            past_sample = max(SAMPLES_AT_ONCE, self.samples_per_revolution // FEWEST_STEPS)
-            self._books[friction] = PhaseBook(
+    @cached_property
+    def _n_level(self) -> int:
+        """Levels for which exponentials are tabulated."""
+        past_sample = max(SAMPLES_AT_ONCE, self.samples_per_revolution // FEWEST_STEPS)
+        return self.sample_level + past_sample.bit_length()
+
+    def library(self, friction: float) -> ModeLibrary:
+        """Contact modes of a friction, shared by its cases."""
+        if friction not in self._libraries:
+            self._libraries[friction] = ModeLibrary(
                 self.reduced,
                 self.model,
                 friction,
                 opened=self._opened,
                 tick=self.tick,
                 sample_level=self.sample_level,
-                n_level=self.sample_level + past_sample.bit_length(),
+                n_level=self._n_level,
             )
-        return self._books[friction]
+        return self._libraries[friction]
+
+    def open_tables(self, friction: float) -> ModeTables:
+        """Tables of the mode with every pair open alone, as wide as those of the friction's library."""
+        if friction not in self._open_tables:
+            library = self._libraries.get(friction)
+            self._open_tables[friction] = tabulate(
+                self._opened,
+                self.reduced,
+                directions(self.reduced, self.model, friction)[2],
+                width=library.width if library else width_without_modes(self.reduced, self.model, friction),
+                tick=self.tick,
+                sample_level=self.sample_level,
+                n_level=self._n_level,
+            )
+        return self._open_tables[friction]
 
 
 Setup: TypeAlias = CentralDifferenceSetup | ModalSetup
@@ -137,11 +170,12 @@ def prepare(
     model = model_at(model or assemble(rig), speed)
     if integrator.method == "modal":
         return ModalSetup(
+            scheme=scheme_of(contact, integrator),
             model=model,
             reduced=reduce_model(model, speed, integrator.accuracy),
             spin=speed,
-            step=BLIND_STEP if integrator.step is None else integrator.step,
-            kick_step=integrator.contact_step(contact),
+            step=SEARCH_STEP if integrator.step is None else integrator.step,
+            contact_step=integrator.contact_step(contact),
             samples_per_revolution=samples_per_revolution,
             is_updated=contact.normal == "updated",
             law=law_of(contact),

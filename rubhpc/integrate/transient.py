@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.measures import empty_samples, empty_tally
+from rubhpc.integrate.measures import empty_samples, new_accumulator
 from rubhpc.kernels.accumulators import HORIZONTAL, TWIST, VERTICAL
 
 if TYPE_CHECKING:
@@ -41,7 +41,10 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
         return pass_revolutions(march, recording, recording.longest_transient), recording.longest_transient
 
     n_stator, done, limit = march.touching().size, 0, recording.longest_transient
-    samples, tally = empty_samples(n_stator, recording.samples_per_revolution), empty_tally(n_stator)
+    samples, accumulator = (
+        empty_samples(n_stator, recording.samples_per_revolution),
+        new_accumulator(n_stator),
+    )
     reference: Floats | None = None
     for i, pause in enumerate(chain([0], cycle(PAUSES))):
         if done + pause + 1 > limit:
@@ -49,7 +52,9 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
         reason = pass_revolutions(march, recording, pause)
         done += pause
         if reason is None:
-            reason = march.advance(0, recording.samples_per_revolution, samples, tally, is_recorded=True)
+            reason = march.advance(
+                0, recording.samples_per_revolution, samples, accumulator, is_recorded=True
+            )
         if reason is not None:
             return reason, done
         done += 1
@@ -69,6 +74,6 @@ def has_settled(cycle: Floats, earlier: Floats, tolerance: float) -> bool:
 
 def pass_revolutions(march: March, recording: Recording, n_revolution: int) -> str | None:
     """March some revolutions without a record; returns why the case cannot go on."""
-    samples, tally = empty_samples(march.touching().size, 0), empty_tally(march.touching().size)
+    samples, accumulator = empty_samples(march.touching().size, 0), new_accumulator(march.touching().size)
     first = -n_revolution * recording.samples_per_revolution
-    return march.advance(first, 0, samples, tally, is_recorded=False)
+    return march.advance(first, 0, samples, accumulator, is_recorded=False)

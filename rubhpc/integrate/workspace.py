@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_directions, fill_drag
-from rubhpc.kernels.contact_step import fill_compliances
+from rubhpc.kernels.contact_forces import fill_compliances
+from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_directions, fill_friction_direction
 
 
 def workspace(pairs: Pairs, step: float) -> Workspace:
@@ -15,9 +15,9 @@ def workspace(pairs: Pairs, step: float) -> Workspace:
         at=np.zeros((q, N_DEGREE)),
         now=np.zeros((q, N_DEGREE)),
         rate=np.zeros((q, N_DEGREE)),
-        pull=np.zeros((q, N_DEGREE)),
-        push=np.zeros((q, N_DEGREE)),
-        drag=np.zeros((q, N_DEGREE)),
+        force_direction=np.zeros((q, N_DEGREE)),
+        gap_jacobian=np.zeros((q, N_DEGREE)),
+        friction_direction=np.zeros((q, N_DEGREE)),
         matrix=np.zeros((q, q)),
         gap=np.zeros(q),
         force=np.zeros(q),
@@ -38,7 +38,9 @@ def workspace(pairs: Pairs, step: float) -> Workspace:
         solution=np.zeros(3),
     )
     for i in range(q):
-        fill_directions(pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.pull[i], work.push[i])
-        fill_drag(pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.drag[i])
+        fill_directions(
+            pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.force_direction[i], work.gap_jacobian[i]
+        )
+        fill_friction_direction(pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.friction_direction[i])
     fill_compliances(pairs, work, step)
     return work

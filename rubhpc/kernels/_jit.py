@@ -30,10 +30,11 @@ def _stamped(compiled: Any) -> Any:
     """Make a change of any kernel outdate the cache of this one.
 
     Numba compares the file of a function alone, though what it calls from other files is compiled into it.
+    The version is compared before the cache is read: an outdated one may name classes that no longer exist.
     """
     cache = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if cache is not None:  # nothing is compiled under NUMBA_DISABLE_JIT
-        cache._source_stamp = (cache._source_stamp, _SOURCES)
+        cache._version = f"{cache._version} {_SOURCES}"
     return compiled
 
 

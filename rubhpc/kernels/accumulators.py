@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline
-from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, Pairs, V, W, Workspace
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, Pairs, V, W, Workspace, rim_sense
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -27,7 +27,7 @@ class Samples(NamedTuple):
     whole: Floats  # (4 + 3 q, n_sample), of which the others are rows, in this order
 
 
-class Tally(NamedTuple):
+class Accumulator(NamedTuple):
     """Running sums and extrema over the recorded revolutions."""
 
     highest: Floats  # (3,), of vertical, horizontal and torsional displacement
@@ -99,18 +99,19 @@ def observe_contact(
     step: float,
     velocity: Floats,
     velocity_next: Floats,
-    tally: Tally,
+    accumulator: Accumulator,
 ) -> None:
-    """Add one step's contact to the tally; velocities are half a step before and after the step's forces.
+    """Add one step's contact; velocities are half a step before and after the step's forces.
 
     The slip speed is `r_d (spin + thx') + t . (vA - vB)`, signed so that steady sliding is positive. What the
     normal force does not give back, `-N` times the rate of the gap, is the loss of the impacts.
     """
+    sense = rim_sense(spin)
     for i in range(pairs.radius.size):
         force = work.force[i]
         if not force > 0.0:
-            tally.is_touching[i] = False
-            tally.age[i] = 0
+            accumulator.is_touching[i] = False
+            accumulator.age[i] = 0
             continue
         rate_v, rate_w = (
             centred(pairs.row[i, V], velocity, velocity_next),
@@ -119,36 +120,37 @@ def observe_contact(
         rate_twist = centred(pairs.row[i, TORSION], velocity, velocity_next)
         rate_axial = centred(pairs.row[i, AXIAL], velocity, velocity_next)
         rate_lateral = centred(pairs.row[i, LATERAL], velocity, velocity_next)
-        push = work.push[i]
+        gap_jacobian = work.gap_jacobian[i]
         ey, ez = pairs.axis_y[i], pairs.axis_z[i]
-        ny, nz = -push[V], -push[W]
+        ny, nz = -gap_jacobian[V], -gap_jacobian[W]
         tip_v = rate_axial * ey - rate_lateral * ez
         tip_w = rate_axial * ez + rate_lateral * ey
         opening = ny * (tip_v - rate_v) + nz * (tip_w - rate_w)
-        sense = 1.0 if spin >= 0.0 else -1.0
         slip = sense * (pairs.radius[i] * (spin + rate_twist) - nz * (rate_v - tip_v) + ny * (rate_w - tip_w))
         friction_force = sense * work.traction[i]
-        if not tally.is_touching[i]:
-            tally.n_contact[i] += 1
-            tally.is_touching[i] = True
-        tally.contact_time[i] += step
-        tally.impulse[i] += force * step
-        tally.friction_work[i] += friction_force * slip * step
-        tally.least_slip[i] = min(tally.least_slip[i], slip)
-        tally.age[i] += 1
-        if tally.age[i] > IMPACT_STEPS:
-            tally.peak_force[i] = max(tally.peak_force[i], force)
-        tally.energy[DRIVE_WORK] += friction_force * pairs.radius[i] * abs(spin) * step
-        tally.energy[FRICTION_LOSS] += friction_force * slip * step
-        tally.energy[IMPACT_LOSS] -= force * opening * step
+        if not accumulator.is_touching[i]:
+            accumulator.n_contact[i] += 1
+            accumulator.is_touching[i] = True
+        accumulator.contact_time[i] += step
+        accumulator.impulse[i] += force * step
+        accumulator.friction_work[i] += friction_force * slip * step
+        accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
+        accumulator.age[i] += 1
+        if accumulator.age[i] > IMPACT_STEPS:
+            accumulator.peak_force[i] = max(accumulator.peak_force[i], force)
+        accumulator.energy[DRIVE_WORK] += friction_force * pairs.radius[i] * abs(spin) * step
+        accumulator.energy[FRICTION_LOSS] += friction_force * slip * step
+        accumulator.energy[IMPACT_LOSS] -= force * opening * step
 
 
 @jit_inline
-def observe_solution(problem: int, pivots: int, residual: float, moved: float, tally: Tally) -> None:
+def observe_solution(
+    problem: int, pivots: int, residual: float, moved: float, accumulator: Accumulator
+) -> None:
     """Note what a contact problem has taken, and how far its solution is from the laws."""
-    tally.pivots[0] = max(tally.pivots[0], pivots)
-    tally.residual[problem, 0] = max(tally.residual[problem, 0], residual)
-    tally.residual[problem, 1] = max(tally.residual[problem, 1], moved)
+    accumulator.pivots[0] = max(accumulator.pivots[0], pivots)
+    accumulator.residual[problem, 0] = max(accumulator.residual[problem, 0], residual)
+    accumulator.residual[problem, 1] = max(accumulator.residual[problem, 1], moved)
 
 
 @jit_inline

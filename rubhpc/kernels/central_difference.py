@@ -11,8 +11,8 @@ from rubhpc.kernels.accumulators import (
     STEP,
     TWIST_ACCELERATION,
     UNBALANCE_WORK,
+    Accumulator,
     Samples,
-    Tally,
     centred,
     observe_contact,
     observe_motion,
@@ -20,8 +20,17 @@ from rubhpc.kernels.accumulators import (
     take_sample,
 )
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact_pairs import N_DEGREE, TORSION, Pairs, Workspace, fill_start, is_any_closed
-from rubhpc.kernels.contact_step import is_plain, solve_contact
+from rubhpc.kernels.contact_forces import solve_contact
+from rubhpc.kernels.contact_pairs import (
+    N_DEGREE,
+    TORSION,
+    Pairs,
+    Workspace,
+    fill_start,
+    is_any_closed,
+    rim_sense,
+)
+from rubhpc.kernels.laws import is_bouncing, is_penalty, is_plain
 from rubhpc.kernels.linear import Linear, circulatory_power, free_velocity
 
 Floats = NDArray[np.float64]
@@ -37,7 +46,7 @@ def apply_contact(
     inverse: Floats,
     row: Ints,
     block: Ints,
-    pull: Floats,
+    force_direction: Floats,
     force: Floats,
     step: float,
     share: Floats,
@@ -51,13 +60,13 @@ def apply_contact(
         if force[i] > 0.0 and share[i] != 0.0:
             for a in range(N_DEGREE):
                 b = block[i, a]
-                if b >= 0 and pull[i, a] != 0.0:
-                    impulse = share[i] * step * pull[i, a] * force[i]
-                    # Row of the transpose: how the block answers to a force on this degree.
-                    answer = inverse[b, row[i, a] - start[b]]
+                if b >= 0 and force_direction[i, a] != 0.0:
+                    impulse = share[i] * step * force_direction[i, a] * force[i]
+                    # Row of the transpose: the block's response to a force on this degree.
+                    response = inverse[b, row[i, a] - start[b]]
                     target = motion[start[b] : start[b + 1]]
                     for k in range(target.size):
-                        target[k] += impulse * answer[k]
+                        target[k] += impulse * response[k]
 
 
 @jit
@@ -77,7 +86,7 @@ def advance(
     work: Workspace,
     scratch: Floats,
     samples: Samples,
-    tally: Tally,
+    accumulator: Accumulator,
     reached: Ints,
 ) -> int:
     """Advance a case over samples `first_sample` to `last_sample` (excluded).
@@ -90,7 +99,7 @@ def advance(
     spin, step : float, rad/s and s
         Rotation speed and time step; `steps_per_sample` steps fill the interval between two samples.
     is_recorded : bool
-        Whether to fill `samples` (at index i - first recorded sample = i) and `tally`.
+        Whether to fill `samples` (at index i - first recorded sample = i) and `accumulator`.
     displacement_limit : float, m
         Displacement of a contact degree or of the output node beyond which the case has diverged.
     output_row : (3,)
@@ -120,20 +129,30 @@ def advance(
     )
     is_updated, at, gap, contact_force = pairs.is_updated, work.at, work.gap, work.force
     friction, traction = pairs.friction, work.traction
-    block, pull, matrix, start, inverse = pairs.block, work.pull, work.matrix, linear.start, linear.inverse
-    highest, lowest, peak_lateral, energy = tally.highest, tally.lowest, tally.peak_lateral, tally.energy
+    block, force_direction, matrix, start, inverse = (
+        pairs.block,
+        work.force_direction,
+        work.matrix,
+        linear.start,
+        linear.inverse,
+    )
+    highest, lowest, peak_lateral, energy = (
+        accumulator.highest,
+        accumulator.lowest,
+        accumulator.peak_lateral,
+        accumulator.energy,
+    )
     force_row, force_cosine, force_sine = linear.force_row, linear.force_cosine, linear.force_sine
     n_dof, q = displacement.size, gap.size
     twist = output_row[2]
     is_direct = is_plain(pairs.law)
     is_linear_pair = q == 1 and not is_updated and is_direct  # one division solves it
-    is_springy = pairs.law.stiffness > 0.0  # a force may act with the gap open at the step's end
-    is_bouncing = pairs.law.restitution > 0.0
+    may_press_open, bounces = is_penalty(pairs.law), is_bouncing(pairs.law)
     start_position, start_rate, delay = work.now, work.rate, work.delay
     solution = work.solution
     whole, late = np.ones(q), np.zeros(q)
     turn_cosine, turn_sine = np.cos(spin * step), np.sin(spin * step)
-    sense = 1.0 if spin >= 0.0 else -1.0
+    sense = rim_sense(spin)
     was_touching = True
     for i_sample in range(first_sample, last_sample):
         angle = sense * 2.0 * np.pi * (i_sample % samples_per_revolution) / samples_per_revolution
@@ -149,7 +168,7 @@ def advance(
             is_touching = is_any_closed(
                 row, axis_y, axis_z, radius, clearance, aside, is_updated, residual, at, gap
             )
-            if is_touching or (is_springy and was_touching):
+            if is_touching or (may_press_open and was_touching):
                 if is_linear_pair and matrix[0, 0] > 0.0:
                     contact_force[0] = -gap[0] / matrix[0, 0]
                     traction[0] = friction[0] * contact_force[0]
@@ -164,14 +183,16 @@ def advance(
                         return CONTACT_UNSOLVED
                     is_touching = n_touching > 0
                 if is_recorded:
-                    observe_solution(STEP, int(solution[0]), solution[1], solution[2], tally)
-                apply_contact(start, inverse, row, block, pull, contact_force, step, whole, velocity_next)
+                    observe_solution(STEP, int(solution[0]), solution[1], solution[2], accumulator)
+                apply_contact(
+                    start, inverse, row, block, force_direction, contact_force, step, whole, velocity_next
+                )
             elif was_touching:
                 contact_force[:] = 0.0
             if is_recorded:
                 observe_motion(displacement, output_row, row, highest, lowest, peak_lateral)
                 if is_touching or was_touching:
-                    observe_contact(pairs, work, spin, step, velocity, velocity_next, tally)
+                    observe_contact(pairs, work, spin, step, velocity, velocity_next, accumulator)
                     for i in range(q):
                         samples.force[i, i_sample] += contact_force[i] / steps_per_sample
                 loss = circulatory_power(linear, displacement, velocity)
@@ -185,9 +206,11 @@ def advance(
                     samples.rotor[TWIST_ACCELERATION, i_sample] = (
                         velocity_next[twist] - velocity[twist]
                     ) / step
-            if is_touching and is_bouncing:  # what a force has moved before its impact was due
+            if is_touching and bounces:  # what a force has moved before its impact was due
                 late[:] = -delay
-                apply_contact(start, inverse, row, block, pull, contact_force, step, late, displacement)
+                apply_contact(
+                    start, inverse, row, block, force_direction, contact_force, step, late, displacement
+                )
             for k in range(n_dof):
                 displacement[k] += step * velocity_next[k]
                 velocity[k] = velocity_next[k]

@@ -12,22 +12,11 @@ from rubhpc.kernels._jit import jit_inline_sum, jit_sum
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Rows of `Phases.output_*`: displacements and rates of the output node, its torsional acceleration, then
+# Rows of `ModeTables.output_*`: displacements and rates of the output node, its torsional acceleration, then
 # three rows a stator tip: axial and lateral displacement, lateral rate.
 N_ROTOR_ROW = 7
 TWIST_ACCELERATION_ROW = 6
 LATERAL_ROW, LATERAL_RATE = 1, 2
-
-
-FINISHED, DIVERGED, CONTACT_UNSOLVED, PHASE_WANTED, SLIP_TURNED, PAUSED = range(6)  # outcomes
-MOST_STEPS = 50_000  # of one call: signals are answered between calls
-
-# What a call leaves in `progress` for the next one: tick reached, phase, set of pairs wanted next (-1: none),
-# steps taken, next sample to take, tick at which the phase began, that from which energies are still to be
-# added (-1: none), how long the contact had lasted, as a level, when its pace was last seen (-1: never),
-# level of the longest step that resolved it then, and events since the caller last set that to 0.
-N_PROGRESS = 10
-TIME, PHASE, WANTED, N_STEP, NEXT_SAMPLE, ENTERED, SPAN, AGE, FINE, N_EVENT = range(N_PROGRESS)
 
 SAMPLES_AT_ONCE = 8  # read from one set of modal coordinates
 FORCED_LEVEL = 6  # steps of up to 2^level ticks follow an event unquestioned, so that time goes on
@@ -35,15 +24,16 @@ RESOLVED = 0.02  # of a signal's size: its fourth derivative times the step to t
 DYING = -1.0  # pace of a mode that is gone before anything is asked after an event
 
 
-class Phases(NamedTuple):
+class ModeTables(NamedTuple):
     """Modal form of every set of closed contacts met so far; complex arrays as (real, imaginary) pairs.
 
-    p phases, m coordinates (padded), q pairs, n reduced degrees, o output rows. The coordinates are those of
-    the modes, then that of the unbalance response, exp(i angle), then the clearance of each pair, m.
+    p contact modes, m coordinates (padded), q pairs, n reduced degrees, o output rows. The coordinates are
+    those of the eigenmodes, then that of the unbalance response, exp(i angle), then the clearance of each
+    pair, m.
     """
 
     mask: Ints  # (p,), bit i set: pair i is closed
-    n_mode: Ints  # (p,), the modes proper
+    n_eigenmode: Ints  # (p,), how many eigenmodes
     switch_re: Floats  # (p, q, m), gap of an open pair, m; force of a closed one, N
     switch_im: Floats
     rate_re: Floats  # (p, q, m), its time derivative
@@ -78,10 +68,10 @@ class Reduced(NamedTuple):
     damping: Floats  # (n, n), D + spin G
     force_cosine: Floats  # (n,)
     force_sine: Floats  # (n,)
-    push: Floats  # (q, n), rate of a gap with the motion
-    pull: Floats  # (q, n), force on the motion of a unit contact force, friction included
+    gap_jacobian: Floats  # (q, n), rate of a gap with the motion
+    force_direction: Floats  # (q, n), force on the motion of a unit contact force, friction included
     slip: Floats  # (q, n), slip speed with the motion, but for that of the steady spin
-    answer: Floats  # (q, q), push @ pull.T, 1/kg
+    delassus: Floats  # (q, q), gap_jacobian @ force_direction.T, 1/kg
     friction: Floats  # (q,), coefficient, not negative
     radius: Floats  # (q,), m
     restitution: float  # normal velocity after an impact over that before it
@@ -89,18 +79,6 @@ class Reduced(NamedTuple):
     is_set_valued: bool  # friction, so that it is known only while the rim outruns the stator
     translations: Floats  # (r, n), displacements that none may pass the limit with
     displacement_limit: float  # m
-
-
-class Clock(NamedTuple):
-    """How time is counted."""
-
-    spin: float  # rad/s
-    tick: float  # s
-    sample_level: int  # 2^level ticks are the interval of samples
-    samples_per_revolution: int
-    blind_level: int  # steps up to 2^level ticks need no bound; they are checked at their end
-    contact_level: int  # longest step with a pair closed while recording
-    n_sample: int  # samples of the record; it ends where the next one would stand
 
 
 @jit_inline_sum
@@ -114,7 +92,7 @@ def dot(re: Floats, im: Floats, z_re: Floats, z_im: Floats) -> float:
 
 @jit_inline_sum
 def bounded(weight: Floats, z_re: Floats, z_im: Floats) -> float:
-    """Bound on a second derivative: the modes' sizes, weighted, however their phases fall."""
+    """Bound on a second derivative: the modes' sizes, weighted, however their tables fall."""
     total = 0.0
     for k in range(z_re.size):
         total += weight[k] * (abs(z_re[k]) + abs(z_im[k]))
@@ -132,15 +110,15 @@ def propagate(re: Floats, im: Floats, z_re: Floats, z_im: Floats, next_re: Float
 
 @jit_sum
 def enter(
-    phases: Phases, p: int, clearance: Floats, cosine: float, sine: float, motion: Floats, z: Floats
+    tables: ModeTables, mode: int, clearance: Floats, cosine: float, sine: float, motion: Floats, z: Floats
 ) -> None:
-    """Modal coordinates `z` (2, m) in phase p of a motion (2 n,) at the shaft's angle; clearance (q,), m."""
+    """Modal coordinates `z` (2, m) in a contact mode of a motion (2 n,) at the shaft's angle."""
     for part in range(2):
-        rows = phases.enter_re[p] if part == 0 else phases.enter_im[p]
+        rows = tables.enter_re[mode] if part == 0 else tables.enter_im[mode]
         target = z[part]
-        target[:] = -phases.enter_cosine[p, part] * cosine - phases.enter_sine[p, part] * sine
+        target[:] = -tables.enter_cosine[mode, part] * cosine - tables.enter_sine[mode, part] * sine
         for i in range(clearance.size):
-            source = phases.enter_constant[p, i, part]
+            source = tables.enter_constant[mode, i, part]
             for k in range(target.size):
                 target[k] -= source[k] * clearance[i]
         for row in range(motion.size):
@@ -148,18 +126,18 @@ def enter(
             source = rows[row]
             for k in range(target.size):
                 target[k] += source[k] * value
-    first = phases.n_mode[p]
+    first = tables.n_eigenmode[mode]
     z[0, first], z[1, first] = cosine, sine
     for i in range(clearance.size):
         z[0, first + 1 + i], z[1, first + 1 + i] = clearance[i], 0.0
 
 
 @jit_sum
-def find_phase(mask: Ints, wanted: int) -> int:
-    """Index of the phase with the wanted set of closed pairs; -1 where it is not tabulated yet."""
-    for p in range(mask.size):
-        if mask[p] == wanted:
-            return p
+def find_mode(mask: Ints, wanted: int) -> int:
+    """Index of the mode with the wanted set of closed pairs; -1 where it is not tabulated yet."""
+    for mode in range(mask.size):
+        if mask[mode] == wanted:
+            return mode
     return -1
 
 
@@ -173,22 +151,22 @@ def floor_log2(count: int) -> int:
 
 
 @jit_inline_sum
-def proved_time(
+def event_free_interval(
     switch_re: Floats,
     switch_im: Floats,
     rate_re: Floats,
     rate_im: Floats,
     bound: Floats,
-    p: int,
+    mode: int,
     z_re: Floats,
     z_im: Floats,
 ) -> float:
-    """Time, s, in which no switch function of phase p can reach zero; tables come one by one for speed."""
+    """Time, s, in which no switch function of a mode can reach zero; tables come one by one for speed."""
     proved = np.inf
     for i in range(switch_re.shape[1]):
-        s = dot(switch_re[p, i], switch_im[p, i], z_re, z_im)
-        rate = dot(rate_re[p, i], rate_im[p, i], z_re, z_im)
-        b = bounded(bound[p, i], z_re, z_im)
+        s = dot(switch_re[mode, i], switch_im[mode, i], z_re, z_im)
+        rate = dot(rate_re[mode, i], rate_im[mode, i], z_re, z_im)
+        b = bounded(bound[mode, i], z_re, z_im)
         if not s > 0.0:
             proved = 0.0
         elif b > 0.0:
@@ -199,7 +177,7 @@ def proved_time(
 
 
 @jit_inline_sum
-def proved_slip(
+def reversal_free_interval(
     steady: float,
     slip_re: Floats,
     slip_im: Floats,
@@ -255,3 +233,12 @@ def has_turned(reduced: Reduced, i: int, spin: float, velocity: Floats) -> bool:
     for k in range(velocity.size):
         s += reduced.slip[i, k] * velocity[k]
     return not s > 0.0
+
+
+@jit_inline_sum
+def has_any_turned(reduced: Reduced, mask: int, spin: float, velocity: Floats) -> bool:
+    """Whether the stator outruns the rim at a pair of `mask`."""
+    found = False
+    for i in range(reduced.radius.size):
+        found = found or ((mask >> i) & 1 == 1 and has_turned(reduced, i, spin, velocity))
+    return found

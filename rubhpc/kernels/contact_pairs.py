@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit, jit_inline
+from rubhpc.kernels.laws import Law  # noqa: TC001 - part of a kernel's signature
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -15,19 +16,6 @@ Ints = NDArray[np.int64]
 # Columns of a pair's degrees: disc v, disc w, disc torsion, stator tip axial, stator tip lateral.
 V, W, TORSION, AXIAL, LATERAL = range(5)
 N_DEGREE = 5
-
-
-class Law(NamedTuple):
-    """What ties the forces of a pair to its gap and its slip."""
-
-    stiffness: float  # of the penalty, N/m; 0: the gap is closed exactly, by a multiplier
-    damping: float  # of the penalty, N s/m
-    restitution: float  # normal velocity after an impact over that before; 0: the gap is closed at once
-    is_set_valued: bool  # friction may stick and turn round; else it is that of steady sliding
-    static_ratio: float  # coefficient of friction at rest over that in sliding
-
-
-MULTIPLIER = Law(stiffness=0.0, damping=0.0, restitution=0.0, is_set_valued=False, static_ratio=1.0)
 
 
 class Pairs(NamedTuple):
@@ -52,9 +40,13 @@ class Workspace(NamedTuple):
     at: Floats  # (q, 5), displacement of each degree at the end of the step without forces, m or rad
     now: Floats  # (q, 5), at its beginning (for the laws that look at velocities or at the step before)
     rate: Floats  # (q, 5), velocity before the forces of the step, m/s or rad/s (likewise)
-    pull: Floats  # (q, 5), generalised force on each degree for a unit normal force, friction included
-    push: Floats  # (q, 5), change of the gap with each degree; force of a unit normal force alone
-    drag: Floats  # (q, 5), force of a unit friction; its negative is the change of the slip with each degree
+    force_direction: (
+        Floats  # (q, 5), generalised force on each degree for a unit normal force, friction included
+    )
+    gap_jacobian: Floats  # (q, 5), change of the gap with each degree; force of a unit normal force alone
+    friction_direction: (
+        Floats  # (q, 5), force of a unit friction; its negative is the change of the slip with each degree
+    )
     matrix: Floats  # (q, q), m/N
     gap: Floats  # (q,), m
     force: Floats  # (q,), normal, N
@@ -73,6 +65,12 @@ class Workspace(NamedTuple):
     basis: Ints  # (3 q,)
     members: Ints  # (q,)
     solution: Floats  # (3,), of the last one: pivots, distance from the laws and what its forces moved, m
+
+
+@jit_inline
+def rim_sense(spin: float) -> float:
+    """1, or -1: the way the rim slides over a tip, from which friction and slip have their signs."""
+    return 1.0 if spin >= 0.0 else -1.0
 
 
 @jit_inline
@@ -106,25 +104,27 @@ def normal_and_gap(
 
 
 @jit_inline
-def fill_directions(pairs: Pairs, i: int, ny: float, nz: float, pull: Floats, push: Floats) -> None:
-    """Directions of pair i for normal (ny, nz): `pull` (5,) that of sliding forces, `push` (5,) the gap's.
+def fill_directions(
+    pairs: Pairs, i: int, ny: float, nz: float, force_direction: Floats, gap_jacobian: Floats
+) -> None:
+    """Force direction (5,) of a sliding contact of pair i with the normal (ny, nz), and gap Jacobian (5,).
 
     Displacements of the tip: axial along the stator's axis e, lateral along x_hat x e.
     """
     ey, ez = pairs.axis_y[i], pairs.axis_z[i]
     fy, fz, moment = force_on_disc(ny, nz, 1.0, pairs.friction[i], pairs.radius[i])
-    pull[V], pull[W], pull[TORSION] = fy, fz, moment
-    pull[AXIAL], pull[LATERAL] = -(fy * ey + fz * ez), -(-fy * ez + fz * ey)
-    push[V], push[W], push[TORSION] = -ny, -nz, 0.0
-    push[AXIAL], push[LATERAL] = ny * ey + nz * ez, -ny * ez + nz * ey
+    force_direction[V], force_direction[W], force_direction[TORSION] = fy, fz, moment
+    force_direction[AXIAL], force_direction[LATERAL] = -(fy * ey + fz * ez), -(-fy * ez + fz * ey)
+    gap_jacobian[V], gap_jacobian[W], gap_jacobian[TORSION] = -ny, -nz, 0.0
+    gap_jacobian[AXIAL], gap_jacobian[LATERAL] = ny * ey + nz * ez, -ny * ez + nz * ey
 
 
 @jit
-def fill_drag(pairs: Pairs, i: int, ny: float, nz: float, drag: Floats) -> None:
-    """Direction `drag` (5,) of a unit friction of pair i: -t on the rotor, +t on the tip."""
+def fill_friction_direction(pairs: Pairs, i: int, ny: float, nz: float, friction_direction: Floats) -> None:
+    """Direction `friction_direction` (5,) of a unit friction of pair i: -t on the rotor, +t on the tip."""
     ey, ez = pairs.axis_y[i], pairs.axis_z[i]
-    drag[V], drag[W], drag[TORSION] = nz, -ny, -pairs.radius[i]
-    drag[AXIAL], drag[LATERAL] = -nz * ey + ny * ez, nz * ez + ny * ey
+    friction_direction[V], friction_direction[W], friction_direction[TORSION] = nz, -ny, -pairs.radius[i]
+    friction_direction[AXIAL], friction_direction[LATERAL] = -nz * ey + ny * ez, nz * ez + ny * ey
 
 
 @jit
@@ -148,7 +148,7 @@ def fill_moved(pairs: Pairs, work: Workspace, i: int) -> None:
         for j in range(pairs.radius.size):
             if work.force[j] != 0.0:
                 for b in range(N_DEGREE):
-                    total += pairs.compliance[i, a, j, b] * work.pull[j, b] * work.force[j]
+                    total += pairs.compliance[i, a, j, b] * work.force_direction[j, b] * work.force[j]
         work.moved[a] = total
 
 

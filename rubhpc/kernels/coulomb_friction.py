@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit, jit_inline
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace
+from rubhpc.kernels.laws import friction_coefficient
 from rubhpc.kernels.lemke import solve_lemke
 
 Floats = NDArray[np.float64]
@@ -32,7 +33,7 @@ def fill_slip(pairs: Pairs, work: Workspace, step: float, spin: float) -> None:
     for i in range(pairs.radius.size):
         total = step * pairs.radius[i] * spin
         for a in range(N_DEGREE):
-            total -= work.drag[i, a] * (work.at[i, a] - work.now[i, a])
+            total -= work.friction_direction[i, a] * (work.at[i, a] - work.now[i, a])
         work.slip[i] = total
 
 
@@ -47,8 +48,8 @@ def solve_friction(pairs: Pairs, work: Workspace, step: float, spin: float) -> i
     """
     q = pairs.radius.size
     for i in range(q):
-        rest = pairs.law.static_ratio if work.is_sticking[i] else 1.0
-        work.cone[i] = abs(pairs.friction[i]) * rest
+        slip_speed, friction = slip_speed_before(pairs, work, i, spin), abs(pairs.friction[i])
+        work.cone[i] = friction_coefficient(pairs.law, friction, slip_speed, work.is_sticking[i])
     for _ in range(2 * q + 1):
         pivots = solve_cones(work)
         if pivots == UNSOLVED:
@@ -56,7 +57,8 @@ def solve_friction(pairs: Pairs, work: Workspace, step: float, spin: float) -> i
         is_settled = True
         for i in range(q):
             bound = work.cone[i] * work.force[i]
-            sliding = abs(pairs.friction[i])
+            slip_speed, friction = slip_speed_before(pairs, work, i, spin), abs(pairs.friction[i])
+            sliding = friction_coefficient(pairs.law, friction, slip_speed, False)
             if work.cone[i] > sliding and abs(work.traction[i]) >= bound * (1.0 - ROUNDING):
                 work.cone[i] = sliding
                 is_settled = False
@@ -70,8 +72,17 @@ def solve_friction(pairs: Pairs, work: Workspace, step: float, spin: float) -> i
         work.is_sticking[i] = abs(work.traction[i]) < bound
         share = work.traction[i] / work.force[i] if work.force[i] > 0.0 else 0.0
         for a in range(N_DEGREE):
-            work.pull[i, a] = work.push[i, a] + share * work.drag[i, a]
+            work.force_direction[i, a] = work.gap_jacobian[i, a] + share * work.friction_direction[i, a]
     return pivots
+
+
+@jit_inline
+def slip_speed_before(pairs: Pairs, work: Workspace, i: int, spin: float) -> float:
+    """Slip of the rim of pair i over the tip before the forces of the step, m/s."""
+    speed: float = pairs.radius[i] * spin
+    for a in range(N_DEGREE):
+        speed -= work.friction_direction[i, a] * work.rate[i, a]
+    return speed
 
 
 @jit
@@ -80,7 +91,7 @@ def feeds_energy(pairs: Pairs, work: Workspace, i: int, step: float, spin: float
     before = step * pairs.radius[i] * spin
     after = work.slip[i]
     for a in range(N_DEGREE):
-        before -= step * work.drag[i, a] * work.rate[i, a]
+        before -= step * work.friction_direction[i, a] * work.rate[i, a]
     for j in range(work.force.size):
         after += work.tangential[0, i, j] * work.force[j] + work.tangential[1, i, j] * work.traction[j]
     # Against what friction can do to the slip in a step: a pair that sticks slips by the rounding of
@@ -169,11 +180,11 @@ def solve_members(work: Workspace, q: int) -> int:
         for b in range(q):
             j = members[b]
             sense = 1.0 if work.slip[j] >= 0.0 else -1.0
-            answer, turn = work.coupling[i, j] * sense / scale, work.tangential[1, i, j] * sense / scale
-            tableau[a, n + b] = -work.matrix[i, j] / scale - work.cone[j] * answer
+            couple, turn = work.coupling[i, j] * sense / scale, work.tangential[1, i, j] * sense / scale
+            tableau[a, n + b] = -work.matrix[i, j] / scale - work.cone[j] * couple
             tableau[ahead, n + b] = -forward * (work.tangential[0, i, j] / scale + work.cone[j] * turn)
             if work.cone[j] > 0.0:
-                tableau[a, n + q + b], tableau[ahead, n + q + b] = answer, forward * turn
+                tableau[a, n + q + b], tableau[ahead, n + q + b] = couple, forward * turn
         if not work.cone[i] > 0.0:  # no friction, whatever the slip: rows that are met as they stand
             for column in range(n, 2 * n + 2):
                 tableau[ahead, column] = tableau[room, column] = 0.0

@@ -12,44 +12,40 @@ Times are whole ticks; the exponentials of 1, 2, 4, ... ticks are tabulated, so 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_sum
-from rubhpc.kernels.contact_modes import (
-    AGE,
+from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
-    ENTERED,
-    FINE,
     FINISHED,
-    FORCED_LEVEL,
+    MODE_WANTED,
     MOST_STEPS,
-    N_EVENT,
-    N_STEP,
-    NEXT_SAMPLE,
+    NONE,
     PAUSED,
-    PHASE,
-    PHASE_WANTED,
-    SAMPLES_AT_ONCE,
     SLIP_TURNED,
-    SPAN,
-    TIME,
-    WANTED,
+    UNDER_WAY,
     Clock,
-    Phases,
+    Progress,
+    shaft_angle,
+)
+from rubhpc.kernels.contact_modes import (
+    FORCED_LEVEL,
+    SAMPLES_AT_ONCE,
+    ModeTables,
     Reduced,
     dot,
     enter,
-    find_phase,
+    event_free_interval,
+    find_mode,
     floor_log2,
-    has_turned,
+    has_any_turned,
     is_beyond,
     propagate,
-    proved_slip,
-    proved_time,
+    reversal_free_interval,
 )
 from rubhpc.kernels.measuring import (
     Recorder,
@@ -63,233 +59,367 @@ from rubhpc.kernels.measuring import (
 from rubhpc.kernels.mode_change import change_contacts
 
 if TYPE_CHECKING:
-    from rubhpc.kernels.accumulators import Samples, Tally
+    from rubhpc.kernels.accumulators import Accumulator, Samples
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-MOST_EVENTS = 200_000  # between two counts from 0; more is chatter without end
+MOST_EVENTS = 200_000  # of one call; more is chatter without end
 GAP_TOLERANCE = 1e-13  # m
 
 
 @jit_sum
 def advance(
-    phases: Phases,
+    tables: ModeTables,
     reduced: Reduced,
     clock: Clock,
-    first_tick: int,
     last_tick: int,
     is_recorded: bool,
-    progress: Ints,
+    progress: Progress,
     z: Floats,
     z_next: Floats,
     motion: Floats,
     recorder: Recorder,
     samples: Samples,
-    tally: Tally,
+    accumulator: Accumulator,
 ) -> int:
-    """Advance a case from `first_tick` to `last_tick`; sample 0 is tick 0.
+    """Advance a case from the tick reached to `last_tick`; sample 0 is tick 0.
 
-    While a gap is open or a force compressive, the switch function s obeys `s + s' t - b t^2 / 2 > 0` for a
-    time that the bound b on its second derivative gives: steps up to it miss no event. Shorter steps than
-    `2^blind_level` ticks are taken without that proof and checked at their end; where they fail, halving
-    finds the event to the tick. While the record finds no contact closed, a step may pass several samples:
-    they are read from its beginning.
+    Every pass enters the contact mode wanted, chooses a step, and takes it, unless a switch function is found
+    negative at its end: then the step is halved, down to the tick within which the event is taken. While the
+    record finds no contact closed, a step may pass several samples: they are read from its beginning.
 
     Parameters
     ----------
     is_recorded : bool
-        Whether to fill `samples` and `tally`.
-    progress : (N_PROGRESS,)
-        See `kernels.phases`. Where a set of contacts is met that is not tabulated, PHASE_WANTED is returned
-        with the motion in `motion` (2 n,); the caller adds the phase and calls again.
+        Whether to fill `samples` and `accumulator`.
+    progress : Progress
+        Where a contact mode is wanted that is not tabulated, MODE_WANTED is returned with the motion in
+        `motion` (2 n,); the caller adds the mode and calls again.
     z, z_next : (2, m)
         Modal coordinates, real and imaginary, and work space.
 
     Returns
     -------
     int
-        FINISHED, DIVERGED (at an event), CONTACT_UNSOLVED, PHASE_WANTED, PAUSED after many steps, or
+        FINISHED, DIVERGED (at an event), CONTACT_UNSOLVED, MODE_WANTED, PAUSED after many steps, or
         SLIP_TURNED: set-valued friction has no closed form from there on.
     """
-    q, n = reduced.push.shape
+    # Tuples are opened here: a field read inside the loop would count a reference at every step.
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
-    mask, switch_re, switch_im = phases.mask, phases.switch_re, phases.switch_im
-    rate_re, rate_im, bound = phases.rate_re, phases.rate_im, phases.bound
-    power_re, power_im = phases.power_re, phases.power_im
-    tick, sample_level = clock.tick, clock.sample_level
-    interval = tick * (1 << sample_level)
-    ticks_per_revolution = clock.samples_per_revolution << sample_level
-    end_tick = clock.n_sample << sample_level
-    sense = 1.0 if clock.spin >= 0.0 else -1.0
+    mask, switch_re, switch_im = tables.mask, tables.switch_re, tables.switch_im
+    rate_re, rate_im, bound = tables.rate_re, tables.rate_im, tables.bound
+    power_re, power_im = tables.power_re, tables.power_im
+    interval = clock.tick * (1 << clock.sample_level)
     highest_level = power_re.shape[1] - 1
-    force, speed, impulse = np.zeros(q), np.zeros(q), np.zeros(q)
-    active, elimination = np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
-    crossing_at = np.zeros(q, dtype=np.bool_)
-    t, p = first_tick, progress[PHASE]
-    ceiling = -1  # while halving: the longest level worth a try
-    is_halving = False
-    is_forced = False
-    last_step = progress[N_STEP] + MOST_STEPS
-    wanted = progress[WANTED]
-    if is_recorded and wanted < 0:
-        if progress[SPAN] < 0:
-            begin_span(phases, p, t, z, progress, recorder)
-        begin_contact(phases, reduced, p, clock.spin, z, z_next, recorder)
+    work = event_work(reduced.radius.size)
+    last_step = progress.n_step + MOST_STEPS
+    progress.halving_level, progress.is_after_event = NONE, 0
+    if is_recorded and progress.wanted < 0:
+        if progress.energy_from < 0:
+            begin_span(tables, z, progress, recorder)
+        begin_contact(tables, reduced, progress.mode, clock.spin, z, z_next, recorder)
     while True:
-        if wanted >= 0:  # go over to another set of contacts
-            angle = sense * 2.0 * np.pi * (t % ticks_per_revolution) / ticks_per_revolution
-            found = find_phase(mask, wanted)
-            progress[TIME], progress[WANTED] = t, wanted
-            if found < 0:
-                return PHASE_WANTED
-            p = found
-            enter(phases, p, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
-            progress[PHASE], progress[WANTED], progress[ENTERED] = p, -1, t
-            wanted, progress[AGE] = -1, -1
-            is_forced, is_halving = True, False
-            if is_recorded:
-                begin_span(phases, p, t, z, progress, recorder)
-                begin_contact(phases, reduced, p, clock.spin, z, z_next, recorder)
-        is_sample = is_recorded and t == progress[NEXT_SAMPLE] << sample_level
-        if t >= last_tick:
-            if is_recorded and t == end_tick:
+        if progress.wanted >= 0 and not enter_wanted(
+            tables, reduced, clock, is_recorded, progress, z, z_next, motion, recorder
+        ):
+            return MODE_WANTED
+        is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
+        if progress.tick >= last_tick:
+            if is_recorded and progress.tick == clock.n_sample << clock.sample_level:
                 if is_sample:  # it closes the last interval
-                    take_samples(phases, p, z_re, z_im, clock.n_sample, 1, interval, recorder, samples, tally)
-                end_span(phases, p, clock, t, z, progress, recorder, tally)
-            progress[TIME] = t
+                    take_samples(
+                        tables,
+                        progress.mode,
+                        z_re,
+                        z_im,
+                        clock.n_sample,
+                        1,
+                        interval,
+                        recorder,
+                        samples,
+                        accumulator,
+                    )
+                end_span(tables, clock, z, progress, recorder, accumulator)
             return FINISHED
-        if progress[N_STEP] > last_step and not (is_forced or is_halving):
-            progress[TIME] = t
+        is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
+        if progress.n_step > last_step and not is_at_event:
             return PAUSED
-        is_free = mask[p] == 0
-        limit = last_tick
-        if is_recorded:
-            reach = SAMPLES_AT_ONCE if is_sample and is_free else 1
-            limit = min(limit, ((t >> sample_level) + reach) << sample_level)
-        level = min(highest_level, floor_log2(limit - t))
-        if is_recorded and not is_free:
-            # What an impact sets off is fast at first: no step is longer than the contact has lasted.
-            age = floor_log2(max(1, t - progress[ENTERED]))
-            if age != progress[AGE]:
-                resolved = min(resolved_contact(phases, p, z_re, z_im) / tick, 1.0 * (1 << highest_level))
-                progress[AGE], progress[FINE] = age, floor_log2(int(max(1.0, resolved)))
-            level = min(level, clock.contact_level, max(age, clock.blind_level), progress[FINE])
-        is_proved = False
-        if is_forced:
-            level, is_forced, is_proved = min(level, FORCED_LEVEL), False, True
-        elif is_halving:
-            level = min(level, ceiling)
-        else:
-            proved = proved_time(switch_re, switch_im, rate_re, rate_im, bound, p, z_re, z_im)
-            if reduced.is_set_valued and not is_free:
-                for i in range(q):
-                    if (mask[p] >> i) & 1:
-                        proved = min(
-                            proved,
-                            proved_slip(
-                                abs(clock.spin) * reduced.radius[i],
-                                phases.slip_re[p, i],
-                                phases.slip_im[p, i],
-                                phases.slip_rate_re[p, i],
-                                phases.slip_rate_im[p, i],
-                                phases.slip_bound[p, i],
-                                z_re,
-                                z_im,
-                            ),
-                        )
-                if proved < 0.0:
-                    progress[TIME] = t
-                    return SLIP_TURNED
-            while level > clock.blind_level and (1 << level) * tick > proved:
-                level -= 1
-            is_proved = (1 << level) * tick <= proved
-        propagate(power_re[p, level], power_im[p, level], z_re, z_im, next_re, next_im)
-        progress[N_STEP] += 1
-        is_crossed = False
-        if not is_proved:
-            for i in range(q):
-                tolerance = 0.0 if (mask[p] >> i) & 1 else GAP_TOLERANCE
-                crossing_at[i] = dot(switch_re[p, i], switch_im[p, i], next_re, next_im) < -tolerance
-                is_crossed = is_crossed or crossing_at[i]
-        if is_crossed and level > 0:
-            is_halving, ceiling = True, level - 1
+        mode = progress.mode
+        level = longest_level(
+            tables, clock, last_tick, highest_level, is_recorded, is_sample, progress, mode, z_re, z_im
+        )
+        level, is_event_free = choose_step(
+            tables,
+            reduced,
+            clock,
+            mask,
+            switch_re,
+            switch_im,
+            rate_re,
+            rate_im,
+            bound,
+            progress,
+            mode,
+            z_re,
+            z_im,
+            level,
+        )
+        if level < 0:
+            return SLIP_TURNED
+        propagate(power_re[mode, level], power_im[mode, level], z_re, z_im, next_re, next_im)
+        progress.n_step += 1
+        crossing = int(np.int64(0))  # no literal: the event would be compiled for it once more
+        if not is_event_free:
+            crossing = find_crossing(mask[mode], switch_re[mode], switch_im[mode], next_re, next_im)
+        if crossing != 0 and level > 0:
+            progress.halving_level = level - 1
             continue
         if is_sample:
-            count = 1 if is_crossed else max(1, (1 << level) >> sample_level)
-            first = progress[NEXT_SAMPLE]
-            take_samples(phases, p, z_re, z_im, first, count, interval, recorder, samples, tally)
-            progress[NEXT_SAMPLE] = first + count
-        if not is_crossed:
-            for k in range(z_re.size):
-                z_re[k], z_im[k] = next_re[k], next_im[k]
-            if is_recorded and not is_free:
-                observe_step(
-                    phases,
-                    reduced,
-                    p,
-                    clock.spin,
-                    (1 << level) * tick,
-                    z_re,
-                    z_im,
-                    t >> sample_level,
-                    1.0 / interval,
-                    recorder,
-                    samples,
-                    tally,
-                )
-            t += 1 << level
-            if is_halving:
-                ceiling -= 1
-                is_halving = ceiling >= 0
+            count = max(1, (1 << level) >> clock.sample_level)
+            first = progress.next_sample
+            take_samples(tables, mode, z_re, z_im, first, count, interval, recorder, samples, accumulator)
+            progress.next_sample = first + count
+        if crossing != 0:  # an event within the next tick is taken here
+            outcome = take_event(
+                tables,
+                reduced,
+                clock,
+                crossing,
+                is_recorded,
+                progress,
+                z,
+                motion,
+                work,
+                recorder,
+                samples,
+                accumulator,
+            )
+            if outcome != UNDER_WAY:
+                return outcome
             continue
-        # An event within the next tick: take it here.
-        progress[N_EVENT] += 1
-        crossing = 0
+        for k in range(z_re.size):
+            z_re[k], z_im[k] = next_re[k], next_im[k]
+        if is_recorded and mask[mode] != 0:
+            observe_step(
+                tables,
+                reduced,
+                mode,
+                clock.spin,
+                (1 << level) * clock.tick,
+                z_re,
+                z_im,
+                progress.tick >> clock.sample_level,
+                1.0 / interval,
+                recorder,
+                samples,
+                accumulator,
+            )
+        progress.tick += 1 << level
+        progress.halving_level = max(progress.halving_level - 1, NONE)
+
+
+class EventWork(NamedTuple):
+    """Work space of an event, q pairs."""
+
+    force: Floats  # (q,)
+    speed: Floats  # (q,)
+    impulse: Floats  # (q,), accumulated before the event, N s
+    active: NDArray[np.bool_]  # (q,)
+    elimination: Floats  # (q, q + 1)
+
+
+@jit_sum
+def event_work(q: int) -> EventWork:
+    """Make the work space of events of q pairs."""
+    return EventWork(np.zeros(q), np.zeros(q), np.zeros(q), np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1)))
+
+
+@jit_sum
+def enter_wanted(
+    tables: ModeTables,
+    reduced: Reduced,
+    clock: Clock,
+    is_recorded: bool,
+    progress: Progress,
+    z: Floats,
+    z_next: Floats,
+    motion: Floats,
+    recorder: Recorder,
+) -> bool:
+    """Enter the contact mode wanted with the reduced motion (2 n,); False where it is not tabulated."""
+    found = find_mode(tables.mask, progress.wanted)
+    if found < 0:
+        return False
+    angle = shaft_angle(clock, progress.tick)
+    enter(tables, found, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
+    progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
+    progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
+    if is_recorded:
+        begin_span(tables, z, progress, recorder)
+        begin_contact(tables, reduced, found, clock.spin, z, z_next, recorder)
+    return True
+
+
+@jit_inline_sum
+def longest_level(
+    tables: ModeTables,
+    clock: Clock,
+    last_tick: int,
+    highest_level: int,
+    is_recorded: bool,
+    is_sample: bool,
+    progress: Progress,
+    mode: int,
+    z_re: Floats,
+    z_im: Floats,
+) -> int:
+    """Level of the longest step up to the next sample to be taken that resolves a recorded contact."""
+    is_free = tables.mask[mode] == 0
+    limit = last_tick
+    if is_recorded:
+        reach = SAMPLES_AT_ONCE if is_sample and is_free else 1
+        limit = min(limit, ((progress.tick >> clock.sample_level) + reach) << clock.sample_level)
+    level = min(highest_level, floor_log2(limit - progress.tick))
+    if is_recorded and not is_free:
+        # What an impact sets off is fast at first: no step is longer than the contact has lasted.
+        age = floor_log2(max(1, progress.tick - progress.entered))
+        if age != progress.contact_age:
+            resolved = resolved_contact(tables, mode, z_re, z_im) / clock.tick
+            resolved = min(resolved, 1.0 * (1 << highest_level))
+            progress.contact_age, progress.resolved_level = age, floor_log2(int(max(1.0, resolved)))
+        level = min(level, clock.contact_level, max(age, clock.search_level), progress.resolved_level)
+    return level
+
+
+@jit_inline_sum
+def choose_step(
+    tables: ModeTables,
+    reduced: Reduced,
+    clock: Clock,
+    mask: Ints,
+    switch_re: Floats,
+    switch_im: Floats,
+    rate_re: Floats,
+    rate_im: Floats,
+    bound: Floats,
+    progress: Progress,
+    mode: int,
+    z_re: Floats,
+    z_im: Floats,
+    longest: int,
+) -> tuple[int, bool]:
+    """Level of the next step, `longest` at most, and whether it is known to be free of events.
+
+    While a gap is open or a force compressive, the switch function s obeys `s + s' t - b t^2 / 2 > 0` for an
+    interval that the bound b on its second derivative gives: steps within it miss no event. Event-search
+    steps, not longer than `2^search_level` ticks, are taken without that and checked at their end. The level
+    is -1 where a slip has turned that set-valued friction relies on.
+    """
+    if progress.is_after_event == 1:
+        progress.is_after_event = 0
+        return min(longest, FORCED_LEVEL), True
+    if progress.halving_level >= 0:
+        return min(longest, progress.halving_level), False
+    free = event_free_interval(switch_re, switch_im, rate_re, rate_im, bound, mode, z_re, z_im)
+    if reduced.is_set_valued and mask[mode] != 0:
+        for i in range(reduced.radius.size):
+            if (mask[mode] >> i) & 1:
+                free = min(
+                    free,
+                    reversal_free_interval(
+                        abs(clock.spin) * reduced.radius[i],
+                        tables.slip_re[mode, i],
+                        tables.slip_im[mode, i],
+                        tables.slip_rate_re[mode, i],
+                        tables.slip_rate_im[mode, i],
+                        tables.slip_bound[mode, i],
+                        z_re,
+                        z_im,
+                    ),
+                )
+        if free < 0.0:
+            return -1, False
+    level = longest
+    while level > clock.search_level and (1 << level) * clock.tick > free:
+        level -= 1
+    return level, (1 << level) * clock.tick <= free
+
+
+@jit_inline_sum
+def find_crossing(closed: int, switch_re: Floats, switch_im: Floats, z_re: Floats, z_im: Floats) -> int:
+    """Set of the pairs whose switch function (q, m) is negative, of which those of `closed` are closed."""
+    crossing = int(np.int64(0))
+    for i in range(switch_re.shape[0]):
+        tolerance = 0.0 if (closed >> i) & 1 else GAP_TOLERANCE
+        if dot(switch_re[i], switch_im[i], z_re, z_im) < -tolerance:
+            crossing |= 1 << i
+    return crossing
+
+
+@jit_sum
+def take_event(
+    tables: ModeTables,
+    reduced: Reduced,
+    clock: Clock,
+    crossing: int,
+    is_recorded: bool,
+    progress: Progress,
+    z: Floats,
+    motion: Floats,
+    work: EventWork,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> int:
+    """Take the event of the pairs `crossing`: what it makes of `motion`, and the contact mode wanted next.
+
+    Returns
+    -------
+    int
+        UNDER_WAY, DIVERGED, SLIP_TURNED or CONTACT_UNSOLVED.
+    """
+    q, n = reduced.gap_jacobian.shape
+    mode, spin = progress.mode, clock.spin
+    closed = tables.mask[mode]
+    progress.n_event += 1
+    for k in range(2 * n):
+        motion[k] = dot(tables.motion_re[mode, k], tables.motion_im[mode, k], z[0], z[1])
+    if is_beyond(reduced, motion):
+        return DIVERGED
+    if is_recorded:
+        end_span(tables, clock, z, progress, recorder, accumulator)
+        work.impulse[:] = accumulator.impulse
+    if reduced.is_set_valued and has_any_turned(reduced, closed | crossing, spin, motion[n:]):
+        return SLIP_TURNED
+    angle = shaft_angle(clock, progress.tick)
+    moment = (1 << FORCED_LEVEL) * clock.tick
+    progress.wanted = change_contacts(
+        reduced,
+        closed,
+        crossing,
+        spin,
+        moment,
+        np.cos(angle),
+        np.sin(angle),
+        motion,
+        is_recorded,
+        work.force,
+        work.speed,
+        work.active,
+        work.elimination,
+        accumulator,
+    )
+    if reduced.is_set_valued and has_any_turned(reduced, closed | crossing, spin, motion[n:]):
+        return SLIP_TURNED
+    if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
+        return CONTACT_UNSOLVED
+    if is_recorded:
+        interval = clock.tick * (1 << clock.sample_level)
         for i in range(q):
-            if crossing_at[i]:
-                crossing |= 1 << i
-        for k in range(2 * n):
-            motion[k] = dot(phases.motion_re[p, k], phases.motion_im[p, k], z_re, z_im)
-        if is_beyond(reduced, motion):
-            progress[TIME] = t
-            return DIVERGED
-        if is_recorded:
-            end_span(phases, p, clock, t, z, progress, recorder, tally)
-            impulse[:] = tally.impulse
-        angle = sense * 2.0 * np.pi * (t % ticks_per_revolution) / ticks_per_revolution
-        if reduced.is_set_valued:
-            for i in range(q):
-                if ((mask[p] | crossing) >> i) & 1 and has_turned(reduced, i, clock.spin, motion[n:]):
-                    progress[TIME] = t
-                    return SLIP_TURNED
-        wanted = change_contacts(
-            reduced,
-            mask[p],
-            crossing,
-            clock.spin,
-            (1 << FORCED_LEVEL) * tick,
-            np.cos(angle),
-            np.sin(angle),
-            motion,
-            is_recorded,
-            force,
-            speed,
-            active,
-            elimination,
-            tally,
-        )
-        if reduced.is_set_valued:
-            for i in range(q):
-                if ((mask[p] | crossing) >> i) & 1 and has_turned(reduced, i, clock.spin, motion[n:]):
-                    progress[TIME] = t
-                    return SLIP_TURNED
-        if wanted < 0 or progress[N_EVENT] > MOST_EVENTS:
-            progress[TIME] = t
-            return CONTACT_UNSOLVED
-        if is_recorded:
-            for i in range(q):
-                samples.force[i, t >> sample_level] += (tally.impulse[i] - impulse[i]) / interval
-                is_new = (wanted >> i) & 1 and not tally.is_touching[i]
-                tally.n_contact[i] += 1 if is_new else 0
-                tally.is_touching[i] = (wanted >> i) & 1 == 1
+            gained = accumulator.impulse[i] - work.impulse[i]
+            samples.force[i, progress.tick >> clock.sample_level] += gained / interval
+            is_closed = (progress.wanted >> i) & 1 == 1
+            accumulator.n_contact[i] += 1 if is_closed and not accumulator.is_touching[i] else 0
+            accumulator.is_touching[i] = is_closed
+    return UNDER_WAY

@@ -17,19 +17,18 @@ from rubhpc.kernels.accumulators import (
     TWIST_ACCELERATION,
     UNBALANCE_WORK,
     VERTICAL,
+    Accumulator,
     Samples,
-    Tally,
 )
+from rubhpc.kernels.case_progress import NONE, Clock, Progress
 from rubhpc.kernels.contact_modes import (
     DYING,
     LATERAL_RATE,
     LATERAL_ROW,
     N_ROTOR_ROW,
     SAMPLES_AT_ONCE,
-    SPAN,
     TWIST_ACCELERATION_ROW,
-    Clock,
-    Phases,
+    ModeTables,
     Reduced,
     dot,
     resolved_time,
@@ -63,7 +62,7 @@ def recorder(q: int) -> Recorder:
 
 
 @jit_inline_sum
-def read_outputs(output: Floats, p: int, z_re: Floats, z_im: Floats, n_value: int, value: Floats) -> None:
+def read_outputs(output: Floats, mode: int, z_re: Floats, z_im: Floats, n_value: int, value: Floats) -> None:
     """Fill the first `n_value` outputs from the modal coordinates, whose number is a multiple of four."""
     m = z_re.size
     for r in range(n_value):
@@ -75,10 +74,10 @@ def read_outputs(output: Floats, p: int, z_re: Floats, z_im: Floats, n_value: in
             j = part * m + k
             for r in range(n_value):
                 value[r] += (
-                    output[p, j, r] * a
-                    + output[p, j + 1, r] * b
-                    + output[p, j + 2, r] * c
-                    + output[p, j + 3, r] * d
+                    output[mode, j, r] * a
+                    + output[mode, j + 1, r] * b
+                    + output[mode, j + 2, r] * c
+                    + output[mode, j + 3, r] * d
                 )
 
 
@@ -96,8 +95,8 @@ def turning_value(before: float, rate_before: float, after: float, rate_after: f
 
 @jit_inline_sum
 def take_samples(
-    phases: Phases,
-    p: int,
+    tables: ModeTables,
+    mode: int,
     z_re: Floats,
     z_im: Floats,
     first: int,
@@ -105,9 +104,9 @@ def take_samples(
     interval: float,
     recorder: Recorder,
     samples: Samples,
-    tally: Tally,
+    accumulator: Accumulator,
 ) -> None:
-    """Record `count` samples from `first` on, all in phase p; the one past the record counts for extrema.
+    """Record `count` samples from `first` on in one mode; the one past the record counts for extrema.
 
     `interval` (s) is that between samples, `z` the coordinates at the first of them.
     """
@@ -120,8 +119,8 @@ def take_samples(
         samples.axial,
         samples.lateral,
     )
-    lowest, highest, peak_lateral = tally.lowest, tally.highest, tally.peak_lateral
-    read_outputs(phases.output, p, z_re, z_im, -(-count * n_row // LANES) * LANES, value)
+    lowest, highest, peak_lateral = accumulator.lowest, accumulator.highest, accumulator.peak_lateral
+    read_outputs(tables.output, mode, z_re, z_im, -(-count * n_row // LANES) * LANES, value)
     for j in range(min(count, n_sample - first)):
         start = j * n_row
         rotor[VERTICAL, first + j] = value[start + VERTICAL]
@@ -155,55 +154,55 @@ def take_samples(
 
 @jit_inline_sum
 def read_contact(
-    phases: Phases, reduced: Reduced, p: int, i: int, spin: float, z_re: Floats, z_im: Floats
+    tables: ModeTables, reduced: Reduced, mode: int, i: int, spin: float, z_re: Floats, z_im: Floats
 ) -> tuple[float, float, float, float]:
-    """Force (N), its rate, slip speed (m/s) and its rate, of pair i, closed in phase p."""
+    """Force (N), its rate, slip speed (m/s) and its rate, of pair i, closed in contact mode `mode`."""
     return (
-        dot(phases.switch_re[p, i], phases.switch_im[p, i], z_re, z_im),
-        dot(phases.rate_re[p, i], phases.rate_im[p, i], z_re, z_im),
-        abs(spin) * reduced.radius[i] + dot(phases.slip_re[p, i], phases.slip_im[p, i], z_re, z_im),
-        dot(phases.slip_rate_re[p, i], phases.slip_rate_im[p, i], z_re, z_im),
+        dot(tables.switch_re[mode, i], tables.switch_im[mode, i], z_re, z_im),
+        dot(tables.rate_re[mode, i], tables.rate_im[mode, i], z_re, z_im),
+        abs(spin) * reduced.radius[i] + dot(tables.slip_re[mode, i], tables.slip_im[mode, i], z_re, z_im),
+        dot(tables.slip_rate_re[mode, i], tables.slip_rate_im[mode, i], z_re, z_im),
     )
 
 
 @jit_sum
-def resolved_contact(phases: Phases, p: int, z_re: Floats, z_im: Floats) -> float:
-    """Time, s, over which cubics follow force and slip of the pairs closed in phase p."""
+def resolved_contact(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
+    """Time, s, over which cubics follow force and slip of the pairs closed in contact mode `mode`."""
     time = np.inf
-    for i in range(phases.switch_re.shape[1]):
-        if (phases.mask[p] >> i) & 1:
-            pace = phases.pace[p]
+    for i in range(tables.switch_re.shape[1]):
+        if (tables.mask[mode] >> i) & 1:
+            pace = tables.pace[mode]
             time = min(
                 time,
-                resolved_time(phases.switch_re[p, i], phases.switch_im[p, i], pace, z_re, z_im),
-                resolved_time(phases.slip_re[p, i], phases.slip_im[p, i], pace, z_re, z_im),
+                resolved_time(tables.switch_re[mode, i], tables.switch_im[mode, i], pace, z_re, z_im),
+                resolved_time(tables.slip_re[mode, i], tables.slip_im[mode, i], pace, z_re, z_im),
             )
     return time
 
 
 @jit_sum
 def begin_contact(
-    phases: Phases, reduced: Reduced, p: int, spin: float, z: Floats, calm: Floats, recorder: Recorder
+    tables: ModeTables, reduced: Reduced, mode: int, spin: float, z: Floats, calm: Floats, recorder: Recorder
 ) -> None:
-    """Read the pairs closed in phase p, at its beginning or where a record begins.
+    """Read the pairs closed in contact mode `mode`, at its beginning or where a record begins.
 
     What dies before the first step ends is left out: no cubic follows it. `calm` (2, m) is work space.
     """
     for k in range(z.shape[1]):
-        dies = phases.pace[p, k] == DYING
+        dies = tables.pace[mode, k] == DYING
         calm[0, k], calm[1, k] = (0.0, 0.0) if dies else (z[0, k], z[1, k])
     for i in range(reduced.radius.size):
-        if (phases.mask[p] >> i) & 1:
-            force, rate, slip, slip_rate = read_contact(phases, reduced, p, i, spin, calm[0], calm[1])
+        if (tables.mask[mode] >> i) & 1:
+            force, rate, slip, slip_rate = read_contact(tables, reduced, mode, i, spin, calm[0], calm[1])
             recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = force, rate
             recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip, slip_rate
 
 
 @jit_inline_sum
 def observe_step(
-    phases: Phases,
+    tables: ModeTables,
     reduced: Reduced,
-    p: int,
+    mode: int,
     spin: float,
     step: float,
     z_re: Floats,
@@ -212,18 +211,20 @@ def observe_step(
     share: float,
     recorder: Recorder,
     samples: Samples,
-    tally: Tally,
+    accumulator: Accumulator,
 ) -> None:
-    """Add a step (s) to the pairs closed in phase p: force and slip as cubics, Simpson's rule for friction.
+    """Add a step (s) of the closed pairs: force and slip as cubics, Simpson's rule for friction.
 
     `z` are the coordinates at its end; `share` (1/s) takes an impulse to the mean force of sample `i_sample`.
     """
     for i in range(reduced.radius.size):
-        if not (phases.mask[p] >> i) & 1:
+        if not (tables.mask[mode] >> i) & 1:
             continue
         before, rate_before = recorder.node[FORCE, i], recorder.node[FORCE_RATE, i]
         slip_before, slip_rate_before = recorder.node[SLIP, i], recorder.node[SLIP_RATE, i]
-        after, rate_after, slip_after, slip_rate_after = read_contact(phases, reduced, p, i, spin, z_re, z_im)
+        after, rate_after, slip_after, slip_rate_after = read_contact(
+            tables, reduced, mode, i, spin, z_re, z_im
+        )
         recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = after, rate_after
         recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip_after, slip_rate_after
         bend = step * (rate_before - rate_after)
@@ -236,35 +237,35 @@ def observe_step(
         if rate_before * rate_after < 0.0:
             peak = max(peak, turning_value(before, rate_before, after, rate_after, step))
         samples.force[i, i_sample] += impulse * share
-        tally.contact_time[i] += step
-        tally.impulse[i] += impulse
-        tally.friction_work[i] += friction_work
-        tally.least_slip[i] = min(tally.least_slip[i], slip_before, slip_after)
-        tally.peak_force[i] = max(tally.peak_force[i], peak)
-        tally.energy[FRICTION_LOSS] += friction_work
-        tally.energy[DRIVE_WORK] += reduced.friction[i] * reduced.radius[i] * abs(spin) * impulse
+        accumulator.contact_time[i] += step
+        accumulator.impulse[i] += impulse
+        accumulator.friction_work[i] += friction_work
+        accumulator.least_slip[i] = min(accumulator.least_slip[i], slip_before, slip_after)
+        accumulator.peak_force[i] = max(accumulator.peak_force[i], peak)
+        accumulator.energy[FRICTION_LOSS] += friction_work
+        accumulator.energy[DRIVE_WORK] += reduced.friction[i] * reduced.radius[i] * abs(spin) * impulse
 
 
 @jit_sum
-def energy_forms(phases: Phases, p: int, z: Floats, entry: Floats) -> None:
-    """Fill `entry` (2,), J, with what grows by damping loss and unbalance work as phase p goes on."""
+def energy_forms(tables: ModeTables, mode: int, z: Floats, entry: Floats) -> None:
+    """Fill `entry` (2,), J, with what grows by damping loss and unbalance work in a contact mode."""
     m = z.shape[1]
     loss = 0.0
     for part in range(2):
         for k in range(m):
             if z[part, k] != 0.0:
-                row = phases.loss[p, part * m + k]
+                row = tables.loss[mode, part * m + k]
                 along = 0.0
                 for j in range(m):
                     along += row[j] * z[0, j] + row[m + j] * z[1, j]
                 loss += along * z[part, k]
-    first = phases.n_mode[p]
+    first = tables.n_eigenmode[mode]
     cosine, sine = z[0, first], z[1, first]
     work = 0.0
     for part in range(2):  # exp(i angle), then its conjugate
         real, imaginary = 0.0, 0.0
         for k in range(m):
-            a, b = phases.work_re[p, part, k], phases.work_im[p, part, k]
+            a, b = tables.work_re[mode, part, k], tables.work_im[mode, part, k]
             real += a * z[0, k] - b * z[1, k]
             imaginary += a * z[1, k] + b * z[0, k]
         work += cosine * real - (sine if part == 0 else -sine) * imaginary
@@ -273,21 +274,27 @@ def energy_forms(phases: Phases, p: int, z: Floats, entry: Floats) -> None:
 
 @jit_sum
 def end_span(
-    phases: Phases, p: int, clock: Clock, t: int, z: Floats, progress: Ints, recorder: Recorder, tally: Tally
+    tables: ModeTables,
+    clock: Clock,
+    z: Floats,
+    progress: Progress,
+    recorder: Recorder,
+    accumulator: Accumulator,
 ) -> None:
-    """Add what damping took and the unbalance gave since the span began, in phase p all along."""
-    if progress[SPAN] < 0:
+    """Add what damping took and the unbalance gave since the span began, in one contact mode all along."""
+    if progress.energy_from < 0:
         return
-    time = (t - progress[SPAN]) * clock.tick
+    mode = progress.mode
+    time = (progress.tick - progress.energy_from) * clock.tick
     loss, work = recorder.entry[0], recorder.entry[1]
-    energy_forms(phases, p, z, recorder.entry)
-    tally.energy[DAMPING_LOSS] += recorder.entry[0] - loss + phases.steady_power[p, 0] * time
-    tally.energy[UNBALANCE_WORK] += recorder.entry[1] - work + phases.steady_power[p, 1] * time
-    progress[SPAN] = -1
+    energy_forms(tables, mode, z, recorder.entry)
+    accumulator.energy[DAMPING_LOSS] += recorder.entry[0] - loss + tables.steady_power[mode, 0] * time
+    accumulator.energy[UNBALANCE_WORK] += recorder.entry[1] - work + tables.steady_power[mode, 1] * time
+    progress.energy_from = NONE
 
 
 @jit_sum
-def begin_span(phases: Phases, p: int, t: int, z: Floats, progress: Ints, recorder: Recorder) -> None:
-    """Begin to add up energies at tick t, in phase p."""
-    energy_forms(phases, p, z, recorder.entry)
-    progress[SPAN] = t
+def begin_span(tables: ModeTables, z: Floats, progress: Progress, recorder: Recorder) -> None:
+    """Begin to add up energies at the tick reached, in the contact mode entered."""
+    energy_forms(tables, progress.mode, z, recorder.entry)
+    progress.energy_from = progress.tick

@@ -12,7 +12,7 @@ from rubhpc.kernels.accumulators import (
     IMPACT,
     IMPACT_LOSS,
     PRESSING,
-    Tally,
+    Accumulator,
     observe_solution,
 )
 from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_complementarity
@@ -47,7 +47,7 @@ def change_contacts(
     speed: Floats,
     active: NDArray[np.bool_],
     elimination: Floats,
-    tally: Tally,
+    accumulator: Accumulator,
 ) -> int:
     """Impact, then the set of closed pairs that goes on; -1 where there is none.
 
@@ -55,73 +55,77 @@ def change_contacts(
     impact sends every candidate that closes back at its restitution (0: inelastic); among those that do not
     part for longer than `moment` (s), the accelerations decide.
     """
-    q, n = reduced.push.shape
+    q, n = reduced.gap_jacobian.shape
     candidates = (closed & ~crossing) | (crossing & ~closed)
     velocity = motion[n:]
     for i in range(q):
-        speed[i] = product(reduced.push[i], velocity) if (candidates >> i) & 1 else np.inf
+        speed[i] = product(reduced.gap_jacobian[i], velocity) if (candidates >> i) & 1 else np.inf
         active[i] = speed[i] < 0.0
         if active[i]:
             speed[i] *= 1.0 + reduced.restitution
-    pivots = solve_complementarity(reduced.answer, speed, 1e-14, force, active, elimination)
+    pivots = solve_complementarity(reduced.delassus, speed, 1e-14, force, active, elimination)
     if pivots == UNSOLVED:
         return -1
     if is_recorded:
-        residual, moved = residual_of(reduced.answer, speed, force)
-        observe_solution(IMPACT, pivots, residual, moved, tally)
+        residual, moved = residual_of(reduced.delassus, speed, force)
+        observe_solution(IMPACT, pivots, residual, moved, accumulator)
     for i in range(q):
         if force[i] > 0.0:
             if is_recorded:
-                observe_impact(reduced, i, spin, force[i], velocity, tally)
+                observe_impact(reduced, i, spin, force[i], velocity, accumulator)
             for k in range(n):
-                velocity[k] += reduced.pull[i, k] * force[i]
+                velocity[k] += reduced.force_direction[i, k] * force[i]
     for i in range(q):
         speed[i] = np.inf
         if (candidates >> i) & 1:
             acceleration = 0.0
             for k in range(n):
-                acceleration += reduced.push[i, k] * (
+                acceleration += reduced.gap_jacobian[i, k] * (
                     reduced.force_cosine[k] * cosine
                     + reduced.force_sine[k] * sine
                     - product(reduced.stiffness[k], motion[:n])
                     - product(reduced.damping[k], velocity)
                 )
             # A pair that parts so slowly that it is pressed together again at once has not parted.
-            if product(reduced.push[i], velocity) <= OPENING + max(-acceleration, 0.0) * moment:
+            if product(reduced.gap_jacobian[i], velocity) <= OPENING + max(-acceleration, 0.0) * moment:
                 speed[i] = acceleration
         active[i] = speed[i] < 0.0
-    pivots = solve_complementarity(reduced.answer, speed, 1e-12, force, active, elimination)
+    pivots = solve_complementarity(reduced.delassus, speed, 1e-12, force, active, elimination)
     if pivots == UNSOLVED:
         return -1
     if is_recorded:
-        residual, moved = residual_of(reduced.answer, speed, force)
-        observe_solution(PRESSING, pivots, residual, moved, tally)
+        residual, moved = residual_of(reduced.delassus, speed, force)
+        observe_solution(PRESSING, pivots, residual, moved, accumulator)
     remaining = 0
     for i in range(q):
         if force[i] > 0.0:
             remaining |= 1 << i
         elif is_recorded and reduced.restitution > 0.0 and (crossing & ~closed) >> i & 1:
-            tally.n_contact[i] += 1  # it has bounced off
+            accumulator.n_contact[i] += 1  # it has bounced off
     return remaining
 
 
 @jit_sum
 def observe_impact(
-    reduced: Reduced, i: int, spin: float, impulse: float, velocity: Floats, tally: Tally
+    reduced: Reduced, i: int, spin: float, impulse: float, velocity: Floats, accumulator: Accumulator
 ) -> None:
-    """Add an impact's impulse (N s) and work to the tally; `velocity` (n,) is the one before it."""
+    """Add an impact's impulse (N s) and work to the accumulator; `velocity` (n,) is the one before it."""
     friction = reduced.friction[i] * impulse
-    # An impulse works with the mean of the velocities before and after; pull is push and friction.
-    closing = product(reduced.push[i], velocity) + 0.5 * impulse * reduced.answer[i, i]
-    total = product(reduced.pull[i], velocity) + 0.5 * impulse * product(reduced.pull[i], reduced.pull[i])
+    # An impulse works with the mean of the velocities before and after; the force direction has friction.
+    closing = product(reduced.gap_jacobian[i], velocity) + 0.5 * impulse * reduced.delassus[i, i]
+    total = product(reduced.force_direction[i], velocity) + 0.5 * impulse * product(
+        reduced.force_direction[i], reduced.force_direction[i]
+    )
     drive = friction * reduced.radius[i] * abs(spin)
     if reduced.friction[i] > 0.0:
-        change = impulse * (product(reduced.pull[i], reduced.pull[i]) - reduced.answer[i, i])
+        change = impulse * (
+            product(reduced.force_direction[i], reduced.force_direction[i]) - reduced.delassus[i, i]
+        )
         gain = (total - closing - 0.5 * change) / reduced.friction[i]  # of the slip on the rim's own speed
         slip = reduced.radius[i] * abs(spin) - gain
-        tally.least_slip[i] = min(tally.least_slip[i], slip, slip - change / reduced.friction[i])
-    tally.impulse[i] += impulse
-    tally.friction_work[i] += drive - (total - closing) * impulse
-    tally.energy[DRIVE_WORK] += drive
-    tally.energy[FRICTION_LOSS] += drive - (total - closing) * impulse
-    tally.energy[IMPACT_LOSS] -= closing * impulse
+        accumulator.least_slip[i] = min(accumulator.least_slip[i], slip, slip - change / reduced.friction[i])
+    accumulator.impulse[i] += impulse
+    accumulator.friction_work[i] += drive - (total - closing) * impulse
+    accumulator.energy[DRIVE_WORK] += drive
+    accumulator.energy[FRICTION_LOSS] += drive - (total - closing) * impulse
+    accumulator.energy[IMPACT_LOSS] -= closing * impulse

@@ -145,7 +145,7 @@ class OperatingPoints:
         first = (0,) * len(self.points.dims)
 
         def predict(index: Index) -> float:
-            if is_modal and not self.study.contact.is_stepped:
+            if is_modal and self.study.contact.closed_form == "always":
                 return float(modal_steps)
             unit = self._unit_speed_at(self._on(self._response_axes, index if self._is_few else first))
             speed = abs(self._on([self._speed_axis], index)[0]) * unit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from rubhpc.input.fields import FieldError, check_fields, choice, choices, count, quantity
 from rubhpc.schema import KEEPABLE
@@ -11,8 +12,11 @@ AUTO = "auto"  # transient until the motion has settled
 LONGEST_TRANSIENT, SETTLED_WITHIN = 240, 1e-4  # then
 PAPER_STEP = 0.5e-6  # s
 SAFE_SHARE = 0.9  # of the stability limit
-BLIND_STEP = 1e-6  # s, of the modal scheme with the fixed normal
+SEARCH_STEP = 1e-6  # s, of the modal scheme with the fixed normal
 TURNING_STEP = 0.25e-6  # s, with the updated one, set-valued friction or a penalty
+
+ClosedForm = Literal["always", "while sliding", "never"]
+CLOSED_FORM: dict[str, ClosedForm] = {"sliding": "always", "coulomb": "while sliding"}  # of friction laws
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +45,7 @@ class Contact:
     friction_law: str = choice(
         doc="Friction law: steady sliding in the sense of the spin, or set-valued Coulomb with stick.",
         example='"coulomb"',
-        of=("sliding", "coulomb"),
+        of=tuple(CLOSED_FORM),
         default="sliding",
     )
     static_friction_ratio: float | None = quantity(
@@ -76,9 +80,11 @@ class Contact:
             raise FieldError("static_friction_ratio", problem)
 
     @property
-    def is_stepped(self) -> bool:
-        """Whether closed contacts may have no closed form, so that the modal scheme takes short steps."""
-        return self.normal == "updated" or self.law == "penalty" or self.friction_law == "coulomb"
+    def closed_form(self) -> ClosedForm:
+        """When the modal scheme has a closed form of contact; elsewhere it takes short steps."""
+        if self.normal == "updated" or self.law == "penalty":
+            return "never"
+        return CLOSED_FORM[self.friction_law]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +125,7 @@ class Integrator:
         """Step in contact, s, of the modal scheme."""
         if self.step is not None:
             return self.step
-        return TURNING_STEP if contact.is_stepped else BLIND_STEP
+        return SEARCH_STEP if contact.closed_form == "always" else TURNING_STEP
 
     def step_within(self, limit: float) -> float:
         """Time step, s, of the central difference for matrices that are stable up to `limit`, s."""

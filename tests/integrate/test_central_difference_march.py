@@ -39,7 +39,7 @@ class PaperScheme:
     """Eqs. 20 to 24 as printed: dense, in displacements of three instants, degrees in the model's order."""
 
     def __init__(self, model, spin, step, clearance, friction):
-        bodies = [model.rotor, *(stator.body for stator in model.stators)]
+        bodies = model.bodies
         M = block_diag(*(body.mass for body in bodies))
         C = block_diag(*(body.damping + spin * body.gyroscopic for body in bodies))
         self.K = block_diag(*(body.stiffness for body in bodies))
@@ -176,8 +176,8 @@ def test_pieces_of_a_run_are_the_run():
     for name in whole.samples._fields:
         assert np.array_equal(getattr(whole.samples, name), getattr(pieces.samples, name)), name
     assert np.count_nonzero(whole.samples.force) > 100
-    for name in whole.tally._fields:
-        assert np.array_equal(getattr(whole.tally, name), getattr(pieces.tally, name)), name
+    for name in whole.accumulator._fields:
+        assert np.array_equal(getattr(whole.accumulator, name), getattr(pieces.accumulator, name)), name
 
 
 def longest_stable_step(case):

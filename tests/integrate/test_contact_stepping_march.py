@@ -8,7 +8,8 @@ from trial_rig import trial_rig
 
 from rubhpc import simulate
 from rubhpc.integrate import case
-from rubhpc.integrate.contact_stepping_march import SteppedMarch
+from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
+from rubhpc.integrate.setup import Scheme
 from rubhpc.rig.reading import with_keys
 
 RUB = {"speed": 170.0, "clearance": "80 um", "friction": 0.2, "transient": 0, "revolutions": 2}
@@ -46,7 +47,7 @@ def test_fixed_normal_in_steps_tends_to_the_exact_answer(monkeypatch):
     rig, given = trial_rig(2), RUB | {"clearance": "60 um"}
     exact = simulate(rig, **given)
     assert exact.contact_impulse.min() > 0.0
-    monkeypatch.setattr(case, "ModalMarch", SteppedMarch)
+    monkeypatch.setitem(case.MARCHES, Scheme.EVENT_DRIVEN, ContactSteppingMarch)
     error = [distance(simulate(rig, **given, step=step), exact) for step in ("2 us", "1 us", "0.5 us")]
     assert error[-1] < 1e-3
     assert np.log2(np.divide(error[:-1], error[1:])) == pytest.approx(2.0, abs=0.35)

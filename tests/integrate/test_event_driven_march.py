@@ -16,9 +16,9 @@ from rubhpc.fem.response import steady_response
 from rubhpc.integrate import event_driven_march, march, mode_tables
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.march import NO_FORCES
-from rubhpc.integrate.mode_library import PhaseBook
+from rubhpc.integrate.mode_library import ModeLibrary
 from rubhpc.integrate.setup import prepare
-from rubhpc.kernels.contact_modes import CONTACT_UNSOLVED
+from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
 from rubhpc.rig.parts import Torsion
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rig import Rig
@@ -76,16 +76,16 @@ def test_case_does_not_depend_on_those_before_it():
 def test_sets_are_made_anew_where_there_is_no_room_for_all(monkeypatch):
     """What is forgotten and met again is tabulated to the same numbers."""
     usual = simulate(trial_rig(3), **CLOSE)
-    monkeypatch.setattr(mode_tables, "MOST_PHASES", 4)
-    monkeypatch.setattr(event_driven_march, "MOST_BOOKS", 1000)
+    monkeypatch.setattr(mode_tables, "MOST_MODES", 4)
+    monkeypatch.setattr(event_driven_march, "MOST_REFILLS", 1000)
     made = []
-    add = PhaseBook.add
+    add = ModeLibrary.add
 
     def counted(book, mask):
         made.append(mask)
         return add(book, mask)
 
-    monkeypatch.setattr(PhaseBook, "add", counted)
+    monkeypatch.setattr(ModeLibrary, "add", counted)
     crowded = simulate(trial_rig(3), **CLOSE)
     assert len(made) > len(set(made))
     check_close(crowded, usual, 1e-9)
@@ -105,8 +105,8 @@ def test_endless_events_are_left_to_short_steps(monkeypatch, too_many):
     """More sets of contacts, or more events, than allowed: the case is done in steps, to the same answer."""
     exact = simulate(trial_rig(3), **CLOSE)
     if too_many == "sets":
-        monkeypatch.setattr(mode_tables, "MOST_PHASES", 4)
-        monkeypatch.setattr(event_driven_march, "MOST_BOOKS", 1)
+        monkeypatch.setattr(mode_tables, "MOST_MODES", 4)
+        monkeypatch.setattr(event_driven_march, "MOST_REFILLS", 1)
     else:
         monkeypatch.setattr(event_driven_march, "advance", lambda *_: CONTACT_UNSOLVED)
     stepped = simulate(trial_rig(3), step="0.25 us", **CLOSE)
@@ -221,13 +221,13 @@ def test_energy_residual_shows_damping_that_does_not_act(monkeypatch):
     """The residual can fail: the loss taken for a hundredth more than it is."""
     given = {"speed_ratio": 0.75, "clearance": "84 um", "transient": 60, "revolutions": 8, "keep": ()}
     sound = simulate("mokhtar2017", **given)
-    usual = PhaseBook.tables
+    usual = ModeLibrary.tables
 
     def overdone(book):
         tables = usual(book)
         return tables._replace(loss=1.01 * tables.loss, steady_power=tables.steady_power * [1.01, 1.0])
 
-    monkeypatch.setattr(PhaseBook, "tables", overdone)
+    monkeypatch.setattr(ModeLibrary, "tables", overdone)
     assert simulate("mokhtar2017", **given).energy_residual > 10 * sound.energy_residual
 
 

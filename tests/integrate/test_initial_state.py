@@ -12,7 +12,7 @@ from trial_rig import trial_rig
 from rubhpc import simulate
 from rubhpc.errors import InputError
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.initial_state import carried, gaps
+from rubhpc.integrate.initial_state import fit_to_gaps, gaps
 from rubhpc.integrate.setup import prepare
 from rubhpc.study.study import Contact, Integrator, Recording
 
@@ -49,7 +49,7 @@ def settled(setup, clearance: float, initial: State | None = None) -> State:
 def energy(setup, state: State) -> float:
     """Of rotor and stators, J."""
     total = 0.0
-    bodies = [setup.model.rotor, *(stator.body for stator in setup.model.stators)]
+    bodies = setup.model.bodies
     parts = zip(
         (state.rotor_displacement, *state.stator_displacement),
         (state.rotor_velocity, *state.stator_velocity),
@@ -64,7 +64,7 @@ def energy(setup, state: State) -> float:
 def test_a_motion_that_goes_on_in_its_own_case_is_left_as_it_is(method):
     setup = setup_of(method)
     state = settled(setup, 1e-4)
-    same = carried(state, setup, 1e-4)
+    same = fit_to_gaps(state, setup, 1e-4)
     assert np.array_equal(same.packed()[:-2], state.packed()[:-2])
 
 
@@ -75,14 +75,14 @@ def test_a_wall_that_moves_in_pushes_as_it_would_slowly(method):
     state = settled(setup, 1e-4)
     gap, push = gaps(state.displacement, setup, 1e-4)
     clearance = 1e-4 - float(gap.max()) - 2e-5  # every gap would be overlapped by 20 um and more
-    start = carried(state, setup, clearance)
+    start = fit_to_gaps(state, setup, clearance)
     after, _ = gaps(start.displacement, setup, clearance)
     assert np.all(after > -1e-12)
     assert after.min() == pytest.approx(0.0, abs=1e-12)
     assert np.array_equal(start.velocity, state.velocity)
     # By the laws of statics: K du = push^T F, with forces that push, and none where the gap is open.
     moved = start.displacement - state.displacement
-    bodies = [setup.model.rotor, *(stator.body for stator in setup.model.stators)]
+    bodies = setup.model.bodies
     stiffness = [0.5 * (body.stiffness + body.stiffness.T) for body in bodies]
     parts = np.split(moved, np.cumsum([body.n_dof for body in bodies])[:-1])
     load = np.concatenate([k @ u for k, u in zip(stiffness, parts, strict=True)])
@@ -103,7 +103,7 @@ def test_a_wall_that_moves_out_lets_go(method):
     setup = setup_of(method, 1)
     state = settled(setup, 1e-4)
     state = replace(state, contact_force=np.array([50.0]))  # pressed at that instant
-    start = carried(state, setup, 1e-2)
+    start = fit_to_gaps(state, setup, 1e-2)
     assert start.contact_force.tolist() == [0.0]
     assert np.array_equal(start.displacement, state.displacement)
     free = run_case(setup, clearance=1e-2, friction=0.1, recording=SHORT, initial=state)
@@ -120,8 +120,8 @@ def test_what_a_penalty_overlaps_stays_and_what_a_wall_adds_goes():
             break
     clearance = (30 + n) * 1e-6
     assert state.overlap[0] > 1e-7
-    assert np.array_equal(carried(state, setup, clearance).displacement, state.displacement)
-    start = carried(state, setup, clearance - 1e-5)
+    assert np.array_equal(fit_to_gaps(state, setup, clearance).displacement, state.displacement)
+    start = fit_to_gaps(state, setup, clearance - 1e-5)
     gap, _ = gaps(start.displacement, setup, clearance - 1e-5)
     assert gap[0] == pytest.approx(-state.overlap[0], abs=1e-12)
 

@@ -8,8 +8,8 @@ from scipy.linalg import expm
 from trial_rig import trial_rig
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.integrate.contact_mode import make_phase
-from rubhpc.integrate.mode_library import PhaseBook
+from rubhpc.integrate.contact_mode import solve_contact_mode
+from rubhpc.integrate.mode_library import ModeLibrary
 from rubhpc.integrate.reduction import directions, reduce_model
 from rubhpc.kernels.contact_modes import (
     LATERAL_RATE,
@@ -18,9 +18,9 @@ from rubhpc.kernels.contact_modes import (
     SAMPLES_AT_ONCE,
     TWIST_ACCELERATION_ROW,
     enter,
-    find_phase,
+    event_free_interval,
+    find_mode,
     floor_log2,
-    proved_time,
 )
 from rubhpc.kernels.measuring import energy_forms
 
@@ -32,17 +32,17 @@ MASKS = (0, 1, 2, 3)
 
 @pytest.fixture(scope="module", params=[180.0, -260.0])
 def case(request):
-    """Every mode kept, so that nothing but rounding parts the phases from the full equations."""
+    """Every mode kept, so that nothing but rounding parts the tables from the full equations."""
     spin = request.param
     model = assemble(trial_rig(2, cross=1e5))
     reduced = reduce_model(model, spin, 1e-30)
-    push, pull, _ = directions(reduced, model, FRICTION)
-    opened = make_phase(reduced, push, pull, 0)
-    book = PhaseBook(
+    gap_jacobian, force_direction, _ = directions(reduced, model, FRICTION)
+    opened = solve_contact_mode(reduced, gap_jacobian, force_direction, 0)
+    library = ModeLibrary(
         reduced, model, FRICTION, opened=opened, tick=TICK, sample_level=SAMPLE_LEVEL, n_level=N_LEVEL
     )
-    book.add(3)
-    return SimpleNamespace(spin=spin, model=model, reduced=reduced, book=book, tables=book.tables())
+    library.add(3)
+    return SimpleNamespace(spin=spin, model=model, reduced=reduced, library=library, tables=library.tables())
 
 
 def closed_pairs(mask):
@@ -59,9 +59,9 @@ def admissible(case, mask, rng):
     x, v = 1e-4 * rng.normal(size=n), 0.05 * rng.normal(size=n)
     closed = closed_pairs(mask)
     if closed:
-        push = case.book.push[closed]
-        x -= np.linalg.pinv(push) @ (push @ x + CLEARANCE[closed])
-        v -= np.linalg.pinv(push) @ (push @ v)
+        gap_jacobian = case.library.gap_jacobian[closed]
+        x -= np.linalg.pinv(gap_jacobian) @ (gap_jacobian @ x + CLEARANCE[closed])
+        v -= np.linalg.pinv(gap_jacobian) @ (gap_jacobian @ v)
     return np.concatenate([x, v])
 
 
@@ -69,8 +69,8 @@ def constrained(case, mask, x, v, cosine, sine):
     """Acceleration and forces that keep the closed gaps shut: [1 -P; Q 0] [x''; N] = [f - K x - C v; 0]."""
     closed, n, q = closed_pairs(mask), len(x), len(CLEARANCE)
     free = applied(case, cosine, sine) - case.reduced.stiffness @ x - case.reduced.damping @ v
-    push, pull = case.book.push[closed], case.book.pull[closed]
-    saddle = np.block([[np.eye(n), -pull.T], [push, np.zeros((len(closed),) * 2)]])
+    gap_jacobian, force_direction = case.library.gap_jacobian[closed], case.library.force_direction[closed]
+    saddle = np.block([[np.eye(n), -force_direction.T], [gap_jacobian, np.zeros((len(closed),) * 2)]])
     solution = np.linalg.solve(saddle, np.concatenate([free, np.zeros(len(closed))]))
     force = np.zeros(q)
     force[closed] = solution[n:]
@@ -79,7 +79,7 @@ def constrained(case, mask, x, v, cosine, sine):
 
 def entered(case, mask, motion, angle):
     """Modal coordinates as complex numbers."""
-    p = find_phase(case.tables.mask, mask)
+    p = find_mode(case.tables.mask, mask)
     z = np.zeros((2, case.tables.switch_re.shape[2]))
     enter(case.tables, p, CLEARANCE, np.cos(angle), np.sin(angle), motion, z)
     return p, z[0] + 1j * z[1]
@@ -111,20 +111,20 @@ def test_motion_comes_back_from_its_modal_coordinates(case, mask):
 def test_motion_obeys_the_equations_with_the_gaps_held(case, mask):
     """M x'' + C x' + K x = f + P N at random states and angles, N the force that the constraint needs."""
     rng = np.random.default_rng(10 + mask)
-    phase = make_phase(case.reduced, case.book.push, case.book.pull, mask)
+    mode = solve_contact_mode(case.reduced, case.library.gap_jacobian, case.library.force_direction, mask)
     closed = closed_pairs(mask)
     for angle in (0.0, 1.0, 3.5):
         motion = admissible(case, mask, rng)
         p, z = entered(case, mask, motion, angle)
-        z = z[: phase.exponent.size]
-        x, v = np.split((phase.motion @ z).real, 2)
-        drift, acceleration = np.split((phase.motion @ (phase.exponent * z)).real, 2)
+        z = z[: mode.exponent.size]
+        x, v = np.split((mode.motion @ z).real, 2)
+        drift, acceleration = np.split((mode.motion @ (mode.exponent * z)).real, 2)
         expected, force = constrained(case, mask, x, v, np.cos(angle), np.sin(angle))
         assert drift == pytest.approx(v, abs=1e-8 * abs(v).max())
         # Stiffness times displacement is 1e6 times the rest and more: its rounding is what is left.
         assert acceleration == pytest.approx(expected, abs=1e-7 * abs(case.reduced.stiffness @ x).max())
-        switch = (phase.switch @ z).real
-        gap = case.book.push @ x + CLEARANCE
+        switch = (mode.switch @ z).real
+        gap = case.library.gap_jacobian @ x + CLEARANCE
         assert gap[closed] == pytest.approx(0.0, abs=1e-15)
         opened = [i for i in range(len(CLEARANCE)) if i not in closed]
         assert switch[opened] == pytest.approx(gap[opened], abs=1e-14)
@@ -140,8 +140,12 @@ def test_steps_of_doubling_length_are_matrix_exponentials(case, mask, level):
     rng = np.random.default_rng(100 + mask)
     n, spin = len(case.reduced.stiffness), case.spin
     closed = closed_pairs(mask)
-    push, pull = case.book.push[closed], case.book.pull[closed]
-    hold = np.eye(n) - pull.T @ np.linalg.inv(push @ pull.T) @ push if closed else np.eye(n)
+    gap_jacobian, force_direction = case.library.gap_jacobian[closed], case.library.force_direction[closed]
+    hold = (
+        np.eye(n) - force_direction.T @ np.linalg.inv(gap_jacobian @ force_direction.T) @ gap_jacobian
+        if closed
+        else np.eye(n)
+    )
     rate = np.zeros((2 * n + 2, 2 * n + 2))
     rate[:n, n : 2 * n] = np.eye(n)
     rate[n : 2 * n, :n] = -hold @ case.reduced.stiffness
@@ -156,7 +160,7 @@ def test_steps_of_doubling_length_are_matrix_exponentials(case, mask, level):
     found = (joined(case.tables, "motion", p) @ moved).real
     for part in (slice(0, n), slice(n, None)):
         assert found[part] == pytest.approx(expected[part], abs=1e-7 * abs(expected[part]).max())
-    gap = case.book.push @ found[:n] + CLEARANCE
+    gap = case.library.gap_jacobian @ found[:n] + CLEARANCE
     assert gap[closed] == pytest.approx(0.0, abs=1e-14)
 
 
@@ -180,7 +184,7 @@ def test_rows_of_the_tables_are_read_off_the_motion(case, mask):
     tight = np.arange(found.size) != TWIST_ACCELERATION_ROW
     assert found[tight] == pytest.approx(expected[tight], rel=1e-7, abs=1e-11)
     assert found[~tight] == pytest.approx(expected[~tight], rel=1e-5)
-    assert (joined(tables, "slip", p) @ z).real == pytest.approx(case.book.slip @ v)
+    assert (joined(tables, "slip", p) @ z).real == pytest.approx(case.library.slip @ v)
     for i in range(SAMPLES_AT_ONCE):  # those at later samples
         later = z * np.exp(exponents(tables, p) * TICK * 2**SAMPLE_LEVEL * i)
         assert read(table[:, :, i], z)[tight] == pytest.approx(
@@ -201,7 +205,9 @@ def test_forms_grow_by_the_energy_lost_and_given(case, mask):
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
     angle, duration = 1.3, 2e-3
     p, z = entered(case, mask, admissible(case, mask, rng), angle)
-    exponent = make_phase(reduced, case.book.push, case.book.pull, mask).exponent
+    exponent = solve_contact_mode(
+        reduced, case.library.gap_jacobian, case.library.force_direction, mask
+    ).exponent
     exponent = np.concatenate([exponent, np.zeros(z.size - exponent.size)])
     node, weight = np.polynomial.legendre.leggauss(20)
     panels = np.linspace(0, duration, 401)
@@ -230,7 +236,7 @@ def test_no_switch_function_vanishes_in_the_time_proved(case, mask):
         motion = 0.3 * admissible(case, 0, rng) if mask == 0 else admissible(case, mask, rng)
         p, z = entered(case, mask, motion, rng.uniform(0, 6))
         tables = case.tables
-        proved = proved_time(
+        proved = event_free_interval(
             tables.switch_re,
             tables.switch_im,
             tables.rate_re,
@@ -253,7 +259,7 @@ def test_no_switch_function_vanishes_in_the_time_proved(case, mask):
 
 
 def test_phase_is_found_by_its_set(case):
-    assert [find_phase(case.tables.mask, mask) for mask in (0, 1, 2, 3, 7)] == [0, 1, 2, 3, -1]
+    assert [find_mode(case.tables.mask, mask) for mask in (0, 1, 2, 3, 7)] == [0, 1, 2, 3, -1]
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 7, 8, 1023, 1024, 2**40 - 1])

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from rubhpc.integrate.orbit_measures import amplitude_spectrum, period, whirl_ratio
+from rubhpc.integrate.orbit_measures import period, whirl_ratio
+from rubhpc.spectra import amplitude_spectrum
 
 SAMPLES = 64  # a revolution
 

@@ -48,7 +48,7 @@ def packed(model):
 
 
 def bodies(model):
-    return [model.rotor, *(stator.body for stator in model.stators)]
+    return model.bodies
 
 
 def whole(model):
@@ -164,7 +164,16 @@ def test_unbalance_and_circulation_act_where_they_should(model, packed):
 
 @pytest.mark.parametrize("spin", [SPIN, -SPIN])
 def test_pairs_take_geometry_from_the_stators_and_sense_from_the_spin(model, packed, spin):
-    pairs = pairs_of(model, packed, clearance=1e-4, friction=0.3, spin=spin, is_updated=True)
+    pairs = pairs_of(
+        model,
+        row=packed.degree_row,
+        block=packed.degree_block,
+        compliance=packed.compliance,
+        clearance=1e-4,
+        friction=0.3,
+        spin=spin,
+        is_updated=True,
+    )
     assert pairs.axis_y + 1j * pairs.axis_z == pytest.approx(np.exp(1j * np.array([0.0, 2.0, -1.0])))
     assert pairs.radius.tolist() == [0.06, 0.06, 0.03]
     assert pairs.clearance == pytest.approx([1e-4, 1e-4, 1.2e-4])

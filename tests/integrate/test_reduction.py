@@ -23,7 +23,7 @@ FULL = 1e-30  # accuracy at which no mode that anything sees is left out
 
 def whole(model, spin):
     """Matrices of all bodies, and rows (seen, n) that read the degrees of contact and output."""
-    bodies = [model.rotor, *(stator.body for stator in model.stators)]
+    bodies = model.bodies
     mass = block_diag(*(body.mass for body in bodies))
     damping = block_diag(*(body.damping + spin * body.gyroscopic for body in bodies))
     stiffness = block_diag(*(body.stiffness for body in bodies))

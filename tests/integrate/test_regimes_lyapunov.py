@@ -10,17 +10,21 @@ from scipy.optimize import brentq, fsolve
 
 from rubhpc import LumpedStator, Rig, State, Unbalance, simulate
 from rubhpc.integrate.central_difference_march import CentralDifferenceMarch
-from rubhpc.integrate.contact_stepping_march import SteppedMarch
-from rubhpc.integrate.event_driven_march import ModalMarch
+from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
+from rubhpc.integrate.event_driven_march import EventDrivenMarch
 from rubhpc.integrate.lyapunov import N_ALIGNING, Marches, growth
-from rubhpc.integrate.neighbour_motions import ModalNeighbours
+from rubhpc.integrate.neighbour_motions import NeighbourMotions
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import read_rig
 from rubhpc.schema import REGIME
 from rubhpc.study.study import Contact, Integrator, Recording
 
 RESTITUTION = 0.8
-MARCHES = {"modal": ModalMarch, "stepped": SteppedMarch, "central-difference": CentralDifferenceMarch}
+MARCHES = {
+    "modal": EventDrivenMarch,
+    "stepped": ContactSteppingMarch,
+    "central-difference": CentralDifferenceMarch,
+}
 
 
 def oscillator(spin, *, damping=None, restitution=None, wall=1e-12):
@@ -43,7 +47,7 @@ def oscillator(spin, *, damping=None, restitution=None, wall=1e-12):
     }
 
 
-def growth_of(rig, given, state, n_span, march=ModalMarch):
+def growth_of(rig, given, state, n_span, march=EventDrivenMarch):
     """Growth per revolution in spans after a state, of a case given as to `simulate`."""
     method = "central-difference" if march is CentralDifferenceMarch else "modal"
     setup = prepare(
@@ -59,8 +63,8 @@ def growth_of(rig, given, state, n_span, march=ModalMarch):
     start = partial(march, setup, given["clearance"], given["friction"], check=None)
 
     def begin():
-        if march is ModalMarch:
-            neighbours = ModalNeighbours(start(initial=state))
+        if march is EventDrivenMarch:
+            neighbours = NeighbourMotions(start(initial=state))
         else:
             neighbours = Marches(lambda initial: start(initial=initial), state, setup, recording)
         neighbours.most_spans = n_span + N_ALIGNING

@@ -11,11 +11,11 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
 from rubhpc.integrate import march
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.orbit_measures import amplitude_spectrum
 from rubhpc.integrate.record import Record
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import PACKAGED, with_keys
 from rubhpc.schema import DIVERGED, DONE, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
+from rubhpc.spectra import amplitude_spectrum
 from rubhpc.study.study import Contact, Integrator, Recording
 
 RIG = read_rig("mokhtar2017")

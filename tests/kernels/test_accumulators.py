@@ -112,11 +112,11 @@ def test_samples_are_the_states_at_their_instants(watched):
 
 
 def test_extrema_are_those_of_all_steps(watched):
-    tally, motion = watched.case.tally, watched.displacement[:, watched.case.packed.output_row]
-    assert np.array_equal(tally.highest, motion.max(axis=0))
-    assert np.array_equal(tally.lowest, motion.min(axis=0))
+    accumulator, motion = watched.case.accumulator, watched.displacement[:, watched.case.packed.output_row]
+    assert np.array_equal(accumulator.highest, motion.max(axis=0))
+    assert np.array_equal(accumulator.lowest, motion.min(axis=0))
     lateral = watched.degree(watched.displacement, LATERAL)
-    assert np.array_equal(tally.peak_lateral, abs(lateral).max(axis=0))
+    assert np.array_equal(accumulator.peak_lateral, abs(lateral).max(axis=0))
 
 
 def test_a_peak_force_is_none_of_an_impact():
@@ -125,34 +125,34 @@ def test_a_peak_force_is_none_of_an_impact():
     still = np.zeros(case.state.shape[1])
     for force, peak in ((500.0, 0.0), (400.0, 0.0), (30.0, 30.0), (20.0, 30.0), (0.0, 30.0), (90.0, 30.0)):
         case.work.force[1] = force
-        observe_contact(case.pairs, case.work, 900.0, 1e-6, still, still, case.tally)
-        assert case.tally.peak_force.tolist() == [0.0, peak, 0.0]
-    assert case.tally.impulse[1] == pytest.approx(1040e-6)
+        observe_contact(case.pairs, case.work, 900.0, 1e-6, still, still, case.accumulator)
+        assert case.accumulator.peak_force.tolist() == [0.0, peak, 0.0]
+    assert case.accumulator.impulse[1] == pytest.approx(1040e-6)
 
 
 def test_contacts_are_counted_where_they_begin(watched):
-    tally, is_touching = watched.case.tally, watched.force > 0
+    accumulator, is_touching = watched.case.accumulator, watched.force > 0
     begins = is_touching & ~np.vstack([np.zeros((1, 3), bool), is_touching[:-1]])
-    assert np.array_equal(tally.n_contact, begins.sum(axis=0))
-    assert tally.contact_time == pytest.approx(is_touching.sum(axis=0) * watched.case.step)
-    assert tally.n_contact.min() >= 1
-    assert tally.n_contact.max() > 1
+    assert np.array_equal(accumulator.n_contact, begins.sum(axis=0))
+    assert accumulator.contact_time == pytest.approx(is_touching.sum(axis=0) * watched.case.step)
+    assert accumulator.n_contact.min() >= 1
+    assert accumulator.n_contact.max() > 1
     assert (is_touching.sum(axis=1) > 1).any()
-    assert np.array_equal(tally.is_touching, is_touching[-1])
+    assert np.array_equal(accumulator.is_touching, is_touching[-1])
 
 
 def test_impulse_slip_and_friction_work_add_up(watched):
-    tally, force, step = watched.case.tally, watched.force, watched.case.step
+    accumulator, force, step = watched.case.accumulator, watched.force, watched.case.step
     _, slip = watched.rates()
-    assert tally.impulse == pytest.approx(force.sum(axis=0) * step)
-    assert tally.friction_work == pytest.approx(FRICTION * (force * slip).sum(axis=0) * step, rel=1e-6)
-    assert tally.least_slip == pytest.approx(np.where(force > 0, slip, np.inf).min(axis=0), rel=1e-6)
+    assert accumulator.impulse == pytest.approx(force.sum(axis=0) * step)
+    assert accumulator.friction_work == pytest.approx(FRICTION * (force * slip).sum(axis=0) * step, rel=1e-6)
+    assert accumulator.least_slip == pytest.approx(np.where(force > 0, slip, np.inf).min(axis=0), rel=1e-6)
 
 
 def test_energies_are_work_along_the_path(watched):
     case, energy, step, velocity = (
         watched.case,
-        watched.case.tally.energy,
+        watched.case.accumulator.energy,
         watched.case.step,
         watched.velocity,
     )

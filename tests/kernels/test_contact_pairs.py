@@ -10,10 +10,10 @@ from scipy.optimize import root
 
 from rubhpc.integrate.workspace import workspace
 from rubhpc.kernels.complementarity import UNSOLVED
+from rubhpc.kernels.contact_forces import solve_contact
 from rubhpc.kernels.contact_pairs import (
     AXIAL,
     LATERAL,
-    MULTIPLIER,
     N_DEGREE,
     TORSION,
     Pairs,
@@ -24,7 +24,7 @@ from rubhpc.kernels.contact_pairs import (
     is_any_closed,
     normal_and_gap,
 )
-from rubhpc.kernels.contact_step import solve_contact
+from rubhpc.kernels.laws import MULTIPLIER
 
 RADIUS, CLEARANCE = 0.06, 1e-4
 STEP, SPIN = 1e-6, 150.0  # s, rad/s
@@ -88,29 +88,32 @@ def test_push_is_the_change_of_the_gap(angle, at, is_updated, aside):
         return normal_and_gap(*axis, RADIUS, CLEARANCE, aside, is_updated, moved)[2]
 
     ny, nz, _ = normal_and_gap(*axis, RADIUS, CLEARANCE, aside, is_updated, at)
-    pull, push = np.zeros((2, N_DEGREE))
-    fill_directions(pairs, 0, ny, nz, pull, push)
+    force_direction, gap_jacobian = np.zeros((2, N_DEGREE))
+    fill_directions(pairs, 0, ny, nz, force_direction, gap_jacobian)
     delta = 1e-6
     for a in range(N_DEGREE):
         nudge = np.eye(N_DEGREE)[a] * delta
         slope = (gap(at + nudge) - gap(at - nudge)) / (2 * delta)
-        assert push[a] == pytest.approx(slope, abs=1e-8)
+        assert gap_jacobian[a] == pytest.approx(slope, abs=1e-8)
 
 
 @given(angles, angles, st.floats(-0.6, 0.6))
 def test_pair_of_forces_is_in_balance(angle, whirl, friction):
     """Action is reaction, normal force works on the gap alone, and friction on the slip alone."""
     pairs = make_pairs(angle, friction)
-    pull, push = np.zeros((2, N_DEGREE))
+    force_direction, gap_jacobian = np.zeros((2, N_DEGREE))
     n = np.exp(1j * whirl)
-    fill_directions(pairs, 0, n.real, n.imag, pull, push)
+    fill_directions(pairs, 0, n.real, n.imag, force_direction, gap_jacobian)
     axis = complex(pairs.axis_y[0], pairs.axis_z[0])
-    on_disc, on_tip = complex(pull[V], pull[W]), complex(pull[AXIAL], pull[LATERAL]) * axis
+    on_disc, on_tip = (
+        complex(force_direction[V], force_direction[W]),
+        complex(force_direction[AXIAL], force_direction[LATERAL]) * axis,
+    )
     assert on_disc + on_tip == pytest.approx(0.0, abs=1e-14)
     velocity = np.array([0.3, -0.2, 5.0, 0.1, 0.7])
     disc, tip = complex(*velocity[:2]), complex(*velocity[3:]) * axis
     slip = RADIUS * velocity[TORSION] + ((disc - tip) * (1j * n).conjugate()).real
-    assert pull @ velocity == pytest.approx(push @ velocity - friction * slip, abs=1e-12)
+    assert force_direction @ velocity == pytest.approx(gap_jacobian @ velocity - friction * slip, abs=1e-12)
 
 
 def test_held_degrees_stand_still():
@@ -177,7 +180,7 @@ def test_forces_close_the_gaps_of_those_that_touch(seed, is_updated):
     assert n_touching == np.count_nonzero(work.force)
     assert n_touching > 0
     assert work.force.min() >= 0.0
-    moved = free + np.einsum("iajb,jb,j->ia", pairs.compliance, work.pull, work.force)
+    moved = free + np.einsum("iajb,jb,j->ia", pairs.compliance, work.force_direction, work.force)
     for i in range(q):
         axis = complex(pairs.axis_y[i], pairs.axis_z[i])
         line = line_of_centres(axis, moved[i])
@@ -186,7 +189,9 @@ def test_forces_close_the_gaps_of_those_that_touch(seed, is_updated):
         assert work.force[i] * abs(gap) <= 1e-12 * work.force.max()
         n = line_of_centres(axis, free[i])
         n = n / abs(n) if is_updated else axis
-        assert complex(work.pull[i, V], work.pull[i, W]) == pytest.approx(-n * (1 + 0.3j))
+        assert complex(work.force_direction[i, V], work.force_direction[i, W]) == pytest.approx(
+            -n * (1 + 0.3j)
+        )
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -13,12 +13,14 @@ from trial_rig import trial_rig
 from rubhpc.integrate.workspace import workspace
 from rubhpc.kernels.central_difference import FINISHED
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact_pairs import MULTIPLIER, N_DEGREE, Pairs
-from rubhpc.kernels.contact_step import fill_residual, solve_contact
+from rubhpc.kernels.contact_forces import fill_residual, solve_contact
+from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs
+from rubhpc.kernels.laws import COULOMB as COULOMB_LAW
+from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.kernels.lemke import solve_lemke
 from rubhpc.rig.reading import with_keys
 
-COULOMB = MULTIPLIER._replace(is_set_valued=True)
+COULOMB = MULTIPLIER._replace(friction_law=COULOMB_LAW)
 STEP, SPIN, RADIUS = 1e-6, 150.0, 0.06  # s, rad/s, m
 
 

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rubhpc.integrate.measures import empty_tally
+from rubhpc.integrate.measures import new_accumulator
 from rubhpc.kernels.accumulators import DRIVE_WORK, FRICTION_LOSS, IMPACT, IMPACT_LOSS, PRESSING
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.mode_change import change_contacts
@@ -17,16 +17,16 @@ ANGLE = 0.8
 def bodies(rng, q, friction=0.0, restitution=0.0):
     """Bodies of unit mass with random matrices; friction pushes across the gap's direction."""
     root = rng.normal(size=(N, N))
-    push = rng.normal(size=(q, N))
-    pull = push + friction * rng.normal(size=(q, N))
+    gap_jacobian = rng.normal(size=(q, N))
+    force_direction = gap_jacobian + friction * rng.normal(size=(q, N))
     return Reduced(
         stiffness=1e4 * root @ root.T,
         damping=rng.normal(size=(N, N)),
         force_cosine=rng.normal(size=N),
         force_sine=rng.normal(size=N),
-        push=push,
-        pull=pull,
-        answer=push @ pull.T,
+        gap_jacobian=gap_jacobian,
+        force_direction=force_direction,
+        delassus=gap_jacobian @ force_direction.T,
         friction=np.full(q, friction),
         radius=np.full(q, 0.06),
         restitution=restitution,
@@ -39,9 +39,9 @@ def bodies(rng, q, friction=0.0, restitution=0.0):
 
 
 def change(reduced, closed, crossing, motion, *, is_recorded=False):
-    """Set that goes on, the motion after, and the tally."""
-    q = len(reduced.push)
-    tally, after = empty_tally(q), motion.copy()
+    """Set that goes on, the motion after, and the accumulator."""
+    q = len(reduced.gap_jacobian)
+    accumulator, after = new_accumulator(q), motion.copy()
     found = change_contacts(
         reduced,
         closed,
@@ -56,9 +56,9 @@ def change(reduced, closed, crossing, motion, *, is_recorded=False):
         np.zeros(q),
         np.zeros(q, dtype=np.bool_),
         np.zeros((q, q + 1)),
-        tally,
+        accumulator,
     )
-    return found, after, tally
+    return found, after, accumulator
 
 
 def solve(matrix, free):
@@ -78,18 +78,18 @@ def solve(matrix, free):
 def enumerated(reduced, candidates, motion):
     """Velocity after the impact and the set that goes on, by enumeration."""
     x, v = motion[:N], motion[N:].copy()
-    pairs = [i for i in range(len(reduced.push)) if candidates >> i & 1]
+    pairs = [i for i in range(len(reduced.gap_jacobian)) if candidates >> i & 1]
     if pairs:
-        arriving = reduced.push[pairs] @ v
+        arriving = reduced.gap_jacobian[pairs] @ v
         arriving *= np.where(arriving < 0.0, 1.0 + reduced.restitution, 1.0)
-        impulse = solve(reduced.answer[np.ix_(pairs, pairs)], arriving)
-        v += impulse @ reduced.pull[pairs]
+        impulse = solve(reduced.delassus[np.ix_(pairs, pairs)], arriving)
+        v += impulse @ reduced.force_direction[pairs]
     force = np.cos(ANGLE) * reduced.force_cosine + np.sin(ANGLE) * reduced.force_sine
     acceleration = force - reduced.stiffness @ x - reduced.damping @ v
-    pairs = [i for i in pairs if abs(reduced.push[i] @ v) < 1e-6]  # parting ones have gone
+    pairs = [i for i in pairs if abs(reduced.gap_jacobian[i] @ v) < 1e-6]  # parting ones have gone
     if not pairs:
         return v, 0
-    pressing = solve(reduced.answer[np.ix_(pairs, pairs)], reduced.push[pairs] @ acceleration)
+    pressing = solve(reduced.delassus[np.ix_(pairs, pairs)], reduced.gap_jacobian[pairs] @ acceleration)
     return v, sum(1 << i for i, n in zip(pairs, pressing, strict=True) if n > 0)
 
 
@@ -106,7 +106,9 @@ def test_set_that_goes_on_is_that_of_enumeration(q, friction, restitution):
         candidates = closed & ~crossing | crossing & ~closed
         kept = [i for i in range(q) if closed >> i & 1]
         if kept:  # closed gaps do not move before the event
-            motion[N:] -= np.linalg.pinv(reduced.push[kept]) @ (reduced.push[kept] @ motion[N:])
+            motion[N:] -= np.linalg.pinv(reduced.gap_jacobian[kept]) @ (
+                reduced.gap_jacobian[kept] @ motion[N:]
+            )
         found, after, _ = change(reduced, closed, crossing, motion)
         velocity, expected = enumerated(reduced, candidates, motion)
         assert found == expected
@@ -124,17 +126,19 @@ def test_impact_leaves_no_pair_closing_and_takes_energy(q):
     for _ in range(100):
         reduced = bodies(rng, q)
         motion = np.concatenate([1e-4 * rng.normal(size=N), rng.normal(size=N)])
-        _, after, tally = change(reduced, 0, (1 << q) - 1, motion, is_recorded=True)
-        speed = reduced.push @ after[N:]
+        _, after, accumulator = change(reduced, 0, (1 << q) - 1, motion, is_recorded=True)
+        speed = reduced.gap_jacobian @ after[N:]
         assert speed.min() > -1e-9
-        assert (np.minimum(tally.impulse, speed) < 1e-9).all()  # pressed pairs move together
+        assert (np.minimum(accumulator.impulse, speed) < 1e-9).all()  # pressed pairs move together
         loss = 0.5 * (motion[N:] @ motion[N:] - after[N:] @ after[N:])
         assert loss >= -1e-12
-        assert tally.energy[IMPACT_LOSS] == pytest.approx(loss, abs=1e-12)
-        assert 1 <= tally.pivots[0] <= 20 * q
-        assert tally.residual[IMPACT, 1] == pytest.approx((reduced.answer.diagonal() * tally.impulse).max())
+        assert accumulator.energy[IMPACT_LOSS] == pytest.approx(loss, abs=1e-12)
+        assert 1 <= accumulator.pivots[0] <= 20 * q
+        assert accumulator.residual[IMPACT, 1] == pytest.approx(
+            (reduced.delassus.diagonal() * accumulator.impulse).max()
+        )
         for problem in (IMPACT, PRESSING):
-            assert tally.residual[problem, 0] <= 1e-12 * tally.residual[problem, 1]
+            assert accumulator.residual[problem, 0] <= 1e-12 * accumulator.residual[problem, 1]
         lost.append(loss)
     assert max(lost) > 0.1
 
@@ -146,33 +150,35 @@ def test_energies_of_an_impact_with_friction_balance(q):
     for _ in range(50):
         reduced = bodies(rng, q, friction=0.3)
         motion = np.concatenate([np.zeros(N), rng.normal(size=N)])
-        _, after, tally = change(reduced, 0, (1 << q) - 1, motion, is_recorded=True)
+        _, after, accumulator = change(reduced, 0, (1 << q) - 1, motion, is_recorded=True)
         gain = 0.5 * (after[N:] @ after[N:] - motion[N:] @ motion[N:])
-        given, rubbed, struck = tally.energy[[DRIVE_WORK, FRICTION_LOSS, IMPACT_LOSS]]
+        given, rubbed, struck = accumulator.energy[[DRIVE_WORK, FRICTION_LOSS, IMPACT_LOSS]]
         assert given - rubbed - struck == pytest.approx(gain, abs=1e-10)
         assert struck >= 0.0
-        drive = (0.3 * tally.impulse * reduced.radius).sum() * SPIN
+        drive = (0.3 * accumulator.impulse * reduced.radius).sum() * SPIN
         assert given == pytest.approx(drive)
-        assert tally.friction_work.sum() == pytest.approx(rubbed)
+        assert accumulator.friction_work.sum() == pytest.approx(rubbed)
 
 
 def test_impact_off_the_record_is_not_added_up():
     rng = np.random.default_rng(0)
     reduced = bodies(rng, 1)
-    motion = np.concatenate([np.zeros(N), -reduced.push[0]])
-    _, after, tally = change(reduced, 0, 1, motion)
-    assert reduced.push[0] @ after[N:] == pytest.approx(0.0, abs=1e-12)
-    assert tally.impulse[0] == 0.0
-    assert not tally.energy.any()
-    assert not tally.pivots.any()
-    assert not tally.residual.any()
+    motion = np.concatenate([np.zeros(N), -reduced.gap_jacobian[0]])
+    _, after, accumulator = change(reduced, 0, 1, motion)
+    assert reduced.gap_jacobian[0] @ after[N:] == pytest.approx(0.0, abs=1e-12)
+    assert accumulator.impulse[0] == 0.0
+    assert not accumulator.energy.any()
+    assert not accumulator.pivots.any()
+    assert not accumulator.residual.any()
 
 
 @pytest.mark.parametrize(("pressed", "expected"), [(True, 1), (False, 0)])
 def test_pair_that_comes_to_rest_stays_if_it_is_pressed(pressed, expected):
     """One mass that meets a fixed stop: closed if the force on it points into the stop, else gone."""
     rng = np.random.default_rng(0)
-    reduced = bodies(rng, 1)._replace(push=np.eye(1, N), pull=np.eye(1, N), answer=np.ones((1, 1)))
+    reduced = bodies(rng, 1)._replace(
+        gap_jacobian=np.eye(1, N), force_direction=np.eye(1, N), delassus=np.ones((1, 1))
+    )
     reduced.force_cosine[:] = reduced.force_sine[:] = reduced.damping[:] = 0.0
     motion = np.zeros(2 * N)
     motion[:N] = (1e-4 if pressed else -1e-4) * np.linalg.solve(reduced.stiffness, 1e6 * np.eye(1, N)[0])
@@ -185,7 +191,9 @@ def test_pair_that_comes_to_rest_stays_if_it_is_pressed(pressed, expected):
 def test_pair_that_would_be_pressed_together_at_once_has_not_parted():
     """Opening at 5 um/s under an acceleration that shuts it again within the moment given to an event."""
     rng = np.random.default_rng(0)
-    reduced = bodies(rng, 1)._replace(push=np.eye(1, N), pull=np.eye(1, N), answer=np.ones((1, 1)))
+    reduced = bodies(rng, 1)._replace(
+        gap_jacobian=np.eye(1, N), force_direction=np.eye(1, N), delassus=np.ones((1, 1))
+    )
     reduced.force_cosine[:] = reduced.force_sine[:] = reduced.damping[:] = 0.0
     motion = np.zeros(2 * N)
     motion[:N] = np.linalg.solve(reduced.stiffness, 100.0 * np.eye(1, N)[0])  # -100 m/s2

@@ -97,7 +97,16 @@ def test_forces_of_a_ring_are_one_problem_solved_in_few_pivots(count, friction):
     model = assemble(ring(count))
     step, spin = 0.5e-6, 300.0
     packed = pack(model, spin, step)
-    pairs = pairs_of(model, packed, clearance=1e-4, friction=friction, spin=spin, is_updated=False)
+    pairs = pairs_of(
+        model,
+        row=packed.degree_row,
+        block=packed.degree_block,
+        compliance=packed.compliance,
+        clearance=1e-4,
+        friction=friction,
+        spin=spin,
+        is_updated=False,
+    )
     matrix = workspace(pairs, step).matrix
     random = np.random.default_rng(count)
     angle = np.array([stator.angle for stator in model.stators])

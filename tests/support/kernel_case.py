@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.integrate.measures import empty_samples, empty_tally
+from rubhpc.integrate.measures import empty_samples, new_accumulator
 from rubhpc.integrate.packing import pack, pairs_of
 from rubhpc.integrate.workspace import workspace
 from rubhpc.kernels.central_difference import advance
-from rubhpc.kernels.contact_pairs import MULTIPLIER
+from rubhpc.kernels.laws import MULTIPLIER
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.packing import Packed
-    from rubhpc.kernels.accumulators import Samples, Tally
+    from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.contact_pairs import Pairs, Workspace
 
 
@@ -35,7 +35,7 @@ class KernelCase:
     per_revolution: int
     state: np.ndarray  # (2, n_dof): displacement, and velocity half a step earlier
     samples: Samples
-    tally: Tally
+    accumulator: Accumulator
 
     @classmethod
     def of(
@@ -55,7 +55,9 @@ class KernelCase:
         packed = pack(model, spin, step)
         pairs = pairs_of(
             model,
-            packed,
+            row=packed.degree_row,
+            block=packed.degree_block,
+            compliance=packed.compliance,
             clearance=clearance,
             friction=friction,
             spin=spin,
@@ -72,7 +74,7 @@ class KernelCase:
             step=step,
             state=np.zeros((2, packed.mass.shape[0])),
             samples=empty_samples(len(model.stators), n_sample),
-            tally=empty_tally(len(model.stators)),
+            accumulator=new_accumulator(len(model.stators)),
         )
 
     def advance(self, first, last, *, is_recorded=False, limit=1.0):
@@ -93,6 +95,6 @@ class KernelCase:
             self.work,
             np.zeros((3, self.state.shape[1])),
             self.samples,
-            self.tally,
+            self.accumulator,
             np.zeros(1, dtype=np.int64),
         )

@@ -9,7 +9,8 @@ import numpy as np
 from rubhpc.fem.model import Body, Model, StatorModel
 from rubhpc.integrate.packing import law_of, pack
 from rubhpc.integrate.reduction import reduce_model
-from rubhpc.integrate.setup import CentralDifferenceSetup, ModalSetup
+from rubhpc.integrate.setup import CentralDifferenceSetup, ModalSetup, scheme_of
+from rubhpc.study.tables import Integrator
 
 
 def body(mass, stiffness, degrees, damping=0.0):
@@ -76,11 +77,12 @@ def set_up_modal(rotor, stators, spin, per_revolution, contact, *, force=None, l
     """Modal scheme of a body and its stators; `step` (s) is that in contact."""
     model = _model(rotor, stators, spin, force, load)
     return ModalSetup(
+        scheme=scheme_of(contact, Integrator()),
         model=model,
         reduced=reduce_model(model, spin, 1e-3),
         spin=spin,
         step=step,
-        kick_step=step,
+        contact_step=step,
         samples_per_revolution=per_revolution,
         is_updated=contact.normal == "updated",
         displacement_limit=math.inf,

@@ -153,7 +153,7 @@ def test_shaft_at_rest_on_a_stator_stays_there(method, normal):
     record = run_case(setup, clearance=gap, friction=0.0, recording=recording)
     assert record.contact_fraction == pytest.approx([1.0])
     stands = -gap - rest.contact_force[0] / stiffness
-    # The force of short steps comes in kicks, the first of which is half a step early.
+    # The force of short steps comes in impulses, the first of which is half a step early.
     still = 2e-5 if (method, normal) == ("modal", "updated") else 1e-9
     assert record.vertical == pytest.approx(np.full(256, stands), rel=still)
     assert record.contact_force[0, 1:] == pytest.approx(np.full(255, rest.contact_force[0]), rel=1e-4)

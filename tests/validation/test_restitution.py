@@ -12,7 +12,7 @@ from trial_rig import trial_rig
 from rubhpc import State
 from rubhpc.integrate.case import run_case
 from rubhpc.kernels.central_difference import FINISHED
-from rubhpc.kernels.contact_pairs import MULTIPLIER
+from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.study import Contact, Recording
 
@@ -116,7 +116,7 @@ def test_impact_on_a_meshed_stator_reverses_the_pair_and_moves_all_by_one_impuls
     row = case.packed.degree_row[0]
     case.state[1, row[:2]] = 0.1 * np.cos(0.3), 0.1 * np.sin(0.3)  # the rim's node, towards the stator
     for i in range(20_000):
-        (u, before), push = case.state.copy(), case.work.push[0]
+        (u, before), push = case.state.copy(), case.work.gap_jacobian[0]
         assert case.advance(i, i + 1) == FINISHED
         if case.work.force[0] > 0.0:
             break
@@ -127,9 +127,9 @@ def test_impact_on_a_meshed_stator_reverses_the_pair_and_moves_all_by_one_impuls
     given = packed.mass @ (after - before) / step + packed.stiffness @ u
     given += packed.damping @ (after + before) / 2
     expected = np.zeros_like(given)
-    expected[row] = case.work.pull[0] * case.work.force[0]
+    expected[row] = case.work.force_direction[0] * case.work.force[0]
     assert given == pytest.approx(expected, abs=1e-6 * expected.max())
     unit = np.zeros_like(given)
-    unit[row] = case.work.pull[0]
+    unit[row] = case.work.force_direction[0]
     yields = push @ np.linalg.solve(packed.mass, unit)[row]
     assert case.work.force[0] * step == pytest.approx((1 + restitution) * arrives / yields, rel=5e-3)

@@ -20,38 +20,24 @@ from rubhpc.kernels.accumulators import (
     STEP,
     TWIST_ACCELERATION,
     UNBALANCE_WORK,
+    Accumulator,
     Samples,
-    Tally,
     observe_contact,
     observe_solution,
 )
+from rubhpc.kernels.case_progress import CONTACT_UNSOLVED, FINISHED, MOST_STEPS, PAUSED, Clock, Progress
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact_modes import (
-    CONTACT_UNSOLVED,
-    FINISHED,
-    MOST_STEPS,
-    N_STEP,
-    NEXT_SAMPLE,
-    PAUSED,
-    SPAN,
-    TIME,
-    Clock,
-    Phases,
-    Reduced,
-    dot,
-    floor_log2,
-    propagate,
-    proved_time,
-)
+from rubhpc.kernels.contact_forces import solve_contact
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, event_free_interval, floor_log2, propagate
 from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_start, is_any_closed
-from rubhpc.kernels.contact_step import is_plain, solve_contact
+from rubhpc.kernels.laws import is_bouncing, is_penalty, is_plain
 from rubhpc.kernels.measuring import Recorder, begin_span, end_span, take_samples
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class Kicks(NamedTuple):
+class ContactImpulses(NamedTuple):
     """How contact forces act on the modes of the open system; q pairs of 5 degrees each, m modes."""
 
     level: int  # steps in contact last 2^level ticks
@@ -63,7 +49,7 @@ class Kicks(NamedTuple):
     drifted_im: Floats
     shifted_re: Floats  # (5 q, m), those of the displacement that a unit impulse makes in a second
     shifted_im: Floats
-    twist_answer: Floats  # (5 q,), torsional acceleration of the output node for a unit force
+    twist_response: Floats  # (5 q,), torsional acceleration of the output node for a unit force
 
 
 @jit_sum
@@ -99,7 +85,13 @@ def book_step(
 
 @jit_sum
 def take_back(
-    kicks: Kicks, work: Workspace, step: float, z_re: Floats, z_im: Floats, before: Floats, now: Floats
+    impulses: ContactImpulses,
+    work: Workspace,
+    step: float,
+    z_re: Floats,
+    z_im: Floats,
+    before: Floats,
+    now: Floats,
 ) -> None:
     """Take back what a step's forces have moved before their impacts were due; velocities stay.
 
@@ -107,90 +99,93 @@ def take_back(
     """
     for i in range(work.force.size):
         for d in range(N_DEGREE):
-            late = work.delay[i] * step * work.force[i] * work.pull[i, d]
+            late = work.delay[i] * step * work.force[i] * work.force_direction[i, d]
             if late != 0.0:
                 for k in range(z_re.size):
-                    z_re[k] -= kicks.shifted_re[i * N_DEGREE + d, k] * late
-                    z_im[k] -= kicks.shifted_im[i * N_DEGREE + d, k] * late
+                    z_re[k] -= impulses.shifted_re[i * N_DEGREE + d, k] * late
+                    z_im[k] -= impulses.shifted_im[i * N_DEGREE + d, k] * late
     for a in range(now.size):
-        moved = dot(kicks.degree_re[a], kicks.degree_im[a], z_re, z_im) - now[a]
+        moved = dot(impulses.degree_re[a], impulses.degree_im[a], z_re, z_im) - now[a]
         before[a] += moved
         now[a] += moved
 
 
 @jit_sum
-def advance_stepped(
-    phases: Phases,
+def advance_by_steps(
+    tables: ModeTables,
     reduced: Reduced,
     clock: Clock,
-    kicks: Kicks,
+    impulses: ContactImpulses,
     pairs: Pairs,
     work: Workspace,
-    first_tick: int,
     last_tick: int,
     is_recorded: bool,
-    progress: Ints,
+    progress: Progress,
     z: Floats,
     z_next: Floats,
     ends: Floats,
     recorder: Recorder,
     samples: Samples,
-    tally: Tally,
+    accumulator: Accumulator,
 ) -> int:
-    """Advance a case from `first_tick` to `last_tick`, as `modal.advance` does with the fixed normal.
+    """Advance a case from the tick reached to `last_tick`, as `event_loop.advance` does.
 
-    `phases` holds the open phase alone; `pairs.row` numbers the 5 q degrees of `kicks`. `ends` (2, 5 q) keeps
-    the degrees at the beginning and the end of the step before, where that was as short; else NaN.
+    `tables` holds the open mode alone; `pairs.row` numbers the 5 q degrees of `impulses`. `ends` (2, 5 q)
+    keeps the degrees at the beginning and the end of the step before, where that was as short; else NaN.
     """
     q = pairs.radius.size
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
-    switch_re, switch_im = phases.switch_re, phases.switch_im
-    gap_rate_re, gap_rate_im, bound = phases.rate_re, phases.rate_im, phases.bound
-    power_re, power_im = phases.power_re, phases.power_im
-    degree_re, degree_im, rate_re, rate_im = kicks.degree_re, kicks.degree_im, kicks.rate_re, kicks.rate_im
-    motion_re, motion_im = phases.motion_re, phases.motion_im
+    switch_re, switch_im = tables.switch_re, tables.switch_im
+    gap_rate_re, gap_rate_im, bound = tables.rate_re, tables.rate_im, tables.bound
+    power_re, power_im = tables.power_re, tables.power_im
+    degree_re, degree_im, rate_re, rate_im = (
+        impulses.degree_re,
+        impulses.degree_im,
+        impulses.rate_re,
+        impulses.rate_im,
+    )
+    motion_re, motion_im = tables.motion_re, tables.motion_im
     n_degree = q * N_DEGREE
     before, now, after, rate = ends[0], ends[1], np.zeros(n_degree), np.zeros(n_degree)
-    x, x_after = np.zeros(reduced.push.shape[1]), np.zeros(reduced.push.shape[1])
+    x, x_after = np.zeros(reduced.gap_jacobian.shape[1]), np.zeros(reduced.gap_jacobian.shape[1])
     is_placed = False  # whether x is where the step begins
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
     if not np.any(skew):
         skew = skew[:0]
-    step = clock.tick * (1 << kicks.level)
+    step = clock.tick * (1 << impulses.level)
     interval = clock.tick * (1 << clock.sample_level)
     end_tick = clock.n_sample << clock.sample_level
-    highest_level = phases.power_re.shape[1] - 1
+    highest_level = tables.power_re.shape[1] - 1
     per_revolution = clock.samples_per_revolution << clock.sample_level
-    is_direct, is_springy = is_plain(pairs.law), pairs.law.stiffness > 0.0
-    is_bouncing = pairs.law.restitution > 0.0
+    is_direct, may_press_open = is_plain(pairs.law), is_penalty(pairs.law)
+    bounces = is_bouncing(pairs.law)
     is_followed = is_recorded or not is_direct  # the steps before and after a force are looked at
-    t, last_step = first_tick, progress[N_STEP] + MOST_STEPS
+    last_step = progress.n_step + MOST_STEPS
     was_touching = bool(np.any(work.force > 0.0))
     while True:
-        if progress[N_STEP] > last_step:
-            progress[TIME] = t
+        t = progress.tick
+        if progress.n_step > last_step:
             return PAUSED
-        is_sample = is_recorded and t == progress[NEXT_SAMPLE] << clock.sample_level
+        is_sample = is_recorded and t == progress.next_sample << clock.sample_level
         is_end = t >= last_tick
         if is_sample and (not is_end or t == end_tick):
             i_sample = t >> clock.sample_level
-            take_samples(phases, 0, z_re, z_im, i_sample, 1, interval, recorder, samples, tally)
-            progress[NEXT_SAMPLE] = i_sample + 1
+            take_samples(tables, 0, z_re, z_im, i_sample, 1, interval, recorder, samples, accumulator)
+            progress.next_sample = i_sample + 1
         if is_end:
             if is_recorded and t == end_tick:
-                end_span(phases, 0, clock, t, z, progress, recorder, tally)
-            progress[TIME] = t
+                end_span(tables, clock, z, progress, recorder, accumulator)
             return FINISHED
         limit = last_tick
         if is_recorded:
             limit = min(limit, ((t >> clock.sample_level) + 1) << clock.sample_level)
         level = min(highest_level, floor_log2(limit - t))
-        proved = proved_time(switch_re, switch_im, gap_rate_re, gap_rate_im, bound, 0, z_re, z_im)
-        while level > kicks.level and (1 << level) * clock.tick > proved:
+        proved = event_free_interval(switch_re, switch_im, gap_rate_re, gap_rate_im, bound, 0, z_re, z_im)
+        while level > impulses.level and (1 << level) * clock.tick > proved:
             level -= 1
-        progress[N_STEP] += 1
+        progress.n_step += 1
         propagate(power_re[0, level], power_im[0, level], z_re, z_im, next_re, next_im)
-        is_near, is_touching = level <= kicks.level, False
+        is_near, is_touching = level <= impulses.level, False
         if is_near:
             for a in range(n_degree):
                 after[a] = dot(degree_re[a], degree_im[a], next_re, next_im)
@@ -210,30 +205,29 @@ def advance_stepped(
                 for a in range(n_degree):
                     now[a] = dot(degree_re[a], degree_im[a], z_re, z_im)
                     before[a] = now[a] - step * dot(rate_re[a], rate_im[a], z_re, z_im)
-        if is_touching or (is_near and is_springy and was_touching):
+        if is_touching or (is_near and may_press_open and was_touching):
             if not is_direct:
                 for a in range(n_degree):
                     rate[a] = (now[a] - before[a]) / step
                 fill_start(pairs.row, now, rate, work.now, work.rate)
             n_touching = solve_contact(pairs, work, step, clock.spin)
             if n_touching == UNSOLVED:
-                progress[TIME] = t
                 return CONTACT_UNSOLVED
             is_touching = n_touching > 0
             if is_recorded:
-                observe_solution(STEP, int(work.solution[0]), work.solution[1], work.solution[2], tally)
+                observe_solution(STEP, int(work.solution[0]), work.solution[1], work.solution[2], accumulator)
             for i in range(q):
                 for d in range(N_DEGREE):
                     b = i * N_DEGREE + d
-                    impulse = step * work.force[i] * work.pull[i, d]
+                    impulse = step * work.force[i] * work.force_direction[i, d]
                     if impulse != 0.0:
                         if is_sample:
                             samples.rotor[TWIST_ACCELERATION, t >> clock.sample_level] += (
-                                kicks.twist_answer[b] * impulse / step
+                                impulses.twist_response[b] * impulse / step
                             )
                         for k in range(z_re.size):
-                            next_re[k] += kicks.drifted_re[b, k] * impulse
-                            next_im[k] += kicks.drifted_im[b, k] * impulse
+                            next_re[k] += impulses.drifted_re[b, k] * impulse
+                            next_im[k] += impulses.drifted_im[b, k] * impulse
             if is_followed:
                 for a in range(n_degree):
                     after[a] = dot(degree_re[a], degree_im[a], next_re, next_im)
@@ -242,31 +236,31 @@ def advance_stepped(
             work.traction[:] = 0.0
             work.is_sticking[:] = False
         if is_recorded and is_touching:
-            if progress[SPAN] >= 0:
-                end_span(phases, 0, clock, t, z, progress, recorder, tally)
+            if progress.energy_from >= 0:
+                end_span(tables, clock, z, progress, recorder, accumulator)
             for k in range(x.size):
                 if not is_placed:
                     x[k] = dot(motion_re[0, k], motion_im[0, k], z_re, z_im)
                 x_after[k] = dot(motion_re[0, k], motion_im[0, k], next_re, next_im)
             angle = clock.spin * clock.tick * (t % per_revolution) + 0.5 * clock.spin * step
-            book_step(reduced, skew, step, angle, x, x_after, tally.energy)
+            book_step(reduced, skew, step, angle, x, x_after, accumulator.energy)
             x[:] = x_after
-        elif is_recorded and progress[SPAN] < 0:
-            begin_span(phases, 0, t, z, progress, recorder)
+        elif is_recorded and progress.energy_from < 0:
+            begin_span(tables, z, progress, recorder)
         if is_recorded and (is_touching or was_touching):
             for a in range(n_degree):
                 rate[a] = 0.5 * (after[a] - before[a]) / step
-            observe_contact(pairs, work, clock.spin, step, rate, rate, tally)
+            observe_contact(pairs, work, clock.spin, step, rate, rate, accumulator)
             for i in range(q):
                 samples.force[i, t >> clock.sample_level] += work.force[i] * step / interval
         was_touching = is_touching
-        is_placed = is_touching and not is_bouncing  # an impact is taken back from where it led
+        is_placed = is_touching and not bounces  # an impact is taken back from where it led
         for a in range(n_degree):
             before[a], now[a] = now[a], after[a]
-        if is_touching and is_bouncing:
-            take_back(kicks, work, step, next_re, next_im, before, now)
+        if is_touching and bounces:
+            take_back(impulses, work, step, next_re, next_im, before, now)
         if not (is_near and is_followed):
             before[0] = np.nan
         for k in range(z_re.size):
             z_re[k], z_im[k] = next_re[k], next_im[k]
-        t += 1 << level
+        progress.tick += 1 << level

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from rubhpc.kernels._jit import jit, jit_inline
 from rubhpc.kernels.complementarity import UNSOLVED, natural_residual, solve_complementarity
 from rubhpc.kernels.contact_pairs import (
     N_DEGREE,
-    Law,
     Pairs,
     Workspace,
     fill_directions,
-    fill_drag,
+    fill_friction_direction,
     fill_matrix,
     fill_moved,
     pair_normal_and_gap,
 )
 from rubhpc.kernels.coulomb_friction import fill_slip, friction_residual, solve_friction
+from rubhpc.kernels.laws import gap_target, is_bouncing, is_penalty, is_set_valued, softness
 
 GAP_TOLERANCE = 1e-14  # m, to which a closed gap is zero
 N_NEWTON = 25  # passes for the curved gap; two or three are taken
@@ -25,75 +23,29 @@ MOST_RESIDUAL = 1e-6  # over what the forces moved: rounding leaves 1e-9, and mo
 
 
 @jit
-def is_plain(law: Law) -> bool:
-    """Whether gaps are closed by multipliers under steady sliding: forces then follow from the gaps alone."""
-    return law.stiffness == 0.0 and law.restitution == 0.0 and not law.is_set_valued
-
-
-@jit
-def softness(law: Law, step: float) -> float:
-    """Compliance of the penalty over a step, m/N: one over (k/4 + c/(2 h)); a multiplier has none."""
-    return 1.0 / (0.25 * law.stiffness + 0.5 * law.damping / step) if law.stiffness > 0.0 else 0.0
-
-
-@jit
 def fill_compliances(pairs: Pairs, work: Workspace, step: float) -> None:
     """What unit forces do to gaps and slips over a step; the directions are filled already."""
-    if pairs.law.is_set_valued:
-        fill_matrix(pairs, work.push, work.push, work.matrix)
-        fill_matrix(pairs, work.push, work.drag, work.coupling)
-        fill_matrix(pairs, work.drag, work.push, work.tangential[0])
-        fill_matrix(pairs, work.drag, work.drag, work.tangential[1])
+    if is_set_valued(pairs.law):
+        fill_matrix(pairs, work.gap_jacobian, work.gap_jacobian, work.matrix)
+        fill_matrix(pairs, work.gap_jacobian, work.friction_direction, work.coupling)
+        fill_matrix(pairs, work.friction_direction, work.gap_jacobian, work.tangential[0])
+        fill_matrix(pairs, work.friction_direction, work.friction_direction, work.tangential[1])
         work.tangential[:] *= -1.0
     else:
-        fill_matrix(pairs, work.push, work.pull, work.matrix)
+        fill_matrix(pairs, work.gap_jacobian, work.force_direction, work.matrix)
     for i in range(pairs.radius.size):
         work.matrix[i, i] += softness(pairs.law, step)
 
 
 @jit
 def fill_targets(pairs: Pairs, work: Workspace, step: float) -> None:
-    """Gap that each pair asks for at the end of the step, m, less what its own force yields.
-
-    Multiplier: zero. Restitution: see `bounce`. Penalty: the force is the mean, 1:2:1, of the springs' at the
-    ends of this step and the one before, and the damper's over both. This mean neither adds nor takes energy,
-    and it is stable for any stiffness.
-    """
-    law = pairs.law
+    """Gap that each pair asks for at the end of the step, and the delay of its impact (`laws.gap_target`)."""
     for i in range(pairs.radius.size):
-        work.target[i] = work.delay[i] = 0.0
         _, _, gap = pair_normal_and_gap(pairs, i, work.now[i])
         opening = 0.0
         for a in range(N_DEGREE):
-            opening += work.push[i, a] * work.rate[i, a]
-        if law.stiffness > 0.0:
-            if gap < 0.0 or work.gap[i] < 0.0:
-                before = gap - step * opening
-                spring = 0.25 * law.stiffness * (2.0 * max(-gap, 0.0) + max(-before, 0.0))
-                work.target[i] = softness(law, step) * (spring + 0.5 * law.damping * before / step)
-        elif work.gap[i] < 0.0 and gap >= 0.0:
-            work.target[i], work.delay[i] = bounce(law.restitution, step, gap, opening, work.gap[i])
-
-
-@jit_inline
-def bounce(restitution: float, step: float, gap: float, opening: float, end: float) -> tuple[float, float]:
-    """Gap to ask for at the end of a step (m) in which an impact falls, and when it falls (s).
-
-    The gap, `gap` at the beginning, would be `end` < 0 at the end, and opened at the rate `opening` half a
-    step before the beginning. With the acceleration that this makes, it closes after the delay, at the rate
-    v-; v+ = -e v- then gives the rate half a step after the beginning. The step is taken at that rate, and
-    what the force has moved before it was due is taken back. Where the flight that follows would end within
-    the step, the gap is closed instead, as without restitution: (0, 0).
-    """
-    acceleration = (end - gap - step * opening) / step**2
-    rate = opening + 0.5 * step * acceleration
-    closing = np.sqrt(max(rate * rate - 2.0 * acceleration * gap, 0.0))
-    if not closing > 0.0 or 2.0 * restitution * closing <= -acceleration * step:
-        return 0.0, 0.0
-    # The root of gap + rate t + acceleration t^2 / 2 that does not cancel.
-    delay = min(2.0 * gap / (closing - rate), step) if closing > rate else step
-    after = restitution * closing + acceleration * (0.5 * step - delay)
-    return gap + step * after, delay
+            opening += work.gap_jacobian[i, a] * work.rate[i, a]
+        work.target[i], work.delay[i] = gap_target(pairs.law, step, gap, opening, work.gap[i])
 
 
 @jit_inline
@@ -104,11 +56,11 @@ def fill_residual(pairs: Pairs, work: Workspace) -> None:
         end = work.gap[i] - work.target[i]
         for j in range(pairs.radius.size):
             end += work.matrix[i, j] * work.force[j]
-            if pairs.law.is_set_valued:
+            if is_set_valued(pairs.law):
                 end += work.coupling[i, j] * work.traction[j]
         distance = max(distance, natural_residual(work.matrix[i, i], work.force[i], end))
         moved = max(moved, work.matrix[i, i] * work.force[i])
-        if pairs.law.is_set_valued:
+        if is_set_valued(pairs.law):
             slipped, held = friction_residual(work, i)
             distance, moved = max(distance, slipped), max(moved, held)
     work.solution[1], work.solution[2] = distance, moved
@@ -132,15 +84,15 @@ def solve_contact(pairs: Pairs, work: Workspace, step: float, spin: float) -> in
     if pairs.is_updated:
         for i in range(q):
             ny, nz, _ = pair_normal_and_gap(pairs, i, work.at[i])
-            fill_directions(pairs, i, ny, nz, work.pull[i], work.push[i])
-            fill_drag(pairs, i, ny, nz, work.drag[i])
+            fill_directions(pairs, i, ny, nz, work.force_direction[i], work.gap_jacobian[i])
+            fill_friction_direction(pairs, i, ny, nz, work.friction_direction[i])
         fill_compliances(pairs, work, step)
-    if law.stiffness > 0.0 or law.restitution > 0.0:
+    if is_penalty(law) or is_bouncing(law):
         fill_targets(pairs, work, step)
-    if law.is_set_valued:
+    if is_set_valued(law):
         fill_slip(pairs, work, step, spin)
     for _ in range(N_NEWTON):
-        if law.is_set_valued:
+        if is_set_valued(law):
             pivots = solve_friction(pairs, work, step, spin)
         else:
             for i in range(q):
@@ -163,7 +115,7 @@ def solve_contact(pairs: Pairs, work: Workspace, step: float, spin: float) -> in
                 linear = gap
                 for j in range(q):
                     linear -= work.matrix[i, j] * work.force[j]
-                    if law.is_set_valued:
+                    if is_set_valued(law):
                         linear -= work.coupling[i, j] * work.traction[j]
                 work.gap[i] = linear
                 gap -= work.target[i]

@@ -1,0 +1,159 @@
+"""What the two modal marches share: modal coordinates of a reduced model, advanced by kernels."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.fem.statics import sag_at_stators
+from rubhpc.integrate.march import March
+from rubhpc.integrate.record import State
+from rubhpc.integrate.reduction import kernel_bodies
+from rubhpc.kernels.case_progress import (
+    CONTACT_UNSOLVED,
+    DIVERGED,
+    FINISHED,
+    SLIP_TURNED,
+    Clock,
+    begin_in,
+    new_progress,
+    restart_clock,
+)
+from rubhpc.kernels.contact_modes import enter
+from rubhpc.kernels.measuring import recorder
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.case_progress import Progress
+    from rubhpc.kernels.contact_modes import ModeTables
+
+    Floats = NDArray[np.float64]
+
+CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
+ALL_SAMPLES = 2**62  # in one kernel call, which pauses by itself
+
+
+class ModalMarch(March):
+    """A case in modal coordinates z (2, m), real and imaginary, of the contact mode that it is in."""
+
+    tables: ModeTables
+
+    def __init__(
+        self,
+        setup: ModalSetup,
+        clearance: float,
+        friction: float,
+        initial: State,
+        check: Callable[[], None] | None,
+    ) -> None:
+        """Take the case and its reduced initial motion; it is put into a contact mode by `_start`."""
+        super().__init__(check, ALL_SAMPLES)
+        self._setup = setup
+        offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
+        self._clearance = clearance + offsets - sag_at_stators(setup.model)[0]
+        turn = setup.interval * setup.samples_per_revolution
+        self.clock = Clock(
+            spin=setup.spin,
+            tick=setup.tick,
+            sample_level=setup.sample_level,
+            samples_per_revolution=setup.samples_per_revolution,
+            search_level=setup.level_within(setup.step),
+            contact_level=math.floor(math.log2(min(setup.interval, turn / CONTACT_STEPS) / setup.tick)),
+            n_sample=0,
+        )
+        self.bodies = kernel_bodies(
+            setup.reduced, setup.model, friction, self._clearance, setup.law, setup.displacement_limit
+        )
+        self._motion = self._reduce(initial)
+        self._recorder = recorder(self._clearance.size)
+        self.progress: Progress = new_progress(1)[0]
+
+    @abstractmethod
+    def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        """Advance from the tick reached to `last_tick`; returns an outcome of `kernels.case_progress`."""
+
+    @abstractmethod
+    def _unsolved(self) -> str:
+        """Why the case cannot go on where the kernel finds no forces, unless it goes on by another march."""
+
+    @abstractmethod
+    def _contact_force(self) -> Floats:
+        """Forces at the sample reached, (q,), N."""
+
+    def energy(self) -> float:
+        """Mechanical energy, J."""
+        n = self.bodies.stiffness.shape[0]
+        motion = self.motion_of(self.progress, self._z)
+        displacement, velocity = motion[:n], motion[n:]
+        return float(0.5 * (velocity @ velocity + displacement @ self.bodies.stiffness @ displacement))
+
+    def final(self) -> State:
+        """State at the sample reached, as far as contact and outputs see it."""
+        setup = self._setup
+        motion = self.motion_of(self.progress, self._z)
+        displacement, velocity = (setup.reduced.basis @ motion.reshape(2, -1).T).T.copy()
+        displacement[: setup.model.rotor.n_dof] += setup.model.sag
+        return State.of_bodies(setup.model, displacement, velocity, self._contact_force())
+
+    def motion_of(self, progress: Progress, z: Floats) -> Floats:
+        """Reduced displacements, then velocities (2 n,), of modal coordinates (2, m)."""
+        mode = progress.mode
+        motion: Floats = self.tables.motion_re[mode] @ z[0] - self.tables.motion_im[mode] @ z[1]
+        return motion
+
+    def is_beyond(self, motion: Floats) -> bool:
+        """Whether a motion (2 n,) takes the output node or a contact degree beyond the limit."""
+        seen = self._setup.reduced.translations @ motion[: self.bodies.stiffness.shape[0]]
+        return not np.all(np.abs(seen) <= self._setup.displacement_limit)
+
+    def _use(self, tables: ModeTables) -> None:
+        """Take tables, and coordinates of their width."""
+        self.tables = tables
+        self._z = np.zeros((2, tables.switch_re.shape[2]))
+        self._z_next = np.zeros_like(self._z)
+
+    def _start(self, mode: int) -> None:
+        """Begin in a contact mode of the tables, at the shaft's angle 0."""
+        begin_in(self.progress, mode)
+        enter(self.tables, mode, self._clearance, 1.0, 0.0, self._motion, self._z)
+
+    def _call(
+        self, stop: int, samples: Samples, accumulator: Accumulator, *, is_recorded: bool
+    ) -> str | None:
+        sample_level = self.clock.sample_level
+        restart_clock(self.progress, self.sample << sample_level, self.sample, is_recorded=is_recorded)
+        self.clock = self.clock._replace(n_sample=samples.rotor.shape[1])
+        while True:
+            outcome = self._kernel(stop << sample_level, samples, accumulator, is_recorded)
+            self.n_step = int(self.progress.n_step)
+            self.sample = int(self.progress.tick) >> sample_level
+            if outcome in (CONTACT_UNSOLVED, SLIP_TURNED):
+                return self._unsolved()
+            if outcome == DIVERGED or self._has_diverged(accumulator):
+                return f"a displacement passed {self._setup.displacement_limit:.3g} m"
+            if outcome == FINISHED:
+                return None
+            if self.check is not None:
+                self.check()
+
+    def _has_diverged(self, accumulator: Accumulator) -> bool:
+        """Whether the output node or a contact degree is, or at a sample was, beyond the limit."""
+        lowest, highest = accumulator.lowest[:2], accumulator.highest[:2]
+        reached = np.concatenate([highest, -lowest, accumulator.peak_lateral])
+        is_within = np.all(reached <= self._setup.displacement_limit)
+        return not is_within or self.is_beyond(self.motion_of(self.progress, self._z))
+
+    def _reduce(self, state: State) -> Floats:
+        """Reduced coordinates and velocities of a state."""
+        project = self._setup.reduced.project
+        displacement = state.displacement
+        displacement[: self._setup.model.sag.size] -= self._setup.model.sag
+        return np.concatenate([project @ displacement, project @ state.velocity])

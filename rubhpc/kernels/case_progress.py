@@ -1,0 +1,91 @@
+"""How time is counted, and how far a case has come: what one kernel call leaves for the next."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+
+from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels.contact_pairs import rim_sense
+
+if TYPE_CHECKING:
+    from rubhpc.kernels.contact_modes import ModeTables
+
+FINISHED, DIVERGED, CONTACT_UNSOLVED, MODE_WANTED, SLIP_TURNED, PAUSED, UNDER_WAY = range(7)  # outcomes
+MOST_STEPS = 50_000  # of one call: the caller checks for stop signals between calls
+NONE = -1  # no contact mode wanted, no energies to add, no halving
+
+
+class Clock(NamedTuple):
+    """How time is counted."""
+
+    spin: float  # rad/s
+    tick: float  # s
+    sample_level: int  # 2^level ticks are the interval of samples
+    samples_per_revolution: int
+    search_level: int  # event-search steps, up to 2^level ticks, need no bound; they are checked at their end
+    contact_level: int  # longest step with a pair closed while recording
+    n_sample: int  # samples of the record; it ends where the next one would stand
+
+
+class Progress(Protocol):
+    """How far a case has come; a record of integers, which kernels change in place.
+
+    The kernels own it. Their callers read it, and change it by the functions below alone.
+    """
+
+    tick: int  # reached
+    mode: int  # contact mode, as its index in the tables
+    wanted: int  # set of pairs to close before the next step, or NONE
+    n_step: int  # steps taken
+    n_event: int  # events since the call before began
+    next_sample: int  # to be taken
+    entered: int  # tick at which the contact mode was entered
+    energy_from: int  # tick from which energies are still to be added, or NONE
+    contact_age: int  # level of the contact's duration when its pace was last read, or NONE
+    resolved_level: int  # of the longest step that resolved the contact then
+    halving_level: int  # while halving towards an event: level of the longest step worth a try; else NONE
+    is_after_event: int  # whether the next step is the first one after an event
+
+
+_RECORD = np.dtype([(name, np.int64) for name in Progress.__annotations__])
+LONG_AGO = -(2**61)  # tick
+
+
+def new_progress(n_case: int) -> Any:
+    """Records (n_case,) of cases at tick 0, with every pair open."""
+    progress = np.zeros(n_case, dtype=_RECORD).view(np.recarray)
+    progress.wanted = progress.energy_from = progress.contact_age = progress.halving_level = NONE
+    progress.entered = LONG_AGO
+    return progress
+
+
+def restart_clock(progress: Progress, tick: int, sample: int, *, is_recorded: bool) -> None:
+    """Count time anew: the case stands at `tick`, where `sample` is due."""
+    progress.entered += tick - progress.tick
+    progress.tick, progress.next_sample, progress.n_event = tick, sample, 0
+    if not is_recorded:
+        progress.energy_from = NONE
+
+
+def begin_in(progress: Progress, mode: int) -> None:
+    """Put the case into a contact mode, of which it has the modal coordinates."""
+    progress.mode = mode
+
+
+def ask_for(progress: Progress, mask: int) -> None:
+    """Have the case enter the contact mode with the pairs of `mask` closed, from its reduced motion."""
+    progress.wanted = mask
+
+
+def closed_pairs(progress: Progress, tables: ModeTables) -> int:
+    """Set of the pairs closed, bit i for pair i."""
+    return int(tables.mask[progress.mode])
+
+
+@jit_inline_sum
+def shaft_angle(clock: Clock, tick: int) -> float:
+    """Angle of the shaft at a tick, rad, counted from the beginning of its revolution."""
+    ticks_per_revolution = clock.samples_per_revolution << clock.sample_level
+    return rim_sense(clock.spin) * 2.0 * np.pi * (tick % ticks_per_revolution) / ticks_per_revolution

@@ -1,0 +1,121 @@
+"""Laws of contact and friction: what ties the forces of a pair to its gap and its slip.
+
+To add one, give it a place here and a name in `study.tables`; CONTRIBUTING.md has the steps.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rubhpc.kernels._jit import jit_inline
+
+FRICTION_LAWS = ("sliding", "coulomb")  # names in a study; their places are the numbers below
+SLIDING, COULOMB = range(2)
+
+
+class Law(NamedTuple):
+    """Laws of a case; but for the first, the fields are named as the keys of `[contact]`."""
+
+    friction_law: int = SLIDING  # one of the numbers above
+    stiffness: float = 0.0  # of the penalty, N/m; 0: the gap is closed exactly, by a multiplier
+    damping: float = 0.0  # of the penalty, N s/m
+    restitution: float = 0.0  # normal velocity after an impact over that before; 0: the gap is closed at once
+    static_friction_ratio: float = 1.0  # coefficient of friction at rest over that in sliding
+
+
+MULTIPLIER = Law()
+
+
+@jit_inline
+def is_set_valued(law: Law) -> bool:
+    """Whether friction may stick and reverse, in place of the steady sliding that the spin makes."""
+    return law.friction_law != SLIDING
+
+
+@jit_inline
+def friction_coefficient(law: Law, friction: float, slip_speed: float, is_sticking: bool) -> float:
+    """Largest friction for a unit normal force.
+
+    Parameters
+    ----------
+    friction : float
+        Coefficient of the case, not negative.
+    slip_speed : float, m/s
+        Of the rim over the tip, before the forces of the step.
+    is_sticking : bool
+        Whether the pair stuck in the step before.
+    """
+    return friction * (law.static_friction_ratio if is_sticking else 1.0)
+
+
+@jit_inline
+def is_penalty(law: Law) -> bool:
+    """Whether a force may act with the gap open at the end of a step."""
+    return law.stiffness > 0.0
+
+
+@jit_inline
+def is_bouncing(law: Law) -> bool:
+    """Whether an impact sends a pair back."""
+    return law.restitution > 0.0
+
+
+@jit_inline
+def is_plain(law: Law) -> bool:
+    """Whether gaps are closed by multipliers under steady sliding: forces then follow from the gaps alone."""
+    return not (is_penalty(law) or is_bouncing(law) or is_set_valued(law))
+
+
+@jit_inline
+def softness(law: Law, step: float) -> float:
+    """Compliance of the penalty over a step, m/N: one over (k/4 + c/(2 h)); a multiplier has none."""
+    return 1.0 / (0.25 * law.stiffness + 0.5 * law.damping / step) if is_penalty(law) else 0.0
+
+
+@jit_inline
+def gap_target(law: Law, step: float, gap: float, opening: float, end: float) -> tuple[float, float]:
+    """Gap asked for at the end of a step, less what its own force yields (m), and delay of an impact (s).
+
+    Multiplier: zero. Restitution: see `bounce`. Penalty: the force is the mean, 1:2:1, of the springs' at the
+    ends of this step and the one before, and the damper's over both. This mean neither adds nor takes energy,
+    and it is stable for any stiffness.
+
+    Parameters
+    ----------
+    step : float, s
+    gap, end : float, m
+        At the beginning of the step, and at its end without forces.
+    opening : float, m/s
+        Rate of the gap over the step before.
+    """
+    if is_penalty(law):
+        if gap < 0.0 or end < 0.0:
+            before = gap - step * opening
+            spring = 0.25 * law.stiffness * (2.0 * max(-gap, 0.0) + max(-before, 0.0))
+            return softness(law, step) * (spring + 0.5 * law.damping * before / step), 0.0
+    elif end < 0.0 and gap >= 0.0:
+        return bounce(law.restitution, step, gap, opening, end)
+    return 0.0, 0.0
+
+
+@jit_inline
+def bounce(restitution: float, step: float, gap: float, opening: float, end: float) -> tuple[float, float]:
+    """Gap to ask for at the end of a step (m) in which an impact falls, and when it falls (s).
+
+    The gap, `gap` at the beginning, would be `end` < 0 at the end, and opened at the rate `opening` half a
+    step before the beginning. With the acceleration that this makes, it closes after the delay, at the rate
+    v-; v+ = -e v- then gives the rate half a step after the beginning. The step is taken at that rate, and
+    what the force has moved before it was due is taken back. Where the flight that follows would end within
+    the step, the gap is closed instead, as without restitution: (0, 0).
+    """
+    acceleration = (end - gap - step * opening) / step**2
+    rate = opening + 0.5 * step * acceleration
+    closing = np.sqrt(max(rate * rate - 2.0 * acceleration * gap, 0.0))
+    if not closing > 0.0 or 2.0 * restitution * closing <= -acceleration * step:
+        return 0.0, 0.0
+    # The root of gap + rate t + acceleration t^2 / 2 that does not cancel.
+    delay = min(2.0 * gap / (closing - rate), step) if closing > rate else step
+    after = restitution * closing + acceleration * (0.5 * step - delay)
+    return gap + step * after, delay
