@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 MOST_SHAPES = 6
 _ROOM = 0.12  # of the abscissa: that the name of a peak takes
+_CIRCLE = 0.1  # of the square of an orbit's size: difference of those of its axes, below which it is a circle
 _RPM = 30 / math.pi
 _BAND: dict[str, Any] = {"color": "0.9", "zorder": 0, "linewidth": 0}
 _PROBES: tuple[dict[str, Any], ...] = (
@@ -94,11 +95,11 @@ def mode_shapes(design: xr.Dataset) -> Drawing:
         for i, ax in enumerate(axes):
             _draw_shape(ax, place, shown.isel(critical=i))
             ax.set(ylim=(-1.15, 1.15), ylabel="Shape")
-        axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, 1.32), ncols=3, fontsize=6, frameon=False)
+        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=3, fontsize=6, frameon=False)
         axes[-1].set(xlabel=label, xlim=(place.min(), place.max()))
         return axes
 
-    return Drawing(shown=shown, draw=draw, panels=(n_critical, 1), height=18 + 24 * n_critical)
+    return Drawing(shown=shown, draw=draw, panels=(n_critical, 1), height=18 + 27 * n_critical)
 
 
 def _draw_shape(ax: Axes, place: np.ndarray[Any, Any], one: xr.Dataset) -> None:
@@ -109,8 +110,10 @@ def _draw_shape(ax: Axes, place: np.ndarray[Any, Any], one: xr.Dataset) -> None:
     )
     size = (np.abs(v + 1j * w) + np.abs(v - 1j * w)) / 2
     largest = int(size.argmax())
-    # the instant at which the largest orbit is on its major axis
-    turn = np.exp(-0.5j * np.angle(v[largest] ** 2 + w[largest] ** 2)) / (size[largest] or 1.0)
+    # when the largest orbit is on its major axis; on a circle, which has none, when it is vertical
+    major = v[largest] ** 2 + w[largest] ** 2
+    is_circle = abs(major) < _CIRCLE * size[largest] ** 2
+    turn = np.exp(-1j * (np.angle(v[largest]) if is_circle else np.angle(major) / 2)) / (size[largest] or 1.0)
     v, w, size = np.real(v * turn), np.real(w * turn), size / (size[largest] or 1.0)
     ax.fill_between(place, -size, size, **_BAND, label="orbit")
     ax.axhline(0.0, color="0.6", linewidth=0.4)
@@ -118,12 +121,7 @@ def _draw_shape(ax: Axes, place: np.ndarray[Any, Any], one: xr.Dataset) -> None:
     ax.plot(place, w, marker=".", label="horizontal", **_PROBES[1])
     rpm = _RPM * float(one["critical_speed"])
     excited = "" if bool(one["is_excited"]) else ", not excited"
-    ax.annotate(
-        f"{rpm:.0f} rpm, {one['critical_whirl'].item()}{excited}",
-        (0.02, 0.04),
-        xycoords="axes fraction",
-        fontsize=6,
-    )
+    ax.set_title(f"{rpm:.0f} rpm, {one['critical_whirl'].item()}{excited}", fontsize=6, pad=2)
 
 
 def _name_peaks(ax: Axes, peaks: xr.Dataset) -> None:
