@@ -95,7 +95,7 @@ def mode_shapes(design: xr.Dataset) -> Drawing:
         for i, ax in enumerate(axes):
             _draw_shape(ax, place, shown.isel(critical=i))
             ax.set(ylim=(-1.15, 1.15), ylabel="Shape")
-        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=3, fontsize=6, frameon=False)
+        axes[-1].legend(loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=3, fontsize=6, frameon=False)
         axes[-1].set(xlabel=label, xlim=(place.min(), place.max()))
         return axes
 
