@@ -95,7 +95,7 @@ def simulate(
     Raises
     ------
     InputError
-        If an argument cannot be used; its text says which and the mend.
+        If an argument cannot be used; its text says which one and how to fix it.
 
     Examples
     --------

@@ -5,7 +5,7 @@
 #     sbatch jobs/slurm/figures.sh map.zarr figures --select clearance_ratio=0.7 --select friction=0.3
 #     sbatch --dependency=afterok:JOB jobs/slurm/figures.sh map.zarr      # once the sweep JOB is complete
 #
-# The folder is `figures` unless told. What follows it are options of `rubhpc cascade`.
+# The folder is `figures` by default. What follows it are options of `rubhpc cascade`.
 
 #SBATCH --job-name=rubhpc-figures
 #SBATCH --ntasks=1

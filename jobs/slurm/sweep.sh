@@ -5,12 +5,12 @@
 #     sbatch --ntasks=128 --time=08:00:00 jobs/slurm/sweep.sh my-study.toml --output /scratch/my-study.zarr
 #
 # Two minutes before the time is up Slurm sends USR1 to this script, which hands it to the ranks. They finish or drop
-# the blocks in hand and end with 75, "stopped early"; the job is then put back into the queue under its own number.
+# the blocks in progress and end with 75, "stopped early"; the job is then put back into the queue under its own number.
 # A job that waits for this one, `sbatch --dependency=afterok:JOB`, so starts when the study is complete.
 #
 # Settings, by `sbatch --export=ALL,NAME=VALUE`:
 #     RUBHPC_LAUNCHER       what starts the ranks; "mpirun" where rubhpc's MPI was not built for srun
-#     RUBHPC_MOST_RESTARTS  job times to take at most, 100 unless told
+#     RUBHPC_MOST_RESTARTS  job times to take at most, 100 by default
 #
 # To stop for good: scancel. (A file STOP in the store ends this job time only.)
 

@@ -63,7 +63,7 @@ def hatch_cells(
 
 
 def is_geometric(values: NDArray[np.float64]) -> bool:
-    """Tell whether grid values are spaced evenly on a log scale."""
+    """Return whether grid values are spaced evenly on a log scale."""
     if values.size < 3 or values.min() <= 0:
         return False
     ratios = np.diff(np.log(values))

@@ -99,7 +99,7 @@ def value_maps(
 ) -> Sequence[Axes]:
     """Draw maps from `map_data`, one for each value of its facets, in one scale of colours.
 
-    Flags and periods have distinct colours, other scalars a continuous bar and, where asked for, contours.
+    Flags and periods have distinct colours, other measures a continuous bar and, where asked for, contours.
     Cells without a result are grey and hatched by their status; out of the model's range, by lines.
 
     Parameters

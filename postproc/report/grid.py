@@ -49,7 +49,7 @@ _MATHTEXT = re.compile(r"\s*\$[^$]*\$")
 
 
 class Measures:
-    """Scalars, flags and settings of every case, loaded; those of cases without a result are NaN."""
+    """Measures, flags and settings of every case, loaded; those of cases without a result are NaN."""
 
     def __init__(self, store: xr.Dataset) -> None:
         self._drawn = drawn_axes(store)

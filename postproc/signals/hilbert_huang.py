@@ -2,7 +2,7 @@
 
 After N. E. Huang and others, Proc. R. Soc. Lond. A 454 (1998) 903-995, as the paper uses it (Figs. 8, 12, 14
 and 16). Touch and release part the motion into spans that obey different equations, so that each span is
-decomposed by itself: sifting across a release would spread the push of the contact over the ringing that
+decomposed by itself: sifting across a release would spread the jump of the contact over the ringing that
 follows. A span's modes are sifted before its Hann window is applied, since over the few cycles of a span the
 window itself would be taken for a modulation and bend the mode.
 """

@@ -1,4 +1,4 @@
-"""What every integrator offers a case: to advance it sample by sample, and to tell its state and energy."""
+"""What every integrator offers a case: advance it sample by sample, return its state and energy."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def measures_of(
     samples_per_revolution: int,
     growth: Iterable[float],
 ) -> dict[str, Any]:
-    """Scalars of a finished case; those of a contact that never happened are zero, or NaN where undefined.
+    """Measures of a finished case; those of a contact that never happened are zero, or NaN where undefined.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def measures_of(
         Mechanical energy at the beginning and at the end of the record.
     spin : float, rad/s
     growth : iterable of float
-        How a small displacement grows after the record (`lyapunov.growth`); read where that tells the regime.
+        How a small displacement grows after the record (`lyapunov.growth`); read where it decides the regime.
     """
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution

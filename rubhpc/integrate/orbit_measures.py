@@ -17,7 +17,7 @@ PERIOD_TOLERANCE = 1e-2  # rms distance of whole cycles over the orbit's size
 
 
 def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) -> int:
-    """Period of the orbit in revolutions; 0 where it has none up to 16 (or the record is too short to tell).
+    """Period of the orbit in revolutions; 0 where it has none up to 16 (or the record is too short).
 
     Whole cycles are compared: the rms distance between revolutions k and k + n over the orbit's size stays
     under 1e-2. A stroboscopic point alone would take a period-2 orbit for period 1.
@@ -38,7 +38,7 @@ def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) ->
     for n in range(1, min(LONGEST_PERIOD, n_revolution - 1) + 1):
         shift = n * samples_per_revolution
         n_pair = vertical.size - shift
-        # The first revolution alone mostly tells that there is no such period.
+        # The first revolution alone mostly shows that there is no such period.
         if all(distance(shift, end) <= most * n_pair for end in (samples_per_revolution, n_pair)):
             return n
     return 0

@@ -93,7 +93,7 @@ class State:
         return cls.of_bodies(model, displacement, np.zeros(n_dof), np.zeros(len(model.stators)))
 
 
-MOST_RESIDUAL = 0.01  # of the energy balance: more is told of
+MOST_RESIDUAL = 0.01  # of the energy balance: a larger one is reported
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

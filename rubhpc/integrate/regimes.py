@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 LEAST_REVOLUTIONS = LONGEST_PERIOD  # of a record without a period that is worth following further
-TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may tell a torus, or a longer period, by itself
+TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may show a torus, or a longer period, by itself
 N_FIRST, N_ALL, N_MOST = 16, 64, 256  # spans whose growth is measured, each where the last left it open
 CLEAR = 0.05  # per revolution: an exponent beyond that over 16 spans keeps its sign
 ZERO = 0.01  # per revolution: an exponent within that is none
@@ -40,9 +40,9 @@ def regime(
 ) -> tuple[int, float]:
     """Flag of `schema.REGIME`, and the largest Lyapunov exponent where that had to be measured (else NaN).
 
-    A record shorter than 16 revolutions without a period leaves the motion undecided: it does not even tell
-    all periods. From 16 to 31 the growth alone decides, for it is measured beyond the record; a longer
-    record may tell a torus, or a period beyond 16, by itself.
+    A record shorter than 16 revolutions without a period leaves the motion undecided: it is too short for
+    some periods. From 16 to 31 the growth alone decides, for it is measured beyond the record; a longer
+    record may show a torus, or a period beyond 16, by itself.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """The zarr store of a study: made whole, written block by block, packed from the journals.
 
-Every array has one chunk a block, and a block has one writer. Metrics are lines of a journal first
+Every array has one chunk a block, and a block has one writer. Measures are lines of a journal first
 (`rubhpc.storage.journal`) and become arrays when a run ends. What is private lies under `.rubhpc`.
 """
 

@@ -1,4 +1,4 @@
-"""The axes of a study's grid: lists, ranges and scalars of a file become values in SI units."""
+"""The axes of a study's grid: lists, ranges and single values of a file become values in SI units."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     reason="they belong to 30 GPa",
 )
 def pseudo_critical_speeds(store: xr.Dataset) -> str:
-    """Tell where the orbits of period 1, 2 and 3 are largest, for both moduli."""
+    """Report where the orbits of period 1, 2 and 3 are largest, for both moduli."""
     found = []
     for modulus in (SOFT, STIFF):
         every = cases(store, stator_youngs_modulus=modulus)
@@ -40,7 +40,7 @@ def pseudo_critical_speeds(store: xr.Dataset) -> str:
     reason="Fig. 3 needs the updated one, the others the fixed one",
 )
 def normals(fixed: xr.Dataset, updated: xr.Dataset) -> str:
-    """Tell the peak reaction at r 0.75, cg 0.70 with either normal."""
+    """Report the peak reaction at r 0.75, cg 0.70 with either normal."""
     force = float(cases(fixed, **SMALL_GAP_CASE)["peak_contact_force"])
     turning = float(cases(updated, speed_ratio=0.75, stator_1_lateral=1)["peak_contact_force"])
     return f"peak reaction at r 0.75, cg 0.70: {force:.1f} N fixed, {turning:.1f} N updated"
@@ -55,7 +55,7 @@ def normals(fixed: xr.Dataset, updated: xr.Dataset) -> str:
     reason="the paper's values disagree",
 )
 def clearance_ratios(near: xr.Dataset, above: xr.Dataset) -> str:
-    """Tell the clearance over the contact-free amplitude."""
+    """Report the clearance over the contact-free amplitude."""
     ratios = [
         float(gap / cases(store)["contact_free_amplitude"]) for gap, store in ((150e-6, near), (70e-6, above))
     ]
@@ -70,7 +70,7 @@ def clearance_ratios(near: xr.Dataset, above: xr.Dataset) -> str:
     reason="Table 1 gives twice that at these gaps; the levels of Fig. 9 agree with it",
 )
 def levels_below_the_critical_speed(store: xr.Dataset) -> str:
-    """Tell the successive peaks of the reaction, and the peak of torsion, for both gaps."""
+    """Report the successive peaks of the reaction, and the peak of torsion, for both gaps."""
     found = []
     for choice in (LARGE_GAP_CASE, SMALL_GAP_CASE):
         case = cases(store, **choice)
@@ -88,7 +88,7 @@ def levels_below_the_critical_speed(store: xr.Dataset) -> str:
     reason="the size of the drop depends on the damping, which is not stated; its sign holds",
 )
 def torsion_over_the_gap(store: xr.Dataset) -> str:
-    """Tell the change of the peak-to-peak value."""
+    """Report the change of the peak-to-peak value."""
     large, small = (
         float(peak_to_peak(cases(store, **choice)["torsion"])) for choice in (LARGE_GAP_CASE, SMALL_GAP_CASE)
     )
@@ -105,7 +105,7 @@ def torsion_over_the_gap(store: xr.Dataset) -> str:
     reason="force over the Euler load, a tip that moves far, slip that changes sign",
 )
 def range_of_the_model(near: xr.Dataset, twice: xr.Dataset, speed: xr.Dataset) -> str:
-    """Tell the validity monitors of these cases."""
+    """Report the validity monitors of these cases."""
     shown = {
         "r 1.5": cases(near, stator_youngs_modulus=SOFT),
         "r 3": cases(twice, friction=0.5),

@@ -55,17 +55,17 @@ def strongest(spectrum: xr.DataArray, n_line: int = 1) -> list[tuple[str, float,
 
 
 def rises(values: Any) -> bool:
-    """Tell whether each of some values is above the one before."""
+    """Return whether each of some values is above the one before."""
     return bool((np.diff(np.asarray(values, dtype=float)) > 0).all())
 
 
 def falls(values: Any) -> bool:
-    """Tell whether each of some values is below the one before."""
+    """Return whether each of some values is below the one before."""
     return bool((np.diff(np.asarray(values, dtype=float)) < 0).all())
 
 
 def within(value: float, low: float, high: float) -> bool:
-    """Tell whether a number lies between two others, ends included."""
+    """Return whether a number lies between two others, ends included."""
     return bool(low <= value <= high)
 
 

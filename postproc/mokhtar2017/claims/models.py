@@ -32,7 +32,7 @@ def tilt(case: xr.Dataset) -> float:
     reason=_OTHER_RIG,
 )
 def freedom_to_bend_tilts_the_orbit(store: xr.Dataset) -> str:
-    """Tell the tilt of the orbit and the vertical motion with and without it."""
+    """Report the tilt of the orbit and the vertical motion with and without it."""
     found = []
     for speed in store["speed_ratio"].values:
         free, held = (cases(store, speed_ratio=speed, stator_1_lateral=on) for on in (1, 0))
@@ -61,7 +61,7 @@ def unevenness(signal: xr.DataArray) -> float:
     reason=f"{_OTHER_RIG}, nor is its contact stiffness",
 )
 def conventional_law_twists_more(penalty: xr.Dataset, multiplier: xr.Dataset) -> str:
-    """Tell sizes, periods and the unevenness of successive revolutions with either law."""
+    """Report sizes, periods and the unevenness of successive revolutions with either law."""
     found = []
     for name, case in (("wall", cases(penalty)), ("multiplier", cases(multiplier, **SMALL_GAP_CASE))):
         parts = [f"{name}: period {int(case['period'])}"]

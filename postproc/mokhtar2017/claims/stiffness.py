@@ -121,7 +121,7 @@ def stiffer_stator_falls_silent_sooner(below: xr.Dataset, near: xr.Dataset) -> F
     reason="horizontal motion depends on the damping, which is not stated",
 )
 def horizontal_motion_near_resonance(store: xr.Dataset) -> str:
-    """Tell both peak-to-peak values over the modulus."""
+    """Report both peak-to-peak values over the modulus."""
     every = cases(store, **{_MODULUS: MODULI})
     sizes = [f"{n} {written(peak_to_peak(every[n]), 'µm', MICRO)}" for n in ("vertical", "horizontal")]
     return f"{'; '.join(sizes)}"

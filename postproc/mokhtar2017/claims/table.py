@@ -43,7 +43,7 @@ def rows(results: Iterable[Result]) -> list[tuple[str, ...]]:
     ]
 
 
-def tally(results: Iterable[Result]) -> str:
+def counts(results: Iterable[Result]) -> str:
     """Return how many claims hold, fail and are reported, in words."""
     counts = Counter(r.verdict for r in results)
     words = {HOLDS: "hold", FAILS: "fail", REPORTED: "are reported"}
@@ -60,14 +60,14 @@ def text(results: Sequence[Result], width: int) -> str:
         for i in range(max(map(len, cells))):
             parts = (cell[i] if i < len(cell) else "" for cell in cells)
             lines.append("  ".join(f"{p:<{w}}" for p, w in zip(parts, widths, strict=True)).rstrip())
-    return "\n".join([*lines, tally(results)])
+    return "\n".join([*lines, counts(results)])
 
 
 def document_of(results: Sequence[Result]) -> str:
     """Return the results as a page of the documents."""
     table = [HEAD, ("---",) * len(HEAD), *rows(results)]
     lines = (f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in table)
-    return f"{_DOCUMENT}\nOf {len(results)} claims {tally(results)}.\n\n{chr(10).join(lines)}\n"
+    return f"{_DOCUMENT}\nOf {len(results)} claims {counts(results)}.\n\n{chr(10).join(lines)}\n"
 
 
 def as_json(results: Sequence[Result]) -> str:
