@@ -30,8 +30,8 @@ def scatter_maps(
 ) -> Sequence[Axes]:
     """Draw the points of `postproc.cases.maps.map_data`, a panel for each value of its facets, in one scale.
 
-    Flags and periods have distinct colours, other measures a continuous bar. A case without a result is a grey
-    cross, and a ring marks what is out of the model's range.
+    Flags and periods have distinct colours, other measures a continuous bar. A case without a result is a
+    grey cross, and a ring marks what is out of the model's range.
 
     Parameters
     ----------
