@@ -32,6 +32,7 @@ class Variable:
 STATUS = ("missing", "done", "failed", "diverged")
 MISSING, DONE, FAILED, DIVERGED = range(4)
 REGIME = ("no_contact", "periodic", "quasi_periodic", "chaotic", "undecided")
+SETTLED = ("not_settled", "settled")
 
 # The recorded signals: name, extra dimensions, unit, long name; in single precision, as are their spectra.
 _SIGNALS = (
@@ -84,8 +85,17 @@ _STATE = Variable(
 )
 
 
-def _measure(name: str, unit: str, long_name: str, *dims: str, dtype: str = "float64") -> Variable:
-    return Variable(name=name, role="measure", dims=dims, dtype=dtype, unit=unit, long_name=long_name)
+def _measure(
+    name: str,
+    unit: str,
+    long_name: str,
+    *dims: str,
+    dtype: str = "float64",
+    flags: tuple[str, ...] = (),
+) -> Variable:
+    return Variable(
+        name=name, role="measure", dims=dims, dtype=dtype, unit=unit, long_name=long_name, flags=flags
+    )
 
 
 _SETTINGS = tuple(
@@ -117,6 +127,7 @@ _MEASURES = (
     _measure("peak_to_peak_vertical", "m", "peak-to-peak vertical displacement"),
     _measure("peak_to_peak_horizontal", "m", "peak-to-peak horizontal displacement"),
     _measure("energy_residual", "1", "residual of the energy balance over the recorded revolutions"),
+    _measure("settled", "1", "whether the motion had settled before the record", dtype="int8", flags=SETTLED),
     _measure("contact_iterations", "1", "most iterations that a contact problem took", dtype="int64"),
     _measure("contact_residual", "1", "largest residual of the contact problems, relative"),
     _measure("transient_revolutions", "1", "revolutions thrown away", dtype="int64"),

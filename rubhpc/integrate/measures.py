@@ -10,6 +10,7 @@ from rubhpc.integrate.orbit_measures import period, whirl_ratio
 from rubhpc.integrate.packing import output_degrees
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.regimes import regime
+from rubhpc.integrate.settling import settled
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     DRIVE_WORK,
@@ -116,10 +117,13 @@ def measures_of(
     n_revolution = n_sample // samples_per_revolution
     duration = 2.0 * np.pi * n_revolution / abs(spin)
     has_touched = accumulator.impulse > 0
+    is_contact = bool(has_touched.any())
     n_contact = np.maximum(accumulator.n_contact, 1)  # one that lasts throughout never begins in the record
     orbit = signals["vertical"], signals["horizontal"], samples_per_revolution
     orbit_period = period(*orbit)
-    flag, exponent = regime(*orbit, period=orbit_period, is_contact=bool(has_touched.any()), growth=growth)
+    flag, exponent = regime(*orbit, period=orbit_period, is_contact=is_contact, growth=growth)
+    rim = stators[0].radius * signals["torsion"]  # m, as the orbit
+    force = signals["contact_force"].reshape(len(stators), n_revolution, samples_per_revolution)
     # Drive and friction exchange a hundred times what the vibration feels of them: only their difference
     # counts.
     flows = [
@@ -148,6 +152,13 @@ def measures_of(
         "peak_to_peak_vertical": float(accumulator.highest[VERTICAL] - accumulator.lowest[VERTICAL]),
         "peak_to_peak_horizontal": float(accumulator.highest[HORIZONTAL] - accumulator.lowest[HORIZONTAL]),
         "energy_residual": float(abs(sum(flows) - (energy[1] - energy[0])) / exchanged),
+        "settled": settled(
+            np.stack([*orbit[:2], rim]),
+            force.mean(axis=2),
+            samples_per_revolution,
+            period=orbit_period,
+            is_contact=is_contact,
+        ),
         "contact_iterations": int(accumulator.pivots[0]),
         "contact_residual": float(np.divide(distance, moved, out=np.zeros(3), where=moved > 0.0).max()),
     }
