@@ -84,6 +84,9 @@ def test_every_module_has_its_layer() -> None:
     placed = set.union(*(placed_in(contract) for contract in LAYERS))
     ordered = {name.rpartition(".")[0] for name in placed}
     assert {name for name in MODULES if name.rpartition(".")[0] in ordered} - placed == {"rubhpc.__main__"}
+    acyclic = {name for contract in CONTRACTS for name in contract.get("ancestors", ())}
+    packages = {name.rpartition(".")[0] for name in MODULES} - {"", *PACKAGES}
+    assert packages - ordered - acyclic == set(), "each package has a contract of its own"
 
 
 def test_kernels_and_postproc_have_a_contract_of_their_own() -> None:
