@@ -62,7 +62,6 @@ if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST_EVENTS = 200_000  # of one call; more is chatter without end
 GAP_TOLERANCE = 1e-13  # m
@@ -111,7 +110,7 @@ def advance(
     rate_re, rate_im, bound = tables.rate_re, tables.rate_im, tables.bound
     power_re, power_im = tables.power_re, tables.power_im
     interval = clock.tick * (1 << clock.sample_level)
-    highest_level = power_re.shape[1] - 1
+    highest_level, is_set_valued = power_re.shape[1] - 1, reduced.is_set_valued
     work = event_work(reduced.radius.size)
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
@@ -146,32 +145,32 @@ def advance(
         if progress.n_step > last_step and not is_at_event:
             return PAUSED
         mode = progress.mode
-        level = longest_level(
-            tables, clock, last_tick, highest_level, is_recorded, is_sample, progress, mode, z_re, z_im
-        )
-        level, is_event_free = choose_step(
-            tables,
-            reduced,
-            clock,
-            mask,
-            switch_re,
-            switch_im,
-            rate_re,
-            rate_im,
-            bound,
-            progress,
-            mode,
-            z_re,
-            z_im,
-            level,
-        )
-        if level < 0:
-            return SLIP_TURNED
+        is_free = mask[mode] == 0
+        reach = last_tick
+        if is_recorded:
+            n_ahead = SAMPLES_AT_ONCE if is_sample and is_free else 1
+            reach = min(reach, ((progress.tick >> clock.sample_level) + n_ahead) << clock.sample_level)
+        longest = min(highest_level, floor_log2(reach - progress.tick))
+        if is_recorded and not is_free:
+            age = contact_age(progress)
+            if age != progress.contact_age:
+                note_resolution(tables, clock, highest_level, age, progress, z)
+            longest = min(longest, clock.contact_level, max(age, clock.search_level), progress.resolved_level)
+        interval_free = 0.0
+        if not is_at_event:
+            interval_free = event_free_interval(
+                switch_re, switch_im, rate_re, rate_im, bound, mode, z_re, z_im
+            )
+            if is_set_valued and not is_free:
+                interval_free = min(interval_free, steady_slip_interval(tables, reduced, clock.spin, mode, z))
+                if interval_free < 0.0:
+                    return SLIP_TURNED
+        level, is_event_free = choose_step(clock, progress, longest, interval_free)
         propagate(power_re[mode, level], power_im[mode, level], z_re, z_im, next_re, next_im)
         progress.n_step += 1
         crossing = int(np.int64(0))  # no literal: the event would be compiled for it once more
         if not is_event_free:
-            crossing = find_crossing(mask[mode], switch_re[mode], switch_im[mode], next_re, next_im)
+            crossing = find_crossing(mask[mode], mode, switch_re, switch_im, next_re, next_im)
         if crossing != 0 and level > 0:
             progress.halving_level = level - 1
             continue
@@ -200,7 +199,7 @@ def advance(
             continue
         for k in range(z_re.size):
             z_re[k], z_im[k] = next_re[k], next_im[k]
-        if is_recorded and mask[mode] != 0:
+        if is_recorded and not is_free:
             observe_step(
                 tables,
                 reduced,
@@ -262,97 +261,76 @@ def enter_wanted(
 
 
 @jit_inline_sum
-def longest_level(
-    tables: ModeTables,
-    clock: Clock,
-    last_tick: int,
-    highest_level: int,
-    is_recorded: bool,
-    is_sample: bool,
-    progress: Progress,
-    mode: int,
-    z_re: Floats,
-    z_im: Floats,
-) -> int:
-    """Level of the longest step up to the next sample to be taken that resolves a recorded contact."""
-    is_free = tables.mask[mode] == 0
-    limit = last_tick
-    if is_recorded:
-        reach = SAMPLES_AT_ONCE if is_sample and is_free else 1
-        limit = min(limit, ((progress.tick >> clock.sample_level) + reach) << clock.sample_level)
-    level = min(highest_level, floor_log2(limit - progress.tick))
-    if is_recorded and not is_free:
-        # What an impact sets off is fast at first: no step is longer than the contact has lasted.
-        age = floor_log2(max(1, progress.tick - progress.entered))
-        if age != progress.contact_age:
-            resolved = resolved_contact(tables, mode, z_re, z_im) / clock.tick
-            resolved = min(resolved, 1.0 * (1 << highest_level))
-            progress.contact_age, progress.resolved_level = age, floor_log2(int(max(1.0, resolved)))
-        level = min(level, clock.contact_level, max(age, clock.search_level), progress.resolved_level)
-    return level
+def contact_age(progress: Progress) -> int:
+    """Level of the time for which the contacts have been what they are.
+
+    What an impact sets off is fast at first: no recorded step is longer than the contact has lasted.
+    """
+    return floor_log2(max(1, progress.tick - progress.entered))
+
+
+@jit_sum
+def note_resolution(
+    tables: ModeTables, clock: Clock, highest_level: int, age: int, progress: Progress, z: Floats
+) -> None:
+    """Note which steps resolve the contacts now, at the level `age` of the time that they have lasted."""
+    resolved = resolved_contact(tables, progress.mode, z[0], z[1]) / clock.tick
+    resolved = min(resolved, 1.0 * (1 << highest_level))
+    progress.contact_age, progress.resolved_level = age, floor_log2(int(max(1.0, resolved)))
+
+
+@jit_sum
+def steady_slip_interval(tables: ModeTables, reduced: Reduced, spin: float, mode: int, z: Floats) -> float:
+    """Time, s, in which no slip of a closed pair can turn; negative where one has."""
+    interval = np.inf
+    for i in range(reduced.radius.size):
+        if (tables.mask[mode] >> i) & 1:
+            interval = min(
+                interval,
+                reversal_free_interval(
+                    abs(spin) * reduced.radius[i],
+                    tables.slip_re[mode, i],
+                    tables.slip_im[mode, i],
+                    tables.slip_rate_re[mode, i],
+                    tables.slip_rate_im[mode, i],
+                    tables.slip_bound[mode, i],
+                    z[0],
+                    z[1],
+                ),
+            )
+    return interval
 
 
 @jit_inline_sum
-def choose_step(
-    tables: ModeTables,
-    reduced: Reduced,
-    clock: Clock,
-    mask: Ints,
-    switch_re: Floats,
-    switch_im: Floats,
-    rate_re: Floats,
-    rate_im: Floats,
-    bound: Floats,
-    progress: Progress,
-    mode: int,
-    z_re: Floats,
-    z_im: Floats,
-    longest: int,
-) -> tuple[int, bool]:
+def choose_step(clock: Clock, progress: Progress, longest: int, interval: float) -> tuple[int, bool]:
     """Level of the next step, `longest` at most, and whether it is known to be free of events.
 
     While a gap is open or a force compressive, the switch function s obeys `s + s' t - b t^2 / 2 > 0` for an
-    interval that the bound b on its second derivative gives: steps within it miss no event. Event-search
-    steps, not longer than `2^search_level` ticks, are taken without that and checked at their end. The level
-    is -1 where a slip has turned that set-valued friction relies on.
+    `interval` (s) that the bound b on its second derivative gives: steps within it miss no event.
+    Event-search steps, not longer than `2^search_level` ticks, need none; they are checked at their end.
     """
+    level, is_event_free = longest, False
     if progress.is_after_event == 1:
         progress.is_after_event = 0
-        return min(longest, FORCED_LEVEL), True
-    if progress.halving_level >= 0:
-        return min(longest, progress.halving_level), False
-    free = event_free_interval(switch_re, switch_im, rate_re, rate_im, bound, mode, z_re, z_im)
-    if reduced.is_set_valued and mask[mode] != 0:
-        for i in range(reduced.radius.size):
-            if (mask[mode] >> i) & 1:
-                free = min(
-                    free,
-                    reversal_free_interval(
-                        abs(clock.spin) * reduced.radius[i],
-                        tables.slip_re[mode, i],
-                        tables.slip_im[mode, i],
-                        tables.slip_rate_re[mode, i],
-                        tables.slip_rate_im[mode, i],
-                        tables.slip_bound[mode, i],
-                        z_re,
-                        z_im,
-                    ),
-                )
-        if free < 0.0:
-            return -1, False
-    level = longest
-    while level > clock.search_level and (1 << level) * clock.tick > free:
-        level -= 1
-    return level, (1 << level) * clock.tick <= free
+        level, is_event_free = min(longest, FORCED_LEVEL), True
+    elif progress.halving_level >= 0:
+        level = min(longest, progress.halving_level)
+    else:
+        while level > clock.search_level and (1 << level) * clock.tick > interval:
+            level -= 1
+        is_event_free = (1 << level) * clock.tick <= interval
+    return level, is_event_free
 
 
 @jit_inline_sum
-def find_crossing(closed: int, switch_re: Floats, switch_im: Floats, z_re: Floats, z_im: Floats) -> int:
-    """Set of the pairs whose switch function (q, m) is negative, of which those of `closed` are closed."""
+def find_crossing(
+    closed: int, mode: int, switch_re: Floats, switch_im: Floats, z_re: Floats, z_im: Floats
+) -> int:
+    """Set of the pairs whose switch function is negative, of which those of `closed` are closed."""
     crossing = int(np.int64(0))
-    for i in range(switch_re.shape[0]):
+    for i in range(switch_re.shape[1]):
         tolerance = 0.0 if (closed >> i) & 1 else GAP_TOLERANCE
-        if dot(switch_re[i], switch_im[i], z_re, z_im) < -tolerance:
+        if dot(switch_re[mode, i], switch_im[mode, i], z_re, z_im) < -tolerance:
             crossing |= 1 << i
     return crossing
 
