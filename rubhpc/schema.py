@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Literal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +21,7 @@ class Variable:
     unit: str = "1"
     long_name: str
     flags: tuple[str, ...] = field(default=())  # meanings of 0, 1, 2, ...
+    worst: Literal["max", "min"] = "max"  # the extreme over stators that is the worst of a case
 
     @property
     def fill_value(self) -> float | int:
@@ -92,9 +94,17 @@ def _measure(
     *dims: str,
     dtype: str = "float64",
     flags: tuple[str, ...] = (),
+    worst: Literal["max", "min"] = "max",
 ) -> Variable:
     return Variable(
-        name=name, role="measure", dims=dims, dtype=dtype, unit=unit, long_name=long_name, flags=flags
+        name=name,
+        role="measure",
+        dims=dims,
+        dtype=dtype,
+        unit=unit,
+        long_name=long_name,
+        flags=flags,
+        worst=worst,
     )
 
 
@@ -120,7 +130,7 @@ _MEASURES = (
     _measure("peak_contact_force", "N", "peak contact force", "stator"),
     _measure("contact_impulse", "N s", "contact impulse per revolution", "stator"),
     _measure("friction_work", "J", "work of friction per revolution", "stator"),
-    _measure("minimum_slip_speed", "m s-1", "lowest slip speed in contact", "stator"),
+    _measure("minimum_slip_speed", "m s-1", "lowest slip speed in contact", "stator", worst="min"),
     _measure("force_over_euler_load", "1", "peak contact force over the stator's Euler load", "stator"),
     _measure("tip_deflection_ratio", "1", "peak lateral tip deflection over the stator's length", "stator"),
     _measure("peak_torsion", "rad", "peak torsional displacement"),

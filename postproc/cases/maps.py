@@ -105,7 +105,8 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
     Returns
     -------
     Dataset over (*facets, y, x), or (*facets, case)
-        The value, `status`, and `validity`: 0 within the model's range, else the sum of 1 (slip reverses, so
+        The value, `status`, `settled` where the store has it (0: the motion still changed in the record), and
+        `validity`: 0 within the model's range, else the sum of 1 (slip reverses, so
         that steady sliding is wrong), 2 (force over the stator's Euler load) and 4 (tip over a tenth of its
         length).
     """
@@ -113,7 +114,8 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
         require_variables(store, [value])
         raise InputError(f"{source(store)}: {value}: no measure of a case; choose {', '.join(MAPPABLE)}")
     store = store.assign(validity=validity(store))
-    data = narrow(store, dict.fromkeys([value, "status", "validity"]), spread=[*spread, *facets])
+    marks = ["status", "validity", *(n for n in ("settled",) if n in store)]  # older stores lack the last
+    data = narrow(store, dict.fromkeys([value, *marks]), spread=[*spread, *facets])
     over = [*facets, *reversed(spread)]
     loaded: xr.Dataset = data.broadcast_like(store[over]).transpose(*over).load()
     return loaded

@@ -24,6 +24,7 @@ from postproc.store.axes import axes_of, find_axis, source
 from postproc.store.open import open_store
 from postproc.store.select import select
 from postproc.store.variables import LONG_ROLES, require_measure
+from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE, VARIABLES
 
@@ -137,7 +138,7 @@ def quantiles(
     levels : sequence of float
         0 to 1.
     over : iterable of axes
-        None: all of them.
+        None: all of them. Of several stators, the worst is taken unless "stator" is one of the axes.
 
     Returns
     -------
@@ -162,7 +163,7 @@ def histogram(
         How many of equal width from the least value to the largest, or their edges, rising, in SI units.
         The last bin holds its upper edge; values outside are in none.
     over : iterable of axes
-        None: all of them.
+        As of `quantiles`.
 
     Returns
     -------
@@ -173,7 +174,7 @@ def histogram(
     values, axes = _done(store, measure, over)
     known = values.values[np.isfinite(values.values)]
     if not known.size:
-        raise InputError(f"{source(store)}: {measure}: no case of this selection is done; select others")
+        raise InputError(f"{source(store)}: {measure}: no selected case has a value; select others")
     edges = np.histogram_bin_edges(known, bins)
     others = [d for d in values.dims if d not in axes]
     rows = values.transpose(*others, *axes)
@@ -221,6 +222,9 @@ def _axes(store: xr.Dataset, values: xr.DataArray, over: Iterable[str]) -> list[
 def _done(store: xr.Dataset, measure: str, over: Iterable[str]) -> tuple[xr.DataArray, list[str]]:
     """Return a measure of the cases that are done, loaded, NaN for others, and the dimensions to reduce."""
     require_measure(store, measure)
+    over = list(over)
+    if "stator" not in over:
+        store = worst_of_stators(store, [measure])
     values = store[measure].astype(float).where(store["status"] == DONE).assign_attrs(store[measure].attrs)
     return values.rename(measure).compute(), _axes(store, values.rename(measure), over)
 

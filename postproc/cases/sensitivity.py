@@ -19,6 +19,7 @@ from postproc.cases.saltelli import by_point, drawn_ranges, estimate
 from postproc.store.axes import axes_of, drawn_axes, source
 from postproc.store.select import narrow, written_values
 from postproc.store.variables import require_measure
+from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
 from rubhpc.study.sampling import CASE
@@ -50,10 +51,10 @@ def sensitivity(
     Parameters
     ----------
     store : Dataset
-        All stators but one must have been left out by selection, and of a sampled study all but one value of
-        each other axis; axes of one value are dropped.
+        Of a sampled study, all but one value of each other axis must have been left out by selection; axes of
+        one value are dropped.
     measure : str
-        A measure or setting of a case.
+        A measure or setting of a case; of several stators, that of the worst one.
     confidence : float
         Of the intervals, 0 to 1.
 
@@ -72,6 +73,7 @@ def sensitivity(
         No such measure, fewer than one axis of two levels, too many cases without a value, or no variance.
     """
     require_measure(store, measure)
+    store = worst_of_stators(store, [measure])
     if drawn_axes(store):
         found = _sampled(store, measure, n_draw, confidence, seed)
     else:
@@ -201,6 +203,7 @@ def _described(
     about_all: dict[str, Any] = {
         "measure": str(values.name),
         "measure_name": str(values.attrs.get("long_name", values.name)),
+        "of_stators": str(values.attrs.get("of_stators", "")),
         "units": str(values.attrs.get("units", "1")),
         "mean": float(used.mean()),
         "standard_deviation": float(used.std()),

@@ -9,6 +9,7 @@ import numpy as np
 from postproc.figures.cells import is_geometric
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import categories
+from postproc.figures.ticks import tick_levels
 from postproc.signals.sections import section_of, sections_along
 from postproc.store.axes import find_axis, ordered_axes, source
 from postproc.store.select import first_of_rest
@@ -50,7 +51,7 @@ def bifurcation(
     cases
         Axes that are not drawn are taken at their first value.
     signal
-        vertical, horizontal or torsion.
+        vertical, horizontal or torsion, or one of their velocities, such as vertical_velocity.
     along
         The axis of the diagram [default: the longest].
     color
@@ -128,6 +129,7 @@ def draw_bifurcation(data: xr.Dataset, signal: str, ax: Axes, color: str | None 
     ax.margins(x=0.01)
     if is_geometric(x):
         ax.set_xscale("log")
+    tick_levels(ax, "x", data[along])
     _widen(ax, section.values * scale.factor)
     ax.set(xlabel=x_label, ylabel=scale.label(f"{short_name(section)},\nonce a revolution"))
     return ax

@@ -11,6 +11,7 @@ from postproc.figures.cascade_lines import draw_frequencies, draw_orders, ordina
 from postproc.figures.cells import cell_edges, is_geometric
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import hertz
+from postproc.figures.ticks import tick_levels
 from postproc.signals.cascade import below, hold_peaks, hold_rows
 from postproc.signals.cascade import cascade as cascade_data
 from postproc.signals.lines import SPIKE, parse_orders, spikes
@@ -88,7 +89,8 @@ def cascade(
         is_waterfall = form == "waterfall"
         picture = waterfall if is_waterfall else intensity
         picture(spectra, axes[0], limit, abscissa)
-        draw_orders(axes[0], spectra, lines, abscissa, "0.35" if is_waterfall else "0.8")
+        colors = ("0.35", "white") if is_waterfall else ("0.8", "0.1")
+        draw_orders(axes[0], spectra, lines, abscissa, *colors)
         draw_frequencies(axes[0], spectra, frequencies, abscissa, "C1" if is_waterfall else "#56B4E9")
 
     shown = below(spectra, limit, abscissa).to_dataset(name=str(spectra.name))
@@ -130,6 +132,7 @@ def waterfall(
     ax.set_ylim(rows.min() - below_rows * span, rows.max() + (height + 0.02) * span)
     ax.set_yticks([t for t in ax.get_yticks() if abs(t - rows.mean()) <= 0.55 * span])
     _name_decades(ax, spectra)
+    tick_levels(ax, "y", spectra[spectra.dims[0]], rows)
     _scale_bar(spectra, ax, peak, gain)
     _name_senses(ax)
     return ax
@@ -163,6 +166,7 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
     ax.set_facecolor("0.85")  # shows where a case is missing
     ax.set(xlim=(_start(spectra, limit), limit), xlabel=_NAMES[abscissa], ylabel=label)
     _name_decades(ax, held)
+    tick_levels(ax, "y", held[held.dims[0]], rows)
     _name_senses(ax, "0.9")
     bar = ax.figure.colorbar(mesh, ax=ax, pad=0.02, aspect=30, extend="min")
     bar.set_label(scale.label(f"{short_name(held)} amplitude"))

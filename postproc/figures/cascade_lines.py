@@ -28,10 +28,11 @@ def draw_orders(
     orders: Sequence[Fraction] = ORDERS,
     abscissa: str = "frequency",
     color: str = "0.35",
+    ground: str = "white",
 ) -> Axes:
     """Add the lines on which multiples of the spin speed lie, named at their upper ends.
 
-    In full spectra each has its twin on the backward side.
+    In full spectra each has its twin on the backward side. `ground` is the colour behind their names.
     """
     rows, rate = _rows_and_rate(spectra)
     left, right = ax.get_xlim()
@@ -47,11 +48,11 @@ def draw_orders(
         ax.plot(x, rows, scalex=False, scaley=False, **style)
         if inside[-1] == rows.size - 1:
             if all(abs(x[-1] - t) > 0.07 * (right - left) for t in tagged):
-                _tag(ax, float(x[-1]), float(rows[-1]), f"{order}X", color, "center")
+                _tag(ax, float(x[-1]), float(rows[-1]), f"{order}X", color, ground, "center")
                 tagged.append(float(x[-1]))
         else:
             end, side = (right, "right") if order > 0 else (left, "left")
-            _tag(ax, end, float(np.interp(abs(end), np.abs(x), rows)), f"{order}X", color, side)
+            _tag(ax, end, float(np.interp(abs(end), np.abs(x), rows)), f"{order}X", color, ground, side)
     return ax
 
 
@@ -111,7 +112,9 @@ def _rows_and_rate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], NDArray[
     return rows[ascending], rate[ascending]
 
 
-def _tag(ax: Axes, x: float, y: float, text: str, color: str, ha: str) -> None:
+def _tag(ax: Axes, x: float, y: float, text: str, color: str, ground: str, ha: str) -> None:
+    from matplotlib.patheffects import withStroke
+
     bottom, top = ax.get_ylim()
     has_room = top - y > 0.05 * (top - bottom)
     ax.annotate(
@@ -125,4 +128,5 @@ def _tag(ax: Axes, x: float, y: float, text: str, color: str, ha: str) -> None:
         color=color,
         zorder=6,
         clip_on=True,
+        path_effects=[withStroke(linewidth=2.0, foreground=ground)],  # readable over lines and spectra
     )

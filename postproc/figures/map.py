@@ -9,12 +9,15 @@ import numpy as np
 from postproc.cases.maps import default_axes, facet_axes, map_data, reasons_of, scatter_axes
 from postproc.figures.cells import cell_edges, hatch_cells, is_geometric
 from postproc.figures.drawing import Drawing
-from postproc.figures.palette import CATEGORIES, NOT_DONE, WARNING, coloured, paint_of
+from postproc.figures.palette import CATEGORIES, NOT_DONE, NOT_SETTLED, WARNING, coloured, paint_of
 from postproc.figures.scatter import scatter_maps
-from postproc.figures.small_multiples import color_bar, legend_below, name_facets
+from postproc.figures.small_multiples import color_bar, legend_below, name_facets, write_over
+from postproc.figures.ticks import tick_levels
 from postproc.store.axes import drawn_axes, source
 from postproc.store.select import first_of_rest
 from postproc.store.units import displayed
+from postproc.store.variables import require_variables
+from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE
 from rubhpc.study.sampling import CASE
@@ -45,15 +48,15 @@ def map(  # noqa: A001 - the name of the command
 ) -> Drawing:
     """Map of a measure, the regime or the status over two axes.
 
-    What is missing or out of the model's range is hatched. A sampled study is drawn as a point a case over
-    two of the quantities that were drawn at random.
+    What is missing, not settled or out of the model's range is hatched. A sampled study is drawn as a point a
+    case over two of the quantities that were drawn at random.
 
     Parameters
     ----------
     cases
         Axes that are not drawn are taken at their first value.
     value
-        A measure, or regime or status.
+        A measure, or regime or status; of several stators, the worst.
     x
         Axis across [default: the longest].
     y
@@ -72,6 +75,9 @@ def map(  # noqa: A001 - the name of the command
     across, up = scatter_axes(cases, x, y) if is_sample else default_axes(cases, x, y, named)
     spread = [CASE] if is_sample else [across, up]
     facets = facet_axes(cases, named, spread)
+    require_variables(cases, [value])
+    if "stator" not in (*spread, *facets):
+        cases = worst_of_stators(cases, [value])
     cases, notes = first_of_rest(cases, [*spread, *facets], value)
     shown = map_data(cases, value, spread, facets)
 
@@ -100,7 +106,8 @@ def value_maps(
     """Draw maps from `map_data`, one for each value of its facets, in one scale of colours.
 
     Flags and periods have distinct colours, other measures a continuous bar and, where asked for, contours.
-    Cells without a result are grey and hatched by their status; out of the model's range, by lines.
+    Cases without a result are grey and hatched by their status; those that had not settled, or are out of the
+    model's range, by lines.
 
     Parameters
     ----------
@@ -135,7 +142,11 @@ def value_maps(
             if is_geometric(values):
                 getattr(ax, f"set_{name}scale")("log")
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
-    if paint.names != []:  # a flag that no case has needs no colours
+        if note := paint.note(cells):
+            write_over(ax, note)
+    tick_levels(axes[0], "x", data[x_name])
+    tick_levels(axes[0], "y", data[y_name])
+    if paint.has_bar:
         bar = color_bar(axes, mesh, paint)
         bar.ax.hlines(levels, *bar.ax.get_xlim(), color="white", linewidth=0.5)
     name_facets(axes, data, facets, x_label, y_label)
@@ -152,8 +163,11 @@ def _hatch(ax: Axes, edges: Edges, data: xr.Dataset, value: str, reasons: str) -
     # Such as durations without contact.
     empty = (status == DONE) & np.isnan(np.asarray(data[value].values, dtype=float))
     handles += hatch_cells(ax, edges, empty, "no value", "", facecolor="white")
-    invalid = (status == DONE) & (data["validity"].values > 0)
     color = "k" if value in CATEGORIES else WARNING
+    if "settled" in data and value != "settled":
+        moving = (status == DONE) & (data["settled"].values == 0)
+        handles += hatch_cells(ax, edges, moving, NOT_SETTLED, "||||", color=color)
+    invalid = (status == DONE) & (data["validity"].values > 0)
     return handles + hatch_cells(ax, edges, invalid, f"out of range: {reasons}", "\\\\\\\\", color=color)
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
+from postproc.figures.small_multiples import legend_below
 from postproc.signals.spectra import samples_per_revolution
 from postproc.signals.waveforms import orbit_data
 from postproc.store.rig_of_case import stator_places
@@ -36,14 +38,20 @@ def orbit(cases: xr.Dataset, *, revolutions: Count | None = None, over: Axis | N
         Draw the cases along AXIS over one another.
     """
     shown = orbit_data(cases, revolutions, over)
-    return Drawing(shown=shown, draw=lambda axes: draw_orbit(shown, axes[0]), height=80)
+
+    def draw(axes: list[Axes]) -> None:
+        draw_orbit(shown, axes[0])
+        if over is None:
+            legend_below(axes[0], axes[0].get_legend_handles_labels()[0])
+
+    return Drawing(shown=shown, draw=draw, height=80)
 
 
 def draw_orbit(data: xr.Dataset, ax: Axes) -> Axes:
     """Draw an orbit, or those along one axis over one another; positive spin turns clockwise.
 
     One case also shows the clearance circle, its stators, the first sample (ring), one point a
-    revolution (dots) and the sense of whirl (arrow).
+    revolution (dots) and the sense of whirl (arrow); their labels make a legend.
     """
     vertical, horizontal = data["vertical"].load(), data["horizontal"].load()
     require_results(vertical, data)
@@ -70,8 +78,9 @@ def _draw_one(vertical: xr.DataArray, horizontal: xr.DataArray, ax: Axes, factor
     is_closed = np.hypot(y[-1] - y[0], z[-1] - z[0]) < 3 * np.hypot(y[1] - y[0], z[1] - z[0])
     path = np.append(np.arange(y.size), 0) if is_closed else np.arange(y.size)
     ax.plot(z[path], y[path], color="C0", linewidth=0.5, zorder=3)
-    ax.plot(z[::n], y[::n], ".", color="C1", markersize=3, zorder=5)
-    ax.plot(z[0], y[0], "o", color="C1", markerfacecolor="none", markersize=5, markeredgewidth=0.8, zorder=5)
+    ax.plot(z[::n], y[::n], ".", color="C1", markersize=3, zorder=5, label="once a revolution")
+    ring: dict[str, Any] = {"markerfacecolor": "none", "markersize": 5, "markeredgewidth": 0.8}
+    ax.plot(z[0], y[0], "o", color="C1", zorder=5, label="first sample", **ring)
     start = n // 8  # an eighth of a turn past the mark, clear of it
     arrow = {"arrowstyle": "-|>", "color": "C0", "mutation_scale": 8, "linewidth": 0}
     ax.annotate("", (z[start + 2], y[start + 2]), xytext=(z[start], y[start]), arrowprops=arrow, zorder=4)
@@ -86,11 +95,16 @@ def _draw_stators(data: xr.Dataset, ax: Axes, factor: float, reach: float) -> No
         return
     edge = {"edgecolor": "0.6", "linestyle": ":", "linewidth": 0.7}
     ax.add_patch(Circle((0, 0), clearance, fill=False, zorder=1, **edge))
-    for angle, offset in stator_places(data):
+    ax.plot([], [], color="0.6", linestyle=":", label="clearance")
+    places = stator_places(data)
+    half_angle = math.pi / max(len(places), 3)  # the stators of a ring do not overlap
+    for i, (angle, offset) in enumerate(places):
         gap = clearance + offset * factor
         # Normal from the disc to the stator and tangent along its face; the plane is (horizontal, vertical).
         n, t = np.array([np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), -np.sin(angle)])
-        half, deep = 0.2 * reach * t, 0.12 * reach * n
+        half, deep = min(0.2 * reach, 0.8 * gap * math.tan(half_angle)) * t, 0.12 * reach * n
         face = np.array([gap * n - half, gap * n + half])
-        ax.add_patch(Polygon([*face, *(face[::-1] + deep)], facecolor="0.85", edgecolor="none", zorder=1))
+        block = Polygon([*face, *(face[::-1] + deep)], facecolor="0.85", edgecolor="none", zorder=1)
+        block.set_label("_stator" if i else "stator")  # one of them is enough for a legend
+        ax.add_patch(block)
         ax.plot(face[:, 0], face[:, 1], color="0.35", linewidth=0.9, zorder=2)

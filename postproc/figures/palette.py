@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.store.units import scale_of, short_name
 from rubhpc.errors import InputError
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, REGIME, STATUS, VARIABLES
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, REGIME, SETTLED, STATUS, VARIABLES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,10 +24,17 @@ NOT_DONE = {
     DIVERGED: ("diverged", "0.6", "////"),
 }
 REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
-PERIOD_COLORS = ("#D55E00", "#56B4E9", "#0072B2", "#009E73", "#CC79A7")  # none, P1 to P4
+PERIOD_COLORS = ("#D55E00", "#88CCEE", "#332288", "#999933", "#CC79A7")  # none, P1 to P4
+SETTLED_COLORS = ("#D55E00", "#56B4E9")
+NOT_SETTLED = SETTLED[0].replace("_", " ")
 STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
 WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
-CATEGORIES = ("status", "regime", "period")
+CATEGORIES = ("status", "regime", "period", "settled")
+_FLAGS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "status": (STATUS, STATUS_COLORS),
+    "regime": (tuple(name.replace("quasi_", "quasi-").replace("_", " ") for name in REGIME), REGIME_COLORS),
+    "settled": (tuple(name.replace("_", " ") for name in SETTLED), SETTLED_COLORS),
+}
 
 
 class Paint(NamedTuple):
@@ -39,6 +46,24 @@ class Paint(NamedTuple):
     label: str
     ticks: list[int] | None = None
     names: list[str] | None = None
+
+    @property
+    def has_bar(self) -> bool:
+        """Whether colours need a scale: not those of a flag that no case has, nor of a single number."""
+        return self.names != [] and self.constant is None
+
+    @property
+    def constant(self) -> str | None:
+        """What is said instead of a scale, where a number is the same in all cases."""
+        if self.names is not None or self.norm is None or self.norm.vmin != self.norm.vmax:
+            return None
+        return f"{self.label}:\n{float(self.norm.vmin or 0.0):.4g} in all cases"
+
+    def note(self, cells: np.ma.MaskedArray[Any, Any]) -> str | None:
+        """Return what is written over a panel: the number that all its cases share, if that is zero."""
+        if self.names is not None or not cells.count():
+            return None
+        return self.constant or ("0 in all cases" if not cells.any() else None)
 
 
 def coloured(data: xr.Dataset, value: str) -> tuple[xr.DataArray, bool]:
@@ -63,8 +88,8 @@ def categories(variable: str, codes: NDArray[np.integer]) -> dict[int, tuple[str
         ramp = matplotlib.colormaps["Greys"](np.linspace(0.45, 1.0, max(len(longer), 2)))
         colors = {**dict(enumerate(PERIOD_COLORS)), **dict(zip(longer, ramp, strict=False))}
         return {c: ("none" if c == 0 else f"P{c}", colors[c]) for c in present}
-    meanings, palette = (STATUS, STATUS_COLORS) if variable == "status" else (REGIME, REGIME_COLORS)
-    return {c: (meanings[c].replace("_", "-" if c == 2 else " "), palette[c]) for c in present}
+    meanings, palette = _FLAGS[variable]
+    return {c: (meanings[c], palette[c]) for c in present}
 
 
 def _scalar_paint(shown: xr.DataArray, log: bool) -> Paint:
@@ -79,7 +104,7 @@ def _scalar_paint(shown: xr.DataArray, log: bool) -> Paint:
     everything = cells(shown.values)
     if np.ma.masked_invalid(np.asarray(shown.values, dtype=float)).count() == 0:
         raise InputError(
-            f"map: no case of this selection has a {shown.name}; run the study first, or select others"
+            f"map: no selected case has a value of {shown.name}; run the study, or select other cases"
         )
     if everything.count() == 0:
         raise InputError(f"map: {shown.name} is nowhere positive; draw it without --log")

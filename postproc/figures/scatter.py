@@ -8,8 +8,8 @@ import numpy as np
 
 from postproc.cases.maps import reasons_of
 from postproc.cases.saltelli import is_log
-from postproc.figures.palette import CATEGORIES, NOT_DONE, WARNING, coloured, paint_of
-from postproc.figures.small_multiples import color_bar, legend_below, name_facets
+from postproc.figures.palette import CATEGORIES, NOT_DONE, NOT_SETTLED, WARNING, coloured, paint_of
+from postproc.figures.small_multiples import color_bar, legend_below, name_facets, write_over
 from postproc.store.units import displayed
 from rubhpc.schema import DONE
 
@@ -31,7 +31,7 @@ def scatter_maps(
     """Draw the points of `postproc.cases.maps.map_data`, a panel for each value of its facets, in one scale.
 
     Flags and periods have distinct colours, other measures a continuous bar. A case without a result is a
-    grey cross, and a ring marks what is out of the model's range.
+    grey cross, a square marks what had not settled and a ring what is out of the model's range.
 
     Parameters
     ----------
@@ -69,7 +69,10 @@ def scatter_maps(
         for name, set_scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
             if is_log(data, name):
                 set_scale("log")
-    color_bar(axes, points, paint)
+        if note := paint.note(colours):
+            write_over(ax, note)
+    if paint.has_bar:
+        color_bar(axes, points, paint)
     name_facets(axes, data, facets, x_label, y_label)
     legend_below(axes[0], list(handles.values()))
     return axes
@@ -95,6 +98,9 @@ def _marks(
     marked.append((empty, {"label": "no value", "marker": "+", "color": "0.6", "linewidths": 0.6}))
     ring = {"s": 2.5 * size, "marker": "o", "facecolors": "none", "linewidths": 0.5}
     colour = "k" if value in CATEGORIES else WARNING
+    if "settled" in data and value != "settled":
+        square = ring | {"s": 4.0 * size, "marker": "s", "label": NOT_SETTLED, "edgecolors": colour}
+        marked.append((is_done & (data["settled"].values == 0), square))
     beyond = is_done & (data["validity"].values > 0)
     marked.append((beyond, ring | {"label": f"out of range: {reasons}", "edgecolors": colour}))
     return [

@@ -26,16 +26,17 @@ def section(
 ) -> Drawing:
     """Poincaré section of two signals.
 
-    It has a point a revolution, in the plane of both signals or of one signal along an axis.
+    It has a point a revolution, in the plane of both signals or of one signal along an axis. Where waveforms
+    are stored, vertical_velocity, horizontal_velocity and torsion_velocity count as signals.
 
     Parameters
     ----------
     cases
         One case, or cases along the axis `over`.
     x
-        Signal across.
+        Signal or velocity across.
     y
-        Signal up.
+        Signal or velocity up.
     over
         Draw signal Y of the cases along AXIS: a bifurcation diagram.
     """

@@ -41,7 +41,7 @@ def sensitivity(
     cases
         All cases of a grid or a sample.
     measure
-        A measure or setting of a case.
+        A measure or setting of a case; of several stators, the worst.
     confidence
         Of the intervals.
     draws
@@ -71,10 +71,12 @@ def draw_bars(indices: xr.Dataset, ax: Axes) -> Axes:
     ax.set_yticks(at, [short_name(xr.DataArray(name=n, attrs={"long_name": text})) for n, text in named])
     ax.tick_params(axis="y", length=0)
     about = indices.attrs
-    measure = xr.DataArray(name=about["measure"], attrs={"long_name": about["measure_name"]})
+    named_after = {"long_name": about["measure_name"], "of_stators": about["of_stators"]}
+    measure = xr.DataArray(name=about["measure"], attrs=named_after)
     subtitle = f"{about['interactions']:.0%} interactions, {about['confidence']:.0%} intervals"
     # To the left of the panel there is room that long names of axes take.
-    ax.set_title(f"{short_name(measure)} ({subtitle})", fontsize=7, loc="right")
+    gap = "\n" if about["of_stators"] else " "
+    ax.set_title(f"{short_name(measure)}{gap}({subtitle})", fontsize=7, loc="right")
     low, high = (indices[[f"first_order_{e}", f"total_{e}"]].to_dataarray() for e in ("low", "high"))
     ends_at = min(0.0, 1.1 * float(low.min())), max(1.0, 1.03 * float(high.max()))  # of estimates
     ax.set(xlim=ends_at, xlabel="Share of the variance")
@@ -87,8 +89,9 @@ def draw_bars(indices: xr.Dataset, ax: Axes) -> Axes:
 def _table(found: xr.Dataset) -> Iterator[str]:
     about = found.attrs
     unit = "" if about["units"] == "1" else f" {about['units']}"
+    of_stators = f", {about['of_stators']}" if about["of_stators"] else ""
     yield (
-        f"{about['measure']}: mean {about['mean']:.6g}{unit}, standard deviation "
+        f"{about['measure']}{of_stators}: mean {about['mean']:.6g}{unit}, standard deviation "
         f"{about['standard_deviation']:.6g}{unit}, {about['cases']} cases"
     )
     yield from about["notes"].splitlines()

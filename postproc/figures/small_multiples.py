@@ -20,17 +20,25 @@ if TYPE_CHECKING:
     from postproc.figures.palette import Paint
 
 _TITLE_WIDTH = 90  # characters of the titles of a row of panels
+_BAR_WIDTH = 40  # characters beside a scale of colours
 _LEGEND_WIDTH = 64  # characters that fit a column of a page, 6 of them taken by each handle
 
 
 def color_bar(axes: Sequence[Axes], mesh: Any, paint: Paint) -> Colorbar:
     """Draw the scale of colours beside all panels."""
     bar = axes[0].figure.colorbar(mesh, ax=list(axes), pad=0.02, aspect=25, ticks=paint.ticks)
-    bar.set_label(paint.label)
+    name, comma, rest = paint.label.rpartition(", ")
+    bar.set_label(f"{name},\n{rest}" if comma and len(paint.label) > _BAR_WIDTH else paint.label)
     if paint.names:
         bar.ax.set_yticklabels(paint.names)
         bar.ax.tick_params(which="both", length=0)
     return bar
+
+
+def write_over(ax: Axes, text: str) -> None:
+    """Write a note over the middle of a panel."""
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 2.0}
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", bbox=box, fontsize=7, zorder=6)
 
 
 def name_facets(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from postproc.signals.spectra import check_signal, samples_per_revolution
+from postproc.signals.velocity import VELOCITIES, section_velocity
 from postproc.store.select import narrow
 from postproc.store.variables import require_variables
 from rubhpc.schema import SECTION_NAMES
@@ -18,11 +19,17 @@ if TYPE_CHECKING:
 def section_of(store: xr.Dataset, signal: str) -> xr.DataArray:
     """Return the section of a signal: the stored one, or else every sample at a whole revolution; lazy.
 
+    Velocities ("vertical_velocity") are taken from the waveform.
+
     Raises
     ------
     InputError
         The signal is unknown, or neither its section nor its waveform is stored.
     """
+    if signal in VELOCITIES:
+        require_variables(store, [VELOCITIES[signal], "spin_speed"])
+        velocity = section_velocity(store[VELOCITIES[signal]], store["spin_speed"])
+        return velocity.rename(f"section_{signal}")
     check_signal(signal)
     if f"section_{signal}" in store:
         return store[f"section_{signal}"]

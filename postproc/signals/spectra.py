@@ -152,7 +152,8 @@ def with_frequency(spectrum: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataA
 def check_signal(signal: str) -> None:
     """Refuse a name that is no recorded signal."""
     if signal not in SIGNAL_NAMES:
-        raise InputError(f"{signal}: no such signal; there are {', '.join(SIGNAL_NAMES)}")
+        velocity = " (a velocity has a section alone)" if signal.endswith("_velocity") else ""
+        raise InputError(f"{signal}: no such signal{velocity}; there are {', '.join(SIGNAL_NAMES)}")
 
 
 def _over_orders(function: Any, orders: NDArray[np.floating[Any]], *waveforms: xr.DataArray) -> xr.DataArray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
-from postproc.store.units import meanings, scale_for
+from postproc.store.units import meanings, scale_for, typed
 from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
 from rubhpc.input.quantity import parse_quantity
@@ -121,7 +121,7 @@ def _typed(axis: xr.DataArray, value: float) -> str:
     if 0 <= value < len(names) and value == int(value):
         return names[int(value)]
     scale = scale_for(str(axis.attrs.get("units", "1")), abs(value))
-    return f"{value * scale.factor:.6g} {scale.unit.replace('µ', 'u')}".rstrip()
+    return f"{value * scale.factor:.6g} {typed(scale.unit)}".rstrip()
 
 
 def _positions(

@@ -25,15 +25,17 @@ _WRITTEN = {
     "Pa": ("Pa", "GMk"),
     "Hz": ("Hz", "kM"),
     "kg": ("kg", ""),
-    "kg m-3": ("kg/m³", ""),
-    "kg/m^3": ("kg/m³", ""),
-    "m s-1": ("m/s", ""),
-    "rad s-1": ("rad/s", ""),
-    "rad/s": ("rad/s", ""),
-    "rad s-2": ("rad/s²", ""),
-    "N m-1": ("N/m", "MGk"),
-    "N/m": ("N/m", "MGk"),
+    "kg m-3": ("kg m⁻³", ""),
+    "kg/m^3": ("kg m⁻³", ""),
+    "m s-1": ("m s⁻¹", "mµ"),
+    "rad s-1": ("rad s⁻¹", ""),
+    "rad/s": ("rad s⁻¹", ""),
+    "rad s-2": ("rad s⁻²", ""),
+    "N m-1": ("N m⁻¹", "MGk"),
+    "N/m": ("N m⁻¹", "MGk"),
 }
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_LOWERED = {raised: plain for plain, raised in _RAISED.items()}
 _MICRO_UP_TO = 2e-3  # orbits stay in µm, and twists in µrad, a little beyond a thousand of them
 
 # Names for axes, where a long name does not fit, and symbols of the paper.
@@ -45,6 +47,9 @@ _SHORT = {
     "stator_axial": "Stator compression",
     "stator_lateral": "Stator lateral deflection",
     "contact_force": "Contact force",
+    "vertical_velocity": "Vertical velocity",
+    "horizontal_velocity": "Horizontal velocity",
+    "torsion_velocity": "Torsional velocity",
     "speed_ratio": "Speed ratio $r$",
     "speed": "Spin speed",
     "spin_speed": "Spin speed",
@@ -112,7 +117,7 @@ def scale_for(unit: str, size: float) -> Scale:
     """Return the scale in which a quantity of magnitude `size` (SI) reads between 1 and 1000."""
     if unit in ("", "1", "dimensionless"):
         return Scale(1.0, "")
-    written, prefixes = _WRITTEN.get(unit, (unit, ""))
+    written, prefixes = _WRITTEN.get(unit, (typeset(unit), ""))
     if not math.isfinite(size) or size <= 0:
         return Scale(1.0, written)
     if "µ" in prefixes and 1e-6 <= size <= _MICRO_UP_TO and unit in ("m", "rad"):
@@ -124,6 +129,19 @@ def scale_for(unit: str, size: float) -> Scale:
         offered[-1],
     )
     return Scale(1 / value, f"{sign}{written}")
+
+
+def typeset(unit: str) -> str:
+    """Return a unit with raised powers: `N m s⁻¹` for `N m s-1`."""
+    return re.sub(r"(?<=[A-Za-z])-?\d+", lambda power: power.group().translate(_RAISED), unit)
+
+
+def typed(unit: str) -> str:
+    """Return a displayed unit as a keyboard types it, and as a study file or `--select` reads it."""
+    powers = re.sub(
+        r"[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda power: f"**{power.group().translate(_LOWERED)}", unit.replace("µ", "u")
+    )
+    return powers.replace(" ", "*") if "**" in powers else powers
 
 
 def scale_of(data: xr.DataArray, unit: str | None = None) -> Scale:
@@ -150,7 +168,10 @@ def meanings(axis: xr.DataArray) -> list[str]:
 def short_name(data: xr.DataArray) -> str:
     """Return a name of the quantity that fits an axis at column width."""
     name = str(data.name).removeprefix("spectrum_").removeprefix("section_")
-    text = _SHORT.get(name) or str(data.attrs.get("long_name", name.replace("_", " ")))
+    text = _SHORT.get(name, "")
+    if text and (of_stators := data.attrs.get("of_stators")):
+        text = f"{text}, {of_stators}"
+    text = text or str(data.attrs.get("long_name", name.replace("_", " ")))
     return text[:1].upper() + text[1:]
 
 

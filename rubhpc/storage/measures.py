@@ -59,8 +59,8 @@ def added_measures(stored: Measures) -> tuple[Variable, ...]:
 
 
 def to_json(measures: Measures) -> list[dict[str, Any]]:
-    """The measures as a manifest lists them."""
-    return [asdict(variable) for variable in measures]
+    """The measures as a manifest lists them: what is stored, not how it is shown."""
+    return [{k: v for k, v in asdict(variable).items() if k != "worst"} for variable in measures]
 
 
 def from_json(listed: list[dict[str, Any]]) -> tuple[Variable, ...]:

@@ -207,7 +207,6 @@ def test_what_has_no_indices_is_refused(spoil: Callable[[xr.Dataset], xr.Dataset
     [
         ("status", "status: is not a measure; choose"),
         ("peak_torson", "did you mean peak_torsion?"),
-        ("peak_contact_force", "select one value of stator (one of 1, 2)"),
     ],
 )
 def test_measure_has_to_be_one(measure: str, said: str) -> None:

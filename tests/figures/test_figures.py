@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 import synthetic_store
+import xarray as xr
 from matplotlib.colors import to_rgba
 
 from postproc.cases.maps import default_axes, map_data
 from postproc.figures.cells import cell_edges, hatch_cells
 from postproc.figures.map import value_maps
-from postproc.figures.orbit import draw_orbit
+from postproc.figures.orbit import draw_orbit, orbit
 from postproc.figures.overlay import overlaid
 from postproc.figures.section import draw_section
 from postproc.figures.spectrum import default_limit, draw_spectrum
@@ -16,10 +17,11 @@ from postproc.figures.style import check_figure_path, house_style, new_figure, s
 from postproc.figures.waveform import draw_panels, draw_waveform
 from postproc.signals.lines import strongest_lines
 from postproc.signals.sections import section_data
-from postproc.signals.spectra import spectrum_data
+from postproc.signals.spectra import check_signal, spectrum_data
 from postproc.signals.waveforms import DEFAULT_SIGNALS, orbit_data, waveform_data
 from postproc.store.select import select
 from rubhpc.errors import InputError
+from rubhpc.schema import DONE
 
 ONE = {"speed_ratio": 0.75, "clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
 
@@ -320,3 +322,55 @@ def test_figures_are_one_column_wide():
     with house_style():
         figure, _ = new_figure()
     assert 85 <= figure.get_figwidth() * 25.4 <= 90
+
+
+def test_velocities_are_those_of_the_sines(case):
+    rate = float(case["spin_speed"])
+    found = section_data(case, ["horizontal_velocity", "torsion_velocity"])
+    for name, known in (
+        ("horizontal", 1e-4 * rate),
+        ("torsion", 2 * 0.3 * synthetic_store.TORSION_PEAK * rate),
+    ):
+        velocity = found[f"section_{name}_velocity"]
+        assert np.isnan(velocity.values[0])  # nothing was recorded before it
+        assert velocity.values[1:] == pytest.approx(known, rel=1e-5)  # single precision is differentiated
+    assert velocity.attrs["units"] == "rad s-1"
+
+
+def test_velocities_need_waveforms_and_are_no_signals(case, ax):
+    stored = select(synthetic_store.make(keep=("section",)), ONE)
+    with pytest.raises(InputError, match='"waveform" in'):
+        section_data(stored, ["vertical_velocity"])
+    with pytest.raises(InputError, match="a velocity has a section alone"):
+        check_signal("vertical_velocity")
+    plane = section_data(case, ["vertical", "horizontal_velocity"])
+    draw_section(plane, "vertical", "horizontal_velocity", ax)
+    assert ax.get_ylabel() == "Horizontal velocity (mm s⁻¹)"
+
+
+def test_an_orbit_names_what_it_marks(case):
+    figure = orbit(case).show().figure
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert set(names) == {"once a revolution", "first sample", "clearance", "stator"}
+
+
+def test_what_had_not_settled_is_hatched(store, ax):
+    settled = xr.where(store["status"] == DONE, 1, -1).astype("int8")
+    settled[{"speed_ratio": 2}] = 0
+    chosen = select(store.assign(settled=settled), {"friction": 0.1, "stator_youngs_modulus": 3e9})
+    value_maps(map_data(chosen, "peak_torsion", ["speed_ratio", "clearance"]), "peak_torsion", [ax])
+    patch = next(p for p in ax.patches if p.get_label() == "not settled")
+    corners = patch.get_path().vertices
+    assert (corners[:, 0].min(), corners[:, 0].max()) == pytest.approx((1.125, 1.375))
+
+
+def test_settling_has_a_map_of_its_own(plain_map, ax):
+    value_maps(plain_map("settled"), "settled", [ax])
+    assert bar_names(ax) == ["settled"]
+
+
+def test_an_axis_of_few_values_is_ticked_at_them(plain_map, ax):
+    value_maps(plain_map("peak_contact_force"), "peak_contact_force", [ax])
+    assert ax.get_yticks() == pytest.approx([70, 84, 100])
+    assert ax.get_xticks() == pytest.approx([0.75, 1.0, 1.25, 1.5, 1.7])
+    assert [text.get_text() for text in ax.get_xticklabels()] == ["0.75", "1", "1.25", "1.5", "1.7"]

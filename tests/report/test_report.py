@@ -71,7 +71,7 @@ def test_all_that_is_shown_of_a_quantity_has_one_unit(two_stator_path: Path) -> 
         "vertical": "µm",
         "horizontal": "µm",
         "torsion": "µrad",
-        "torsion_acceleration": "rad/s²",
+        "torsion_acceleration": "rad s⁻²",
         "stator_axial": "µm",
         "stator_lateral": "µm",
         "contact_force": "N",

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from postproc.store.units import caption, displayed, scale_for
+from postproc.store.units import caption, displayed, scale_for, typed, typeset
+from rubhpc.input.quantity import parse_quantity
 
 
 @pytest.mark.parametrize(
@@ -17,10 +18,11 @@ from postproc.store.units import caption, displayed, scale_for
         ("N", 2700.0, 1e-3, "kN"),
         ("Pa", 30e9, 1e-9, "GPa"),
         ("s", 3e-3, 1e3, "ms"),
-        ("rad s-2", 5e3, 1.0, "rad/s²"),
+        ("rad s-2", 5e3, 1.0, "rad s⁻²"),
         ("1", 0.7, 1.0, ""),
         ("m", 0.0, 1.0, "m"),
         ("cd", 5e-7, 1.0, "cd"),  # an unknown unit stays as it is
+        ("kg m2", 5.0, 1.0, "kg m²"),  # but for its powers
     ],
 )
 def test_quantities_are_shown_in_the_unit_that_suits_their_size(unit, size, factor, written):
@@ -66,3 +68,12 @@ def test_a_long_caption_takes_as_many_lines_as_it_needs():
         r"$r$ = 0.75, $c_g$ = 0.75, $\mu$ = 0.75, rotor disc 1 mass = 0.75,",
         "stator = 0.75, stator 1 angle = 0.75",
     ]
+
+
+@pytest.mark.parametrize("unit", ["m s-1", "kg m-3", "rad s-2", "N m-1", "m", "Pa"])
+def test_a_displayed_unit_can_be_typed_back(unit):
+    scale = scale_for(unit, 5e-5 if unit == "m" else 5e5)
+    spelt = typed(scale.unit)
+    assert spelt.isascii()
+    known = typed(typeset(unit))  # in pint's spelling
+    assert parse_quantity(f"{scale.factor:.17g} {spelt}", known, "here") == pytest.approx(1.0)

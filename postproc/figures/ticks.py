@@ -1,0 +1,71 @@
+"""Ticks at the values of an axis of the study, where these are few enough to be labelled."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.store.units import displayed, meanings
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from numpy.typing import NDArray
+
+MOST = 10  # values; an axis of more has round ticks
+_CHARACTER, _GAP, _LINE = 1.5, 1.5, 3.6  # mm, of labels of 8 pt
+_PANEL = 0.85  # of the room for axes and their labels, taken by the axes
+
+
+def tick_levels(ax: Axes, which: str, levels: xr.DataArray, at: NDArray[np.float64] | None = None) -> None:
+    """Tick the values of a coordinate, and label as many as have room, at equal steps of their number.
+
+    Set limits and scale of the axes first. An axis of many values keeps its ticks.
+
+    Parameters
+    ----------
+    which : {"x", "y"}
+    at : (n,), optional
+        Where the values are on the axes, if not at their displayed value.
+    """
+    from matplotlib.ticker import NullLocator
+
+    values, _ = displayed(levels)
+    if values.size > MOST:
+        return
+    places = values if at is None else at
+    names = [f"{value:.0f}" if 1e4 <= abs(value) < 1e6 else f"{value:.4g}" for value in values]
+    if flags := meanings(levels):
+        names = [flags[int(value)] for value in levels.values]
+    axis: Axis = getattr(ax, f"{which}axis")
+    ascending = np.argsort(places)
+    gaps = np.diff(_millimetres(ax, which, places[ascending]))
+    need = _LINE if which == "y" else _GAP + _CHARACTER * max(map(len, names))
+    step = next(
+        (n for n in range(1, values.size) if _least_gap(gaps, n) >= need),
+        max(values.size - 1, 1),  # the first and the last
+    )
+    labels = [""] * values.size
+    for i in ascending[::step]:
+        labels[i] = names[i]
+    axis.set_ticks(places, labels)
+    axis.set_minor_locator(NullLocator())
+
+
+def _millimetres(ax: Axes, which: str, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return where values are along an axis, about: the layout of the figure is not known yet."""
+    scale = getattr(ax, f"{which}axis").get_transform()
+    ends = np.asarray(scale.transform(np.asarray(getattr(ax, f"get_{which}lim")())))
+    share = (np.asarray(scale.transform(places)) - ends[0]) / (ends[1] - ends[0])
+    box = ax.get_window_extent()
+    pixels = box.width if which == "x" else box.height
+    millimetres: NDArray[np.float64] = share * _PANEL * pixels / ax.figure.dpi * 25.4
+    return millimetres
+
+
+def _least_gap(gaps: NDArray[np.float64], step: int) -> float:
+    """Return the least distance between every `step`-th of points with these gaps."""
+    at = np.concatenate(([0.0], np.cumsum(gaps)))[::step]
+    return float(np.diff(at).min()) if at.size > 1 else np.inf

@@ -1,0 +1,58 @@
+"""Velocities once a revolution, from recorded displacements: local differences of shaft-locked samples."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from postproc.signals.spectra import samples_per_revolution
+from rubhpc.schema import SECTION_NAMES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+VELOCITIES = {f"{name}_velocity": name for name in SECTION_NAMES}
+_REACH = 4  # samples to either side
+
+
+def section_velocity(waveform: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataArray:
+    """Return the time derivative of a signal at every whole revolution, in its unit per second; lazy.
+
+    It is that of the polynomial of degree 8 through the sample and four on either side; NaN at the first
+    sample, before which there is none. Unlike the derivative of a Fourier series, it asks for no whole
+    periods. The relative error at order `k` is about `(2 pi k / n)^8 / 630` of `n` samples a revolution: 2e-9
+    at 4X of 256.
+
+    Parameters
+    ----------
+    waveform : (..., sample)
+        Whole revolutions, with the coordinate `revolution`.
+    spin_speed : (...)
+        rad/s
+
+    Returns
+    -------
+    (..., section)
+    """
+    n = samples_per_revolution(waveform)
+    near = np.arange(-_REACH, _REACH + 1)
+    taps = np.arange(n, waveform.sizes["sample"], n)[:, None] + near
+    picked = waveform.drop_vars("revolution").isel(sample=xr.DataArray(taps, dims=("section", "tap")))
+    weights = xr.DataArray(_derivative_weights(near), dims="tap")
+    per_sample = (picked.astype(float) * weights).sum("tap", skipna=False)
+    per_sample = per_sample.pad(section=(1, 0), constant_values=np.nan)
+    velocity: xr.DataArray = per_sample * (spin_speed * (n / (2 * math.pi)))
+    unit = str(waveform.attrs.get("units", "m"))
+    long_name = f"velocity of the {waveform.attrs.get('long_name', waveform.name)}, once a revolution"
+    return velocity.assign_attrs(units=f"{unit} s-1", long_name=long_name)
+
+
+def _derivative_weights(offsets: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the weights of samples at some offsets in the derivative at offset 0, a sample apart."""
+    x = offsets.astype(float)
+    wanted = np.zeros(x.size)
+    wanted[1] = 1.0
+    return np.linalg.solve(np.vander(x, increasing=True).T, wanted).astype(np.float64)
