@@ -24,7 +24,7 @@ _EVERYDAY = {
     "Pa": {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9},
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
     "rad": {"rad": 1.0, "deg": math.pi / 180},
-    "rad/s": {"rad/s": 1.0, "rpm": math.pi / 30, "Hz": 2 * math.pi},
+    "rad/s": {"rad/s": 1.0, "rpm": math.pi / 30},
     "Hz": {"Hz": 1.0, "rpm": 1 / 60},
     "N/m": {"N/m": 1.0},
     "": {"%": 1e-2},
@@ -48,7 +48,7 @@ def parse_quantity(value: object, unit: str, where: str) -> float:
     ----------
     value : int, float or str
         A number counts as SI; text carries a number and a unit ("1800 rpm", "100 um", "5 %").
-        1 Hz is 2 pi rad/s where `unit` is rad/s, and the other way round.
+        A rotation speed (`unit` rad/s) names turns or an angle: "rpm", "turn/s", "rad/s", "deg/s".
     unit : str
         Unit of the result, readable by pint; "" for a number without dimension.
     where : str
@@ -57,7 +57,8 @@ def parse_quantity(value: object, unit: str, where: str) -> float:
     Raises
     ------
     InputError
-        When `value` is not a finite number, or has the wrong unit.
+        When `value` is not a finite number, or has the wrong unit, or one such as 1/min or Hz for a rotation
+        speed, which may count turns or radians.
     """
     if isinstance(value, str):
         return _parse_text(value, unit, where)
@@ -120,6 +121,8 @@ def _factor(given: str, unit: str, where: str, text: str) -> float:
         raise InputError(f"{where}: {brief(text)} is not a multiple of {unit or 1}; {_fix(unit)}")
     # To pint a radian is 1, and so is the turn in a hertz: count the turns that it loses.
     turns = _turns(units) - _turns(wanted)
+    if _is_rotation(wanted) and _angles(units) != 1:
+        raise InputError(_ambiguous(text, factor, where))
     if _angles(units) + turns == _angles(wanted):
         factor *= (2 * math.pi) ** turns
     tidy = float(f"{factor:.14g}")  # 999.9999999999999 for g/cm^3
@@ -133,6 +136,20 @@ def _registry() -> Any:
     registry: Any = pint.UnitRegistry()
     registry.define("@alias revolution = rev")
     return registry
+
+
+def _is_rotation(wanted: Any) -> bool:
+    return _angles(wanted) == 1 and wanted.dimensionality == {"[time]": -1}
+
+
+def _ambiguous(text: str, per_second: float, where: str) -> str:
+    """Return the problem of a unit such as 1/min or Hz for a rotation speed, and both ways to write it."""
+    number = _TEXT.fullmatch(text)[1]  # type: ignore[index]
+    value = float(Decimal(number) * Decimal(f"{per_second:.14g}"))
+    return (
+        f"{where}: {brief(text)} is ambiguous for a rotation speed; "
+        f'write "{60 * value:.12g} rpm" if it counts turns, "{value:.12g} rad/s" if it counts radians'
+    )
 
 
 def _turns(units: Any) -> float:

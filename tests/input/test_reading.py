@@ -43,12 +43,31 @@ def test_a_quantity_comes_in_si_units(value, unit, expected):
 
 
 @pytest.mark.parametrize(
-    "turns_a_minute", ["1800 rpm", "30 Hz", "0.03 kHz", "30 rev/s", "1800 turn/min", "10800 deg/s"]
+    "turns_a_minute", ["1800 rpm", "30 turn/s", "30 rps", "30 rev/s", "1800 turn/min", "10800 deg/s"]
 )
 def test_a_turn_is_two_pi_however_it_is_written(turns_a_minute):
-    # pint takes a radian for 1, and would make 30 rad/s of 30 Hz
     assert parse_quantity(turns_a_minute, "rad/s", "speed") == pytest.approx(60 * math.pi, rel=1e-15)
     assert parse_quantity(turns_a_minute, "Hz", "frequency") == pytest.approx(30.0, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("given", "turns", "angle"),
+    [  # to pint each of them is rad/s
+        ("3000 1/min", "3000 rpm", "50 rad/s"),
+        ("3000 min^-1", "3000 rpm", "50 rad/s"),
+        ("50 1/s", "3000 rpm", "50 rad/s"),
+        ("50 Hz", "3000 rpm", "50 rad/s"),
+        ("0.05 kHz", "3000 rpm", "50 rad/s"),
+        ("50 counts/s", "3000 rpm", "50 rad/s"),
+        ("1e3 %/s", "600 rpm", "10 rad/s"),
+    ],
+)
+@pytest.mark.parametrize("unit", ["rad/s", "rad * s**-1"])  # of a rig or study, of a store
+def test_a_rotation_speed_says_whether_it_counts_turns(given, turns, angle, unit):
+    fix = f'write "{turns}" if it counts turns, "{angle}" if it counts radians'
+    with pytest.raises(InputError) as refused:
+        parse_quantity(given, unit, "speed")
+    assert str(refused.value) == f'speed: "{given}" is ambiguous for a rotation speed; {fix}'
 
 
 @pytest.mark.parametrize("text", ["30 um", "70 um", "0.3 mm", "110 um", "56 um"])

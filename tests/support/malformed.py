@@ -124,6 +124,8 @@ CASES = [
     _study("wrong unit", _FRICTION, 'friction = "3 mm"', '[grid] friction: "3 mm" is not a plain number'),
     _study("unit on a ratio", _SPEED, 'speed_ratio = "30 Hz"', "[grid] speed_ratio:", "30 Hz"),
     _study("speed in metres", _SPEED, 'speed = "3 m/s"', "[grid] speed:", "rad/s"),
+    _study("speed in minutes", _SPEED, 'speed = "3000 1/min"', "[grid] speed:", '"3000 rpm"', '"50 rad/s"'),
+    _study("speed in hertz", _SPEED, 'speed = { start = "50 Hz", stop = 9, num = 2 }', "start: ", "rpm"),
     _study("no unit in text", _GAP, 'clearance = "100"', '[grid] clearance: "100" has no unit'),
     _study("unknown unit", _GAP, 'clearance = "100 microns_"', "[grid] clearance: unknown unit", "um"),
     _study(
