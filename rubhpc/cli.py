@@ -14,7 +14,7 @@ import click
 
 from postproc.catalogue import figures
 from rubhpc import __version__
-from rubhpc.errors import RubError
+from rubhpc.errors import RubError, printable
 from rubhpc.running.launch import launch
 
 _STOPPED = 75
@@ -132,7 +132,7 @@ def main(args: list[str] | None = None) -> None:
 def _report(text: str, code: int) -> int:
     """Print an error in one line, on the first rank only."""
     if launch().rank == 0:
-        print(f"rubhpc: {' '.join(text.split())}", file=sys.stderr)
+        print(f"rubhpc: {printable(' '.join(text.split()))}", file=sys.stderr)
     return code
 
 

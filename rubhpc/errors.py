@@ -1,10 +1,22 @@
 """Errors that reach the user: one line with where, what is wrong and how to fix it, and an exit code."""
 
 
+def printable(text: str) -> str:
+    """Return a text as one line that is safe on a terminal: white space as blanks, other controls escaped."""
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() else " " if c.isspace() else c.encode("unicode_escape").decode() for c in text
+    )
+
+
 class RubError(Exception):
-    """Anything the user can fix; its text is one line."""
+    """Anything the user can fix; its text is one line, without control characters."""
 
     exit_code = 1
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(printable(text))
 
 
 class InputError(RubError):

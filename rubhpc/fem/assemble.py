@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from rubhpc.errors import InputError
+from rubhpc.fem.computable import MOST_DEGREES, check_computable, computable
 from rubhpc.fem.forces import forces_on
 from rubhpc.fem.model import Model
 from rubhpc.fem.rotor import assemble_rotor
@@ -25,14 +27,31 @@ def assemble(rig: Rig) -> Model:
 
     The recorded node is the first stator's, or else the first disc's, or else the middle of the shaft; a
     `MatrixRotor` may name another one.
+
+    Raises
+    ------
+    InputError
+        When the values of the rig leave the floating-point range, or it has too many degrees of freedom.
     """
-    body = assemble_rotor(rig.rotor)
-    constant, cosine, sine = forces_on(rig.rotor, body)
+    with computable("[rotor]"):
+        body = assemble_rotor(rig.rotor)
+        constant, cosine, sine = forces_on(rig.rotor, body)
+    check_computable("[rotor]", body)
+    stators, n_degree = [], body.n_dof
+    for number, stator in enumerate(rig.stator, 1):
+        with computable(f"[stator.{number}]"):
+            model = _stator(rig, stator)
+        check_computable(f"[stator.{number}]", model.body)
+        stators.append(model)
+        n_degree += model.body.n_dof
+        if n_degree > MOST_DEGREES:
+            problem = f"rotor and {len(rig.stator)} stators have more than {MOST_DEGREES} degrees of freedom"
+            raise InputError(f"rig {rig.name}: {problem}; use fewer elements")
     return Model(
         rotor=body,
         unbalance_cosine=cosine,
         unbalance_sine=sine,
-        stators=tuple(_stator(rig, stator) for stator in rig.stator),
+        stators=tuple(stators),
         output_node=rig.rotor.recorded_node([stator.node for stator in rig.stator]),
         sag=sag_under(body, constant),
         load=constant,

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import math
 import operator
 from dataclasses import MISSING, field
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, printable
 from rubhpc.input.matrix import parse_matrix
-from rubhpc.input.quantity import brief, parse_quantity
+from rubhpc.input.quantity import brief, out_of_range, parse_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -191,7 +190,7 @@ def place(file: str, table: str = "", key: str = "") -> str:
     """Return "file: [table] key", the start of a message about an input, on one line."""
     name = " ".join(p for p in (f"[{table[:80]}]" if table else "", key[:80]) if p)
     head = ": ".join(p for p in (file, name) if p)
-    return "".join(c if c.isprintable() else " " for c in head)
+    return printable(head)
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
@@ -240,8 +239,8 @@ def _check_quantity(value: object, bounds: Any) -> str:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
         return f"{brief(value)} is not a number; give one in SI units"
-    if not math.isfinite(number):
-        return f"{brief(value)} is not finite; give a finite number"
+    if problem := out_of_range(number):
+        return f"{brief(value)} {problem}"
     for word, holds in (("above", number.__gt__), ("at_least", number.__ge__), ("below", number.__lt__)):
         limit = bounds[word]
         if limit is not None and not holds(limit):

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
+MOST_ROWS = 3000  # a matrix is dense: 72 MB
 ROUNDING = 1e-9  # of the greatest entry: what a matrix may depart from symmetry by
 _ENTRY = np.dtype([("row", "<i4"), ("column", "<i4"), ("value", "<f8")])
 
@@ -28,7 +29,7 @@ def parse_matrix(value: object, where: str) -> Matrix:
     InputError
         When it is not a square matrix of finite real numbers.
     """
-    if isinstance(value, dict):
+    if isinstance(value, dict):  # as a store holds it
         return _decoded(value, where)
     fix = "give the rows, [[1.0, 0.0], [0.0, 1.0]]"
     try:
@@ -40,6 +41,9 @@ def parse_matrix(value: object, where: str) -> Matrix:
         raise InputError(f"{where}: {brief(value)} is not a matrix of real numbers; {fix}")
     if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.size:
         raise InputError(f"{where}: has the shape {given.shape}; give a square one, (n_dof, n_dof)")
+    if len(given) > MOST_ROWS:
+        problem = f"{len(given)} rows are too many; reduce the model to at most {MOST_ROWS}"
+        raise InputError(f"{where}: {problem}")
     entries: Matrix = np.array(given, dtype=np.float64) + 0.0  # no negative zeros: they would not be equal
     if not np.isfinite(entries).all():
         row, column = np.argwhere(~np.isfinite(entries))[0]
@@ -73,6 +77,8 @@ def is_symmetric(entries: Matrix, sign: float = 1.0) -> bool:
 def _decoded(table: dict[str, Any], where: str) -> Matrix:
     try:
         size = int(table["size"])
+        if not 0 < size <= MOST_ROWS:
+            raise ValueError
         packed = np.frombuffer(base64.b64decode(table["nonzero"], validate=True), dtype=_ENTRY)
         entries = np.zeros((size, size))
         entries[packed["row"], packed["column"]] = packed["value"]

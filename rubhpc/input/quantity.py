@@ -8,8 +8,9 @@ from decimal import Decimal
 from functools import cache
 from typing import Any
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, printable
 
+LEAST, GREATEST = 1e-30, 1e30  # size of a quantity: beyond, sums of products of a few leave the floats
 # One number, then a product of units. Nothing else reaches pint, whose grammar also takes sums and towers of
 # powers.
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?"
@@ -68,9 +69,18 @@ def parse_quantity(value: object, unit: str, where: str) -> float:
         number = float(value)
     except OverflowError:
         number = math.inf
-    if not math.isfinite(number):
-        raise InputError(f"{where}: {brief(value)} is not finite; write a finite number")
+    if problem := out_of_range(number):
+        raise InputError(f"{where}: {brief(value)} {problem}")
     return number + 0.0  # no negative zero, which would be a second case
+
+
+def out_of_range(number: float) -> str:
+    """Return why no quantity has this value, in SI units, and how to fix it; "" where one may."""
+    if not math.isfinite(number):
+        return "is not finite; write a finite number"
+    if number and not LEAST <= abs(number) <= GREATEST:
+        return f"is out of range; its size must be 0, or from {LEAST:g} to {GREATEST:g} in SI units"
+    return ""
 
 
 def brief(value: object) -> str:
@@ -82,7 +92,7 @@ def brief(value: object) -> str:
         if isinstance(value, bool)
         else str(value)
     )
-    text = "".join(c if c.isprintable() else " " for c in text)
+    text = printable(text)
     return text if len(text) <= 60 else f"{text[:56]} ..."
 
 
@@ -93,13 +103,11 @@ def _parse_text(text: str, unit: str, where: str) -> float:
     number, given = match[1], (match[2] or "").strip()
     if not given and unit:
         raise InputError(f"{where}: {brief(text)} has no unit; write {brief(f'{number} {unit}')} or a number")
-    if not math.isfinite(float(number)):
-        raise InputError(f"{where}: {brief(text)} is not finite; write a finite number")
     factor = 1.0 if given == unit else _EVERYDAY.get(unit, {}).get(given) or _factor(given, unit, where, text)
     # In decimals "30 um" is 3e-05, the very number that a user writes in SI; 30 * 1e-6 is not.
     result = float(Decimal(number) * Decimal(repr(factor)))
-    if not math.isfinite(result):
-        raise InputError(f"{where}: {brief(text)} is not finite; write a finite number")
+    if problem := out_of_range(result):
+        raise InputError(f"{where}: {brief(text)} {problem}")
     return result + 0.0
 
 

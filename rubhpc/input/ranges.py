@@ -14,7 +14,7 @@ from rubhpc.input.quantity import brief, parse_quantity
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-MOST_VALUES = 10_000_000  # of one axis: a typing error must not fill the memory
+MOST_VALUES = 100_000  # of one axis: a typing error must not fill the memory
 RANGE_KEYS = ("start", "stop", "step", "num", "scale")
 _DRAWN_KEYS = ("start", "stop", "scale")
 

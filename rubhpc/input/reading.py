@@ -10,7 +10,7 @@ import re
 import tomllib
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, printable
 from rubhpc.input.fields import FieldError, check_value, nearest, parse_field, place
 from rubhpc.input.matrix import encode_matrix
 from rubhpc.input.quantity import brief, parse_quantity
@@ -185,8 +185,7 @@ def _parse_toml(content: bytes, file: str) -> dict[str, Any]:
         lines = text.splitlines() or [""]
         end = (str(len(lines)), str(len(lines[-1]) + 1))
         where = (at[1], at[2]) if at and at[1] else end
-        reason = (message[: at.start()] if at else message)[:120]
-        reason = "".join(c if c.isprintable() else " " for c in reason)
+        reason = printable((message[: at.start()] if at else message)[:120])
         raise InputError(
             f"{file}: line {where[0]}, column {where[1]}: not TOML: {reason}; correct that line"
         ) from None

@@ -12,6 +12,8 @@ from typing import Any
 
 from rubhpc.input.fields import FieldError, check_fields, count, flag, pairs, quantity
 
+MOST_ELEMENTS = 200  # of a shaft or a stator: matrices are dense, and time grows with the third power
+
 
 @dataclass(frozen=True, kw_only=True)
 class Damping:
@@ -56,7 +58,7 @@ class ShaftSection:
     inner_diameter: float = quantity(
         "m", doc="Diameter of the bore.", example='"8 mm"', default=0.0, at_least=0
     )
-    elements: int = count(doc="Number of equal finite elements.", example="14", at_most=1000)
+    elements: int = count(doc="Number of equal finite elements.", example="14", at_most=MOST_ELEMENTS)
     youngs_modulus: float = quantity("Pa", doc="Young's modulus.", example='"210 GPa"', above=0)
     shear_modulus: float = quantity("Pa", doc="Shear modulus.", example='"79.6 GPa"', above=0)
     density: float = quantity("kg/m^3", doc="Density.", example="7800.0", above=0)

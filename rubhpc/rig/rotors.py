@@ -17,7 +17,15 @@ from rubhpc.input.matrix import is_symmetric
 from rubhpc.rig.bearing_table import AnyBearing, BearingTable  # noqa: TC001 - likewise
 from rubhpc.rig.forces import RotorForces
 from rubhpc.rig.matrix_body import check_body, checked_matrices
-from rubhpc.rig.parts import FIXED_AT_NODE_1, UNDAMPED, Damping, Disc, ShaftSection, Torsion
+from rubhpc.rig.parts import (
+    FIXED_AT_NODE_1,
+    MOST_ELEMENTS,
+    UNDAMPED,
+    Damping,
+    Disc,
+    ShaftSection,
+    Torsion,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,6 +49,9 @@ class Rotor(RotorForces):
         for key in ("shaft", "bearing"):
             if not getattr(self, key):
                 raise FieldError(key, f"missing; a rotor has at least one [[rotor.{key}]]")
+        if self.n_node - 1 > MOST_ELEMENTS:
+            problem = f"{self.n_node - 1} elements are too many; use at most {MOST_ELEMENTS} in all sections"
+            raise FieldError("shaft", problem)
         for key in ("disc", "bearing"):
             for i, item in enumerate(getattr(self, key), 1):
                 self.check_node(f"{key}.{i}.node", item.node)

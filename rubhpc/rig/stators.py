@@ -11,7 +11,7 @@ from numpy.typing import NDArray  # noqa: TC002
 
 from rubhpc.input.fields import FieldError, check_fields, count, flag, matrix, quantity, table, words
 from rubhpc.rig.matrix_body import check_body, checked_matrices
-from rubhpc.rig.parts import UNDAMPED, Damping
+from rubhpc.rig.parts import MOST_ELEMENTS, UNDAMPED, Damping
 
 MOST_STATORS = 62  # a contact mode is numbered by the bits of an integer
 
@@ -57,7 +57,9 @@ class Stator(Seat):
     height: float = quantity(
         "m", doc="Height along the lateral (tangential) motion.", example='"5 mm"', above=0
     )
-    elements: int = count(doc="Number of equal finite elements.", example="6", default=6, at_most=1000)
+    elements: int = count(
+        doc="Number of equal finite elements.", example="6", default=6, at_most=MOST_ELEMENTS
+    )
     youngs_modulus: float = quantity("Pa", doc="Young's modulus.", example='"3 GPa"', above=0)
     poissons_ratio: float = quantity(
         "", doc="Poisson's ratio.", example="0.3", default=0.3, above=-1, below=0.5

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rubhpc.rig.rig import Rig
     from rubhpc.study.study import Study
 
-MOST_CASES = 50_000_000  # a larger grid is taken for a mistake: it would fill the memory
+MOST_CASES = 10_000_000  # a larger grid is taken for a mistake: it would fill the memory
 _BLOCK = 16  # cases of a block by default, at most
 _MOST_RIGS = 64  # along an axis: assembled before the run, 1 ms each; of more values only the two ends
 PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before

@@ -55,6 +55,7 @@ _TABLES = ("title", "rig", "output", "grid", "sample", "override", "contact", "i
 _RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution", "degree"}) - {
     "clearance"
 }
+_MOST_AXES = 32  # arrays have 64 dimensions at most
 _MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
 
 
@@ -104,6 +105,9 @@ class Study:
     source: Path | None = None
 
     def __post_init__(self) -> None:
+        if not self.output.name:  # "/" or "."
+            problem = f"{brief(str(self.output))} does not name a store"
+            raise InputError(f'output: {problem}; write output = "my_study.zarr", or another path')
         if any(axis.sweep == BOTH for axis in self.axes) and self.axes[-1].name != DIRECTION:
             object.__setattr__(self, "axes", (*self.axes, direction_axis()))
         _check_axes(self.axes)
@@ -215,6 +219,9 @@ def _overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
 def _read_axes(table: dict[str, Any], rig: Rig, sample: Sample | None, file: str) -> tuple[Axis, ...]:
     pairs = flatten(table)
     names = [name for name, _ in pairs]
+    if len(names) > _MOST_AXES:
+        problem = f"{len(names)} axes are too many; use at most {_MOST_AXES}, and [override] for the others"
+        raise InputError(f"{place(file, 'grid')}: {problem}")
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"{place(file, 'grid', name)}: is duplicated; remove one")

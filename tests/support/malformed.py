@@ -72,7 +72,43 @@ _SPEED = "speed_ratio = [0.75, 1.5]"
 _GAP = "clearance_ratio = 0.70"
 _FRICTION = "friction = 0.3"
 
+_SECTION = RIG[RIG.index("[[rotor.shaft]]") : RIG.index("[[rotor.disc]]")]
+
+# Numbers that overflow in the matrices, or take minutes and gigabytes.
+_EXTREME = [
+    *(
+        _rig(f"{old} as {new}", old, new, *says)
+        for old, new, *says in [
+            ('"0.8 m"', "8e147", "[rotor.shaft.1] length: 8e+147 is out of range", "1e+30"),
+            ('"0.8 m"', '"8e147 m"', '[rotor.shaft.1] length: "8e147 m" is out of range'),
+            ("density = 7800.0", "density = 5e-324", "density: 5e-324 is out of range"),
+            ('"40 mm"', '"1.8e138 mm"', "[stator.1] length:", "is out of range"),
+            ('"40 mm"', "5e-324", "[stator.1] length:", "is out of range"),
+            ("elements = 6", "elements = 999", "[stator.1] elements: 999 is out of range", "at most 200"),
+        ]
+    ),
+    _rig(
+        "shaft of many sections",
+        "[[rotor.disc]]",
+        f"{_SECTION.replace('= 14', '= 190')}[[rotor.disc]]",
+        "[rotor] shaft: 204 elements are too many",
+    ),
+    _study("speed past the floats", _SPEED, "speed_ratio = 1e300", "speed_ratio: 1e+300 is out of range"),
+    _study("an axis past memory", _FRICTION, "friction = { start = 0, stop = 1, num = 10000000 }", "num"),
+    _study(
+        "more axes than dimensions",
+        _FRICTION,
+        "\n".join([_FRICTION, *(f'"rotor.x{i}" = 1' for i in range(40))]),
+        "[grid]: 43 axes are too many",
+    ),
+    _study("output the root", '"good.zarr"', '"/"', 'output: "/" does not name a store'),
+    _study("output the folder itself", '"good.zarr"', '"./"', 'output: "." does not name a store'),
+    _study("a key that colours", _FRICTION, '"\\u001b[31mx" = 1', r"[grid] \x1b[31mx: unknown axis"),
+    _rig("a key that turns the line", "angle = 0.0", '"\\u202ex" = 1', r"[stator.1] \u202ex: unknown key"),
+]
+
 CASES = [
+    *_EXTREME,
     # the file
     Malformed("empty file", ("study.toml", "rig: missing"), study=b""),
     Malformed("not UTF-8", ("study.toml: line 1", "UTF-8"), study=b'title = "\xff"\n'),
