@@ -1,7 +1,7 @@
-"""Synchronous full annular rub of a ring of stators in closed form: what dense rings come to.
+"""Synchronous full annular rub of a ring of stators in closed form: the limit of many stators.
 
 H. F. Black, Interaction of a whirling rotor with a vibrating stator across a clearance annulus, J. Mech. Eng.
-Sci. 10 (1968) 1-12, for a ring of many stators, each on its own; docs/theory/annular.md.
+Sci. 10 (1968) 1-12, here for a ring of many independent stators; docs/theory/annular.md.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from rubhpc.fem.response import steady_response
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model, StatorModel
 
-_LEAST = 1.001  # orbit radius over the clearance from which an arc of contact is looked for
-_MOST = 10.0  # orbit radius over that of the contact-free response up to which it is looked for
+_LEAST = 1.001  # lowest orbit radius of the search, over the clearance
+_MOST = 10.0  # highest, over the radius of the contact-free orbit
 
 
 @dataclass(frozen=True, kw_only=True)
 class AnnularRub:
-    """A circular orbit that presses an arc of the ring which goes round with it.
+    """A circular orbit in contact with an arc of the ring; the arc rotates with the orbit.
 
     Attributes
     ----------
     radius : float
-        Of the orbit of the disc, m.
+        Radius of the disc's orbit, m.
     phase : float
-        Of the orbit, from straight up with the spin, when the shaft's angle is zero, rad.
+        Angle of the deflection at shaft angle zero, from straight up in the sense of the spin, rad.
     normal_force : float
         Sum of the normal forces at any instant, N.
     arc : tuple of (rear, front)
-        Where contact ends and begins, from the line of the deflection in the sense of the spin, rad.
+        Angles at which contact ends and begins, from the deflection in the sense of the spin, rad.
     """
 
     radius: float
@@ -48,23 +48,23 @@ class AnnularRub:
 
 
 def annular_rub(model: Model, spin: float, clearance: float, friction: float) -> AnnularRub:
-    """Solve the synchronous full annular rub of an isotropic rotor in a ring without gaps.
+    """Return the synchronous full annular rub of an isotropic rotor in a continuous ring.
 
     Parameters
     ----------
     model : Model
-        Its stators are equal, stand at one node and all around: `count` of them in a rig.
+        With equal stators at one node, evenly spaced all around: a ring made with `count`.
     spin : float
         rad/s.
     clearance : float
         m.
     friction : float
-        Coefficient; friction slides steadily.
+        Coefficient of steadily sliding friction.
 
     Returns
     -------
     AnnularRub
-        The orbit with the least radius. Whether it is stable is another question.
+        The orbit with the smallest radius. It may be unstable.
 
     Raises
     ------
@@ -79,13 +79,13 @@ def annular_rub(model: Model, spin: float, clearance: float, friction: float) ->
         problem = (
             f"the contact-free orbit of {abs(free):.4g} m does not reach a clearance of {clearance:.4g} m"
         )
-        raise InputError(f"annular rub: {problem}; take a smaller one")
+        raise InputError(f"annular rub: {problem}; use a smaller clearance")
     turning = np.zeros(rotor.n_dof, dtype=np.complex128)
     turning[rows] = 1.0, -1j
     dynamic = rotor.stiffness - spin**2 * rotor.mass + 1j * spin * (rotor.damping + spin * rotor.gyroscopic)
     lateral = [row for row in range(rotor.n_dof) if rotor.part[row] in rotor.part[rows]]
     receptance = np.linalg.solve(dynamic[np.ix_(lateral, lateral)], turning[lateral])[lateral.index(rows[0])]
-    if spin < 0.0:  # seen in a mirror
+    if spin < 0.0:  # mirror image
         free, receptance = free.conjugate(), receptance.conjugate()
     static, moving = (1.0 / _tip_receptance(stator, frequency) for frequency in (0.0, abs(spin)))
     density = len(model.stators) / (2.0 * math.pi)
@@ -115,7 +115,7 @@ def annular_rub(model: Model, spin: float, clearance: float, friction: float) ->
     balance = np.array([excess(radius) for radius in radii])
     crossings = np.flatnonzero((balance[:-1] < 0.0) & (balance[1:] >= 0.0))
     if not crossings.size:
-        raise InputError("annular rub: no circular orbit balances the forces; the ring is left or too soft")
+        raise InputError("annular rub: no circular orbit balances the forces; use a stiffer ring")
     radius = float(brentq(excess, *radii[crossings[0] : crossings[0] + 2]))
     balanced = radius + receptance * (1.0 + 1j * friction) * force(radius)
     return AnnularRub(
@@ -127,7 +127,7 @@ def annular_rub(model: Model, spin: float, clearance: float, friction: float) ->
 
 
 def _tip_receptance(stator: StatorModel, frequency: float) -> complex:
-    """Radial displacement of a stator's tip for a unit force there at a frequency (rad/s), m/N."""
+    """Return the radial receptance of a stator's tip at a frequency (rad/s), m/N."""
     body = stator.body
     tip = np.arange(body.n_dof) == stator.axial
     dynamic = body.stiffness - frequency**2 * body.mass + 1j * frequency * body.damping

@@ -3,7 +3,7 @@
 Consistent matrices with the shear parameter `phi = 12 EI / (kappa G A L^2)`: J. S. Przemieniecki, Theory of
 Matrix Structural Analysis (1968), Secs. 5.6 and 11.4; for rotors H. D. Nelson, J. Mech. Design 102 (1980)
 793-803.
-With phi = 0 and rotary inertia kept they are those of a Rayleigh beam.
+With phi = 0 they are those of a Rayleigh beam, which has rotary inertia but no shear deformation.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class Element:
     Attributes
     ----------
     mass, gyroscopic, stiffness : (n_dof, n_dof)
-        Of one element (12, 12) for a rotor, (6, 6) for a stator. The gyroscopic matrix is to be
-        multiplied by the spin, rad/s.
+        For one element (12, 12) of a rotor, (6, 6) of a stator. The gyroscopic matrix holds for a spin of
+        1 rad/s.
     """
 
     mass: Matrix
@@ -45,7 +45,7 @@ class Element:
 
 
 def join(elements: Sequence[Element]) -> Element:
-    """Join elements end to end: (n_dof, n_dof) matrices, node by node."""
+    """Return the assembled matrices, (n_dof, n_dof), of elements joined end to end."""
     half = len(elements[0].mass) // 2
     n_dof = half * (len(elements) + 1)
     mass, gyroscopic, stiffness = np.zeros((3, n_dof, n_dof))
@@ -58,7 +58,7 @@ def join(elements: Sequence[Element]) -> Element:
 
 
 def shear_coefficient_circle(poissons_ratio: float, bore_ratio: float = 0.0) -> float:
-    """Cowper's shear coefficient of a circle with a bore of `bore_ratio` times its diameter.
+    """Return Cowper's shear coefficient of a circle with a bore of `bore_ratio` times its diameter.
 
     G. R. Cowper, J. Appl. Mech. 33 (1966) 335-340.
     """
@@ -71,12 +71,12 @@ def shear_coefficient_circle(poissons_ratio: float, bore_ratio: float = 0.0) -> 
 
 
 def shear_coefficient_rectangle(poissons_ratio: float) -> float:
-    """Cowper's shear coefficient of a rectangle, whatever its sides."""
+    """Return Cowper's shear coefficient of a rectangle; it does not depend on the sides."""
     return 10 * (1 + poissons_ratio) / (12 + 11 * poissons_ratio)
 
 
 def bar(length: float, rigidity: float, inertia: float) -> tuple[Matrix, Matrix]:
-    """Consistent mass and stiffness of a bar in tension or torsion.
+    """Return consistent mass and stiffness matrix of a bar in tension or torsion.
 
     Parameters
     ----------
@@ -99,10 +99,10 @@ def bar(length: float, rigidity: float, inertia: float) -> tuple[Matrix, Matrix]
 def bending(
     length: float, flexural_rigidity: float, shear_rigidity: float, mass: float, rotary_inertia: float
 ) -> tuple[Matrix, Matrix, Matrix]:
-    """Return the translational mass, rotary mass and stiffness of a beam bent in one plane.
+    """Return translational mass, rotary mass and stiffness matrix of a beam bent in one plane.
 
-    Degrees: deflection and rotation of the first end, then of the second; a rotation is positive
-    where it is the slope of a beam without shear.
+    Degrees: deflection and rotation of the first end, then of the second. The rotation has the sign of the
+    slope; without shear deformation it is the slope.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def bending(
     flexural_rigidity : float
         E I, N m^2.
     shear_rigidity : float
-        kappa G A, N; infinite for a beam that does not shear.
+        kappa G A, N; infinite without shear deformation.
     mass : float
         rho A, kg/m.
     rotary_inertia : float
@@ -120,7 +120,7 @@ def bending(
     Returns
     -------
     translational, rotary, stiffness : (4, 4)
-        kg, kg m, kg m^2 and N/m, N, N m by the degrees they couple.
+        In kg, kg m or kg m^2, and N/m, N or N m, depending on the degrees coupled.
     """
     L = length
     phi = 12 * flexural_rigidity / (shear_rigidity * L**2)
@@ -145,16 +145,16 @@ def bending(
 
 
 def _symmetric(a: float, b: float, c: float, d: float, e: float, f: float) -> Matrix:
-    """Matrix of a beam that is the same seen from either end."""
+    """Return the matrix of a beam that is symmetric about its middle."""
     return np.array([[a, c, b, -d], [c, e, d, f], [b, d, a, -c], [-d, f, -c, e]])
 
 
 def rotor_element(section: ShaftSection) -> Element:
     """Return the element of a shaft section: (12, 12), degrees `ROTOR_DEGREES` at each node.
 
-    In the x-y plane the rotation that bends v upwards is `thz`; in the x-z plane it is `-thy`. The disc law
-    `Id thy'' + spin Ip thz' = My`, `Id thz'' - spin Ip thy' = Mz`, with Ip = 2 Id in every slice of a round
-    shaft, makes the gyroscopic matrix twice the rotary mass between the two planes.
+    The slope of v is `thz`, that of w is `-thy`. A slice of a round shaft has Ip = 2 Id, so by
+    `Id thy'' + spin Ip thz' = My` and `Id thz'' - spin Ip thy' = Mz`, the equations of a disc, the gyroscopic
+    matrix is twice the rotary mass matrix, between the two planes.
     """
     L = section.length / section.elements
     outer, inner = section.outer_diameter, section.inner_diameter

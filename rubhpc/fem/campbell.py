@@ -1,4 +1,4 @@
-"""Modes followed through a range of speeds, and the speeds at which the unbalance meets them."""
+"""Campbell diagram: modes tracked over the speed, and the speeds at which an order meets them."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def campbell(
     speeds: Sequence[float] | NDArray[np.float64],
     tracks: Sequence[tuple[Mode, ...]] | None = None,
 ) -> xr.Dataset:
-    """Follow every mode of a body from speed to speed.
+    """Return frequency, damping ratio and whirl of every mode of a body over the speed.
 
-    From one speed to the next, modes of one kind are paired so that, all together, shapes and
-    eigenvalues change least: curves that cross keep to their shapes.
+    Modes at successive speeds are matched so that the sum of the changes of shape and eigenvalue is least:
+    where two curves cross, each keeps its shape.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def campbell(
     speeds : (n_speed,)
         Spin, rad/s, in order.
     tracks : sequence of tuple of Mode, optional
-        What `follow_modes` returned for these speeds, if it is known.
+        Result of `follow_modes` for these speeds, if available.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def campbell(
 
 
 def follow_modes(body: Body, speeds: Sequence[float] | NDArray[np.float64]) -> list[tuple[Mode, ...]]:
-    """Return every mode of a body, each at all speeds (rad/s, in order)."""
+    """Return every mode of a body as a tuple over the speeds (rad/s, in order)."""
     followed = [modes(body, float(speeds[0]))]
     for speed in speeds[1:]:
         followed.append(continued(body, followed[-1], float(speed)))
@@ -79,25 +79,25 @@ def follow_modes(body: Body, speeds: Sequence[float] | NDArray[np.float64]) -> l
 
 
 def continued(body: Body, before: list[Mode], speed: float) -> list[Mode]:
-    """Return the modes at a speed (rad/s) in the order of those at a speed close by."""
+    """Return the modes at a speed (rad/s) in the order of their matches at a nearby speed, `before`."""
     found = modes(body, speed)
     return [found[i] for i in _order(body, before, found)]
 
 
 def critical_speeds(curves: xr.Dataset, order: float = 1.0) -> list[tuple[int, float]]:
-    """Spins at which a multiple of the spin frequency equals that of a lateral mode.
+    """Return the spins at which a multiple of the spin frequency equals the frequency of a lateral mode.
 
     Parameters
     ----------
     curves : xarray.Dataset
         From `campbell`.
     order : float
-        Of the spin frequency; 1 is the unbalance.
+        Multiple of the spin frequency; 1 for unbalance.
 
     Returns
     -------
     list of (mode, speed)
-        Number of the mode and spin (rad/s), interpolated along its curve; by rising speed.
+        Number of the mode and spin (rad/s), interpolated linearly; by rising speed.
     """
     speeds = curves["speed"].values
     excess = order * speeds / (2 * math.pi) - curves["frequency"].values
@@ -111,7 +111,7 @@ def critical_speeds(curves: xr.Dataset, order: float = 1.0) -> list[tuple[int, f
 
 
 def _order(body: Body, before: list[Mode], after: list[Mode]) -> NDArray[np.intp]:
-    """Which mode of `after` carries on each mode of `before`, (n_mode,)."""
+    """Return the number in `after` of the match of each mode in `before`, (n_mode,)."""
     likeness = np.abs(
         np.stack([mode.shape.conj() for mode in before])
         @ body.mass

@@ -1,4 +1,4 @@
-"""Modes of the first-order form: damped, gyroscopic, with their kind and sense of whirl."""
+"""Damped, gyroscopic modes of a body, with their kind and sense of whirl."""
 
 from __future__ import annotations
 
@@ -40,25 +40,26 @@ class Mode:
     Attributes
     ----------
     frequency : float
-        Natural frequency, `|eigenvalue| / 2 pi`, Hz; modes are sorted by it. Of an overdamped mode, with its
-        two real eigenvalues a and b, `sqrt(|a b|) / 2 pi`; 0 for a rigid body's.
+        Natural frequency, `|eigenvalue| / 2 pi`, Hz; modes are sorted by it. An overdamped mode has two real
+        eigenvalues a and b, and the frequency `sqrt(|a b|) / 2 pi`; a rigid-body mode has 0.
     damped_frequency : float
-        Of the free oscillation, `Im(eigenvalue) / 2 pi`, Hz; 0 for an overdamped mode.
+        Frequency of the free oscillation, `Im(eigenvalue) / 2 pi`, Hz; 0 for an overdamped mode.
     damping_ratio : float
-        `-Re(eigenvalue) / |eigenvalue|` of a mode that oscillates, negative where it grows. Of an overdamped
-        one `-(a + b) / (2 sqrt(a b))`, at least 1; -1 if a or b grows. A rigid body's mode has 0,
-        or 1 where its motion dies out.
+        `-Re(eigenvalue) / |eigenvalue|` for an oscillating mode, negative if it is unstable;
+        `-(a + b) / (2 sqrt(a b))`, at least 1, for an overdamped one, and -1 if it is unstable. A rigid-body
+        mode has 0, or 1 if a damper stops it.
     kind : str
-        "lateral", "torsional" or "axial"; where matrices couple them, the one with most of the kinetic
-        energy, which may be "other" for coordinates of its own.
+        "lateral", "torsional" or "axial"; if matrices couple them, the one with most of the kinetic energy,
+        which is "other" for user-defined coordinates.
     whirl : str
-        Lateral modes of a rotor: "forward" (in the sense of the spin), "backward", or "planar" where neither
-        sense leads, as for the two equal modes of an isotropic rotor at standstill. Else "none", also where
-        the nodes do not all move in both planes.
+        "forward" (in the sense of the spin), "backward", or "planar" if neither dominates, as in the two
+        equal modes of an isotropic rotor at standstill. "none" for other kinds, for stators, and if some node
+        moves in one plane only.
     eigenvalue : complex
-        rad/s, its imaginary part not negative; of two real ones the slower to decay.
+        rad/s, with an imaginary part of at least 0; of two real eigenvalues the one that decays more slowly.
     shape : (n_dof,) complex
-        Displacements, of unit modal mass (shape^H M shape = 1), the largest component real and positive.
+        Displacements, scaled to unit modal mass (shape^H M shape = 1); the largest component is real and
+        positive.
     """
 
     frequency: float
@@ -83,7 +84,7 @@ def modes(body: Body, spin: float = 0.0) -> list[Mode]:
     Returns
     -------
     list of Mode
-        As many as the body has degrees of freedom.
+        One for each degree of freedom.
     """
     body = body.at(spin)
     found = []
@@ -106,7 +107,7 @@ def modes(body: Body, spin: float = 0.0) -> list[Mode]:
 
 
 def _groups(body: Body) -> list[list[int]]:
-    """Rows of each kind of motion, those together that the body couples: an eigenproblem each."""
+    """Rows of each eigenproblem: one for each kind of motion, or for kinds that the body couples."""
     kind = np.array([_kind_of(name) for _, name in body.degrees])
     label = np.unique(kind, return_inverse=True)[1] if body.n_dof else np.zeros(0, dtype=int)
     for part in range(int(body.part.max(initial=-1)) + 1):
@@ -130,7 +131,7 @@ def _kind(shape: Vector, mass: NDArray[np.float64], names: list[str]) -> str:
 
 
 def _turns(degrees: list[tuple[int, str]]) -> bool:
-    """Whether every node that moves sideways does so in both planes, in the same order."""
+    """Whether all nodes with a lateral degree have it in both planes, in the same order."""
     places = {name: [node for node, n in degrees if n == name] for name in ("v", "w", "thy", "thz")}
     return bool(places["v"]) and places["v"] == places["w"] and places["thy"] == places["thz"]
 
@@ -140,10 +141,10 @@ def _eigenpairs(
 ) -> list[Pair]:
     """Both eigenvalues (rad/s) of each mode, the slower first, and its shape.
 
-    The first-order form is set up in the undamped modes q of the symmetric part of K, of frequencies sigma,
-    with the states `y = sigma q` and `q'`; N is the rest of K: `y' = sigma q'` and
-    `q'' = -(sigma + N / sigma) y - C q'`. Without dampers and N it is skew-symmetric, and its eigenvalues
-    carry no more error than the undamped ones, over four decades of frequency.
+    The first-order form uses the undamped modes q of the symmetric part of K, with frequencies sigma, and the
+    states `y = sigma q` and `q'`. With N, the skew-symmetric part of K, it reads `y' = sigma q'` and
+    `q'' = -(sigma + N / sigma) y - C q'`. Without damping and N it is skew-symmetric, and its eigenvalues are
+    as accurate as the undamped ones, over four decades of frequency.
     """
     n_mode = len(mass)
     symmetric = (stiffness + stiffness.T) / 2
@@ -171,10 +172,10 @@ def _real_pairs(
     mass: NDArray[np.float64],
     damping: NDArray[np.float64],
 ) -> Iterator[Pair]:
-    """Real eigenvalues two by two: those of one mode have the most similar shapes.
+    """Yield the real eigenvalues in pairs: the two of a mode have the most similar shapes.
 
-    They are compared where they dissipate: the slow creep of a bearing bends the shaft along, its fast
-    root does not. A trace of mass stands in for the damping of a free body that has none.
+    Shapes are compared in the norm of the damping matrix: the slow root of a bearing also bends the shaft,
+    its fast root does not. A small share of the mass matrix keeps the norm definite without damping.
     """
     resistance = (damping + damping.T) / 2
     trace = 1e-9 * np.abs(resistance).max() / np.abs(mass).max() or 1.0
@@ -193,7 +194,7 @@ def _real_pairs(
 def _whirls(
     pairs: list[Pair], mass: NDArray[np.float64], names: list[str], spin: float
 ) -> tuple[list[Pair], list[str]]:
-    """Sense of whirl of each mode; two of one eigenvalue, whose every mixture is a mode, are taken planar."""
+    """Return modes and their sense of whirl; two with one eigenvalue are replaced by planar ones."""
     pairs = sorted(pairs, key=lambda pair: pair[0].imag)
     tolerance = 100 * EPS * max(abs(first) for first, _, _ in pairs)
     words = [whirl_word(whirl_index(shape, mass, names), spin) for _, _, shape in pairs]

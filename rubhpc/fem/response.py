@@ -1,4 +1,4 @@
-"""Linear response without contact: unbalance response, reference frequency, limit of the time step."""
+"""Linear response without contact: to unbalance; reference frequency; stability limit of the step."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
-    """Steady response of the rotor to its unbalance, no stator touching.
+    """Return the steady response of the rotor to its unbalance, without contact.
 
     Parameters
     ----------
@@ -36,8 +36,8 @@ def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
     Raises
     ------
     InputError
-        If the response has no bound: the spin is a natural frequency of an undamped rotor; or if a bearing
-        has no coefficients at that speed.
+        If the spin is a natural frequency of an undamped rotor, whose response is unbounded, or if it is
+        outside the table of a bearing.
     """
     rotor = model.rotor.at(spin)
     lateral = rotor.rows(KINDS["lateral"])
@@ -59,10 +59,10 @@ def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
 
 
 def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -> float:
-    """Largest deflection `sqrt(v^2 + w^2)` in a revolution of the steady contact-free orbit, m.
+    """Return the largest deflection `sqrt(v^2 + w^2)` of the steady contact-free orbit, m.
 
-    `v + i w` is a forward circle of radius |F| and a backward one of radius |B|; they line up twice a
-    revolution, on the major axis of the ellipse: |F| + |B|.
+    The orbit is the sum of a forward circle of radius |F| and a backward circle of radius |B|: an ellipse
+    with the major semi-axis |F| + |B|.
 
     Parameters
     ----------
@@ -80,10 +80,10 @@ def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -
 
 
 def first_lateral_frequency(model: Model) -> float:
-    """Lowest undamped lateral natural frequency of the rotor at standstill, rad/s: where `speed_ratio` is 1.
+    """Return the lowest undamped lateral natural frequency of the rotor at standstill, rad/s.
 
-    A rotor free to move sideways has it at its first bending mode, above those of the rigid body. Bearings
-    that depend on the speed have the coefficients of standstill, or else of the lowest speed of their table.
+    It is the speed at which `speed_ratio` is 1. Rigid-body modes, of frequency 0, do not count.
+    Speed-dependent bearings have their coefficients at standstill, or at the lowest speed of their table.
     """
     undamped = replace(model.rotor.at(0.0), damping=np.zeros_like(model.rotor.damping), by_speed=None)
     rows = undamped.rows(KINDS["lateral"])
@@ -100,16 +100,16 @@ def first_lateral_frequency(model: Model) -> float:
 
 
 def step_limit(model: Model) -> float:
-    """Longest stable step of the central difference, 2 / omega_max over all bodies, s.
+    """Return the stability limit of the step of the central difference, 2 / omega_max over all bodies, s.
 
     omega_max^2 is the spectral radius of `M^-1 K`. Neither damping nor spin lowers the limit, because the
-    scheme takes `D + spin G` at the centre, with the velocity `(u_{n+1} - u_{n-1}) / 2h`. Multiplied by that
-    velocity, a step says that the discrete energy `d^T (M - h^2/4 K) d / 2h^2 + m^T K m / 2`, with d the
-    difference and m the mean of two successive displacements, falls by what D dissipates; G does no work. The
-    energy is a norm, and thus bounds the motion, while `h < 2 / omega_max`. (Damping with the velocity of the
-    half step behind would lower the limit.)
+    scheme applies `D + spin G` to the central velocity `(u_{n+1} - u_{n-1}) / 2h`. The scalar product of a
+    step with that velocity shows that the discrete energy `d^T (M - h^2/4 K) d / 2h^2 + m^T K m / 2`, with d
+    the difference and m the mean of two successive displacements, decreases by the dissipation of D; G does
+    no work. While `h < 2 / omega_max` the energy is a norm, and thus bounds the motion. (Damping evaluated
+    half a step earlier would lower the limit.)
 
-    Where bearings depend on the speed, it is the least over the speeds of their tables.
+    For speed-dependent bearings it is the minimum over the speeds of their tables.
     """
     rotors = [model.rotor, *(model.rotor.at(speed) for speed in model.rotor.tabulated_speeds)]
     bodies = [*rotors, *(stator.body for stator in model.stators if stator.body.n_dof)]
