@@ -20,7 +20,7 @@ import rubhpc
 from rubhpc.cli import commands
 from rubhpc.rig.rig import Rig
 from rubhpc.schema import VARIABLES
-from rubhpc.study.axes import _OwnAxes as OwnAxes
+from rubhpc.study.axes import OwnAxes
 from rubhpc.study.tables import Contact, Integrator, Recording, Run, Sample
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ import xarray as xr
 
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.select import narrow
+from postproc.store.units import meanings
 from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE, VARIABLES
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
 MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in ("measure", "flag", "setting"))
+_FRICTION_LAW = "contact_friction_law"  # where it is an axis: under Coulomb's law slip may reverse
 MOST_FACETS, MOST_PANELS = 2, 6
 # Where the model leaves its range, by variable: the flag, what is out of range, and the test.
 VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
@@ -137,6 +139,8 @@ def validity(store: xr.Dataset) -> xr.DataArray:
             bad = is_bad(store[name])
             # A case is out of range where one of its stators is, whichever is drawn.
             bad = bad.any([d for d in ("stator",) if d in bad.dims])
+            if name == "minimum_slip_speed" and _FRICTION_LAW in store.coords:
+                bad &= store[_FRICTION_LAW] != meanings(store[_FRICTION_LAW]).index("coulomb")
             found = found + np.int8(bit) * bad.astype(np.int8)
     legend = ", ".join(f"{bit} ({text} out of range)" for bit, text, _ in monitors(store).values())
     return found.rename("validity").assign_attrs(units="1", long_name=f"sum of {legend}")

@@ -18,6 +18,7 @@ from postproc.store.units import displayed
 from rubhpc.errors import InputError
 from rubhpc.study.axes import coordinate_of
 from rubhpc.study.sampling import cases_per_point
+from rubhpc.study.tables import SALTELLI
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,10 +32,15 @@ def by_point(values: xr.DataArray, store: xr.Dataset) -> Floats:
     Raises
     ------
     InputError
-        When some of the sample has been left out by selection.
+        When the sample is not Saltelli's, or some of it has been left out by selection.
     """
-    n_point = int(_study(store).get("sample", {}).get("n", 0))
-    shape = (n_point, cases_per_point(len(drawn_axes(store))))
+    sample = _study(store).get("sample", {})
+    if (method := sample.get("method", SALTELLI)) != SALTELLI:
+        raise InputError(
+            f'{source(store)}: its sample was drawn with method = "{method}", and Sobol indices need '
+            'Saltelli\'s design; run the study with [sample] method = "sobol" into another output'
+        )
+    shape = (int(sample.get("n", 0)), cases_per_point(len(drawn_axes(store))))
     if values.size != math.prod(shape):
         raise InputError(
             f"{source(store)}: {values.size} of the {math.prod(shape)} cases of the sample are selected, and "

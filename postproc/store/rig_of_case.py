@@ -9,6 +9,8 @@ import xarray as xr
 from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import rig_from_dict, with_keys
+from rubhpc.study.axes import coordinate_of
+from rubhpc.study.contact_axes import PREFIX
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -111,4 +113,5 @@ def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
 def rig_axes(case: xr.Dataset) -> dict[str, str]:
     """Return the axes of the study that are keys of the rig: coordinate to dotted key."""
     study: dict[str, Any] = case.attrs.get("study", {})
-    return {name.replace(".", "_"): name for name in study.get("grid", {}) if "." in name}
+    keys = (name for name in study.get("grid", {}) if "." in name and not name.startswith(PREFIX))
+    return {coordinate_of(key): key for key in keys}

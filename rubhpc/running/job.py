@@ -172,12 +172,12 @@ def _warm_up(grid: CaseGrid, block: Block, stopping: Stopping) -> None:
         if stopping.look():
             raise Stopped
 
-    with suppress(Exception):  # what is wrong with this case will be its reason to fail
-        case = grid.cases(block)[0]
-        compile_kernels(
-            set_up(grid.study, case),
-            clearance=case.clearance,
-            friction=case.friction,
-            recording=grid.study.recording,
-            check=check,
-        )
+    with suppress(Exception):  # what is wrong with these cases will be their reason to fail
+        for case in grid.with_each_law(block.start):
+            compile_kernels(
+                set_up(grid.study, case),
+                clearance=case.clearance,
+                friction=case.friction,
+                recording=grid.study.recording,
+                check=check,
+            )

@@ -124,7 +124,7 @@ def make_plan(study: Study) -> Plan:
     names = {axis.coordinate: axis.name for axis in study.axes}  # a dimension as the study names its axis
     if study.sample is not None:
         n_range = sum(axis.drawn_from is not None for axis in study.axes)
-        names[CASE] = f"{CASE} ({study.sample.n} points of {n_range} ranges)"
+        names[CASE] = f"{CASE} ({study.sample.n} points of {n_range} range{'s' * (n_range > 1)})"
     return Plan(
         title=study.title,
         store=study.output,

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from rubhpc.storage.store import Store
     from rubhpc.study.cases import Block, Case, CaseGrid
     from rubhpc.study.study import Study
+    from rubhpc.study.tables import Contact
 
     Arrays = dict[str, NDArray[Any]]
 
@@ -46,11 +47,11 @@ _SETUPS = 4  # prepared setups a rank keeps; a block shares one, and neighbours 
 
 
 def set_up(study: Study, case: Case, model: Model | None = None) -> Setup:
-    """What the cases of this rig and speed share; `model` is the rig's, where it has been assembled."""
+    """What the cases of this rig, speed and contact share; `model` is the rig's, if it is assembled."""
     return prepare(
         case.rig,
         case.speed,
-        contact=study.contact,
+        contact=case.contact,
         integrator=study.integrator,
         samples_per_revolution=study.recording.samples_per_revolution,
         model=model,
@@ -87,7 +88,7 @@ class Worker:
 
     def __post_init__(self) -> None:
         self._record_type = self.store.manifest.header.record_type
-        self._setups: OrderedDict[tuple[int, float], tuple[Rig, Setup]] = OrderedDict()
+        self._setups: OrderedDict[tuple[int, float, Contact], tuple[Rig, Setup]] = OrderedDict()
         self._initial_states = InitialStates(self.grid, self.store, self.ledger, self._repair)
         self._unsynced: list[Path] = []
         self._next_sync = time.monotonic() + _SYNC_GAP
@@ -219,6 +220,7 @@ class Worker:
         key = (
             id(case.rig),
             case.speed,
+            case.contact,
         )  # a rig that is kept here keeps its id; hashing it takes as long as a block
         if key in self._setups:
             setup = self._setups[key][1]

@@ -21,7 +21,7 @@ from zarr.storage import MemoryStore
 from rubhpc.schema import VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.manifest import PRIVATE, Manifest
-from rubhpc.study.axes import DIRECTION, DIRECTIONS
+from rubhpc.study.axes import meanings_of
 from rubhpc.version import __version__
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def _static(grid: CaseGrid) -> dict[str, tuple[tuple[str, ...], NDArray[Any], di
             (axis.dimension,),
             np.array(axis.values, dtype=np.float64),
             {"units": axis.unit or "1", "long_name": axis.long_name}
-            | (_flags(DIRECTIONS) if axis.name == DIRECTION else {}),
+            | (_flags(meanings) if (meanings := meanings_of(axis.name)) else {}),
         )
         for axis in grid.study.axes
     }

@@ -14,8 +14,9 @@ from rubhpc.schema import STATE, VARIABLES, case_measures
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import Header
 from rubhpc.storage.measures import from_json, to_json, unlisted_measures
-from rubhpc.study.axes import FROM_REST, coordinate_of, written
+from rubhpc.study.axes import FROM_REST, coordinate_of, meanings_of, written
 from rubhpc.study.continuation import CaseIds, continuation_of
+from rubhpc.study.identity import WHOLE
 from rubhpc.study.points import Points
 
 if TYPE_CHECKING:
@@ -258,9 +259,10 @@ class Manifest:
             names = [axis.name for axis in self.axes if axis.dimension == dim]
             if lost and len(names) == 1:
                 rest = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
-                values = ", ".join(f"{value:.12g}" for (value,) in lost[:3])
+                words = meanings_of(names[0])
+                values = ", ".join(words[int(v)] if words else f"{v:.12g}" for (v,) in lost[:3])
                 found.append(f"axis {names[0]} lacks {values}{rest}, which is stored")
-            elif lost:
+            elif lost and not any(WHOLE in text for text in found):
                 n_mine, n_yours = (dict(zip(m.dims, m.shape, strict=True))[dim] for m in (self, other))
                 why = "n can only grow" if n_yours < n_mine else "this SALib or SciPy draws other points"
                 found.append(f"the sample lacks {len(lost)} of its {n_mine} cases ({why})")

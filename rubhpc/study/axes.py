@@ -12,6 +12,7 @@ from rubhpc.input.dotted import find_key
 from rubhpc.input.fields import check_value, nearest, parse_field, place, quantity
 from rubhpc.input.quantity import brief
 from rubhpc.input.ranges import MOST_VALUES, RANGE_KEYS, Range, read_ends, read_range
+from rubhpc.study.contact_axes import PREFIX, choices_of, contact_field
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _OwnAxes:
+class OwnAxes:
     """The axes that are no keys of the rig, declared as any other field is."""
 
     speed_ratio: float = quantity(
@@ -39,7 +40,7 @@ class _OwnAxes:
     friction: float = quantity("", doc="Coefficient of friction.", example="[0.1, 0.3, 0.5]", at_least=0)
 
 
-_OWN = {declared.name: declared for declared in fields(_OwnAxes)}
+_OWN = {declared.name: declared for declared in fields(OwnAxes)}
 SPEED_AXES = ("speed_ratio", "speed")
 CLEARANCE_AXES = ("clearance_ratio", "clearance")
 _TABLE_KEYS = ("values", *RANGE_KEYS, "sweep")
@@ -47,6 +48,7 @@ SWEEPS = ("from_rest", "up", "down", "both")
 FROM_REST, UP, DOWN, BOTH = SWEEPS
 DIRECTION = "direction"  # the axis that a sweep in both directions adds
 DIRECTIONS = (UP, DOWN)  # meanings of 0 and 1 on it
+_NO_ORDER = "words have no order to sweep along; leave it out, or sweep another axis"
 NO_NEIGHBOURS = "the cases of a sample have no neighbours to start from; remove sweep or [sample]"
 
 
@@ -84,6 +86,8 @@ class Axis:
     def __post_init__(self) -> None:
         if self.sweep not in SWEEPS:
             raise InputError(f"{place('', 'grid', self.name)}: sweep: {_unknown_sweep(self.sweep)}")
+        if self.sweep != FROM_REST and choices_of(self.name):
+            raise InputError(f"{place('', 'grid', self.name)}: sweep: {_NO_ORDER}")
         if self.sweep != FROM_REST:
             object.__setattr__(self, "values", tuple(sorted(self.values)))
         if problem := _problem(self.name, self.values, is_drawn=self.drawn_from is not None):
@@ -97,7 +101,18 @@ class Axis:
     @property
     def is_rig_key(self) -> bool:
         """Whether the axis sets a key of the rig."""
-        return self.name not in _OWN and self.name != DIRECTION
+        return self.name not in _OWN and self.name != DIRECTION and not self.is_contact_key
+
+    @property
+    def is_contact_key(self) -> bool:
+        """Whether the axis sets a key of [contact]."""
+        return self.name.startswith(PREFIX)
+
+    @property
+    def words(self) -> list[str]:
+        """What its values stand for; [] where they are quantities."""
+        meanings = meanings_of(self.name)
+        return [meanings[int(value)] for value in self.values] if meanings else []
 
     @property
     def tried(self) -> tuple[float, ...]:
@@ -111,7 +126,8 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     Parameters
     ----------
     name : str
-        A dotted key of the rig, or one of speed_ratio, speed, clearance_ratio, clearance, friction.
+        A dotted key of the rig, "contact." and a key of [contact], or one of speed_ratio, speed,
+        clearance_ratio, clearance, friction.
     values : list, dict or single value
         A dict is a range, stop included: `{start, stop, step}`, or `{start, stop, num}` with the `scale`
         "lin" or "log"; or it holds `values`. Either may say how the axis is swept: `{values, sweep}`.
@@ -130,6 +146,8 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     sweep = FROM_REST
     if isinstance(values, dict):
         values, sweep = _read_table(values, where)
+    if sweep != FROM_REST and choices_of(name):
+        raise InputError(f"{where}: sweep: {_NO_ORDER}")
     return replace(_axis(name, declared, _read(declared, values, where), where), sweep=sweep)
 
 
@@ -170,10 +188,15 @@ def coordinate_of(name: str) -> str:
     return name.replace(".", "_")
 
 
+def meanings_of(name: str) -> tuple[str, ...]:
+    """Return what the values 0, 1, ... on an axis stand for; () where they are quantities."""
+    return DIRECTIONS if name == DIRECTION else choices_of(name)
+
+
 def written(name: str, value: float, unit: str) -> str:
     """Return a value on an axis for people, as in `friction=0.3`."""
-    if name == DIRECTION:
-        return f"{name}={DIRECTIONS[int(value)]}"
+    if meanings := meanings_of(name):
+        return f"{name}={meanings[int(value)]}"
     return f"{name}={value:.6g}" + (f" {unit}" if unit not in ("", "1") else "")
 
 
@@ -209,6 +232,11 @@ def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]
 def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
     if name in _OWN:
         return _OWN[name]
+    if name.startswith(PREFIX):
+        try:
+            return contact_field(name)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
     try:
         return find_key(rig, name)
     except InputError as error:
@@ -249,35 +277,50 @@ def _read(declared: Field[Any], values: object, where: str) -> tuple[float, ...]
     if isinstance(values, dict):
         if declared.metadata["kind"] == "flag":
             raise InputError(f"{where}: a range between true and false; write [true, false]")
+        if words := declared.metadata.get("of"):
+            listed = ", ".join(f'"{word}"' for word in words)
+            raise InputError(f"{where}: a range of words; write a list of them, such as [{listed}]")
         return tuple(read_range(values, declared.metadata.get("unit", ""), where))
     if not isinstance(values, list | tuple):
         values = [values]
     if len(values) > MOST_VALUES:
         raise InputError(f"{where}: {len(values)} values are too many; at most {MOST_VALUES}")
-    return tuple(float(parse_field(declared, value, where)) for value in values)
+    return tuple(_number(declared, value, where) for value in values)
+
+
+def _number(declared: Field[Any], value: object, where: str) -> float:
+    """A value of a file as an axis holds it: of a word its place among the choices."""
+    parsed = parse_field(declared, value, where)
+    if declared.metadata["kind"] != "choice":
+        return float(parsed)
+    if problem := check_value(declared, parsed):
+        raise InputError(f"{where}: {problem}")
+    return float(declared.metadata["of"].index(parsed))
 
 
 def _problem(name: str, values: tuple[float, ...], *, is_drawn: bool = False) -> str:
     """What is wrong with the values of an axis; "" when nothing is."""
     if not values:
         return "empty; give at least one value"
-    if name in _OWN:
+    if name in _OWN or (name.startswith(PREFIX) and not choices_of(name)):
+        declared = _OWN[name] if name in _OWN else contact_field(name)
         for value in (min(values), max(values)):
-            if problem := check_value(_OWN[name], value):
+            if problem := check_value(declared, value):
                 return problem
     if name in SPEED_AXES and 0.0 in values:
         return "0 is no speed; leave it out, the rotor has to spin"
     if not is_drawn and len(set(values)) < len(values):
         ordered = sorted(values)
         twice = next(v for v, following in itertools.pairwise(ordered) if v == following)
-        return f"{twice:.12g} is duplicated; remove one"
+        meanings = meanings_of(name)
+        return f"{meanings[int(twice)] if meanings else f'{twice:.12g}'} is duplicated; remove one"
     return ""
 
 
 def _store_unit(unit: str) -> str:
     """Return a pint-readable unit in the notation of the store: "kg/m^3" becomes "kg m-3"."""
     over, _, under = unit.partition("/")
-    factors = [f for f in over.replace("^", "").split() if f != "1"]
+    factors = [f for f in over.replace("^", "").replace("*", " ").split() if f != "1"]
     for factor in under.split():
         symbol, power = re.fullmatch(r"(\D+?)\^?(\d*)", factor).groups()  # type: ignore[union-attr]
         factors.append(f"{symbol}-{power or 1}")

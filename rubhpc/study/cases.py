@@ -9,8 +9,8 @@ import hashlib
 import itertools
 import json
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from rubhpc.input.fields import place
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.axes import FROM_REST
 from rubhpc.study.continuation import CaseIds, continuation_of
+from rubhpc.study.identity import identity_parts
 from rubhpc.study.operating_points import OperatingPoints
 from rubhpc.study.points import Points, boxed
 
@@ -31,11 +32,11 @@ if TYPE_CHECKING:
 
     from rubhpc.rig.rig import Rig
     from rubhpc.study.study import Study
+    from rubhpc.study.tables import Contact
 
 MOST_CASES = 10_000_000  # a larger grid is taken for a mistake: it would fill the memory
 _BLOCK = 16  # cases of a block by default, at most
 _MOST_RIGS = 64  # along an axis: assembled before the run, 1 ms each; of more values only the two ends
-PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -48,6 +49,7 @@ class Case:
     speed: float  # rad/s
     clearance: float  # m
     friction: float
+    contact: Contact
     contact_free_amplitude: float  # m
 
 
@@ -184,6 +186,10 @@ class CaseGrid:
         points = self.points.within(block.start, block.shape)
         return [self._ids(point) for point in points]
 
+    def with_each_law(self, index: Sequence[int]) -> list[Case]:
+        """Return the case at an index, and those that differ from it in nothing but laws of contact."""
+        return [self.case(at) for at in self._operating_points.with_each_law(tuple(index))]
+
     def operating_points(self) -> dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]:
         """Return the operating points: name -> (dimensions it depends on, values in SI units).
 
@@ -207,6 +213,7 @@ class CaseGrid:
             speed=speed,
             clearance=self._operating_points.clearance(index),
             friction=self._operating_points.friction(index),
+            contact=self._operating_points.contact(index),
             contact_free_amplitude=amplitude,
         )
 
@@ -249,35 +256,6 @@ def _named(study: Study) -> Iterator[None]:
         raise InputError(f"{place(str(study.source))}: {error}") from None
 
 
-def identity_parts(study: Study) -> dict[str, Any]:
-    """Return all that changes the results of a study except the values on its axes, for JSON.
-
-    A rig key that is an axis is left out, since every case sets it. Of a sample, everything but the number of
-    points is included.
-    """
-    keys = [axis.name for axis in study.axes if axis.is_rig_key]
-    rig = with_keys(
-        study.rig, {axis.name: axis.values[0] for axis in study.axes if axis.is_rig_key}
-    ).as_dict()
-    for key in keys:
-        _blank(rig, key.split("."))
-    del rig["name"]
-    swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
-    parts = {
-        "physics": PHYSICS,
-        "axes": [axis.name for axis in study.axes],
-        **({"sweep": swept} if swept else {}),  # absent in older stores
-        "rig": rig,
-        "contact": asdict(study.contact),
-        "integrator": asdict(study.integrator),
-        "record": asdict(study.recording) | {"keep": sorted(study.recording.keep)},
-    }
-    if study.sample is not None:
-        ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
-        parts["sample"] = {"method": study.sample.method, "seed": study.sample.seed, "ranges": ranges}
-    return parts
-
-
 def count_state(study: Study) -> int:
     """Length of the final state of a case: displacement and velocity of each degree, two per stator.
 
@@ -298,15 +276,3 @@ def count_state(study: Study) -> int:
                 )
                 raise InputError(f"[grid] {axis.name}: {problem}; remove this axis, or the sweep of {swept}")
     return n_state
-
-
-def _blank(table: Any, key: list[str]) -> None:
-    """Replace the value of a dotted key by "axis", in one item of a list or in all."""
-    if isinstance(table, list):
-        items, rest = ([table[int(key[0]) - 1]], key[1:]) if key[0].isdigit() else (table, key)
-        for item in items:
-            _blank(item, rest)
-    elif len(key) == 1:
-        table[key[0]] = "axis"
-    else:
-        _blank(table[key[0]], key[1:])

@@ -15,6 +15,7 @@ from rubhpc.fem.constraints import find_rigid_body_mode
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.axes import CLEARANCE_AXES, SPEED_AXES
+from rubhpc.study.contact_axes import choices_of, contact_at
 from rubhpc.study.points import Points
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from rubhpc.rig.rig import Rig
     from rubhpc.study.points import Index, Values
     from rubhpc.study.study import Study
+    from rubhpc.study.tables import Contact
 
 _EVENT_STEPS = 60  # that the modal scheme takes a revolution, samples apart
 _TOUCHING = 0.15  # share of the time in contact, where it takes short steps there
@@ -44,7 +46,7 @@ class OperatingPoints:
     points : Points
         Where the cases lie; an index here is one along its dimensions.
     costly_dims : list of int
-        The dimensions along which speed or rig change: cases that differ there share no setup.
+        The dimensions along which speed, rig or contact change: cases that differ there share no setup.
 
     Raises
     ------
@@ -64,6 +66,7 @@ class OperatingPoints:
         )
         self._is_speed_ratio = names[self._speed_axis] == "speed_ratio"
         self._is_clearance_ratio = names[self._clearance_axis] == "clearance_ratio"
+        self._contact_axes = [i for i, axis in enumerate(study.axes) if axis.is_contact_key]
         self._rig_axes = [i for i, axis in enumerate(study.axes) if axis.is_rig_key]
         rotor_axes = [i for i in self._rig_axes if names[i].startswith("rotor.")]
         # The contact-free response depends on the rotor, and on the stator's node, at which it is evaluated.
@@ -72,9 +75,10 @@ class OperatingPoints:
         ]
         self._response_axes = sorted(rotor_axes + node_axes)
         self._speed_setters = [*(rotor_axes if self._is_speed_ratio else ()), self._speed_axis]
-        self.costly_dims = self._dims(self._speed_axis, *self._rig_axes)
+        self.costly_dims = self._dims(self._speed_axis, *self._rig_axes, *self._contact_axes)
         # Cached by value, not by index: of axes that share a dimension only some may matter here.
         self._rig_at = lru_cache(maxsize=256)(self._make_rig)
+        self._contact_at = lru_cache(maxsize=4096)(self._make_contact)
         self._model_at = lru_cache(maxsize=4)(self._make_model)
         self._unit_speed_at = lru_cache(maxsize=65536)(self._make_unit_speed)
         self._response_at = lru_cache(maxsize=65536)(self._make_response)
@@ -100,6 +104,18 @@ class OperatingPoints:
     def friction(self, index: Index) -> float:
         """Coefficient of friction of a case."""
         return self._on([self._friction_axis], index)[0]
+
+    def contact(self, index: Index) -> Contact:
+        """Contact of a case."""
+        return self._contact_at(self._on(self._contact_axes, index))
+
+    def with_each_law(self, index: Index) -> list[Index]:
+        """Index of a case and of those that differ from it in the words on contact axes only."""
+        laws = set(self._dims(*(i for i in self._contact_axes if choices_of(self.study.axes[i].name))))
+        options = (
+            range(n) if dim in laws else index[dim : dim + 1] for dim, n in enumerate(self.points.shape)
+        )
+        return list(itertools.product(*options))
 
     def arrays(self) -> dict[str, tuple[list[int], NDArray[np.float64]]]:
         """Return name -> (dimensions that set it, values along them, SI units), for all cases.
@@ -134,7 +150,7 @@ class OperatingPoints:
     def steps(self) -> NDArray[np.float64]:
         """Predicted integration steps of a case, of length 1 along the dimensions that do not change them."""
         rig_axes = self._rig_axes if self._is_few else []
-        along = self._dims(self._speed_axis, *rig_axes)
+        along = self._dims(self._speed_axis, *rig_axes, *self._contact_axes)
         recording = self.study.recording
         turns = recording.longest_transient + recording.revolutions
 
@@ -145,15 +161,14 @@ class OperatingPoints:
         first = (0,) * len(self.points.dims)
 
         def predict(index: Index) -> float:
-            if is_modal and self.study.contact.closed_form == "always":
+            contact = self.contact(index)
+            if is_modal and contact.closed_form == "always":
                 return float(modal_steps)
             unit = self._unit_speed_at(self._on(self._response_axes, index if self._is_few else first))
             speed = abs(self._on([self._speed_axis], index)[0]) * unit
             duration = turns * 2 * math.pi / speed
             if is_modal:
-                return modal_steps + _TOUCHING * duration / self.study.integrator.contact_step(
-                    self.study.contact
-                )
+                return modal_steps + _TOUCHING * duration / self.study.integrator.contact_step(contact)
             return duration / self._step_at(self._on(self._rig_axes, index if self._is_few else first))
 
         shape = [n if dim in along else 1 for dim, n in enumerate(self.points.shape)]
@@ -187,7 +202,7 @@ class OperatingPoints:
         table = np.fromiter(map(value, self._indices(dims)), dtype=np.float64, count=math.prod(shape))
         return table.reshape(shape)
 
-    def _told(self, axes: Iterable[int], index: Index) -> str:
+    def _named(self, axes: Iterable[int], index: Index) -> str:
         """Values of a case on some axes, for messages."""
         names = (self.study.axes[i].name for i in axes)
         pairs = zip(names, self._on(axes, index), strict=True)
@@ -197,6 +212,11 @@ class OperatingPoints:
         """Rig with these values on the rig axes."""
         keys = (self.study.axes[i].name for i in self._rig_axes)
         return with_keys(self.study.rig, dict(zip(keys, values, strict=True)))
+
+    def _make_contact(self, values: Values) -> Contact:
+        """Contact with these values on the contact axes."""
+        names = (self.study.axes[i].name for i in self._contact_axes)
+        return contact_at(self.study.contact, dict(zip(names, values, strict=True)))
 
     def _make_model(self, values: Values) -> Model:
         """Model with these values on the response axes, and the first ones on the other rig axes."""
@@ -227,7 +247,7 @@ class OperatingPoints:
         for index in self._indices(self._dims(*self._rig_axes) if self._is_few else ()):
             limit = self._limit_at(self._on(self._rig_axes, index))
             if step >= limit:
-                where = self._told(self._rig_axes, index)
+                where = self._named(self._rig_axes, index)
                 problem = f"{step:g} s is above the stability limit{f' at {where}' if where else ''}"
                 raise InputError(f"[integrator] step: {problem}; take less than {limit:.3g} s")
 
@@ -235,7 +255,7 @@ class OperatingPoints:
         """Refuse the modal scheme for a body that nothing holds: it has no constant response."""
         for index in self._indices(self._dims(*self._response_axes) if self._is_few else ()):
             if free := find_rigid_body_mode(self._model_at(self._on(self._response_axes, index))):
-                where = self._told(self._response_axes, index)
+                where = self._named(self._response_axes, index)
                 problem = f"modal needs bodies that are held, and {free}{f' at {where}' if where else ''}"
                 # Friction turns a free rotor back for ever: it has no steady twist.
                 hold = "give it a stiffness, however soft" if "torsion" in free else "hold it"

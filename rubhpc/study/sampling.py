@@ -1,8 +1,9 @@
 """Draws the cases of a sampled study: one column of values for each range of its grid.
 
-The points are Saltelli's: a and b from one point of a scrambled Sobol' sequence, and between them a with one
-value after the other taken from b (A. Saltelli et al., Comput. Phys. Commun. 181, 2010). The cases of a point
-follow one another, and a longer sequence continues a shorter one.
+Saltelli's points are a and b from one point of a scrambled Sobol' sequence, and between them a with one value
+after the other taken from b (A. Saltelli et al., Comput. Phys. Commun. 181, 2010). The cases of a point are
+consecutive. A longer sequence continues a shorter one, and so do random points. A Latin hypercube is drawn as
+a whole.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ if TYPE_CHECKING:
     from rubhpc.study.axes import Axis
     from rubhpc.study.tables import Sample
 
+    Points = np.ndarray[tuple[int, int], np.dtype[np.float64]]
+
 CASE = "case"  # the dimension of all that is drawn
 MOST_DRAWN = 2_000_000  # cases; a larger number is taken for a mistake: it would fill the memory
 
 
 def cases_per_point(n_range: int) -> int:
-    """Return how many cases a base point makes."""
+    """Return how many cases a base point of Saltelli's design makes."""
     return n_range + 2
 
 
@@ -35,7 +38,7 @@ def draw(axes: Sequence[Axis], sample: Sample) -> tuple[Axis, ...]:
     Parameters
     ----------
     axes : sequence of Axis
-        Two at least from `make_range`.
+        One at least from `make_range`, two for Saltelli's design.
 
     Raises
     ------
@@ -43,15 +46,16 @@ def draw(axes: Sequence[Axis], sample: Sample) -> tuple[Axis, ...]:
         When there are fewer ranges, or too many cases.
     """
     ranges = [axis for axis in axes if axis.drawn_from is not None]
-    if len(ranges) < 2:
+    if not ranges or (sample.is_saltelli and len(ranges) < 2):
         what = f"{ranges[0].name} is the only range" if ranges else "no axis of [grid] is a range"
-        raise InputError(f"[sample]: {what}; write two {{ start, stop }} at least, or leave [sample] out")
-    n_case = sample.n * cases_per_point(len(ranges))
+        fix = "two { start, stop } at least" if sample.is_saltelli else "a { start, stop }"
+        raise InputError(f"[sample]: {what}; write {fix}, or leave [sample] out")
+    n_case = sample.n * (cases_per_point(len(ranges)) if sample.is_saltelli else 1)
     if n_case > MOST_DRAWN:
         size = f"{sample.n} points of {len(ranges)} ranges make {n_case} cases"
         raise InputError(f"[sample] n: {size}, too many; the limit is {MOST_DRAWN}, use a smaller n")
     # Of the unit cube: what SALib would make of ranges may change with its version.
-    shares = iter(_design(len(ranges), sample).T)
+    shares = iter(_points(len(ranges), sample).T)
     return tuple(
         replace(axis, dimension=CASE, values=tuple(map(axis.drawn_from.at, next(shares).tolist())))
         if axis.drawn_from is not None
@@ -60,10 +64,21 @@ def draw(axes: Sequence[Axis], sample: Sample) -> tuple[Axis, ...]:
     )
 
 
-def _design(n_range: int, sample: Sample) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def _points(n_range: int, sample: Sample) -> Points:
     """Points in the unit cube, (n_case, n_range)."""
-    from SALib.sample import sobol
+    if sample.is_saltelli:
+        from SALib.sample import sobol
 
-    cube = {"num_vars": n_range, "names": list(range(n_range)), "bounds": [[0.0, 1.0]] * n_range}
-    design = sobol.sample(cube, sample.n, calc_second_order=False, seed=sample.seed)
-    return np.asarray(design, dtype=np.float64)
+        cube = {"num_vars": n_range, "names": list(range(n_range)), "bounds": [[0.0, 1.0]] * n_range}
+        design = sobol.sample(cube, sample.n, calc_second_order=False, seed=sample.seed)
+        return np.asarray(design, dtype=np.float64)
+    random = np.random.default_rng(sample.seed)
+    if sample.method == "random":
+        return random.random((sample.n, n_range))
+    from scipy.stats import qmc
+
+    if sample.method == "lhs":
+        return np.asarray(qmc.LatinHypercube(n_range, seed=random).random(sample.n), dtype=np.float64)
+    # The sequence is drawn up to a power of two, as it is meant to be; what n leaves of it is its beginning.
+    whole = qmc.Sobol(n_range, seed=random).random_base2((sample.n - 1).bit_length())
+    return np.asarray(whole[: sample.n], dtype=np.float64)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,25 +11,22 @@ from rubhpc.input.fields import place
 from rubhpc.input.quantity import brief
 from rubhpc.input.reading import build, read_toml, refuse_unknown
 from rubhpc.rig.reading import read_rig, with_keys
-from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import (
     BOTH,
-    CLEARANCE_AXES,
     DIRECTION,
     FROM_REST,
-    NO_NEIGHBOURS,
-    SPEED_AXES,
     Axis,
     direction_axis,
     flatten,
     make_axis,
     make_range,
 )
+from rubhpc.study.checks import check_axes, check_rigs
+from rubhpc.study.contact_axes import PREFIX, check_contacts
 from rubhpc.study.sampling import draw
-from rubhpc.study.tables import Contact, Integrator, Recording, Run, Sample
+from rubhpc.study.tables import Contact, ContactKeys, Integrator, Recording, Run, Sample
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
     from os import PathLike
 
     from rubhpc.rig.rig import Rig
@@ -51,12 +46,7 @@ __all__ = [
 ]
 
 _TABLES = ("title", "rig", "output", "grid", "sample", "override", "contact", "integrator", "record", "run")
-# Names that a store takes for itself; an axis `clearance` is the very setting of that name.
-_RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution", "degree"}) - {
-    "clearance"
-}
 _MOST_AXES = 32  # arrays have 64 dimensions at most
-_MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
 
 
 DEFAULT_CONTACT, DEFAULT_INTEGRATOR, DEFAULT_RECORDING, DEFAULT_RUN = (
@@ -82,6 +72,8 @@ class Study:
         swept in both directions adds a last one, `direction`.
     sample : Sample or None
         How some of the axes have been drawn (`rubhpc.study.sampling.draw`).
+    contact : ContactKeys
+        A `Contact`; of a grid with contact axes what they leave open, as far as it applies to a case's law.
     output : Path
         The store.
     source : Path or None
@@ -97,7 +89,7 @@ class Study:
     rig: Rig
     axes: tuple[Axis, ...]
     sample: Sample | None = None
-    contact: Contact = DEFAULT_CONTACT
+    contact: ContactKeys = DEFAULT_CONTACT
     integrator: Integrator = DEFAULT_INTEGRATOR
     recording: Recording = DEFAULT_RECORDING
     run: Run = DEFAULT_RUN
@@ -110,8 +102,9 @@ class Study:
             raise InputError(f'output: {problem}; write output = "my_study.zarr", or another path')
         if any(axis.sweep == BOTH for axis in self.axes) and self.axes[-1].name != DIRECTION:
             object.__setattr__(self, "axes", (*self.axes, direction_axis()))
-        _check_axes(self.axes)
-        _check_rigs(self.rig, [axis for axis in self.axes if axis.is_rig_key], self.axes)
+        check_axes(self.axes)
+        check_contacts(self.contact, [axis for axis in self.axes if axis.is_contact_key])
+        check_rigs(self.rig, self.axes)
 
     def axis(self, *names: str) -> Axis:
         """Return the first axis that has one of these names."""
@@ -127,16 +120,24 @@ class Study:
             "rig": self.rig.name,
             "grid": {
                 axis.name: {"unit": axis.unit}
-                | (asdict(axis.drawn_from) if axis.drawn_from else {"values": list(axis.values)})
+                | (asdict(axis.drawn_from) if axis.drawn_from else {"values": [*(axis.words or axis.values)]})
                 | ({"sweep": axis.sweep} if axis.sweep != FROM_REST else {})
                 for axis in self.axes
                 if axis.name != DIRECTION
             },
             **({"sample": asdict(self.sample)} if self.sample else {}),
-            "contact": {key: value for key, value in asdict(self.contact).items() if value is not None},
+            "contact": {
+                key: value
+                for key, value in asdict(self.contact).items()
+                if value is not None and PREFIX + key not in {axis.name for axis in self.axes}
+            },
             "integrator": asdict(self.integrator),
             "record": asdict(self.recording) | {"keep": list(self.recording.keep)},
         }
+
+
+def _values(axis: Axis) -> list[str | float]:
+    return [*(axis.words or axis.values)]
 
 
 def read_study(
@@ -174,7 +175,12 @@ def read_study(
     axes = _read_axes(_table(table, "grid", file), rig, sample, file)
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
         raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
-    contact = build(Contact, table.get("contact", {}), file, "contact")
+    on_axes = {axis.name for axis in axes if axis.is_contact_key}
+    for name in on_axes & {PREFIX + key for key in _table(table, "contact", file)}:
+        raise InputError(
+            f"{place(file, 'contact', name.removeprefix(PREFIX))}: is an axis of the grid too; leave one out"
+        )
+    contact = build(ContactKeys if on_axes else Contact, table.get("contact", {}), file, "contact")
     integrator = build(Integrator, table.get("integrator", {}), file, "integrator")
     recording = build(Recording, table.get("record", {}), file, "record")
     run = build(Run, table.get("run", {}), file, "run")
@@ -232,73 +238,3 @@ def _read_axes(table: dict[str, Any], rig: Rig, sample: Sample | None, file: str
         return draw(axes, sample)
     except InputError as error:
         raise InputError(f"{place(file)}: {error}") from None
-
-
-def _check_axes(axes: tuple[Axis, ...]) -> None:
-    names = [axis.name for axis in axes]
-    for options, example in (
-        (SPEED_AXES, "speed_ratio = [0.75, 1.5]"),
-        (CLEARANCE_AXES, "clearance_ratio = 0.7"),
-        (("friction",), "friction = 0.3"),
-    ):
-        given = [name for name in names if name in options]
-        if not given:
-            raise InputError(f"[grid] {options[0]}: missing; add {' or '.join(options)}, such as {example}")
-        if len(given) > 1:
-            raise InputError(f"[grid] {given[1]}: conflicts with {given[0]}; give only one of them")
-    swept = [axis.name for axis in axes if axis.sweep != FROM_REST]
-    if len(swept) > 1:
-        raise InputError(f"[grid] {swept[1]}: sweep: {swept[0]} is swept already; leave one of the two out")
-    if swept and any(axis.dimension != axis.coordinate for axis in axes):
-        raise InputError(f"[grid] {swept[0]}: sweep: {NO_NEIGHBOURS}")
-    taken: dict[str, str] = {}
-    for axis in axes:
-        if axis.coordinate in _RESERVED:
-            fix = "name one stator, such as stator.1.lateral" if axis.is_rig_key else "remove it"
-            raise InputError(f"[grid] {axis.name}: {axis.coordinate} is another variable of a store; {fix}")
-        if axis.coordinate in taken:
-            raise InputError(
-                f"[grid] {axis.name}: is the same dimension as {taken[axis.coordinate]}; leave one out"
-            )
-        taken[axis.coordinate] = axis.name
-        for other in axes:
-            without_numbers = ".".join(part for part in axis.name.split(".") if not part.isdigit())
-            if other.name == without_numbers != axis.name:
-                raise InputError(f"[grid] {axis.name}: is set by the axis {other.name} too; leave one out")
-
-
-def _check_rigs(rig: Rig, rig_axes: list[Axis], axes: tuple[Axis, ...]) -> None:
-    """Refuse a grid some of whose rigs cannot be, or cannot be studied."""
-    names = [axis.name for axis in rig_axes]
-    grid: Iterable[tuple[float, ...]]
-    if math.prod(len(axis.tried) for axis in rig_axes) <= _MOST_RIGS:
-        grid = itertools.product(*(axis.tried for axis in rig_axes))
-    else:
-        first = [axis.tried[0] for axis in rig_axes]
-        grid = itertools.chain.from_iterable(
-            ((*first[:i], value, *first[i + 1 :]) for value in axis.tried) for i, axis in enumerate(rig_axes)
-        )
-    for values in grid:
-        case = dict(zip(names, values, strict=True))
-        try:
-            _check_rig(with_keys(rig, case), axes)
-        except InputError as error:
-            if not case:
-                raise
-            values_text = ", ".join(f"{name} = {value:g}" for name, value in case.items())
-            raise InputError(f"[grid] {values_text}: invalid rig: {error}") from None
-
-
-def _check_rig(rig: Rig, axes: tuple[Axis, ...]) -> None:
-    if not rig.stator:
-        raise InputError(f"rig: {rig.name} has no stator to touch; add a [[stator]] to it")
-    by_name = {axis.name: axis for axis in axes}
-    if "clearance_ratio" in by_name and not any(u.mass * u.radius for u in rig.rotor.unbalance):
-        problem = f"{rig.name} has no unbalance, so no contact-free amplitude"
-        raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead, or an unbalance")
-    if "clearance" in by_name:
-        least = min(by_name["clearance"].tried)
-        offset = min(stator.clearance_offset for stator in rig.stator)
-        if least + offset <= 0:
-            problem = f"{least:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
-            raise InputError(f"[grid] clearance: {problem}; give a larger clearance")

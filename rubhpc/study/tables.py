@@ -13,6 +13,7 @@ LONGEST_TRANSIENT, SETTLED_WITHIN = 240, 1e-4  # then
 PAPER_STEP = 0.5e-6  # s
 SAFE_SHARE = 0.9  # of the stability limit
 SEARCH_STEP = 1e-6  # s, of the modal scheme with the fixed normal
+SALTELLI, FEWEST_POINTS = "sobol", 8  # the design that Sobol' indices need
 TURNING_STEP = 0.25e-6  # s, with the updated one, set-valued friction or a penalty
 
 ClosedForm = Literal["always", "while sliding", "never"]
@@ -20,8 +21,8 @@ CLOSED_FORM: dict[str, ClosedForm] = {"sliding": "always", "coulomb": "while sli
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contact:
-    """Laws of contact and friction, and the direction of the normal."""
+class ContactKeys:
+    """What [contact] gives, each key for itself; axes of the grid may give the rest."""
 
     law: str = choice(
         doc="Contact law: multipliers that close gaps exactly, or a spring and damper (penalty).",
@@ -64,6 +65,14 @@ class Contact:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact(ContactKeys):
+    """Laws of contact and friction, and the direction of the normal: keys that agree."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
         if self.law == "penalty":
             if self.stiffness is None:
                 raise FieldError("stiffness", "missing; a penalty needs one, such as stiffness = 1e8")
@@ -198,19 +207,19 @@ class Sample:
     """How the cases of a sampled study are drawn from the ranges of its grid."""
 
     method: str = choice(
-        doc="Sampling method: Saltelli's design of Sobol' points.",
+        doc="Saltelli's design of Sobol' points, a Sobol' sequence, a Latin hypercube, or random points.",
         example='"sobol"',
-        of=("sobol",),
-        default="sobol",
+        of=(SALTELLI, "sobol-sequence", "lhs", "random"),
+        default=SALTELLI,
     )
     n: int = count(
-        doc="Number of base points, a power of two; d ranges make n (d + 2) cases.",
+        doc="Number of cases; with sobol of base points, a power of two: d ranges make n (d + 2) cases.",
         example="1024",
-        at_least=8,
+        at_least=1,
         at_most=2**20,
     )
     seed: int = count(
-        doc="Seed of the scrambling; a larger n with the same seed continues the sample.",
+        doc="Seed; a larger n with the same seed continues the sample, but for a Latin hypercube.",
         example="1",
         default=1,
         at_least=0,
@@ -218,10 +227,24 @@ class Sample:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.n & (self.n - 1):
+        if self.is_saltelli and self.n < FEWEST_POINTS:
+            problem = f"{self.n} is out of range; it must be at least {FEWEST_POINTS}"
+            raise FieldError("n", f'{problem}, or take method = "sobol-sequence"')
+        if self.is_saltelli and self.n & (self.n - 1):
             near = 2 ** self.n.bit_length()
             problem = f"{self.n} is no power of two, without which Sobol' points lose their balance"
-            raise FieldError("n", f"{problem}; write {near // 2} or {near}")
+            fix = f'write {near // 2} or {near}, or take method = "sobol-sequence"'
+            raise FieldError("n", f"{problem}; {fix}")
+
+    @property
+    def is_saltelli(self) -> bool:
+        """Whether the cases are those that Sobol' indices need."""
+        return self.method == SALTELLI
+
+    @property
+    def can_grow(self) -> bool:
+        """Whether a larger n keeps the cases of a smaller one."""
+        return self.method != "lhs"
 
 
 @dataclass(frozen=True, kw_only=True)

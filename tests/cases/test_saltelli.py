@@ -170,3 +170,10 @@ def test_command_tells_ranges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert "stator_youngs_modulus        1 to 100 GPa, log" in done.output
     assert (tmp_path / "sines_sensitivity.png").stat().st_size > 10_000
     assert "drawn_from" in (tmp_path / "shares.csv").read_text()
+
+
+def test_a_sample_of_another_method_has_no_indices():
+    cases = sample_of_sines(64)
+    cases.attrs["study"]["sample"]["method"] = "lhs"
+    with pytest.raises(InputError, match='drawn with method = "lhs", and Sobol indices need Saltelli'):
+        sensitivity(cases, "peak_torsion")

@@ -40,7 +40,7 @@ def test_a_key_has_a_meaning_and_an_example(cls, field):
         assert check_value(field, parse_field(field, table[field.name], "a.toml")) == ""
 
 
-@pytest.mark.parametrize("field", [pytest.param(f, id=f.name) for f in dataclasses.fields(axes._OwnAxes)])
+@pytest.mark.parametrize("field", [pytest.param(f, id=f.name) for f in dataclasses.fields(axes.OwnAxes)])
 def test_an_axis_has_a_meaning_and_an_example(field):
     assert field.metadata["doc"].endswith(".")
     example = tomllib.loads(f"axis = {field.metadata['example']}")["axis"]

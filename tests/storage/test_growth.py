@@ -25,7 +25,7 @@ from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import bring_up_to_date, grid_for, open_store
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.storage.verify import verify
-from rubhpc.study import cases as sweep_module
+from rubhpc.study import identity
 from rubhpc.study.study import Run, Study, make_axis, read_study
 
 if TYPE_CHECKING:
@@ -291,8 +291,8 @@ def test_another_version_of_the_physics_is_refused_unless_it_is_accepted(tmp_pat
     store = open_store(grid_for(study))
     compute(store, all_of_it=True)
     before = known(store)
-    old = sweep_module.PHYSICS
-    monkeypatch.setattr(sweep_module, "PHYSICS", old + 1)
+    old = identity.PHYSICS
+    monkeypatch.setattr(identity, "PHYSICS", old + 1)
     told = f"physics was {old}, is {old + 1}"
     with pytest.raises(StoreError, match=f"{told}; --accept-version keeps its cases"):
         grid_for(study)

@@ -17,6 +17,7 @@ from rubhpc.rig.reading import with_keys
 from rubhpc.running.driver import run as run_here
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
+from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
@@ -179,3 +180,55 @@ def test_a_sample_that_cannot_be_is_refused(tmp_path, old, new, says):
     assert says in str(refused.value)
     assert str(refused.value).startswith(f"{path}: ")
     assert not list(tmp_path.glob("*.zarr"))
+
+
+@pytest.mark.parametrize("method", ["sobol-sequence", "lhs", "random"])
+def test_other_methods_draw_any_number_of_cases(tmp_path, method):
+    """Each mean is that of the range: within 4 standard errors if random; a hypercube fills each slice."""
+    sampled = f'[sample]\nn = 100\nmethod = "{method}"'
+    study = read_study(write_sample(tmp_path, run=sampled))
+    grid = CaseGrid(study)
+    assert grid.shape == (100, 2)
+    speed = (np.array(study.axes[0].values) - 1.2) / 1.2
+    friction = np.log(np.array(study.axes[2].values) / 0.05) / np.log(10)
+    for share in (speed, friction):
+        assert share.min() >= 0
+        assert share.max() <= 1
+        assert share.mean() == pytest.approx(0.5, abs=4 / np.sqrt(12 * 100) if method == "random" else 0.02)
+        slices = np.bincount((100 * share).astype(int), minlength=100)
+        assert (slices == 1).all() == (method == "lhs")
+    assert abs(np.corrcoef(speed, friction)[0, 1]) < 0.4
+    one = read_study(write_sample(tmp_path, "one.toml", run=sampled, speed_ratio=[1.4]))
+    assert CaseGrid(one).dims == ("speed_ratio", "clearance_ratio", "case")
+    seeded = read_study(write_sample(tmp_path, "seed.toml", run=sampled + "\nseed = 2"))
+    assert seeded.axes[0].values != study.axes[0].values
+
+
+@pytest.mark.parametrize("method", ["sobol-sequence", "random"])
+def test_a_longer_sequence_keeps_its_cases(tmp_path, method):
+    short, long = (
+        CaseGrid(read_study(write_sample(tmp_path, run=f'[sample]\nn = {n}\nmethod = "{method}"')))
+        for n in (13, 50)
+    )
+    assert short.identity == long.identity
+    ids = {case.id for block in long.blocks() for case in long.cases(block)}
+    assert {case.id for block in short.blocks() for case in short.cases(block)} < ids
+
+
+def test_a_latin_hypercube_cannot_grow(tmp_path):
+    short, long = (
+        Manifest.of(CaseGrid(read_study(write_sample(tmp_path, run=f'[sample]\nn = {n}\nmethod = "lhs"'))))
+        for n in (8, 16)
+    )
+    found = short.differences(long)
+    assert found == ["sample.n (this sample is drawn as a whole and cannot grow) was 8, is 16"]
+
+
+def test_a_sample_needs_a_range(tmp_path):
+    path = write_sample(
+        tmp_path, run='[sample]\nn = 8\nmethod = "lhs"', speed_ratio=[1.4], friction=[0.1, 0.2]
+    )
+    with pytest.raises(
+        InputError, match=r"no axis of \[grid\] is a range; write a \{ start, stop \}, or leave"
+    ):
+        read_study(path)

@@ -1,0 +1,65 @@
+"""What the results of a study depend on, apart from the values on its axes."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from rubhpc.rig.reading import with_keys
+from rubhpc.study.axes import FROM_REST
+from rubhpc.study.contact_axes import PREFIX
+
+if TYPE_CHECKING:
+    from rubhpc.study.study import Study
+
+PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before
+WHOLE = "n (this sample is drawn as a whole and cannot grow)"
+_AXIS = "axis"  # in place of a value that every case sets
+
+
+def identity_parts(study: Study) -> dict[str, Any]:
+    """Return all that changes the results of a study except the values on its axes, for JSON.
+
+    A key of rig or contact that is an axis is left out, since every case sets it. Of a sample that can grow,
+    everything but the number of points is included.
+    """
+    keys = [axis.name for axis in study.axes if axis.is_rig_key]
+    rig = with_keys(
+        study.rig, {axis.name: axis.values[0] for axis in study.axes if axis.is_rig_key}
+    ).as_dict()
+    for key in keys:
+        _blank(rig, key.split("."))
+    del rig["name"]
+    contact = asdict(study.contact)
+    contact |= {axis.name.removeprefix(PREFIX): _AXIS for axis in study.axes if axis.is_contact_key}
+    swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
+    parts = {
+        "physics": PHYSICS,
+        "axes": [axis.name for axis in study.axes],
+        **({"sweep": swept} if swept else {}),  # absent in older stores
+        "rig": rig,
+        "contact": contact,
+        "integrator": asdict(study.integrator),
+        "record": asdict(study.recording) | {"keep": sorted(study.recording.keep)},
+    }
+    if study.sample is not None:
+        ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
+        parts["sample"] = {
+            "method": study.sample.method,
+            "seed": study.sample.seed,
+            "ranges": ranges,
+            **({} if study.sample.can_grow else {WHOLE: study.sample.n}),
+        }
+    return parts
+
+
+def _blank(table: Any, key: list[str]) -> None:
+    """Replace the value of a dotted key, in one item of a list or in all."""
+    if isinstance(table, list):
+        items, rest = ([table[int(key[0]) - 1]], key[1:]) if key[0].isdigit() else (table, key)
+        for item in items:
+            _blank(item, rest)
+    elif len(key) == 1:
+        table[key[0]] = _AXIS
+    else:
+        _blank(table[key[0]], key[1:])
