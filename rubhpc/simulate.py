@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
+from rubhpc.fem.stability import instability_message
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
@@ -120,9 +123,13 @@ def simulate(
         spin = ratio * first_lateral_frequency(model)
     else:
         spin = parse_quantity(speed, "rad/s", "simulate: speed")
+    unstable = instability_message(model, spin)
+    amplitude = math.nan if unstable else contact_free_amplitude(model, spin)
     if clearance_ratio is not None:
         ratio = parse_quantity(clearance_ratio, "", "simulate: clearance_ratio")
-        gap = ratio * contact_free_amplitude(model, spin)
+        if unstable:
+            raise InputError(f"simulate: clearance_ratio: {unstable}; give clearance instead")
+        gap = ratio * amplitude
     else:
         gap = parse_quantity(clearance, "m", "simulate: clearance")
     for stator in model.stators:
@@ -164,5 +171,5 @@ def simulate(
         keep=tuple(keep),
     )
     record = run_case(setup, clearance=gap, friction=mu, recording=recording, initial=initial)
-    record.settings["contact_free_amplitude"] = contact_free_amplitude(model, spin)
-    return record
+    record.settings["contact_free_amplitude"] = amplitude
+    return replace(record, note=unstable)

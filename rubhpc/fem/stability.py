@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+from scipy.linalg import eigvalsh
+
 from rubhpc.fem.modes import modes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Body, Model
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 _ROUNDING = 1e-8
 _ROUNDING_OF_GREATEST = 1e-12
 _RESOLUTION = 1e-6  # of a threshold speed
+_SYMMETRY = 1e-12  # of a matrix, that is rounding
 
 
 def logarithmic_decrement(mode: Mode) -> float:
@@ -41,6 +44,20 @@ def unstable_modes(body: Body, spin: float = 0.0) -> list[Mode]:
     Growth is `mode.eigenvalue.real`, 1/s.
     """
     return growing_modes(modes(body, spin))
+
+
+def is_passive(body: Body) -> bool:
+    """Whether nothing in a body can feed a motion, so that it is stable at every spin.
+
+    The stiffness is symmetric (no circulation) and nowhere negative, and the damping takes energy from
+    every velocity; gyroscopic forces do no work.
+    """
+    stiffness, damping = body.stiffness, (body.damping + body.damping.T) / 2
+    greatest = np.abs(stiffness).max(initial=0.0)
+    if np.abs(stiffness - stiffness.T).max(initial=0.0) > _SYMMETRY * greatest:
+        return False
+    spectra = [eigvalsh(matrix) for matrix in (stiffness, damping) if matrix.size]
+    return all(values[0] >= -_SYMMETRY * np.abs(values).max() for values in spectra)
 
 
 def growing_modes(found: Sequence[Mode]) -> list[Mode]:
@@ -80,7 +97,8 @@ def threshold_speed(
 
 def instability_message(model: Model, spin: float) -> str:
     """Return one line that says how the rotor is unstable at a spin (rad/s); "" where it is stable."""
-    grows = unstable_modes(model.rotor, spin)
+    rotor = model.rotor.at(spin)
+    grows = [] if is_passive(rotor) else unstable_modes(rotor, spin)
     if not grows:
         return ""
     mode = grows[0]

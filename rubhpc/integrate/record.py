@@ -104,6 +104,8 @@ class Record:
     ----------
     status : int
         `schema.DONE` or `schema.DIVERGED`; a diverged case holds NaN and says why in `reason`.
+    note : str
+        What is wrong with the rig at this speed: an unstable rotor.
     signals : dict of (n_sample,) or (n_stator, n_sample)
         Shaft-locked samples over the recorded revolutions, SI units as in `rubhpc.schema`.
     spectra : dict of (n_order,) or (n_stator, n_order)
@@ -120,6 +122,7 @@ class Record:
 
     status: int = DONE
     reason: str = ""
+    note: str = ""
     samples_per_revolution: int
     signals: dict[str, Floats] = field(default_factory=dict)
     spectra: dict[str, Floats] = field(default_factory=dict)
@@ -140,9 +143,10 @@ class Record:
     def remark(self) -> str:
         """Why the case diverged, or what is wrong with its result; "" where nothing is."""
         residual = self.measures.get("energy_residual", 0.0)
-        if self.reason or not residual > MOST_RESIDUAL:
-            return self.reason
-        return f"its energy balance is off by {100 * residual:.2g} %; take a shorter step"
+        texts = [text for text in (self.reason, self.note) if text]
+        if not self.reason and residual > MOST_RESIDUAL:
+            texts.append(f"its energy balance is off by {100 * residual:.2g} %; take a shorter step")
+        return "; ".join(texts)
 
     def __repr__(self) -> str:
         """One line: status and what it holds."""

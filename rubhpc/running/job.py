@@ -109,6 +109,9 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
         for i, sequence in enumerate(sequences)
         if any(missing_share(block, is_missing) for block in sequence)
     ]
+    if pending and not request.quiet:
+        for line in grid.warnings():
+            print(f"warning: {line}", flush=True)
     if pending:
         _warm_up(grid, sequences[pending[-1]][0], stopping)
     return Job(

@@ -51,6 +51,8 @@ class Plan:
         For what is missing, from the pilot cases; NaN where they failed.
     failures : tuple of str
         Coordinates of the pilot cases that failed, and why.
+    warnings : tuple of str
+        Unstable speeds, and a sag beyond the clearance.
     """
 
     title: str
@@ -65,6 +67,7 @@ class Plan:
     steps: int
     core_hours: float
     failures: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def _idle(self) -> str:
@@ -92,6 +95,7 @@ class Plan:
                 + ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING)),
                 f"to compute  {self.steps:.3g} steps, {cost}",
                 *(f"failed      a pilot case: {text}" for text in self.failures),
+                *(f"warning     {text}" for text in self.warnings),
             ]
         )
 
@@ -138,6 +142,7 @@ def make_plan(study: Study) -> Plan:
         steps=round(steps),
         core_hours=steps * pace / 3600 if left else 0.0,
         failures=tuple(failures),
+        warnings=grid.warnings(),
     )
 
 

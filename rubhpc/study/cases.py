@@ -24,6 +24,7 @@ from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.identity import identity_parts
 from rubhpc.study.operating_points import OperatingPoints
 from rubhpc.study.points import Points, boxed
+from rubhpc.study.warnings import warnings_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -203,6 +204,10 @@ class CaseGrid:
         with _named(self.study):
             found = self._operating_points.arrays()
         return {name: (tuple(self.dims[i] for i in dims), values) for name, (dims, values) in found.items()}
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return what the study is to be warned of: unstable speeds, sag beyond the clearance."""
+        return warnings_of(self._operating_points)
 
     def _case(self, index: tuple[int, ...], name: str) -> Case:
         speed, amplitude = self._operating_points.response(index)

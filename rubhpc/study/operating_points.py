@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fem.assemble import assemble
+from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.constraints import find_rigid_body_mode
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
+from rubhpc.fem.stability import instability_message, is_passive
+from rubhpc.fem.statics import sag_at_stators
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.axes import CLEARANCE_AXES, SPEED_AXES
 from rubhpc.study.contact_axes import choices_of, contact_at
@@ -45,6 +47,8 @@ class OperatingPoints:
     ----------
     points : Points
         Where the cases lie; an index here is one along its dimensions.
+    is_clearance_ratio : bool
+        Whether clearances are given as shares of the contact-free amplitude.
     costly_dims : list of int
         The dimensions along which speed, rig or contact change: cases that differ there share no setup.
 
@@ -65,7 +69,7 @@ class OperatingPoints:
             for options in (SPEED_AXES, CLEARANCE_AXES, ("friction",))
         )
         self._is_speed_ratio = names[self._speed_axis] == "speed_ratio"
-        self._is_clearance_ratio = names[self._clearance_axis] == "clearance_ratio"
+        self.is_clearance_ratio = names[self._clearance_axis] == "clearance_ratio"
         self._contact_axes = [i for i, axis in enumerate(study.axes) if axis.is_contact_key]
         self._rig_axes = [i for i, axis in enumerate(study.axes) if axis.is_rig_key]
         rotor_axes = [i for i in self._rig_axes if names[i].startswith("rotor.")]
@@ -80,6 +84,7 @@ class OperatingPoints:
         self._rig_at = lru_cache(maxsize=256)(self._make_rig)
         self._contact_at = lru_cache(maxsize=4096)(self._make_contact)
         self._model_at = lru_cache(maxsize=4)(self._make_model)
+        self._is_passive_at = lru_cache(maxsize=65536)(self._make_is_passive)
         self._unit_speed_at = lru_cache(maxsize=65536)(self._make_unit_speed)
         self._response_at = lru_cache(maxsize=65536)(self._make_response)
         self._limit_at = lru_cache(maxsize=4096)(self._make_limit)
@@ -93,13 +98,27 @@ class OperatingPoints:
         return self._rig_at(self._on(self._rig_axes, index))
 
     def response(self, index: Index) -> tuple[float, float]:
-        """Spin speed (rad/s) and contact-free amplitude (m) of a case."""
+        """Spin speed (rad/s) and contact-free amplitude (m; NaN of an unstable rotor) of a case."""
         return self._response_at(self._on(self._response_axes, index), self._on([self._speed_axis], index)[0])
+
+    def instability(self, index: Index) -> str:
+        """How the rotor of a case is unstable at its speed; "" where it is stable."""
+        return instability_message(
+            self._model_at(self._on(self._response_axes, index)), self.response(index)[0]
+        )
+
+    def sag_beyond(self, index: Index, clearance: float) -> float:
+        """How far constant loads bend the rotor of a case into a stator, m; negative where they do not."""
+        model = self._model_at(self._on(self._response_axes, index))
+        model = model_at(model, self.response(index)[0])
+        nearer, _ = sag_at_stators(model)
+        offset = [stator.clearance_offset for stator in self.rig(index).stator]
+        return float(max(nearer - offset)) - clearance if model.sag.any() else -math.inf
 
     def clearance(self, index: Index) -> float:
         """Radial clearance at rest of a case, m."""
         (value,) = self._on([self._clearance_axis], index)
-        return value * self.response(index)[1] if self._is_clearance_ratio else value
+        return value * self.response(index)[1] if self.is_clearance_ratio else value
 
     def friction(self, index: Index) -> float:
         """Coefficient of friction of a case."""
@@ -135,7 +154,7 @@ class OperatingPoints:
         speed = table[tuple(slice(None) if dim in along_speed else 0 for dim in along)][..., 0]
         along_clearance = self._dims(self._clearance_axis)
         clearance = np.array(self._values[self._clearance_axis], dtype=np.float64)
-        if self._is_clearance_ratio:
+        if self.is_clearance_ratio:
             whole = sorted({*along, *along_clearance})
             clearance = self._laid(clearance, along_clearance, whole) * self._laid(amplitude, along, whole)
             along_clearance = whole
@@ -227,10 +246,20 @@ class OperatingPoints:
         """Speed, rad/s, of 1 on the speed axis."""
         return first_lateral_frequency(self._model_at(values)) if self._is_speed_ratio else 1.0
 
+    def _make_is_passive(self, values: Values) -> bool:
+        """Whether the rotor is stable at every speed, as can be seen at once."""
+        rotor = self._model_at(values).rotor
+        return rotor.by_speed is None and is_passive(rotor)
+
     def _make_response(self, values: Values, speed: float) -> tuple[float, float]:
         speed = speed * self._unit_speed_at(values)
         amplitude = contact_free_amplitude(self._model_at(values), speed)
-        if self._is_clearance_ratio and not amplitude > 0:
+        is_stable = self._is_passive_at(values)
+        if problem := "" if is_stable else instability_message(self._model_at(values), speed):
+            if self.is_clearance_ratio:
+                raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead")
+            amplitude = math.nan
+        if self.is_clearance_ratio and not amplitude > 0:
             problem = f"no contact-free amplitude at {speed:.6g} rad/s to take it of"
             raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead")
         return speed, amplitude

@@ -1,0 +1,75 @@
+"""What a study is warned of before it runs: unstable rotors, and shafts that sag beyond their clearance."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.study.operating_points import OperatingPoints
+
+_RPM = 30 / math.pi
+_MOST_SAGS = (
+    4096  # pairs of rotor and speed whose sag is compared with the clearance; of more, an even spread
+)
+
+
+def warnings_of(points: OperatingPoints) -> tuple[str, ...]:
+    """Return a line for each thing that is likely to be a mistake; none as a rule."""
+    found = (_instability(points), _sag(points))
+    return tuple(line for line in found if line)
+
+
+def _instability(points: OperatingPoints) -> str:
+    """Which speeds have an unstable rotor, and how the first one is unstable."""
+    arrays = points.arrays()
+    dims, amplitude = arrays["contact_free_amplitude"]
+    unstable = np.argwhere(np.isnan(amplitude))
+    if not unstable.size:
+        return ""
+    at = [0] * len(points.points.dims)
+    speeds = []
+    for place in unstable:
+        for dim, i in zip(dims, place.tolist(), strict=True):
+            at[dim] = i
+        speeds.append(points.response(tuple(at))[0] * _RPM)
+        if len(speeds) == 1:
+            first = points.instability(tuple(at))
+    n = f"{len(unstable)} of {amplitude.size} operating points, {_span(np.array(speeds))}"
+    return f"at {n}: {first}"
+
+
+def _sag(points: OperatingPoints) -> str:
+    """Where a clearance from a ratio is less than the shaft's sag towards a stator."""
+    if not points.is_clearance_ratio:
+        return ""
+    dims, clearance = points.arrays()["clearance"]
+    every = np.argwhere(np.ones_like(clearance, dtype=bool))
+    spread = every[np.unique(np.linspace(0, len(every) - 1, min(len(every), _MOST_SAGS)).round().astype(int))]
+    worst, n_bad, text = 0.0, 0, ""
+    for place in spread:
+        at = [0] * len(points.points.dims)
+        for dim, i in zip(dims, place.tolist(), strict=True):
+            at[dim] = i
+        gap = clearance[tuple(place)]
+        overlap = points.sag_beyond(tuple(at), float(gap))
+        n_bad += overlap > 0.0
+        if overlap > worst:
+            worst = overlap
+            text = f"by up to {overlap:.3g} m at a clearance of {gap:.3g} m"
+    if not n_bad:
+        return ""
+    share = f"{n_bad} of {len(spread)}"
+    return (
+        f"[grid] clearance_ratio: the sag of the shaft exceeds {share} clearances, {text}: it rests on a "
+        "stator, and the ratio says little; give clearance instead"
+    )
+
+
+def _span(speeds: NDArray[np.float64]) -> str:
+    low, high = speeds.min(), speeds.max()
+    return f"{low:.6g} rpm" if low == high else f"{low:.6g} to {high:.6g} rpm"
