@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Body
 
+FAR_APART = "lengths, stiffnesses or densities are too far apart to compute with; correct them"
+ROUNDING = 1e-13  # least eigenvalue, with a unit diagonal, at which a mass matrix counts as definite
 MOST_DEGREES = 3000  # of freedom of a rig: its matrices are dense, 72 MB each
 
 
@@ -43,10 +45,10 @@ def check_computable(part: str, body: Body) -> None:
         if not (diagonal > 0.0).all():
             raise np.linalg.LinAlgError
         size = np.sqrt(diagonal)
-        np.linalg.cholesky(body.mass / size / size[:, np.newaxis])
+        np.linalg.cholesky(body.mass / size / size[:, np.newaxis] - ROUNDING * np.eye(body.n_dof))
     except np.linalg.LinAlgError:
         raise InputError(_problem(part)) from None
 
 
 def _problem(part: str) -> str:
-    return f"{part}: lengths, stiffnesses or densities are too far apart to compute with; correct them"
+    return f"{part}: {FAR_APART}"

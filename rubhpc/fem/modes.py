@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import eig
 
+from rubhpc.errors import InputError
+from rubhpc.fem.computable import FAR_APART
 from rubhpc.fem.undamped import EPS, undamped_modes
 from rubhpc.fem.whirl import planar_twins, whirl_index, whirl_word
 
@@ -154,6 +156,8 @@ def _eigenpairs(
     state = np.block(
         [[np.zeros((n_mode, n_mode)), np.diag(sigma)], [-stiff / sigma, -basis.T @ damping @ basis]]
     )
+    if not np.isfinite(state).all():
+        raise InputError(f"modes: {FAR_APART}")
     values, vectors = eig(state)
     shapes = basis @ (vectors[:n_mode] / sigma[:, np.newaxis])
     # at critical damping rounding splits a double root by the square root of EPS

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import LinAlgError, eigh, null_space
 
+from rubhpc.errors import InputError
+from rubhpc.fem.computable import FAR_APART
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -30,11 +33,23 @@ def undamped_modes(mass: Matrix, stiffness: Matrix) -> tuple[Matrix, Matrix]:
     basis : (n_dof, n_dof)
         Shapes as columns, `basis^T M basis = 1`.
 
+    Raises
+    ------
+    InputError
+        When the matrices are too ill-conditioned.
+
     Notes
     -----
     The eigenvalues of `(K, M)` carry the rounding of the highest, that of a short stiff element. Those of
     `(M, K)` are 1/w^2, exact for the lowest, and inexact only for frequencies some 1e7 times as high.
     """
+    try:
+        return _undamped_modes(mass, stiffness)
+    except (LinAlgError, ValueError):  # which scipy raises for what is not finite
+        raise InputError(f"modes: {FAR_APART}") from None
+
+
+def _undamped_modes(mass: Matrix, stiffness: Matrix) -> tuple[Matrix, Matrix]:
     rigid = _rigid_shapes(mass, stiffness)
     if rigid.shape[1] == len(mass):
         return np.zeros(len(mass)), rigid

@@ -6,6 +6,7 @@ import pytest
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
+from rubhpc.fem.modes import modes
 from rubhpc.rig.reading import read_rig, rig_from_dict, with_keys
 
 
@@ -27,6 +28,12 @@ def test_values_far_apart_are_refused(shaft):
         assemble(rig)
     problem = "lengths, stiffnesses or densities are too far apart to compute with"
     assert str(refused.value) == f"[rotor]: {problem}; correct them"
+
+
+def test_a_shaft_as_thick_as_a_planet_has_no_modes():
+    rig = with_keys(read_rig("mokhtar2017"), {"rotor.shaft.outer_diameter": 5.6e23})
+    with pytest.raises(InputError, match=r"\A(modes|\[rotor\]): .* too far apart to compute with; correct"):
+        modes(assemble(rig).rotor)
 
 
 def test_a_ring_of_too_many_elements_is_refused():
