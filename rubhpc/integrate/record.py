@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rubhpc.integrate.record_variables import RecordVariables
 from rubhpc.schema import DONE, STATUS, VARIABLES
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ MOST_RESIDUAL = 0.01  # of the energy balance: a larger one is reported
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Record:
+class Record(RecordVariables):
     """One simulated case; every stored variable is an attribute (`record.vertical`, `record.period`).
 
     Attributes
@@ -131,10 +132,17 @@ class Record:
     settings: dict[str, float] = field(default_factory=dict)
     final: State
 
+    def _groups(self) -> tuple[dict[str, Any], ...]:
+        return self.signals, self.spectra, self.sections, self.measures, self.settings
+
+    def __dir__(self) -> list[str]:
+        """Return all attributes, the variables that this record holds among them."""
+        return sorted({*super().__dir__(), *(name for group in self._groups() for name in group)})
+
     def __getattr__(self, name: str) -> Any:
         """Return a variable by its name in the schema."""
         if not name.startswith("_"):
-            for group in (self.signals, self.spectra, self.sections, self.measures, self.settings):
+            for group in self._groups():
                 if name in group:
                     return group[name]
         raise AttributeError(f"this record holds no {name}")

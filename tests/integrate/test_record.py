@@ -1,10 +1,14 @@
 """A record: variables by name, one line to print, a dataset with units; and the state it ends in."""
 
+import ast
+import inspect
+
 import numpy as np
 import pytest
 
 from rubhpc import read_rig
 from rubhpc.fem.assemble import assemble
+from rubhpc.integrate import record_variables
 from rubhpc.integrate.measures import diverged_record
 from rubhpc.integrate.record import Record, State
 from rubhpc.schema import DIVERGED, VARIABLES
@@ -45,6 +49,25 @@ def test_variables_are_attributes(record):
     assert not hasattr(record, "horizontal")
     with pytest.raises(AttributeError, match="holds no torsion"):
         _ = record.torsion
+
+
+def test_a_record_lists_its_variables(record):
+    names = dir(record)
+    assert {"vertical", "peak_contact_force", "clearance", "to_dataset"} <= set(names)
+    assert "horizontal" not in names  # this one does not hold it
+
+
+def test_types_of_variables_are_those_of_the_schema():
+    """Editors and type checkers read these; at run time they are no attributes of the class."""
+    tree = ast.parse(inspect.getsource(record_variables))
+    typed = {a.target.id: a.annotation.id for a in ast.walk(tree) if isinstance(a, ast.AnnAssign)}
+    expected = {
+        variable.name: "Floats" if variable.dims else "int" if variable.dtype.startswith("int") else "float"
+        for variable in VARIABLES.values()
+        if variable.role != "state" and variable.name != "status"
+    }
+    assert typed == expected
+    assert not hasattr(record_variables.RecordVariables, "vertical")
 
 
 def test_one_line_says_what_it_holds(record):
