@@ -57,20 +57,30 @@ def simulate(
     ----------
     rig : Rig, str or path
         A rig, the name of a packaged one ("mokhtar2017"), or the path of a rig file.
-    speed : float (rad/s) or str with a unit, or speed_ratio : float
-        Rotation speed, or its ratio to the rotor's first lateral frequency at standstill.
-    clearance : float (m) or str with a unit, or clearance_ratio : float
-        Radial clearance, or its ratio to the contact-free amplitude at that speed.
+    speed : float (rad/s) or str with a unit, optional
+        Rotation speed; either this or `speed_ratio`.
+    speed_ratio : float, optional
+        Rotation speed over the rotor's first lateral frequency at standstill.
+    clearance : float (m) or str with a unit, optional
+        Radial clearance; either this or `clearance_ratio`.
+    clearance_ratio : float, optional
+        Radial clearance over the contact-free amplitude at that speed.
     friction : float
         Coefficient of friction.
     overrides : dict, optional
         Single keys of the rig: `{"stator.youngs_modulus": "30 GPa"}`.
     law : {"lagrange", "penalty"}
-        Gaps closed exactly, or by a spring of `stiffness` (N/m) and a damper of `damping` (N s/m).
+        Gaps closed exactly, or by a spring and a damper.
+    stiffness : float (N/m) or str with a unit, optional
+        Of the penalty's spring, which needs one.
+    damping : float (N s/m) or str with a unit, optional
+        Of the penalty's damper; default none.
     restitution : float, optional
         Normal velocity after an impact over that before it, 0 to 1; default none.
     friction_law : {"sliding", "coulomb"}
-        Steady sliding; or set-valued, with stick, and `static_friction_ratio` (1 or more) at rest.
+        Steady sliding; or set-valued, with stick.
+    static_friction_ratio : float, optional
+        Coefficient of friction at rest over that in sliding, 1 or more, of Coulomb's law; default 1.
     normal : {"fixed", "updated"}
         Contact normal along the stator's axis, or along the line of centres.
     method : {"modal", "central-difference"}
@@ -81,11 +91,16 @@ def simulate(
         is less).
     accuracy : float
         Relative accuracy of the modal integrator: how many modes it keeps.
-    transient : int or "auto", revolutions : int, samples_per_revolution : int
-        Revolutions thrown away, revolutions kept, samples in each.
-    transient_limit : int, transient_tolerance : float, optional
-        With `transient="auto"`, revolutions are thrown away until displacements repeat themselves after 8 or
-        12 revolutions to this share of their largest value (1e-4), but no more than the limit (240).
+    transient : int or "auto"
+        Revolutions discarded; "auto" until displacements repeat themselves after 8 or 12 revolutions.
+    transient_limit : int, optional
+        Most revolutions discarded with `transient="auto"`; default 240.
+    transient_tolerance : float, optional
+        Share of their largest value by which they may differ with `transient="auto"`; default 1e-4.
+    revolutions : int
+        Revolutions recorded.
+    samples_per_revolution : int
+        Samples in each, an even number.
     keep : tuple of {"waveform", "spectrum", "section"}
         What the record holds besides its measures.
     initial : State, optional
