@@ -16,19 +16,9 @@ from postproc.catalogue import figures
 from rubhpc import __version__
 from rubhpc.errors import RubError, printable
 from rubhpc.running.launch import launch
+from rubhpc.threads import VARIABLES
 
 _STOPPED = 75
-# One thread a rank: BLAS, numba and zarr would each start as many as the machine has cores. BLAS's sums would
-# also depend on the number of threads, and so would the last bit of a result.
-_THREADS = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "BLIS_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-    "ZARR_THREADING__MAX_WORKERS",
-)
-
 # name -> (where it is, what it does). The figure commands come from `postproc.catalogue`.
 COMMANDS = {
     "run": ("rubhpc.commands.run:run", "Run a study, or what is left of it (run may be left out)."),
@@ -108,7 +98,7 @@ def commands() -> None:
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line and exit with its code."""
-    for name in _THREADS:
+    for name in VARIABLES:
         os.environ[name] = "1"
     try:
         code = commands.main(args, prog_name="rubhpc", standalone_mode=False)

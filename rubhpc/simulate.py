@@ -17,6 +17,7 @@ from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import Record
 
 
+@on_one_thread
 def simulate(
     rig: Rig | str | PathLike[str],
     *,

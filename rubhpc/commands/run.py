@@ -26,6 +26,12 @@ _TRUST = click.option(
 @click.option(
     "--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more than N cases fail."
 )
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Share the work among N processes of this machine, without MPI.",
+)
 @click.option("--time-limit", metavar="TIME", help='Stop after TIME: "2 h", or seconds.')
 @click.option(
     "--accept-version",
@@ -44,12 +50,13 @@ def run(
     trust_rig: bool,
     retry_failed: bool,
     max_failures: int | None,
+    workers: int | None,
     time_limit: str | None,
     accept_version: bool,
     only: str | None,
     quiet: bool,
 ) -> int:
-    """Run STUDY.toml, or what is left of it; under mpirun, on all its ranks.
+    """Run STUDY.toml, or what is left of it; with --workers, or under mpirun, on several processes.
 
     It stops cleanly, with code 75, on SIGTERM, SIGINT or SIGUSR1, at its time limit, or when a file STOP is
     created in the store; the same command resumes it.
@@ -70,6 +77,7 @@ def run(
             max_failures=max_failures,
             time_limit=None if time_limit is None else quantity(time_limit, "s", "--time-limit"),
             accept_version=accept_version,
+            workers=workers,
             quiet=quiet,
             stopping=stopping,
         )

@@ -116,7 +116,9 @@ def enter(
     for part in range(2):
         rows = tables.enter_re[mode] if part == 0 else tables.enter_im[mode]
         target = z[part]
-        target[:] = -tables.enter_cosine[mode, part] * cosine - tables.enter_sine[mode, part] * sine
+        from_cosine, from_sine = tables.enter_cosine[mode, part], tables.enter_sine[mode, part]
+        for k in range(target.size):  # arrays in one expression would take 5 s longer to compile
+            target[k] = -from_cosine[k] * cosine - from_sine[k] * sine
         for i in range(clearance.size):
             source = tables.enter_constant[mode, i, part]
             for k in range(target.size):

@@ -367,7 +367,8 @@ def take_event(
         return DIVERGED
     if is_recorded:
         end_span(tables, clock, z, progress, recorder, accumulator)
-        work.impulse[:] = accumulator.impulse
+        for i in range(q):
+            work.impulse[i] = accumulator.impulse[i]
     if reduced.is_set_valued and has_any_turned(reduced, closed | crossing, spin, motion[n:]):
         return SLIP_TURNED
     angle = shaft_angle(clock, progress.tick)

@@ -57,6 +57,7 @@ def part(
         An outcome of `kernels.event_loop.advance`; with MODE_WANTED call again once the mode is tabulated.
     """
     progress = pair.progress
+    is_recorded = n_tick < 0  # never; `advance` would be compiled once more for a literal
     if pair.size[0] == 0.0:
         read_motion(tables, progress[0].mode, pair.z[0], pair.motion[0])
         displace(tables, clock.spin, pair)
@@ -68,7 +69,7 @@ def part(
                     reduced,
                     clock,
                     n_tick,
-                    False,
+                    is_recorded,
                     progress[k],
                     pair.z[k],
                     pair.z_next,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import RubError, StoppedEarly
+from rubhpc.integrate.compilation import announced_by, seconds_compiling
 from rubhpc.running.crash import crash
 from rubhpc.running.job import RunRequest, prepare_job
-from rubhpc.running.launch import move_to
 from rubhpc.running.pool import Pool, RankLost, Totals, connect
 from rubhpc.running.progress import Progress
 from rubhpc.running.stopping import Stopping
 from rubhpc.running.watchdog import Watchdog
 from rubhpc.running.worker import Worker
+from rubhpc.running.workers import start_workers
 from rubhpc.schema import DONE, FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.in_progress import InProgress, forget
@@ -30,6 +31,7 @@ from rubhpc.storage.store import Store
 from rubhpc.storage.summary import Summary
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import Study, read_study
+from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     import os
@@ -42,6 +44,7 @@ _PACKING_GAP = 600.0  # s between packings while a run is on; one takes 5 s for 
 _REASONS = 100  # failed cases a summary names, at most
 
 
+@on_one_thread
 def run(
     study: Study | str | os.PathLike[str],
     *,
@@ -51,10 +54,11 @@ def run(
     time_limit: float | None = None,
     accept_version: bool = False,
     trust_rig: bool = False,
+    workers: int | None = None,
     quiet: bool = False,
     stopping: Stopping | None = None,
 ) -> Summary:
-    """Run a study, or what is left of it, on this process or on all MPI ranks it is called on.
+    """Run a study, or what is left of it, on this process, on `workers`, or on all MPI ranks it is called on.
 
     Parameters
     ----------
@@ -72,6 +76,8 @@ def run(
         Keep the cases of a store that another version of the physics has computed, and continue.
     trust_rig : bool
         Whether a rig that is Python code, `rig = "my_rig.py:build"`, may be run.
+    workers : int, optional
+        Processes of this machine that share the work, this one among them; they need no MPI.
     quiet : bool
         Print no progress.
     stopping : Stopping, optional
@@ -100,10 +106,42 @@ def run(
         )
         return replace(found, run=limits, output=found.output if output is None else Path(output))
 
-    pool = connect()
+    with nullcontext(connect()) if workers is None else start_workers(workers) as pool:
+        return _run_in(
+            pool,
+            resolve,
+            stopping or Stopping(),
+            retry_failed=retry_failed,
+            accept_version=accept_version,
+            quiet=quiet,
+        )
+
+
+@on_one_thread
+def take_part(pool: Pool, stopping: Stopping) -> None:
+    """Do a worker's part of a run; everything it has to know comes from the first rank."""
+
+    def unknown() -> Study:
+        raise AssertionError("a worker is not the first rank")
+
+    _run_in(pool, unknown, stopping, retry_failed=False, accept_version=False, quiet=True)
+
+
+def _run_in(
+    pool: Pool,
+    resolve: Callable[[], Study],
+    stopping: Stopping,
+    *,
+    retry_failed: bool,
+    accept_version: bool,
+    quiet: bool,
+) -> Summary:
+    """Run what the first rank resolves, on all ranks of a pool."""
     resolved: Study | None = None
     try:
-        with stopping or Stopping() as watch, ExitStack() as held:
+        with stopping as watch, ExitStack() as held:
+            watch.forward_to(pool.stop)
+            held.enter_context(announced_by(_say_nothing if quiet else _say))
             resolved = pool.from_first(resolve)
             watch.watch(resolved.output / "STOP", resolved.run.time_limit)
             request = RunRequest(
@@ -117,6 +155,7 @@ def run(
             summary = _run(request, pool)
     except RankLost as error:  # and no rank can continue
         pool.abort(error.exit_code)
+        raise
     except RubError:  # raised on all ranks alike
         pool.close()
         raise
@@ -130,15 +169,27 @@ def run(
     return summary
 
 
+def _clock() -> float:
+    """Seconds, but for those in which this rank compiles."""
+    return time.monotonic() - seconds_compiling()
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
+
+
+def _say_nothing(text: str) -> None:
+    pass
+
+
 def _run(request: RunRequest, pool: Pool) -> Summary:
     """Run the study, again on those that are left where ranks are lost on the way."""
-    began, n_rank = time.monotonic(), pool.size
+    began, n_rank = _clock(), pool.size
     is_broken = False
     while True:
         try:
             if is_broken:
                 pool.leave_lost()
-                move_to(pool.rank, pool.size)
                 is_broken = False
             return replace(_round(request, pool, began), lost=n_rank - pool.size)
         except RankLost:
@@ -153,7 +204,7 @@ def _round(request: RunRequest, pool: Pool, began: float) -> Summary:
     if job.suspect and not request.stopping.look():
         _together(pool, lambda: _try_suspects(job, pool, request.stopping))
     reason = next((reason for reason in pool.gather(request.stopping.verdict) if reason), "")
-    summary = pool.from_first(lambda: _finish(job, pool.totals().n_case, time.monotonic() - began))
+    summary = pool.from_first(lambda: _finish(job, pool.totals().n_case, _clock() - began))
     n_missing = summary.counts[MISSING]
     if n_missing and reason:
         raise StoppedEarly(
@@ -187,7 +238,7 @@ def _compute(job: Job, pool: Pool, request: RunRequest) -> None:
     sequences = [every[i] for i in job.pending]
     quiet = request.quiet or pool.rank > 0
     with (
-        _progress(job, grid, sequences, quiet=quiet, has_bar=pool.size == 1) as progress,
+        _progress(job, grid, sequences, quiet=quiet, has_bar=not pool.is_launched) as progress,
         _open_worker(job, pool, grid, store, stopping, "rank", progress) as worker,
     ):
         next_packing = time.monotonic() + _PACKING_GAP

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.case import compile_kernels, run_case
-from rubhpc.running.worker import set_up
+from rubhpc.running.pilots import count_preparations, seconds_of, time_pilots
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 from rubhpc.storage.duration import duration
 from rubhpc.storage.growth import origins
@@ -19,16 +17,13 @@ from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import cases_without_files, grid_for, is_store, missing_share
 from rubhpc.storage.store import Store
 from rubhpc.study.sampling import CASE
+from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rubhpc.study.cases import Block, CaseGrid
-    from rubhpc.study.study import Recording, Study
+    from rubhpc.study.study import Study
 
-_PILOTS, _FEW_PILOTS, _ENOUGH = 9, 3, 20.0  # cases; run even if slow; seconds after which no more are started
-_FIRST_STEPS, _PILOT_TIME = 50_000, 1.0  # predicted, of a pilot's first try; seconds of its longest, about
-_SECTION = 0.618  # golden: shares k * _SECTION (mod 1) spread evenly, however many
 _LINE = 400  # bytes of a case in a journal, about, for one stator
 _FIXED_FILES = 85  # metadata, packed arrays and coordinates
 
@@ -100,6 +95,7 @@ class Plan:
         )
 
 
+@on_one_thread
 def make_plan(study: Study) -> Plan:
     """Count, look into the store if there is one, and time pilot cases; writes nothing.
 
@@ -123,7 +119,8 @@ def make_plan(study: Study) -> Plan:
     missing = (status == MISSING).reshape(grid.shape)
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
     steps = sum(block.cost * share for block, share in left)
-    pace, failures = _pace(grid, manifest, [block for block, _ in left])
+    pace, failures = time_pilots(grid, manifest, [block for block, _ in left])
+    seconds = seconds_of(pace, steps, count_preparations(grid, missing)) if left else 0.0
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
     names = {axis.coordinate: axis.name for axis in study.axes}  # a dimension as the study names its axis
     if study.sample is not None:
@@ -140,70 +137,10 @@ def make_plan(study: Study) -> Plan:
         n_file=len(blocks) * len(manifest.variables) + _FIXED_FILES,
         n_byte=grid.n_case * (per_case + 2 * _LINE),
         steps=round(steps),
-        core_hours=steps * pace / 3600 if left else 0.0,
+        core_hours=seconds / 3600,
         failures=tuple(failures),
         warnings=grid.warnings(),
     )
-
-
-def _pace(grid: CaseGrid, manifest: Manifest, blocks: list[Block]) -> tuple[float, list[str]]:
-    """Seconds a predicted step takes, and what failed.
-
-    The mean over cases spread evenly from the longest block to the last, each from another place in its
-    block: the first cases of all blocks share a value on every axis that a block spans.
-    """
-    paces, failures = [], []
-    spread = np.linspace(0, len(blocks) - 1, _PILOTS).round().astype(int)
-    picked: list[int] = np.unique(spread).tolist() if blocks else []
-    began = time.monotonic()
-    for k, i in enumerate(picked):
-        if k >= _FEW_PILOTS and time.monotonic() - began > _ENOUGH:
-            break
-        block = blocks[i]
-        box = np.unravel_index(int(k * _SECTION % 1.0 * math.prod(block.shape)), block.shape)
-        index = tuple(int(start + step) for start, step in zip(block.start, box, strict=True))
-        try:
-            paces.append(_pilot(grid, index, block.cost / math.prod(block.shape)))
-        except Exception as error:  # whatever is wrong with the case: the others are timed all the same
-            where = manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))
-            failures.append(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}")
-    return (float(np.mean(paces)) if paces else math.nan), failures
-
-
-def _pilot(grid: CaseGrid, index: tuple[int, ...], steps: float) -> float:
-    """Seconds per predicted step of a case, shortened where the whole of it takes long.
-
-    Revolutions that are recorded cost more than those thrown away: their shares stay.
-    """
-    study, case = grid.study, grid.case(index)
-    whole = study.recording
-    setup = set_up(study, case)
-
-    def seconds(recording: Recording) -> float:
-        record = run_case(setup, clearance=case.clearance, friction=case.friction, recording=recording)
-        return float(record.measures["wall_time"])
-
-    def shortened(transient: int, revolutions: int) -> Recording:
-        return replace(
-            whole,
-            transient=transient,
-            transient_limit=None,
-            transient_tolerance=None,
-            revolutions=revolutions,
-        )
-
-    compile_kernels(setup, clearance=case.clearance, friction=case.friction, recording=shortened(0, 1))
-    share = min(1 / 16, _FIRST_STEPS / steps)
-    while True:
-        transient, revolutions = round(share * whole.longest_transient), round(share * whole.revolutions) or 1
-        taken = seconds(shortened(transient, revolutions))
-        done = (transient + revolutions) / (whole.longest_transient + whole.revolutions)
-        longer = min(1.0, done * _PILOT_TIME / taken, 4 * share)  # a rub may begin late, and then costs more
-        if longer == 1.0:
-            return seconds(whole) / steps
-        if longer < 2 * share:
-            return taken / (steps * done)
-        share = longer
 
 
 def _size(n_byte: float) -> str:

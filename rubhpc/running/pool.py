@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar
 import numpy as np
 
 from rubhpc.errors import InputError, RubError
-from rubhpc.running.launch import Launch, end_with_launcher, killed_with_launcher, launch
+from rubhpc.running.launch import Launch, end_with_launcher, killed_with_launcher, launch, move_to
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -56,6 +56,7 @@ class Pool(Protocol):
 
     rank: int
     size: int
+    is_launched: bool  # by mpirun or the like, which stands between the ranks and the terminal
 
     def from_first(self, make: Callable[[], T]) -> T:
         """What `make` returns on the first rank, on all ranks; a RubError it raises is raised on all."""
@@ -78,8 +79,11 @@ class Pool(Protocol):
     def close(self) -> None:
         """End the run together with all ranks."""
 
-    def abort(self, code: int) -> NoReturn:
-        """End every process of the run now."""
+    def stop(self) -> None:
+        """Have the others stop as this one does, unless a launcher sends its signals to all."""
+
+    def abort(self, code: int) -> None:
+        """End the other processes of the run now, or this one where a launcher then ends them."""
 
 
 class Alone:
@@ -87,6 +91,7 @@ class Alone:
 
     rank = 0
     size = 1
+    is_launched = False
 
     def __init__(self) -> None:
         self._sums = np.zeros(len(Totals()), np.int64)
@@ -119,9 +124,11 @@ class Alone:
     def close(self) -> None:
         """See Pool."""
 
-    def abort(self, code: int) -> NoReturn:
+    def stop(self) -> None:
         """See Pool."""
-        sys.exit(code)
+
+    def abort(self, code: int) -> None:
+        """See Pool."""
 
 
 class Ranks:
@@ -130,6 +137,8 @@ class Ranks:
     Where the library survives the loss of a rank (Open MPI under `mpirun --with-ft ulfm`), the others learn
     of it at their next meeting as a RankLost; elsewhere the launcher ends them all.
     """
+
+    is_launched = True
 
     def __init__(self) -> None:
         from mpi4py import MPI
@@ -191,12 +200,16 @@ class Ranks:
         with self._losses():
             self._comm = self._comm.Shrink()
         self._open()  # the old window stays: to free it takes all ranks
+        move_to(self.rank, self.size)
 
     def close(self) -> None:
         """See Pool."""
         with suppress(self._mpi.Exception):
             self._window.Unlock_all()
             self._window.Free()
+
+    def stop(self) -> None:
+        """See Pool."""
 
     def abort(self, code: int) -> NoReturn:
         """See Pool."""

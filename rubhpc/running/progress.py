@@ -6,6 +6,7 @@ import sys
 import time
 from typing import TYPE_CHECKING, Self
 
+from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.storage.duration import duration
 
 if TYPE_CHECKING:
@@ -39,7 +40,8 @@ class Progress:
         self._n_case, self._cost, self._n_done = n_case, max(cost, 1.0), n_done
         self._quiet = quiet or n_done == n_case
         self._has_bar = has_bar and sys.stdout.isatty()
-        self._began = self._shown = time.monotonic()
+        self._shown = time.monotonic()
+        self._began = self._shown - seconds_compiling()
         self._gap = _FIRST_LINE
         self._bar: Bar | None = None
 
@@ -75,13 +77,13 @@ class Progress:
         n_ended = self._n_done + sums.n_case
         if self._bar is None:
             print(f"{n_ended}/{self._n_case} cases; {self._rest(sums)}", flush=True)
-            self._gap = min(max(self._gap, 0.1 * (now - self._began)), _LONGEST_GAP)
+            self._gap = min(max(self._gap, 0.1 * (now - seconds_compiling() - self._began)), _LONGEST_GAP)
         else:
             self._bar.update(self._bar.task_ids[0], completed=n_ended, rest=self._rest(sums))
 
     def _rest(self, sums: Totals) -> str:
         """Rate, time left (by predicted steps, for cases differ) and what went wrong."""
-        seconds = max(time.monotonic() - self._began, 1e-9)
+        seconds = max(time.monotonic() - seconds_compiling() - self._began, 1e-9)
         texts = [f"{sums.n_case / seconds:.3g} a second"]
         if sums.cost:
             left = seconds * (self._cost - sums.cost) / sums.cost

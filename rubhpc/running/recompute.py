@@ -18,6 +18,7 @@ from rubhpc.storage.measures import blank_records
 from rubhpc.storage.resume import grid_for, is_store
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.study.points import Points
+from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     from typing import Any
@@ -62,6 +63,7 @@ class Reproduction:
         return "\n".join(f"{name:{width}}  {value}" for name, value in lines.items())
 
 
+@on_one_thread
 def reproduce(study: Study, name: str) -> Reproduction:
     """Compute the case whose id begins with `name`, compare every bit with the store, write nothing.
 

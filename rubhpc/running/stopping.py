@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Self
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
     from types import FrameType, TracebackType
 
@@ -34,6 +35,7 @@ class Stopping:
         self._looked = 0.0
         self._began = time.monotonic()
         self._handlers: dict[int, object] = {}
+        self._forward: Callable[[], None] = lambda: None
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
@@ -84,7 +86,15 @@ class Stopping:
 
     def ask(self, reason: str) -> None:
         """Have the run stop."""
-        self.reason = self.reason or reason
+        if not self.reason:
+            self.reason = reason
+            self._forward()
+
+    def forward_to(self, others: Callable[[], None]) -> None:
+        """Call this when the run is asked to stop."""
+        self._forward = others
+        if self.reason:
+            others()
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         if (

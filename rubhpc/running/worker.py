@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.integrate.case import run_case
+from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
 from rubhpc.running.initial_states import InitialState, InitialStates
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 
 # Seconds between syncs, at least, and times what the last took: slow disks cost 2 %.
 _SYNC_GAP, _SYNC_SHARE = 1.0, 50.0
-_SETUPS = 4  # prepared setups a rank keeps; a block shares one, and neighbours often do
+MOST_SETUPS = 4  # prepared setups a rank keeps; a block shares one, and neighbours often do
 
 
 def set_up(study: Study, case: Case, model: Model | None = None) -> Setup:
@@ -124,13 +125,13 @@ class Worker:
                 continue
             if self.stopping.look() or not self.stopping.fits(cost * self._pace):
                 break
-            began = time.perf_counter()
+            began = time.perf_counter() - seconds_compiling()
             try:
                 start = self._initial_states.start_of(cases[i_case], flat, data, entries)
                 entry = self._enter(cases[i_case], int(flat[i_case]), data, i_case, start)
             except Stopped:
                 break
-            self._seconds += time.perf_counter() - began
+            self._seconds += time.perf_counter() - seconds_compiling() - began
             self._cost += cost
             entries.append(entry)
             self.report(
@@ -228,7 +229,7 @@ class Worker:
             model = next((kept.model for rig, kept in self._setups.values() if rig is case.rig), None)
             setup = set_up(study, case, model)
             self._setups[key] = (case.rig, setup)
-            if len(self._setups) > _SETUPS:
+            if len(self._setups) > MOST_SETUPS:
                 self._setups.popitem(last=False)
         limit = self.watch.limit
         end = time.monotonic() + limit if limit else float("inf")

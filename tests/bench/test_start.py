@@ -1,6 +1,8 @@
 """Time from the shell: to the help text, and to the first case of a study."""
 
+import resource
 import subprocess
+import sys
 
 import pytest
 from running import command, environment, write_study
@@ -32,3 +34,21 @@ def test_first_case_is_done_within_three_seconds(benchmark, tmp_path):
 
     benchmark.pedantic(run, setup=study, rounds=4, warmup_rounds=1)
     assert benchmark.stats.stats.min < 3.0
+
+
+def test_kernels_of_the_first_case_are_compiled_within_a_minute(tmp_path):
+    """In processor time, with an empty cache."""
+    case = "speed_ratio=0.75, clearance_ratio=0.7, transient=1, revolutions=2, samples_per_revolution=32"
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        [sys.executable, "-c", f"import rubhpc; rubhpc.simulate('mokhtar2017', {case})"],
+        env=environment(NUMBA_CACHE_DIR=str(tmp_path)),
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    taken = after.ru_utime - before.ru_utime
+    print(f"\n{taken:.1f} s of processor time")
+    assert done.stderr == "rubhpc: compiling kernels, once after an installation: up to a minute\n"
+    assert taken < 60

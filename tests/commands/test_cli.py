@@ -235,12 +235,16 @@ def test_plan_times_a_transient_that_ends_by_itself(tmp_path, capsys):
 
 def test_pilots_see_every_value_of_an_axis_within_blocks(tmp_path, monkeypatch):
     """The first cases of blocks, which hold all of a friction axis, would never rub."""
-    from rubhpc.running import plan
+    from rubhpc.running import pilots, plan
     from rubhpc.study.study import read_study
 
     asked = []
     monkeypatch.setattr(
-        plan, "_pilot", lambda case_grid, index, steps: asked.append(case_grid.case(index)) or 1.0
+        pilots,
+        "_pilot",
+        lambda case_grid, index, steps: (
+            asked.append(case_grid.case(index)) or pilots.Pace(1.0, 0.0, 0.0, 0.0)
+        ),
     )
     study = read_study(write_study(tmp_path))
     plan.make_plan(study)
@@ -248,12 +252,12 @@ def test_pilots_see_every_value_of_an_axis_within_blocks(tmp_path, monkeypatch):
 
 
 def test_plan_tells_why_its_pilots_failed(tmp_path, monkeypatch, capsys):
-    from rubhpc.running import plan
+    from rubhpc.running import pilots
 
     def burst(*_: object) -> None:
         raise ZeroDivisionError("by\nzero")
 
-    monkeypatch.setattr(plan, "set_up", burst)
+    monkeypatch.setattr(pilots, "set_up", burst)
     code, out, err = call(capsys, "plan", write_study(tmp_path))
     assert (code, err) == (0, "")
     assert "core-hours unknown: the pilot cases failed" in out

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 
+import pytest
 from running import ROOT, environment
 
 from rubhpc.kernels import _jit
@@ -16,35 +17,71 @@ def value():
     return {value}
 """
 CALLER = """
-from probe._jit import jit
+from probe._jit import compilation, jit
 from probe.callee import value
+names = []
+compilation.began = names.append
 @jit
 def twice():
     return 2 * value()
-print(twice(), sum(twice.stats.cache_hits.values()))
+print(twice(), sum(twice.stats.cache_hits.values()), *names)
+assert compilation.seconds > 0.0 or not names
 """
 
 
-def test_change_of_a_callee_in_another_file_outdates_the_cache(tmp_path):
-    """Else a kernel would go on with the old form of what it calls."""
+@pytest.fixture
+def probe(tmp_path):
+    """A package with kernels of its own; call it to start a Python that calls one of them."""
     package = tmp_path / "probe"
     package.mkdir()
     (package / "__init__.py").touch()
     shutil.copy(ROOT / "rubhpc" / "kernels" / "_jit.py", package)
     (package / "caller.py").write_text(CALLER)
 
-    def twice(value, flavour):
+    def start(value, flavour="jit"):
+        """It prints its result, whether that came from the cache, and what was compiled."""
         (package / "callee.py").write_text(CALLEE.format(value=value, flavour=flavour))
-        run = [sys.executable, "-c", "import probe.caller"]
-        shown = subprocess.run(
-            run, cwd=tmp_path, env=environment(PYTHONPATH=""), check=True, capture_output=True, text=True
+        return subprocess.Popen(
+            [sys.executable, "-c", "import probe.caller"],
+            cwd=tmp_path,
+            env=environment(PYTHONPATH="", NUMBA_CACHE_DIR=str(tmp_path / "cache")),
+            stdout=subprocess.PIPE,
+            text=True,
         )
-        return [int(word) for word in shown.stdout.split()]
 
-    assert twice(3, "jit") == [6, 0]
-    assert twice(3, "jit") == [6, 1]  # from the cache
-    assert twice(4, "jit") == [8, 0]
-    assert twice(5, "jit_inline") == [10, 0]
+    return start
+
+
+def end(process):
+    out, _ = process.communicate(timeout=100)
+    assert process.returncode == 0
+    return out.split()
+
+
+def test_change_of_a_callee_in_another_file_outdates_the_cache(probe):
+    """Else a kernel would go on with the old form of what it calls."""
+    assert end(probe(3)) == ["6", "0", "twice"]
+    assert end(probe(3)) == ["6", "1"]  # from the cache, though the file has another date
+    assert end(probe(4)) == ["8", "0", "twice"]
+    assert end(probe(5, "jit_inline")) == ["10", "0", "twice"]
+
+
+def test_versions_that_take_turns_keep_their_caches(probe, tmp_path):
+    """As installations of two versions in one environment do; of many, the latest four are kept."""
+    assert end(probe(3)) == ["6", "0", "twice"]
+    assert end(probe(4)) == ["8", "0", "twice"]
+    assert end(probe(3)) == ["6", "1"]
+    for value in (5, 6, 7):
+        end(probe(value))
+    assert len([*tmp_path.rglob("kernels-*")]) == 4
+    assert end(probe(7)) == ["14", "1"]
+
+
+def test_processes_that_need_a_kernel_at_once_compile_it_once(probe):
+    """The others wait for the first and load what it has compiled."""
+    shown = [end(process) for process in [probe(3) for _ in range(4)]]
+    assert sorted(words[1] for words in shown) == ["0", "1", "1", "1"]
+    assert {words[0] for words in shown} == {"6"}
 
 
 @_jit.jit

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import xarray as xr
-from running import journalled_cases, write_study
+from running import journalled_cases, write_sample, write_study
 
 from rubhpc.errors import InputError, StoppedEarly, StoreError
 from rubhpc.integrate.record import Record
+from rubhpc.kernels._jit import compilation
 from rubhpc.running import driver, job, stopping, worker
 from rubhpc.running.driver import run
+from rubhpc.running.pilots import count_preparations
 from rubhpc.schema import (
     DIVERGED,
     DONE,
@@ -31,6 +33,7 @@ from rubhpc.schema import (
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
+from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import Integrator, read_study
 
 if TYPE_CHECKING:
@@ -433,3 +436,50 @@ def test_a_second_interrupt_does_not_wait(physics, study):
         run(study, quiet=True)
     with Store(study.output).lock():  # released all the same
         pass
+
+
+def test_compilations_are_announced_and_are_no_time_of_the_run(physics, study, monkeypatch, capsys):
+    def compile_slowly(*_: Any) -> None:
+        began = time.perf_counter()
+        compilation.began("advance")
+        time.sleep(0.5)
+        compilation.seconds += time.perf_counter() - began
+
+    monkeypatch.setattr(job, "_warm_up", compile_slowly)
+    monkeypatch.setattr("rubhpc.integrate.compilation._announced", set())
+    monkeypatch.setattr(compilation, "seconds", compilation.seconds)
+    began = time.perf_counter()
+    summary = run(study)
+    assert summary.seconds < time.perf_counter() - began - 0.49
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first == "compiling kernels, once after an installation: up to a minute"
+
+
+SWEEP = '{ start = 0.9, stop = 2.0, num = 12, sweep = "up" }'
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        write_study,
+        write_sample,
+        lambda folder: write_study(folder, speed_ratio=SWEEP, block=4),
+        lambda folder: write_study(folder, speed_ratio=[0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5], block=16),
+    ],
+    ids=["grid", "sample", "sweep", "many speeds"],
+)
+def test_as_many_speeds_are_prepared_as_are_foreseen(physics, tmp_path, write):
+    read = read_study(write(tmp_path))
+    grid = CaseGrid(read)
+    foreseen = count_preparations(grid, np.ones(grid.shape, bool))
+    run(read, quiet=True)
+    assert foreseen.speed == len(physics.prepared)
+
+
+def test_preparations_of_many_cases_are_foreseen_from_a_part(tmp_path, monkeypatch):
+    grid = CaseGrid(read_study(write_sample(tmp_path, n=64)))
+    whole = count_preparations(grid, np.ones(grid.shape, bool))
+    monkeypatch.setattr("rubhpc.running.pilots._MOST_COUNTED", 200)
+    part = count_preparations(grid, np.ones(grid.shape, bool))
+    assert part.speed == pytest.approx(whole.speed, rel=0.25)
+    assert part.friction == pytest.approx(whole.friction, rel=0.25)

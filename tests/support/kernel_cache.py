@@ -21,6 +21,15 @@ rubhpc.simulate("mokhtar2017", **case)
 rubhpc.simulate("mokhtar2017", **case, friction_law="coulomb")
 rubhpc.simulate("mokhtar2017", **case, normal="updated")
 rubhpc.simulate("mokhtar2017", **case, method="central-difference")
+from rubhpc.integrate.event_driven_march import EventDrivenMarch
+from rubhpc.integrate.neighbour_motions import NeighbourMotions
+from rubhpc.integrate.record import State
+from rubhpc.integrate.setup import prepare
+from rubhpc.study.study import Contact, Integrator
+shared = dict(contact=Contact(), integrator=Integrator(), samples_per_revolution=32)
+setup = prepare(rubhpc.read_rig("mokhtar2017"), 150.0, **shared)
+march = EventDrivenMarch(setup, 1e-4, 0.3, State.at_rest(setup.model), None)
+NeighbourMotions(march).part(1)
 """
 
 

@@ -1,0 +1,55 @@
+"""What users read while kernels are compiled, and the time that it takes, which is none of a case's."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rubhpc.kernels._jit import compilation
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+# Kernels that are announced by themselves -> what for; they are compiled when a case first needs them.
+_PARTS = {
+    "advance_by_steps": "for contact in short steps",
+    "part": "for neighbouring motions, which distinguish chaos from order",
+}
+_announced: set[str] = set()
+
+
+def seconds_compiling() -> float:
+    """Seconds that this process has spent on compilations so far."""
+    return compilation.seconds
+
+
+def to_stderr(text: str) -> None:
+    """Print it on the error stream."""
+    print(f"rubhpc: {text}", file=sys.stderr, flush=True)
+
+
+def announce_by(announce: Callable[[str], None]) -> None:
+    """Have `announce` called, once a part of the program, before kernels in no cache are compiled."""
+
+    def begin(name: str) -> None:
+        part = _PARTS.get(name, "")
+        if part not in _announced:
+            _announced.add(part)
+            announce(f"compiling kernels{part and ' '}{part}, once after an installation: up to a minute")
+
+    compilation.began = begin
+
+
+@contextmanager
+def announced_by(announce: Callable[[str], None]) -> Iterator[None]:
+    """`announce_by` within a context."""
+    before = compilation.began
+    announce_by(announce)
+    try:
+        yield
+    finally:
+        compilation.began = before
+
+
+announce_by(to_stderr)

@@ -1,0 +1,54 @@
+"""One thread a process for linear algebra: BLAS's sums, and a result's last bit, depend on their number.
+
+On matrices as small as these, threads also take more processor time than they save.
+"""
+
+from __future__ import annotations
+
+from functools import cache, wraps
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from contextlib import AbstractContextManager
+
+    from threadpoolctl import ThreadpoolController
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+# What libraries read as they start: BLAS, numba and zarr would each start as many threads as there are cores.
+VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "ZARR_THREADING__MAX_WORKERS",
+)
+
+
+def on_one_thread(function: Callable[P, T]) -> Callable[P, T]:
+    """Hold the libraries of linear algebra to one thread in a function, whatever the environment says."""
+
+    @wraps(function)
+    def held(*args: P.args, **kwargs: P.kwargs) -> T:
+        with one_thread():
+            return function(*args, **kwargs)
+
+    return held
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """Hold them to one thread within a context; it costs some 50 us."""
+    limit: AbstractContextManager[object] = _controller().limit(limits=1)
+    return limit
+
+
+@cache
+def _controller() -> ThreadpoolController:
+    """The libraries that are loaded, found once."""
+    import scipy.linalg  # noqa: F401 - it brings the second BLAS, NumPy's being the first
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

@@ -1,0 +1,26 @@
+"""What users read of compilations."""
+
+from rubhpc.integrate import compilation
+from rubhpc.kernels import _jit
+
+
+def test_each_part_is_announced_once(monkeypatch):
+    monkeypatch.setattr(compilation, "_announced", set())
+    before, texts = _jit.compilation.began, []
+    with compilation.announced_by(texts.append):
+        for name in ("enter", "advance", "part", "enter", "part", "advance_by_steps"):
+            _jit.compilation.began(name)
+    assert _jit.compilation.began is before
+    common = "once after an installation: up to a minute"
+    assert texts == [
+        f"compiling kernels, {common}",
+        f"compiling kernels for neighbouring motions, which distinguish chaos from order, {common}",
+        f"compiling kernels for contact in short steps, {common}",
+    ]
+
+
+def test_parts_are_names_of_kernels():
+    from rubhpc.kernels import separation, stepping_loop
+
+    kernels = {**vars(separation), **vars(stepping_loop)}
+    assert all(name in kernels for name in compilation._PARTS)

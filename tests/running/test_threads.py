@@ -1,0 +1,71 @@
+"""Linear algebra on one thread, whatever the environment says: `rubhpc.run` in a script is as the command."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+
+from running import environment, stored_bytes, write_sample
+
+from rubhpc.threads import VARIABLES
+
+SCRIPT = """
+import sys, rubhpc
+rubhpc.run(sys.argv[1], quiet=True)
+"""
+COUNTED = """
+import scipy.linalg
+from threadpoolctl import threadpool_info
+from rubhpc.threads import on_one_thread, one_thread
+def counts():
+    return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+print(counts())
+print(on_one_thread(counts)())
+with one_thread():
+    print(counts())
+print(counts())
+"""
+
+
+def script(text, *arguments, **variables):
+    """Run Python without the variables that hold libraries to one thread; its output and processor time."""
+    kept = {key: value for key, value in environment().items() if key not in VARIABLES}
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        [sys.executable, "-c", text, *map(str, arguments)],
+        env=kept | variables,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return done.stdout, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def test_libraries_are_held_to_one_thread_and_let_go():
+    shown, _ = script(COUNTED, OPENBLAS_NUM_THREADS="2", MKL_NUM_THREADS="2")
+    before, decorated, held, after = map(eval, shown.splitlines())
+    assert before
+    assert set(decorated) == set(held) == {1}
+    assert after == before
+    if os.cpu_count() > 1:
+        assert set(before) == {2}
+
+
+def test_a_script_stores_what_the_command_does_in_as_little_time(tmp_path):
+    """A sampled study prepares every case anew, so linear algebra is most of it."""
+    study = write_sample(tmp_path)
+    stores, times = [], []
+    for name, variables in (("warm", {}), ("free", {}), ("held", dict.fromkeys(VARIABLES, "1"))):
+        store = tmp_path / f"{name}.zarr"
+        text = study.read_text().replace(str(tmp_path / "tiny.zarr"), str(store))
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text)
+        _, taken = script(SCRIPT, path, **variables)
+        stores.append(stored_bytes(store))
+        times.append(taken)
+    assert stores[1] == stores[2]
+    assert times[1] < 1.3 * times[2]
