@@ -32,7 +32,7 @@ COMMANDS = {
     "reduce": ("rubhpc.commands.reduce:reduce", "Mean, envelope, quantiles or histogram over many cases."),
     "report": ("rubhpc.commands.report:report", "One HTML page: maps, and every case behind them."),
     "view": ("rubhpc.commands.report:view", "The same over a big store, served to this machine alone."),
-    "export": ("rubhpc.commands.export:export", "Cases as one HDF5 file."),
+    "export": ("rubhpc.commands.export:export", "Cases as one file: HDF5, CSV or Parquet."),
     "claims": ("rubhpc.commands.claims:claims", "The paper's claims against the stores of jobs/paper."),
 }
 

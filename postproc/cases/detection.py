@@ -10,6 +10,7 @@ import numpy as np
 from postproc.signals.indicators import INDICATORS
 from postproc.store.axes import source
 from rubhpc.errors import InputError
+from rubhpc.schema import DONE, REGIME
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,14 +60,7 @@ def judge(scores: xr.Dataset, false_alarm: float = 0.05, seed: int = 1) -> xr.Da
     score = scores[list(INDICATORS)].to_dataarray("indicator").compute()
     values = score.transpose("indicator", *axes, "level", "draw").values
     done = np.isfinite(values).all(axis=(0, -2, -1))
-    is_first = np.random.default_rng(seed).permutation(rub.size).reshape(rub.shape) < rub.size / 2
-    halves = [half & done for half in (is_first, ~is_first)]
-    fewest = min(int((half & kind).sum()) for half in halves for kind in (rub, ~rub))
-    if fewest < _LEAST:
-        raise InputError(
-            f"{source(scores)}: {int((done & ~rub).sum())} cases without contact and "
-            f"{int((done & rub).sum())} with it are too few to learn from; take some {4 * _LEAST} of each"
-        )
+    halves = _halves(scores, rub, done, seed)
     names = [*INDICATORS, TOGETHER]
     is_detected = np.full((len(names), *values.shape[1:]), math.nan)
     areas = np.zeros((2, len(names), values.shape[-2]))
@@ -98,6 +92,35 @@ def judge(scores: xr.Dataset, false_alarm: float = 0.05, seed: int = 1) -> xr.Da
             for name, (value, text) in found.items()
         }
     )
+
+
+def require_both_kinds(store: xr.Dataset, seed: int = 1) -> None:
+    """Check that `judge` can learn from a store, by the regime of its cases alone: no waveform is read.
+
+    Raises
+    ------
+    InputError
+        There are too few cases without contact, or with it.
+    """
+    regime, done = (store[name].values for name in ("regime", "status"))
+    _halves(store, regime != REGIME.index("no_contact"), done == DONE, seed)
+
+
+def _halves(
+    data: xr.Dataset, rub: NDArray[np.bool_], done: NDArray[np.bool_], seed: int
+) -> list[NDArray[np.bool_]]:
+    """Return the cases of either half that are done; InputError where one has too few of a kind."""
+    is_first = np.random.default_rng(seed).permutation(rub.size).reshape(rub.shape) < rub.size / 2
+    halves = [half & done for half in (is_first, ~is_first)]
+    fewest = min(int((half & kind).sum()) for half in halves for kind in (rub, ~rub))
+    if fewest < _LEAST:
+        n_free, n_rub = int((done & ~rub).sum()), int((done & rub).sum())
+        which = "smaller clearances" if n_rub < n_free else "clearances above the contact-free amplitude"
+        raise InputError(
+            f"{source(data)}: {n_free} selected cases without contact and {n_rub} with it are too few to "
+            f"learn from; take some {4 * _LEAST} of each, the others by {which} in the study"
+        )
+    return halves
 
 
 def area_under_curve(with_rub: Floats, without: Floats) -> float:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from postproc.cases.detection import TOGETHER, judge
+from postproc.cases.detection import TOGETHER, judge, require_both_kinds
 from postproc.figures.drawing import Drawing
-from postproc.signals.indicators import LEVELS, indicator_scores
+from postproc.signals.indicators import CHANNELS, LEVELS, indicator_scores
 from postproc.store.export import check_data_path
+from postproc.store.variables import require_variables
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -59,6 +60,8 @@ def indicators(
     """
     path = check_data_path(scores) if scores else None
     levels = tuple(sorted(set(noise))) or LEVELS
+    require_variables(cases, [*CHANNELS, "regime", "status"])
+    require_both_kinds(cases, seed)
     judged = judge(indicator_scores(cases, levels, draws, seed), false_alarms, seed)
     return Drawing(
         shown=judged[["detection_rate", "false_alarm_rate", "area_under_curve"]],

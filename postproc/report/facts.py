@@ -13,7 +13,7 @@ from postproc.cases.saltelli import drawn_ranges
 from postproc.report.grid import plain
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.units import Scale, scale_for, short_name
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS, VARIABLES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,7 +95,7 @@ def validity_rows(
             continue
         values = measures.values(name)
         bad = is_bad(xr.DataArray(values)).values  # NaN is beyond nothing
-        worst = np.nanargmin if name == "minimum_slip_speed" else np.nanargmax
+        worst = np.nanargmin if VARIABLES[name].worst == "min" else np.nanargmax
         limit = _LIMITS.get(name, f"{text} out of range") if name in watched else _FOLLOWED[name]
         rows.append(_row(measures, axes, name, bad, worst, n_done, limit))
     if "energy_residual" in measures.names:

@@ -12,6 +12,7 @@ from postproc.figures.cells import cell_edges, is_geometric
 from postproc.figures.palette import categories
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.units import Scale, displayed, meanings, scale_for, short_name
+from postproc.store.worst import worst_word
 from rubhpc.schema import DIVERGED, DONE, SIGNAL_NAMES, VARIABLES
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ _FIRST = (
     "regime",
     "peak_contact_force",
     "period",
+    "settled",
     "peak_torsion",
     "clearance",
     "spin_speed",
@@ -36,7 +38,7 @@ _FIRST = (
     "peak_to_peak_vertical",
     "peak_to_peak_horizontal",
 )
-_FLAGS = ("status", "regime", "period", "validity")
+_FLAGS = ("status", "regime", "period", "validity", "settled")
 _WITHIN, *_BEYOND = ("#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#F0E442", "#0072B2", "#D55E00", "#8C5A2B")
 _MOTION = ("peak_to_peak_vertical", "peak_to_peak_horizontal")
 # Measures of which all that is named has its unit.
@@ -118,6 +120,7 @@ class Measures:
                     "unit": scale.unit,
                     "factor": scale.factor,
                     "by_stator": self.is_by_stator(name),
+                    "worst": worst_word(name),
                     "is_setting": self._is_setting(name),
                     "is_flag": name in _FLAGS,
                     "categories": self._categories(name),

@@ -24,6 +24,7 @@ from postproc.report.facts import (
     validity_rows,
 )
 from postproc.report.grid import Measures, described_axes, validity_text
+from postproc.report.linear_design import design_facts
 from postproc.report.packing import as_text
 from postproc.report.side_view import description, side_view
 from postproc.store.axes import source
@@ -101,6 +102,7 @@ class Page:
             "validity_rows": validity_rows(store, self.measures, axes, len(self.cases.done)),
             "failures": failures(store, axes),
             "n_done": len(self.cases.done),
+            "design": design_facts(store),
         }
 
     def _embedded_facts(self, names: list[str], *, is_served: bool) -> dict[str, Any]:

@@ -68,7 +68,8 @@ def indicator_scores(
     Parameters
     ----------
     store : Dataset
-        Waveforms of many cases, some of which touch and some of which do not; one stator.
+        Waveforms of many cases, some of which touch and some of which do not. Of several stators, an
+        indicator is that of the one where it is highest.
     levels : sequence of float
         Of the noise, above 0.
     n_draw : int
@@ -92,7 +93,8 @@ def indicator_scores(
             f"levels: {list(levels)}, draws: {n_draw}: give levels above 0 and at least one draw"
         )
     axes = axes_of(store)
-    data = narrow(store, [*CHANNELS, "regime", "spin_speed", "status"], axes)
+    spread = [*axes, "stator"] if store.sizes.get("stator", 1) > 1 else axes
+    data = narrow(store, [*CHANNELS, "regime", "spin_speed", "status"], spread)
     data = data.assign({n: data[n].compute() for n in ("regime", "spin_speed", "status")})
     is_done = data["status"] == DONE
     require_results(is_done.where(is_done), store)
@@ -107,7 +109,6 @@ def indicator_scores(
     n = samples_per_revolution(data[CHANNELS[0]])
     n_turn = data.sizes["sample"] // n
     data = data.isel(sample=slice(-n * (n_turn // _WHOLE * _WHOLE or n_turn), None))
-    reference = [float(_rms(data[name]).where(rub).median()) for name in CHANNELS]
     frequencies = _natural(data)
     highest = (1 + _BAND) * frequencies["stator"] / (data["spin_speed"] / (2 * math.pi))
     if float(highest.max()) >= n / 2:
@@ -116,17 +117,22 @@ def indicator_scores(
             f"{source(store)}: {n} samples a revolution do not resolve the stator's vibration at the lowest "
             f"speed; take at least {least}, or select faster cases"
         )
+    reference = [float(_rms(data[name]).where(rub).median()) for name in CHANNELS]
+    waves = [data[name] for name in CHANNELS]
+    if "stator" not in data.dims:
+        waves[-1] = waves[-1].expand_dims("stator")
+        frequencies["stator"] = frequencies["stator"].expand_dims("stator")
     place = xr.DataArray(np.arange(rub.size).reshape(rub.shape), dims=rub.dims, coords=rub.coords)
     if data[CHANNELS[0]].chunks is not None:  # blocks of cases as they lie on disk, each with whole records
         place = place.chunk({d: data[CHANNELS[0]].chunksizes[d] for d in axes})
     found: xr.DataArray = xr.apply_ufunc(
         _block,
-        *(data[name] for name in CHANNELS),
+        *waves,
         place,
         data["spin_speed"],
         frequencies["torsion"],
         frequencies["stator"],
-        input_core_dims=[["sample"]] * len(CHANNELS) + [[]] * 4,
+        input_core_dims=[*[["sample"]] * 3, ["stator", "sample"], *[[]] * 3, ["stator"]],
         output_core_dims=[["indicator", "level", "draw"]],
         dask="parallelized",
         output_dtypes=[float],
@@ -157,15 +163,20 @@ def _natural(data: xr.Dataset) -> dict[str, xr.DataArray]:
     if len(along) > 1:
         raise InputError(f"{source(data)}: select one value of {' or of '.join(along)}")
     axis = along[0] if along else None
-    rotor, stator = natural_frequencies(data, axis), stator_frequencies(data, axis)
-    if "torsional" not in rotor or "lateral" not in stator:
+    rotor = natural_frequencies(data, axis)
+    each = [data.isel(stator=i) for i in range(data.sizes["stator"])] if "stator" in data.dims else [data]
+    stators = [stator_frequencies(case, axis) for case in each]
+    if "torsional" not in rotor or any("lateral" not in stator for stator in stators):
         raise InputError(f"{source(data)}: torsion or stator has no natural frequency to look at")
-    return {"torsion": rotor["torsional"], "stator": stator["lateral"]}
+    lateral = [stator["lateral"] for stator in stators]
+    stator = xr.concat(lateral, "stator") if "stator" in data.dims else lateral[0]
+    return {"torsion": rotor["torsional"], "stator": stator}
 
 
 def _rms(wave: xr.DataArray) -> xr.DataArray:
+    """Return the rms of a signal about its mean, of several stators the largest."""
     swing = wave.astype(float)
-    deviation: xr.DataArray = swing.std("sample").compute()
+    deviation: xr.DataArray = swing.std("sample").max([d for d in ("stator",) if d in wave.dims]).compute()
     return deviation
 
 
@@ -183,7 +194,11 @@ def _block(
     reference: Sequence[float],
     noise: Noise,
 ) -> Floats:
-    """(..., n_sample) x 4, (...) x 4 -> (..., n_indicator, n_level, n_draw): one block of cases."""
+    """One block of cases: (..., n_indicator, n_level, n_draw).
+
+    Waves are (..., n_sample), `lateral` (..., n_stator, n_sample), `stator_frequency` (..., n_stator), the
+    rest (...).
+    """
     shape = np.broadcast_shapes(place.shape, spin.shape, torsion.shape[:-1])
     n_sample = torsion.shape[-1]
     n_turn = n_sample // n
@@ -191,35 +206,37 @@ def _block(
     twist = np.fft.rfft(torsion.astype(float), axis=-1) * (math.sqrt(2) / n_sample)
     shake = np.fft.rfft(lateral.astype(float), axis=-1) * (math.sqrt(2) / n_sample)
     rate = spin / (2 * math.pi)
-    orders = [np.broadcast_to(f / rate, shape) for f in (torsion_frequency, stator_frequency)]
+    n_stator = lateral.shape[-2]
+    twist_order = np.broadcast_to(torsion_frequency / rate, shape)
+    shake_order = np.broadcast_to(stator_frequency / rate[..., None], (*shape, n_stator))
     places, rates = np.broadcast_to(place, shape), np.broadcast_to(rate, shape)
-    spectra = [np.broadcast_to(a, (*shape, a.shape[-1])) for a in (whirl, twist, shake)]
+    whirl, twist = (np.broadcast_to(a, (*shape, a.shape[-1])) for a in (whirl, twist))
+    shake = np.broadcast_to(shake, (*shape, *shake.shape[-2:]))
     out = np.full((*shape, len(INDICATORS), noise.levels.size, noise.n_draw), math.nan)
     sizes = math.hypot(*reference[:2]), reference[2], reference[3]
     for i in np.ndindex(*shape):
-        if not np.isfinite(spectra[1][i][0]):
+        if not np.isfinite(twist[i][0]):
             continue
         rng = np.random.default_rng([noise.seed, int(places[i])])
         spacing = float(rates[i]) / n_turn  # Hz from line to line
         white = math.sqrt(spacing / _BANDWIDTH)  # rms of a line, of unit noise
-        twisting, whirling, shaking = (
-            _twist_lines(float(orders[0][i]), n_turn),
-            _whirl_lines(n_turn, n_sample),
-            _band_lines(float(orders[1][i]), n_turn),
-        )
-        noisy = [
-            _with_noise(lines[i], at, n_turn, size, gain * white, noise, rng)
-            for lines, at, size, gain in (
-                (spectra[0], whirling, sizes[0], math.sqrt(1 / 2)),  # half of it whirls backward
-                (spectra[1], twisting, sizes[1], 1.0),
-                (spectra[2], shaking, sizes[2], 1.0),
-            )
+        channels = [
+            (whirl[i], _whirl_lines(n_turn, n_sample), sizes[0], math.sqrt(1 / 2)),  # half whirls backward
+            (twist[i], _twist_lines(float(twist_order[i]), n_turn), sizes[1], 1.0),
+            *(
+                (shake[i][k], _band_lines(float(shake_order[i][k]), n_turn), sizes[2], 1.0)
+                for k in range(n_stator)
+            ),
         ]
+        whirling, twisting, *shaking = (
+            _with_noise(lines, at, n_turn, size, gain * white, noise, rng)
+            for lines, at, size, gain in channels
+        )
         out[i] = [
-            _decibels(_power(noisy[1]) / spacing),
-            _decibels(_power(noisy[0]) / spacing),
-            _decibels(_power(noisy[2])),
-            _burst_level(noisy[2], n_turn),
+            _decibels(_power(twisting) / spacing),
+            _decibels(_power(whirling) / spacing),
+            np.max([_decibels(_power(band)) for band in shaking], axis=0),
+            np.max([_burst_level(band, n_turn) for band in shaking], axis=0),
         ]
     return out
 

@@ -14,16 +14,23 @@ if TYPE_CHECKING:
     import xarray as xr
 
 HDF5 = (".nc", ".h5", ".hdf5")
+_COMPRESSED = {"zlib": True, "complevel": 4, "shuffle": True}  # any HDF5 library has these filters
 FORMATS = (".csv", ".json", ".zarr", *HDF5)
+
+
+def check_folder(path: str | Path, formats: tuple[str, ...]) -> Path:
+    """Return `path` if its extension is one of the formats and its folder is there; InputError if not."""
+    path = Path(path)
+    if path.suffix.lower() not in formats:
+        raise InputError(f"{path}: unknown format; choose one of {', '.join(formats)}")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: no directory {path.parent}; make it first")
+    return path
 
 
 def check_data_path(path: str | Path) -> Path:
     """Return `path` if data can be written to it; InputError with the remedy if not."""
-    path = Path(path)
-    if path.suffix.lower() not in FORMATS:
-        raise InputError(f"{path}: unknown format; choose one of {', '.join(FORMATS)}")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: no directory {path.parent}; make it first")
+    path = check_folder(path, FORMATS)
     if path.suffix.lower() == ".zarr" and path.exists():
         raise InputError(f"{path}: exists already; choose another --data, or remove it")
     return path
@@ -68,7 +75,7 @@ def _write_csv(data: xr.Dataset, path: Path) -> None:
 
 
 def write_hdf5(data: xr.Dataset, path: Path) -> None:
-    """Write an HDF5 file that is netCDF 4 too, chunk by chunk; it gets its name once it is complete.
+    """Write an HDF5 file that is netCDF 4 too, compressed; it gets its name once it is complete.
 
     Tables of attributes (study, rig, versions) become text in JSON.
     """
@@ -78,7 +85,8 @@ def write_hdf5(data: xr.Dataset, path: Path) -> None:
     }
     partial = path.with_name(f".{path.name}.part")
     try:
-        data.to_netcdf(partial, engine="h5netcdf")
+        packed = {n: _COMPRESSED for n, v in data.variables.items() if v.ndim and v.dtype.kind in "fiu"}
+        data.to_netcdf(partial, engine="h5netcdf", encoding=packed)
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)

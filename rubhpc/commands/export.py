@@ -1,4 +1,4 @@
-"""`rubhpc export`: cases of a store as one HDF5 file."""
+"""`rubhpc export`: cases of a store as one file, HDF5 or a table."""
 
 from __future__ import annotations
 
@@ -14,24 +14,30 @@ from rubhpc.errors import InputError
 @click.argument("store")
 @SELECT
 @click.option("--value", "names", multiple=True, metavar="NAME", help="A variable [default: all of them].")
-@click.option("--output", metavar="FILE", help="The file, .h5, .hdf5 or .nc [default: STORE.h5 here].")
+@click.option(
+    "--output", metavar="FILE", help="The file, .h5, .hdf5, .nc, .csv or .parquet [default: STORE.h5 here]."
+)
 def export(store: str, selection: tuple[str, ...], names: tuple[str, ...], output: str | None) -> None:
-    """Write cases of STORE as one HDF5 file, which h5py, MATLAB, and xarray as netCDF 4 read.
+    """Write cases of STORE as one file, by its extension.
 
-    Names, dimensions, units and coordinates are those of the store; study and rig are attributes.
+    HDF5 (.h5, .hdf5, .nc), compressed, has all variables with names, dimensions, units and coordinates of the
+    store, study and rig as attributes; h5py, MATLAB, and xarray as netCDF 4 read it. A table (.csv, .parquet)
+    has one row a case, with axes, settings and measures; Parquet needs `pip install 'rubhpc[parquet]'`.
     """
-    from postproc.store.export import HDF5, check_data_path, write_hdf5
+    from postproc.store.case_table import TABLES, case_table, write_table
+    from postproc.store.export import HDF5, check_folder, write_hdf5
     from rubhpc.input.fields import nearest
 
     cases = open_cases(store, selection)
     for name in names:
         if name not in cases.data_vars:
             raise InputError(f"{store}: no variable {name}; {nearest(name, map(str, cases.data_vars))}")
-    path = check_data_path(output or f"{Path(store).resolve().stem}.h5")
-    if path.suffix.lower() not in HDF5:
-        raise InputError(f"{path}: an export is HDF5; name it {path.stem}.h5")
+    path = check_folder(output or f"{Path(store).resolve().stem}.h5", (*HDF5, *TABLES))
     try:
-        write_hdf5(cases[list(names)] if names else cases, path)
+        if path.suffix.lower() in TABLES:
+            write_table(case_table(cases, names), path)
+        else:
+            write_hdf5(cases[list(names)] if names else cases, path)
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"{path}: cannot be written: {reason}; choose another --output") from error

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 import synthetic_store
+import xarray as xr
 from browsers import find_browser
 
 from postproc.report.budget import write_report
@@ -61,12 +62,16 @@ def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
 
 @pytest.fixture(scope="session")
 def stores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Stores of four axes and two stators, of one axis, of one case, of measures alone, without results."""
+    """Stores of four axes and two stators, of a ring, of one axis or case, of measures alone, without any."""
     folder = tmp_path_factory.mktemp("stores")
     whole = synthetic_store.make(n_stator=2)
+    ring = synthetic_store.make(n_stator=3)
+    share = xr.DataArray([0.0, 1.0, 0.5], dims="stator")  # the first never touches
+    ring["peak_contact_force"] = (ring["peak_contact_force"] * share).assign_attrs(units="N")
     rest = {"clearance": [1], "friction": [1], "stator_youngs_modulus": [0]}
     made = {
         "whole": whole,
+        "ring": ring,
         "line": whole.isel(rest),
         "single": whole.isel(speed_ratio=[1], **rest),
         "scalars": synthetic_store.make(keep=()),

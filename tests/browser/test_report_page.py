@@ -111,8 +111,24 @@ def test_cases_without_a_result_say_so(visit: Visit, pages: dict[str, str]) -> N
 def test_the_worst_case_is_one_click_away(visit: Visit, pages: dict[str, str]) -> None:
     page = visit(pages["whole"])
     page.get_by_role("button", name=re.compile("^1.2")).click()
-    expect(page.locator("#map-title")).to_have_text("Contact force over Euler load, stator 1")
+    expect(page.locator("#map-title")).to_have_text("Contact force over Euler load, largest of 2 stators")
     expect(page.locator("#case-text")).to_contain_text("Speed ratio 1.7")
+
+
+def test_the_page_opens_on_a_rub_and_lists_stators_worst_first(visit: Visit, pages: dict[str, str]) -> None:
+    page = visit(pages["ring"])
+    assert "peak contact force 0 N" not in said(page)
+    assert "(largest of 3 stators)" in said(page)
+    page.locator("#measures > summary").click()
+    row = page.get_by_role("row", name=re.compile("^Peak contact force"))
+    assert row.locator("summary").inner_text().endswith("stator 2")
+    row.locator("summary").click()
+    places = [text.split(":")[0] for text in row.locator("li").all_inner_texts()]
+    assert places == ["stator 2", "stator 3", "stator 1"]
+    page.get_by_label("Show", exact=True).select_option(label="Peak contact force")
+    expect(page.locator("#map-title")).to_have_text("Peak contact force, largest of 3 stators")
+    page.get_by_label("Of", exact=True).select_option(label="Stator 1")
+    expect(page.locator("#map-title")).to_have_text("Peak contact force, stator 1")
 
 
 def test_any_measure_over_any_axes(visit: Visit, pages: dict[str, str]) -> None:

@@ -282,3 +282,21 @@ def test_wrong_input_is_one_line(
         CliRunner().invoke(report, [str(two_stator_path), *args], catch_exceptions=False)
     assert told in str(refusal.value)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_page_has_the_critical_speeds_of_the_rotor(synthetic_path: Path) -> None:
+    store = open_store(synthetic_path)
+    text = Page(store).html(values={})
+    assert "Without contact, the rotor is stable" in text
+    assert re.search(r"<td class=.number.>1894</td><td>forward</td>", text)  # 31.56 Hz
+    assert "data:image/svg+xml;base64," in text
+    bare = store.copy()
+    bare.attrs = {k: v for k, v in store.attrs.items() if k != "rig"}
+    assert "There is no linear design of this rig" in Page(bare).html(values={})
+
+
+def test_measures_say_which_stator_is_the_worst(two_stator_path: Path) -> None:
+    facts = json.loads(Elements(Page(open_store(two_stator_path)).html()).scripts["facts"])
+    worst = {v["name"]: v["worst"] for v in facts["variables"] if v["by_stator"]}
+    assert worst["peak_contact_force"] == "largest"
+    assert worst["minimum_slip_speed"] == "smallest"

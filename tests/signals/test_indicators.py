@@ -161,6 +161,20 @@ def test_scores_do_not_depend_on_chunks_and_are_lazy():
     assert not np.allclose(other["torsion_harmonics"], whole["torsion_harmonics"])
 
 
+def test_of_several_stators_the_loudest_counts():
+    single = store({"stator_lateral": 1e-5 * bursts(1)}, np.array([True, False]))
+    silent = xr.zeros_like(single["stator_lateral"])
+    waves = xr.concat([silent, single["stator_lateral"], silent], "stator").transpose(..., "stator", "sample")
+    ring = single.drop_dims("stator").assign(stator_lateral=waves).assign_coords(stator=[1, 2, 3])
+    table = ring.attrs["rig"]
+    ring.attrs["rig"] = {**table, "stator": [{**table["stator"][0], "angle": a} for a in (0.0, 2.0, 4.0)]}
+    known, found = (indicator_scores(cases, [QUIET], 1) for cases in (single, ring))
+    for name in ("torsion_harmonics", "lateral_subharmonics", "stator_resonance"):
+        assert found[name].values == pytest.approx(known[name].values, abs=1e-3), name
+    assert found["contact_periodicity"].values.min() > 190  # of a silent stator it would be 0 dB
+    assert found["reference"].values == pytest.approx(known["reference"].values)
+
+
 def test_what_is_not_done_has_no_score():
     cases = store({n: np.ones((3, N * TURNS)) for n in CHANNELS}, np.array([True, False, False]))
     is_done = xr.DataArray([True, True, False], dims="clearance")
@@ -305,6 +319,16 @@ def test_the_command_prints_its_table_and_writes_what_is_asked(written):
         assert float(verdict[50:].mean()) < 0.15
     table = np.genfromtxt("rates.csv", delimiter=",", names=True, dtype=None, encoding=None)
     assert set(table["indicator"]) == {*INDICATORS, TOGETHER}
+
+
+def test_the_command_reads_no_waveform_of_a_store_without_contact(tmp_path, monkeypatch):
+    def fail(*_):
+        raise AssertionError("waveforms were read")
+
+    monkeypatch.setattr("postproc.figures.indicators.indicator_scores", fail)
+    store({}, np.arange(100) < 3).to_zarr(tmp_path / "free.zarr", zarr_format=3, consolidated=False)
+    with pytest.raises(InputError, match="97 selected cases without contact and 3 with it are too few"):
+        CliRunner().invoke(COMMAND, [str(tmp_path / "free.zarr")], catch_exceptions=False)
 
 
 def test_the_command_refuses_bad_levels(written):

@@ -91,6 +91,25 @@ const recordOf = remembered(200, async (flat) => {
   return record;
 });
 
+// Of several stators, the worst: the largest value, or the smallest where that is the worse one.
+const WORST = -1;
+function worstStator(v, values, flat) {
+  let at = 0;
+  for (let i = 1; i < facts.nStator; i++) {
+    const here = values[flat * facts.nStator + i], best = values[flat * facts.nStator + at];
+    if (!Number.isNaN(here) && (Number.isNaN(best) || (v.worst === "smallest" ? here < best : here > best))) at = i;
+  }
+  return at;
+}
+
+// The value of a case: that of one stator, or of the worst.
+function valueAt(v, values, flat, stator) {
+  if (!v.by_stator) return values[flat];
+  return values[flat * facts.nStator + (stator === WORST ? worstStator(v, values, flat) : stator)];
+}
+
+const ofStators = (v, stator) => (v.by_stator && facts.nStator > 1 ? (stator === WORST ? `, ${v.worst} of ${facts.nStator} stators` : `, stator ${stator + 1}`) : "");
+
 const flatOf = (at) => at.reduce((flat, i, k) => flat * shape[k] + i, 0);
 
 function placeOf(flat) {

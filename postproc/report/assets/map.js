@@ -6,6 +6,7 @@ const HATCHES = {
   failed: ["#cccccc", "#444444", (c) => { slope(c, 1); slope(c, -1); }],
   diverged: ["#999999", "#222222", (c) => slope(c, 1)],
   beyond: [null, "#d1490b", (c) => slope(c, -1)],
+  unsettled: [null, "#d1490b", (c) => { c.fillRect(3.4, 0, 1.1, 8); }],
   empty: ["#ffffff", "#ffffff", () => {}],
 };
 
@@ -27,6 +28,8 @@ function hatch(context, kind, color, fine) {
   return context.createPattern(tile, "repeat");
 }
 
+const PAINTED = ["known", "beyond", "unsettled"];
+
 class CaseMap {
   constructor(place, onPick) {
     this.place = place;
@@ -46,7 +49,8 @@ class CaseMap {
     this.iX = x;
     this.iY = y;
     const v = variable[value];
-    const [values, status, validity] = await Promise.all([valuesOf(value), valuesOf("status"), valuesOf("validity")]);
+    const [values, status, validity, settled] = await Promise.all(
+      [value, "status", "validity", ...(variable.settled ? ["settled"] : [])].map(valuesOf));
     const axes = [x, y].join();
     if (axes !== this.axes) {
       if (this.chart) drop(this.chart);
@@ -60,8 +64,8 @@ class CaseMap {
     const shown = [value, stator, isLog, ...rest].join();
     if (shown !== this.shown) {
       this.validity = validity;
-      const cells = this.describe(v, values, status, validity, stator, at);
-      this.fill(v, cells, this.colours(v, values, cells, isLog));
+      const cells = this.describe(v, values, { status, validity, settled }, stator, at);
+      this.fill(v, cells, this.colours(v, values, cells, isLog, stator));
       this.shown = shown;
     }
     this.mark(at);
@@ -69,25 +73,25 @@ class CaseMap {
   }
 
   // Every cell by rows from below: its case, its value, and what is to be seen of it.
-  describe(v, values, status, validity, stator, at) {
+  describe(v, values, { status, validity, settled }, stator, at) {
     const nX = this.x.values.length, nY = this.y ? this.y.values.length : 1;
-    const stride = v.by_stator ? facts.nStator : 1, shift = v.by_stator ? stator : 0;
     const step = (k) => shape.slice(k + 1).reduce((product, n) => product * n, 1);
     const base = at.slice();
     base[this.iX] = 0;
     if (this.y) base[this.iY] = 0;
     const start = flatOf(base), across = step(this.iX), up = this.y ? step(this.iY) : 0;
-    const cells = { nX, nY, flat: [], value: [], kind: [], color: [] };
+    const cells = { nX, nY, flat: [], value: [], kind: [], color: [], constant: null };
     const isKnown = v.name === "status" || v.is_setting;
     for (let j = 0; j < nY; j++) {
       for (let i = 0; i < nX; i++) {
         const flat = start + this.x.order[i] * across + (this.y ? this.y.order[j] * up : 0);
-        const value = values[flat * stride + shift], state = status[flat];
+        const value = valueAt(v, values, flat, stator), state = status[flat];
         cells.flat.push(flat);
         cells.value.push(value);
         cells.kind.push(isKnown ? "known"
           : state === MISSING ? "missing" : state === FAILED ? "failed" : state === DIVERGED ? "diverged"
-          : !Number.isFinite(value) ? "empty" : validity[flat] > 0 && v.name !== "validity" ? "beyond" : "known");
+          : !Number.isFinite(value) ? "empty" : validity[flat] > 0 && v.name !== "validity" ? "beyond"
+          : settled?.[flat] === 0 && v.name !== "settled" ? "unsettled" : "known");
       }
     }
     return cells;
@@ -97,13 +101,14 @@ class CaseMap {
     const { v, validity, cells } = this, n = j * cells.nX + i, kind = cells.kind[n];
     const where = [`${this.x.label} ${axisValue(this.x, this.x.order[i])}`];
     if (this.y) where.push(`${this.y.label} ${axisValue(this.y, this.y.order[j])}`);
-    const what = kind === "known" || kind === "beyond" ? `${v.label}: ${valueText(v, cells.value[n])}` : kind === "empty" ? "no value" : kind;
-    return `${where.join(", ")}\n${what}${kind === "beyond" ? `\nout of range: ${facts.validity[validity[cells.flat[n]]]}` : ""}`;
+    const what = PAINTED.includes(kind) ? `${v.label}: ${valueText(v, cells.value[n])}` : kind === "empty" ? "no value" : kind;
+    const mark = kind === "beyond" ? `\nout of range: ${facts.validity[validity[cells.flat[n]]]}` : kind === "unsettled" ? "\nnot settled" : "";
+    return `${where.join(", ")}\n${what}${mark}`;
   }
 
   // Colours run over the whole study, so that they mean the same whatever the other axes are set to.
-  colours(v, values, cells, isLog) {
-    const painted = (i) => cells.kind[i] === "known" || cells.kind[i] === "beyond";
+  colours(v, values, cells, isLog, stator) {
+    const painted = (i) => PAINTED.includes(cells.kind[i]);
     const color = cells.kind.map((kind, i) => (painted(i) ? null : HATCHES[kind][0]));
     if (v.is_flag) {
       const of = new Map(v.categories.map((c) => [c.code, c.color]));
@@ -111,13 +116,15 @@ class CaseMap {
       return null;
     }
     let low = Infinity, high = -Infinity;
-    for (const x of values) {
+    const shown = v.by_stator && stator === WORST ? Array.from({ length: nCase }, (_, flat) => valueAt(v, values, flat, WORST)) : values;
+    for (const x of shown) {
       if (Number.isFinite(x) && (!isLog || x > 0)) {
         if (x < low) low = x;
         if (x > high) high = x;
       }
     }
     if (!(high >= low)) { low = 0; high = 1; }
+    if (low === high) cells.constant = low * v.factor;
     const on = isLog ? (x) => Math.log(x) : (x) => x;
     const palette = PALETTE(), span = on(high) - on(low) || 1;
     cells.color = color.map((c, i) => {
@@ -171,7 +178,7 @@ class CaseMap {
 
   // Columns start at zero; what has no height fills the figure.
   columns(v, cells) {
-    const heights = cells.value.map((x, i) => (v.is_flag || !["known", "beyond"].includes(cells.kind[i]) ? NaN : x * v.factor));
+    const heights = cells.value.map((x, i) => (v.is_flag || !PAINTED.includes(cells.kind[i]) ? NaN : x * v.factor));
     const finite = heights.filter(Number.isFinite);
     const high = Math.max(0, ...finite), low = Math.min(0, ...finite), span = high - low || 1;
     setRange(this.figure.y_range, low < 0 ? low - 0.05 * span : 0, high + 0.05 * span);
@@ -198,7 +205,7 @@ class CaseMap {
     const range = figure.y_range, y = this.y ? along(this.y.edges, this.y.is_log, canvas.height) : [0, canvas.height];
     const level = (value) => (canvas.height * (value - range.start)) / (range.end - range.start);
     const patterns = Object.fromEntries(Object.keys(HATCHES).map((kind) =>
-      [kind, hatch(context, kind, kind === "beyond" && this.v.is_flag ? "#111111" : HATCHES[kind][1], fine)]));
+      [kind, hatch(context, kind, ["beyond", "unsettled"].includes(kind) && this.v.is_flag ? "#111111" : HATCHES[kind][1], fine)]));
     for (let j = 0; j < cells.nY; j++) {
       for (let i = 0; i < cells.nX; i++) {
         const n = j * cells.nX + i, h = this.heights?.[n];
@@ -217,11 +224,11 @@ class CaseMap {
   }
 
   colourBar(v, scale) {
-    const wanted = scale && this.y;
+    const wanted = scale && this.y && scale.low < scale.high; // a single number is in the legend
     if (this.bar) this.bar.visible = false;
     if (!wanted) return;
     const mapper = new (scale.isLog ? Bokeh.LogColorMapper : Bokeh.LinearColorMapper)({
-      palette: scale.palette, low: scale.low, high: scale.high === scale.low ? scale.low + 1 : scale.high,
+      palette: scale.palette, low: scale.low, high: scale.high,
     });
     if (this.bar && this.barFigure === this.figure && this.barIsLog === scale.isLog) {
       this.bar.color_mapper = mapper;

@@ -1,5 +1,5 @@
 // What is chosen, the controls that choose it, and what follows from it.
-const state = { at: shape.map(() => 0), value: null, x: null, y: null, stator: 0, isLog: false, signal: null, isLogSpectrum: false, isOrder: false };
+const state = { at: shape.map(() => 0), value: null, x: null, y: null, stator: WORST, isLog: false, signal: null, isLogSpectrum: false, isOrder: false };
 const panels = {};
 let map = null;
 
@@ -52,7 +52,7 @@ function buildControls() {
     place.append(choice("Across", several, String(state.x), swap("x")), choice("Up", several, String(state.y), swap("y")));
   }
   if (facts.nStator > 1) {
-    const numbers = Array.from({ length: facts.nStator }, (_, i) => [String(i), `Stator ${i + 1}`]);
+    const numbers = [[String(WORST), "Worst stator"], ...Array.from({ length: facts.nStator }, (_, i) => [String(i), `Stator ${i + 1}`])];
     place.append(choice("Of", numbers, String(state.stator), (i) => update({ stator: Number(i) })));
   }
   if (facts.free.length > 1) place.append(check("Logarithmic colours", state.isLog, (isLog) => update({ isLog })));
@@ -142,7 +142,7 @@ async function redraw() {
 
 function drawLegend(v, cells) {
   const kinds = new Set(cells.kind);
-  const words = { beyond: "out of the model's range", missing: "missing", failed: "failed", diverged: "diverged", empty: "no value" };
+  const words = { beyond: "out of the model's range", unsettled: "not settled", missing: "missing", failed: "failed", diverged: "diverged", empty: "no value" };
   const present = new Set(cells.value);
   const swatches = v.categories.filter((c) => present.has(c.code)).map((c) => {
     const swatch = element("i");
@@ -150,10 +150,11 @@ function drawLegend(v, cells) {
     return element("span", {}, swatch, c.name);
   });
   for (const [kind, text] of Object.entries(words)) {
-    if (kinds.has(kind)) swatches.push(element("span", {}, element("i", { className: kind === "beyond" && v.is_flag ? "beyond dark" : kind }), text));
+    if (kinds.has(kind)) swatches.push(element("span", {}, element("i", { className: ["beyond", "unsettled"].includes(kind) && v.is_flag ? `${kind} dark` : kind }), text));
   }
+  if (cells.constant !== null) swatches.push(element("span", {}, `${withUnit(cells.constant, v.unit)} in all cases`));
   byId("legend").replaceChildren(...swatches);
-  byId("map-title").textContent = v.label + (v.by_stator && facts.nStator > 1 ? `, stator ${state.stator + 1}` : "");
+  byId("map-title").textContent = v.label + ofStators(v, state.stator);
 }
 
 async function drawCase(flat) {
@@ -190,17 +191,26 @@ async function caseTable(flat) {
   const rows = [];
   for (const v of facts.variables) {
     const values = await valuesOf(v.name);
-    const n = v.by_stator ? facts.nStator : 1;
-    const texts = Array.from({ length: n }, (_, i) => valueText(v, values[flat * n + i]));
-    rows.push(element("tr", {}, element("th", { scope: "row", textContent: v.label }), ...texts.map((t) => element("td", { className: "number", textContent: t, colSpan: n === 1 ? facts.nStator : 1 }))));
-    if (["regime", "peak_contact_force", "peak_torsion"].includes(v.name) || v.name === state.value) said.push(`${v.label.toLowerCase()} ${texts[v.by_stator ? state.stator : 0]}`);
+    const text = valueText(v, valueAt(v, values, flat, v.by_stator ? state.stator : 0));
+    const worst = valueText(v, valueAt(v, values, flat, WORST));
+    const isRing = v.by_stator && facts.nStator > 1;
+    const cell = element("td", { className: "number" }, ...(isRing ? stators(v, values, flat, worst) : [worst]));
+    rows.push(element("tr", {}, element("th", { scope: "row", textContent: v.label + ofStators(v, WORST) }), cell));
+    if (["regime", "peak_contact_force", "peak_torsion"].includes(v.name) || v.name === state.value) said.push(`${v.label.toLowerCase()} ${text}${ofStators(v, state.stator).replace(/^, (.*)/, " ($1)")}`);
     if (facts.isServed && !v.by_stator && rows.length > 40) break;
   }
-  const head = facts.nStator > 1
-    ? [element("thead", {}, element("tr", {}, element("th", { textContent: "" }), ...Array.from({ length: facts.nStator }, (_, i) => element("th", { scope: "col", className: "number", textContent: `Stator ${i + 1}` }))))]
-    : [];
-  byId("case-table").replaceChildren(...head, element("tbody", {}, ...rows));
+  byId("case-table").replaceChildren(element("tbody", {}, ...rows));
   return said.join(", ");
+}
+
+// The worst value; behind it those of all stators, the worst first, and last those without any.
+function stators(v, values, flat, worst) {
+  const own = Array.from({ length: facts.nStator }, (_, i) => [i + 1, values[flat * facts.nStator + i]]);
+  if (own.every(([, x]) => Number.isNaN(x) || x === own[0][1])) return [worst];
+  const sign = v.worst === "smallest" ? 1 : -1;
+  own.sort(([i, x], [k, y]) => Number.isNaN(x) - Number.isNaN(y) || sign * (x - y) || i - k);
+  const list = own.map(([i, x]) => element("li", {}, `stator ${i}: ${valueText(v, x)}`));
+  return [element("details", {}, element("summary", {}, `${worst}, stator ${own[0][0]}`), element("ol", {}, ...list))];
 }
 
 // The state of the page is in its address, so that a link restores it.
@@ -226,6 +236,13 @@ async function startAt() {
   let flat = [...status.keys()].find((i) => status[i] === 1) ?? 0;
   const shown = facts.isServed ? null : Object.keys(embedded.records).map(Number);
   if (shown?.length) flat = shown[Math.floor(shown.length / 2)];
+  // Among those that rub: there is more to be seen than in a circle.
+  const force = variable.peak_contact_force;
+  if (force) {
+    const forces = await valuesOf(force.name);
+    const rubs = (shown?.length ? shown : [...status.keys()].filter((i) => status[i] === 1)).filter((i) => valueAt(force, forces, i, WORST) > 0);
+    if (rubs.length) flat = rubs[Math.floor(rubs.length / 2)];
+  }
   state.at = placeOf(flat);
   const axes = facts.free.slice(0, 2).map((name) => facts.axes.findIndex((a) => a.name === name));
   // The speed runs across, wherever it is in the grid.

@@ -117,8 +117,9 @@ class Orbit extends Plane {
     const isSeen = gap > 0 && gap < 3 * reach;
     const turn = isSeen ? Array.from({ length: 121 }, (_, i) => (i * Math.PI) / 60) : [];
     this.circle.data = { z: turn.map((a) => gap * Math.sin(a)), y: turn.map((a) => gap * Math.cos(a)) };
+    const halfAngle = Math.PI / Math.max(places.length, 3); // the stators of a ring do not overlap
     const faces = (isSeen ? places : []).map(([angle, offset]) => {
-      const near = gap + offset * factor, far = near + 0.12 * reach, half = 0.22 * reach;
+      const near = gap + offset * factor, far = near + 0.12 * reach, half = Math.min(0.22 * reach, 0.8 * near * Math.tan(halfAngle));
       const [s, c] = [Math.sin(angle), Math.cos(angle)];
       const corner = (along, across) => [along * s + across * c, along * c - across * s];
       return [corner(near, -half), corner(near, half), corner(far, half), corner(far, -half)];

@@ -1,0 +1,136 @@
+"""Cases as a table, one row a case: values of axes, settings and measures, without waveforms."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from postproc.store.axes import axes_of, source
+from postproc.store.worst import worst_of_stators
+from rubhpc.errors import InputError
+from rubhpc.schema import VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+TABLES = (".csv", ".parquet")
+_ROW = "row"
+
+
+def case_table(store: xr.Dataset, names: Sequence[str] = ()) -> xr.Dataset:
+    """Return the cases of a store as columns over `row`, loaded, in the order of the grid.
+
+    The values of axes come first, then what was drawn or selected, then settings, flags (in words) and
+    measures. Of several stators a column has the worst (`postproc.store.worst`), and the last ones, named as
+    `peak_contact_force_stator_3`, have each of them.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Variables to take; none: all that have one value a case or one a stator.
+
+    Raises
+    ------
+    InputError
+        A variable has many values a case.
+    """
+    axes = axes_of(store)
+    known = [str(n) for n, v in store.data_vars.items() if set(v.dims) <= {*axes, "stator"}]
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"{source(store)}: {name}: has many values a case, and a table has one row a case; export it "
+                "as .h5 or .nc"
+            )
+    chosen = [name for name in known if not names or name in names]
+    data = worst_of_stators(store, chosen)
+    several = store.sizes.get("stator", 1) > 1
+    wanted = {
+        str(label): coordinate
+        for label, coordinate in store.coords.items()
+        if set(coordinate.dims) <= set(axes) and coordinate.dtype.kind in "fiu"
+    }
+    each: dict[str, xr.DataArray] = {}
+    for name in chosen:
+        wanted[name] = data[name]
+        if several and "stator" in store[name].dims:
+            for i in range(store.sizes["stator"]):
+                each[f"{name}_stator_{int(store['stator'][i])}"] = store[name].isel(stator=i)
+    wanted |= each
+    in_order = [*axes, *(n for n in wanted if n not in axes)]
+    shape = store["status"]
+    columns = {}
+    for name in in_order:
+        values = wanted[name].squeeze("stator") if "stator" in wanted[name].dims else wanted[name]
+        column = values.broadcast_like(shape).transpose(*axes).values.ravel()
+        about = {k: str(v) for k, v in wanted[name].attrs.items() if k in ("units", "long_name")}
+        columns[name] = (_ROW, _in_words(name, column, wanted[name]), about)
+    attrs = {k: v for k, v in store.attrs.items() if k in ("title", "study", "rig", "versions", "identity")}
+    return xr.Dataset(columns, attrs=attrs)
+
+
+def write_table(table: xr.Dataset, path: Path) -> None:
+    """Write a table of `case_table` as CSV, or Parquet; it gets its name once it is complete.
+
+    In CSV the unit is in the heading, as in `clearance (m)`; in Parquet it is in the metadata of each column,
+    with its long name, and study and rig are in those of the file.
+
+    Raises
+    ------
+    InputError
+        Parquet needs the extra `parquet`, which is not installed.
+    """
+    partial = path.with_name(f".{path.name}.part")
+    try:
+        if path.suffix.lower() == ".csv":
+            frame = table.to_dataframe()[list(table.data_vars)]
+            frame.rename(columns={str(n): _heading(v) for n, v in table.items()}).to_csv(partial, index=False)
+        else:
+            _write_parquet(table, partial)
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _write_parquet(table: xr.Dataset, path: Path) -> None:
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError as error:
+        raise InputError(
+            f"{path.name.removeprefix('.').removesuffix('.part')}: Parquet needs the package {error.name}; "
+            "install it with pip install 'rubhpc[parquet]', or export .csv"
+        ) from error
+    arrays, fields = [], []
+    for name, column in table.items():
+        values = column.values
+        # A number that is missing is null, as readers of tables expect.
+        mask = np.isnan(values) if values.dtype.kind == "f" else None
+        arrays.append(pyarrow.array(values.tolist() if values.dtype.kind == "O" else values, mask=mask))
+        fields.append(pyarrow.field(str(name), arrays[-1].type, metadata=dict(column.attrs)))
+    about = {k: v if isinstance(v, str) else json.dumps(v) for k, v in table.attrs.items()}
+    schema = pyarrow.schema(fields, metadata=about)
+    parquet.write_table(pyarrow.table(arrays, schema=schema), path, compression="zstd")
+
+
+def _in_words(name: str, column: Any, source_of: xr.DataArray) -> Any:
+    """Return the values of a flag or a direction in words, others as they are; -1 of integers becomes NaN."""
+    variable = VARIABLES.get(name)
+    words = variable.flags if variable is not None else ()
+    words = words or tuple(str(source_of.attrs.get("flag_meanings", "")).split())
+    if words:
+        return np.array([words[i] if 0 <= i < len(words) else "" for i in column.astype(int)], dtype=object)
+    if variable is not None and variable.role == "measure" and variable.dtype.startswith("int"):
+        return np.where(column == -1, math.nan, column)
+    return column
+
+
+def _heading(column: xr.DataArray) -> str:
+    unit = str(column.attrs.get("units", "1"))
+    return f"{column.name} ({unit})" if unit not in ("", "1") else str(column.name)
