@@ -27,6 +27,7 @@ from postproc.store.variables import LONG_ROLES, require_measure
 from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE, VARIABLES
+from rubhpc.storage.regular_files import CHECKED, RegularFiles
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -48,9 +49,13 @@ def open_in_pieces(path: str | Path, n_byte: float | None = None) -> xr.Dataset:
     if n_byte is None:
         n_byte = min(max(_MEMORY / (4 * (os.cpu_count() or 1)), _SMALLEST), _LARGEST)
     store = open_store(path)
-    with warnings.catch_warnings(), zarr.config.set(FAST_DECODING):
+    files = RegularFiles(path)
+    is_fast = FAST_DECODING and not files.has_waiting_blocks  # it reads files by itself
+    with warnings.catch_warnings(), zarr.config.set(FAST_DECODING if is_fast else CHECKED):
         warnings.simplefilter("ignore", RuntimeWarning)  # as in `open_store`
-        bare = xr.open_zarr(path, chunks=None, decode_times=False, decode_timedelta=False)
+        bare = xr.open_zarr(
+            path if is_fast else files, chunks=None, decode_times=False, decode_timedelta=False
+        )
     pieces: dict[str, xr.DataArray] = {}
     for name, variable in VARIABLES.items():
         if variable.role in LONG_ROLES and name in store:

@@ -10,6 +10,8 @@ from postproc.store.axes import drawn_axes
 from postproc.store.variables import LONG_ROLES
 from rubhpc.errors import StoreError
 from rubhpc.schema import VARIABLES
+from rubhpc.storage.regular_files import CHECKED, RegularFiles
+from rubhpc.storage.store import is_damaged
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,6 +36,8 @@ def open_store(path: str | Path) -> xr.Dataset:
     try:
         measures = _open(path, chunks="auto", without=long)
         arrays = _open(path, chunks={}, without=short)
+    except StoreError:
+        raise
     except Exception as error:  # zarr and xarray raise a dozen kinds for a directory that is not a store
         reason = str(error).partition("\n")[0]
         raise StoreError(f"{path}: cannot be read as a zarr store ({reason}); check the path") from error
@@ -44,18 +48,32 @@ def open_store(path: str | Path) -> xr.Dataset:
     if "status" not in store:
         raise StoreError(f"{path}: is not a rubhpc store; give the directory that a study was run into")
     store.encoding["source"] = str(path)
+    _check_attributes(store, path)
     return store
+
+
+def _check_attributes(store: xr.Dataset, path: Path) -> None:
+    """Refuse attributes of other types than a run writes."""
+    study = store.attrs.get("study", {})
+    tables = (study, store.attrs.get("rig", {}), study.get("grid", {}) if isinstance(study, dict) else {})
+    if is_damaged(path) or not all(isinstance(table, dict) for table in tables):
+        raise StoreError(f"{path}: its metadata are damaged; run its study again to repair them")
 
 
 def _open(path: Path, chunks: Any, without: list[str]) -> xr.Dataset:
     import xarray as xr
+    import zarr
 
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), zarr.config.set(CHECKED):
         # A store made by other tools may lack consolidated metadata. Durations in seconds stay numbers, and
         # nothing here is a date.
         warnings.simplefilter("ignore", RuntimeWarning)
         store = xr.open_zarr(
-            path, chunks=chunks, drop_variables=without, decode_times=False, decode_timedelta=False
+            RegularFiles(path),
+            chunks=chunks,
+            drop_variables=without,
+            decode_times=False,
+            decode_timedelta=False,
         )
     held = {n: store[n].compute() for n in ("revolution", *drawn_axes(store)) if n in store}
     opened: xr.Dataset = store.assign_coords(held)

@@ -22,7 +22,7 @@ from rubhpc.running.watchdog import Watchdog
 from rubhpc.running.worker import Worker
 from rubhpc.running.workers import start_workers
 from rubhpc.schema import DONE, FAILED, MISSING
-from rubhpc.storage.disk import disk_errors
+from rubhpc.storage.disk import disk_errors, remove
 from rubhpc.storage.in_progress import InProgress, forget
 from rubhpc.storage.journal import count
 from rubhpc.storage.manifest import PRIVATE
@@ -200,10 +200,13 @@ def _round(request: RunRequest, pool: Pool, began: float) -> Summary:
     """Compute what is missing, together."""
     job = pool.from_first(lambda: prepare_job(request, pool.size))
     request.token = job.token
+    _together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=False))
     _together(pool, lambda: _compute(job, pool, request))
     if job.suspect and not request.stopping.look():
         _together(pool, lambda: _try_suspects(job, pool, request.stopping))
     reason = next((reason for reason in pool.gather(request.stopping.verdict) if reason), "")
+    if not reason:
+        _together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=True))
     summary = pool.from_first(lambda: _finish(job, pool.totals().n_case, _clock() - began))
     n_missing = summary.counts[MISSING]
     if n_missing and reason:
@@ -250,6 +253,14 @@ def _compute(job: Job, pool: Pool, request: RunRequest) -> None:
                 next_packing = time.monotonic() + _PACKING_GAP
     if stopping.reason:
         pool.add(Totals(stop=1))
+
+
+def _pack_blocks(job: Job, pool: Pool, stopping: Stopping, *, is_end: bool) -> None:
+    """Pack this rank's part of the shards; at the beginning of a run, only those that are mostly unpacked."""
+    files = Store(job.study.output).block_files
+    least = 1 if is_end else files.n_inner // 2 + 1
+    with disk_errors(job.study.output):
+        files.pack(pool.rank, pool.size, least=least, is_over=stopping.look)
 
 
 def _try_suspects(job: Job, pool: Pool, stopping: Stopping) -> None:
@@ -339,7 +350,7 @@ def _finish(job: Job, computed: int, seconds: float) -> Summary:
     ledger = store.replay()
     store.pack(ledger)
     with disk_errors(store.path):
-        (store.path / "STOP").unlink(missing_ok=True)
+        remove(store.path / "STOP")
         forget(store.in_progress_directory, ledger.status != MISSING)
     failed = np.flatnonzero(ledger.status == FAILED)[:_REASONS].tolist()
     return Summary(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,8 +36,10 @@ class Plan:
     ----------
     counts : tuple of int
         Cases that are missing, done, failed and diverged, in this order.
-    n_sequence, n_block, n_per_block, n_file : int
-        Sequences and blocks of the whole grid, and cases in a block; files of the finished store, about.
+    n_sequence, n_block, n_per_block : int
+        Sequences and blocks of the whole grid, and cases in a block.
+    n_file, n_file_running : int
+        Files of the finished store, and at most before its blocks are packed, about.
     n_byte : int
         Of the finished store before compression, about.
     steps : int
@@ -58,11 +60,21 @@ class Plan:
     n_block: int
     n_per_block: int
     n_file: int
+    n_file_running: int
     n_byte: int
     steps: int
     core_hours: float
     failures: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    @property
+    def _files(self) -> str:
+        more = (
+            f", up to {self.n_file_running} before a run packs them"
+            if self.n_file_running > self.n_file
+            else ""
+        )
+        return f"{self.n_file} files{more}"
 
     @property
     def _idle(self) -> str:
@@ -85,7 +97,7 @@ class Plan:
                 f"{self.title} -> {self.store}",
                 f"cases       {n_case} = {sizes}",
                 f"blocks      {self.n_block}, at most {self.n_per_block} cases each; {self._idle}",
-                f"store       {_size(self.n_byte)} before compression, {self.n_file} files",
+                f"store       {_size(self.n_byte)} before compression, {self._files}",
                 "so far      "
                 + ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING)),
                 f"to compute  {self.steps:.3g} steps, {cost}",
@@ -112,6 +124,7 @@ def make_plan(study: Study) -> Plan:
     status = np.zeros(grid.n_case, np.int8)
     if is_store(study.output):
         store = Store(study.output)
+        manifest = replace(manifest, shard=store.manifest.shard)
         ledger = store.replay(with_measures=False)
         ledger.status[cases_without_files(store, ledger)] = MISSING
         origin = origins(store.manifest, manifest)
@@ -122,6 +135,8 @@ def make_plan(study: Study) -> Plan:
     pace, failures = time_pilots(grid, manifest, [block for block, _ in left])
     seconds = seconds_of(pace, steps, count_preparations(grid, missing)) if left else 0.0
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
+    shards = zip(manifest.shape, manifest.shard, strict=False)
+    n_shard = math.prod(-(-n // s) for n, s in shards) if manifest.shard else 0
     names = {axis.coordinate: axis.name for axis in study.axes}  # a dimension as the study names its axis
     if study.sample is not None:
         n_range = sum(axis.drawn_from is not None for axis in study.axes)
@@ -134,7 +149,8 @@ def make_plan(study: Study) -> Plan:
         n_sequence=len(grid.sequences()),
         n_block=len(blocks),
         n_per_block=math.prod(grid.chunk),
-        n_file=len(blocks) * len(manifest.variables) + _FIXED_FILES,
+        n_file=(n_shard or len(blocks)) * len(manifest.variables) + _FIXED_FILES,
+        n_file_running=(n_shard + len(blocks)) * len(manifest.variables) + _FIXED_FILES,
         n_byte=grid.n_case * (per_case + 2 * _LINE),
         steps=round(steps),
         core_hours=seconds / 3600,

@@ -1,9 +1,11 @@
-"""Files that are whole or absent, and operating system errors in one line."""
+"""Files that are whole or absent, reading of regular files only, and operating system errors in one line."""
 
 from __future__ import annotations
 
 import errno
 import os
+import shutil
+import stat
 import uuid
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -13,6 +15,7 @@ from rubhpc.errors import StoreError
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+    from typing import BinaryIO
 
 _ADVICE = {
     errno.ENOSPC: "the disk is full; free some space and run the same command again",
@@ -26,6 +29,77 @@ _ADVICE = {
     errno.ENOENT: "part of its path is missing and cannot be made; choose another place with --output",
     errno.EIO: "the disk reports an input/output error; repair it, then run rubhpc verify on the store",
 }
+
+
+LARGEST = 2**30  # bytes that are read at once, at most
+
+
+class NotRegular(OSError):  # noqa: N818 - an errno of its own
+    """What lies at a path is no regular file: a directory, a pipe, a device."""
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a regular file for reading; a pipe is not waited for, and a device is not read.
+
+    Raises
+    ------
+    NotRegular
+        The path, or what it links to, is no regular file.
+    OSError
+        It cannot be opened.
+    """
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise NotRegular(errno.EINVAL, "is not a regular file", str(path))
+        return os.fdopen(handle, "rb")
+    except BaseException:
+        os.close(handle)
+        raise
+
+
+def read_regular(path: Path, most: int = LARGEST) -> bytes:
+    """The content of a regular file of at most `most` bytes.
+
+    Raises
+    ------
+    NotRegular
+        The path, or what it links to, is no regular file.
+    OSError
+        It cannot be read, or is larger.
+    """
+    with open_regular(path) as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise OSError(errno.EINVAL, "is larger than a file of its kind can be", str(path))
+    return data
+
+
+def is_filled(path: Path) -> bool:
+    """Whether a regular file is there that holds something; a power cut may leave empty ones.
+
+    Raises
+    ------
+    OSError
+        Whether it is there cannot be seen.
+    """
+    try:
+        found = path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return stat.S_ISREG(found.st_mode) and found.st_size > 0
+
+
+def remove(path: Path) -> None:
+    """Remove whatever is at a path, if there is something; a link, not what it leads to."""
+    try:
+        path.unlink()
+    except FileNotFoundError:
+        pass
+    except OSError:
+        if not path.is_dir() or path.is_symlink():
+            raise
+        shutil.rmtree(path)
 
 
 @contextmanager

@@ -19,9 +19,9 @@ import numpy as np
 
 from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.storage import layout
-from rubhpc.storage.disk import disk_errors, flush_to_disk, write_whole
+from rubhpc.storage.disk import disk_errors, flush_to_disk, remove, write_whole
 from rubhpc.storage.journal import Entry, Journal, next_run
-from rubhpc.storage.manifest import GROWTH, PRIVATE, Manifest, manifests
+from rubhpc.storage.manifest import BLOCKS, GROWTH, PRIVATE, Manifest, manifests
 from rubhpc.storage.measures import added_measures, converted
 from rubhpc.storage.store import Store, case_checksum
 
@@ -69,7 +69,7 @@ def grow(store: Store, grid: CaseGrid) -> None:
     """
     draft = store.private / f"{GROWTH}.draft"
     with disk_errors(store.path):
-        shutil.rmtree(draft, ignore_errors=True)
+        remove(draft)
         try:
             _put_together(draft, store, grid)
             os.sync()  # everything is on the disk before it counts
@@ -97,6 +97,10 @@ def finish_growth(path: Path) -> None:
                 for file in [staged] if staged.is_file() else staged.rglob("*"):
                     if file.is_file():
                         _move(file, path / file.relative_to(growth))
+        blocks = growth / PRIVATE / BLOCKS
+        for file in blocks.rglob("*") if blocks.is_dir() else ():
+            if file.is_file():
+                _move(file, path / file.relative_to(growth))
         os.sync()
         for file in manifests(path):
             if file.is_relative_to(growth) and file.exists():
@@ -121,6 +125,7 @@ def _put_together(draft: Path, store: Store, grid: CaseGrid) -> None:
         measures=(*before.measures, *added),
         added=(*before.added, *(variable.name for variable in added)),
         accepted=accepted,
+        shard=before.shard,
     )
     files = layout.skeleton(grid, after)
     for name, data in files.items():
@@ -167,7 +172,7 @@ def _stage_blocks(new: Store, old: Store, ledger: Ledger, origin: NDArray[np.int
         if np.array_equal(here, source):
             continue  # the block stays as it is
         wanted = np.flatnonzero((source >= 0) & is_stored[source])
-        if not len(wanted) and not any(file.exists() for file in old.chunk_files(start)):
+        if not len(wanted) and not old.has_any_file(start):
             continue
         data = new.empty_block(start)
         for i_case in wanted.tolist():

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
+from rubhpc.storage.disk import read_regular, remove
+
 if TYPE_CHECKING:
     from types import TracebackType
 
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from rubhpc.storage.manifest import Manifest
 
 _RECORD = 64  # bytes of the current case; the evidence follows
+_MOST = 2**20  # bytes with its evidence, at most
 _CRASHES = 2  # deaths by a fatal signal or for lack of memory after which a case has failed
 _DEATHS = 5  # deaths of unknown cause: the launcher may have been killed, or the power cut
 _OVERRUN = "over its time limit"
@@ -89,7 +92,7 @@ def read_deaths(directory: Path, manifest: Manifest, is_missing: NDArray[np.bool
     for record in sorted(directory.glob("run*")) if directory.is_dir() else ():
         found = _read(record)
         if found is None or not _is_open(*found[:2], manifest, is_missing):
-            record.unlink(missing_ok=True)  # it died before its first case, or that has been computed since
+            remove(record)  # it died before its first case, or that has been computed since
             continue
         flat, _, evidence = found
         deaths[flat] += 1
@@ -112,7 +115,7 @@ def forget(directory: Path, is_judged: NDArray[np.bool_]) -> None:
     for record in directory.glob("run*"):
         found = _read(record)
         if found is None or found[0] >= len(is_judged) or is_judged[found[0]]:
-            record.unlink(missing_ok=True)
+            remove(record)
 
 
 def _is_open(flat: int, name: str, manifest: Manifest, is_missing: NDArray[np.bool_]) -> bool:
@@ -121,7 +124,10 @@ def _is_open(flat: int, name: str, manifest: Manifest, is_missing: NDArray[np.bo
 
 def _read(record: Path) -> tuple[int, str, str] | None:
     """Flat index and id of the recorded case, and the evidence of its death; None without a case."""
-    data = record.read_bytes()
+    try:
+        data = read_regular(record, _MOST)
+    except OSError:
+        return None
     found = re.fullmatch(r"(\d+) ([0-9a-f]{32})", data[:_RECORD].decode(errors="replace").strip())
     if found is None:
         return None

@@ -21,6 +21,7 @@ from zlib import crc32
 import numpy as np
 
 from rubhpc.schema import STATUS
+from rubhpc.storage.disk import NotRegular, open_regular
 from rubhpc.storage.measures import blank_records, columns, converted, measures_type, record_type
 from rubhpc.study.continuation import CaseIds
 
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 _FORMAT = 1
 _BATCH = 2**16  # records moved to the ledger at once
+_LONGEST = 2**24  # bytes of a line, at most
 _NAME = re.compile(r"run(\d{6})-(\w+)\.journal")
 
 
@@ -95,9 +97,12 @@ class Header:
     def type_in(self, header: dict[str, Any]) -> np.dtype[np.void] | None:
         """Packed record in a journal with this header; None where it belongs to another study or grid."""
         listed = header.pop("metrics", ())
-        if header != self.grid or any(n not in (0, self.n_stator) for *_, n in listed):
+        if header != self.grid:
             return None
-        return record_type(listed)
+        try:
+            return record_type(listed) if all(n in (0, self.n_stator) for *_, n in listed) else None
+        except (TypeError, ValueError):
+            return None
 
     @cached_property
     def types_by_size(self) -> dict[int, np.dtype[np.void]]:
@@ -233,24 +238,45 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
     status, checksum, is_known, reasons = ledger.status, ledger.checksum, ledger.is_known, ledger.reasons
     cases: list[int] = []
     records = bytearray()
-    with path.open("rb") as file:
-        first = file.readline()
-        is_sound = first[:8] == b"%08x" % crc32(first[9:-1])
-        kind = header.type_in(json.loads(first[9:-1])) if is_sound else None
+    try:
+        opened = open_regular(path)
+    except NotRegular:  # what was in it is lost
+        ledger.n_damaged += 1
+        return 0
+    with opened as file:
+        first = file.readline(_LONGEST)
+        about = _header_in(first)
+        is_sound = about is not None
+        kind = header.type_in(about) if about is not None else None
         if is_sound and kind is None:
             return 0
         ledger.n_damaged += not is_sound
         n_line = 0
-        for line in file:
+        while line := file.readline(_LONGEST):
             text = line[9:-1]
             if line[:8] != b"%08x" % crc32(text) or line[-1:] != b"\n":
                 ledger.n_damaged += 1
                 ledger.damaged_cases |= _still_legible(text, n_case)
                 continue
-            number, name, state, check, packed, reason = text.split(b" ", 5)
-            flat = int(number)
-            is_wanted = packed != b"-" and (ledger.measures is not None or not is_sound)
-            measures = binascii.a2b_base64(packed) if is_wanted else b""
+            if line == first:  # the header once more
+                continue
+            try:
+                number, name, state, check, packed, why = text.split(b" ", 5)
+                flat, code, crc = int(number), int(state), int(check, 16)
+                is_wanted = packed != b"-" and (ledger.measures is not None or not is_sound)
+                measures = binascii.a2b_base64(packed) if is_wanted else b""
+                reason = json.loads(why) if why != b"-" else ""
+                is_fit = (
+                    0 <= flat < n_case
+                    and 0 <= code < len(STATUS)
+                    and 0 <= crc < 2**32
+                    and isinstance(reason, str)
+                )
+            except (ValueError, RecursionError):
+                is_fit = False
+            if not is_fit or (is_sound and measures and kind is not None and len(measures) != kind.itemsize):
+                ledger.n_damaged += 1
+                continue
             if not is_sound:  # then a line counts only if its id is that of its case
                 if measures and kind is None:
                     kind = header.types_by_size.get(len(measures))
@@ -258,20 +284,31 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
                 if name.decode() != header.id_at(flat) or not is_fit:
                     continue
             n_line += 1
-            status[flat] = int(state)
-            checksum[flat] = int(check, 16)
+            status[flat] = code
+            checksum[flat] = crc
             is_known[flat] = True
             if measures:
                 cases.append(flat)
                 records += measures
                 if len(cases) == _BATCH:
                     _enter(ledger, kind, cases, records)
-            if reason != b"-":
-                reasons[flat] = json.loads(reason)
+            if reason:
+                reasons[flat] = reason
             elif reasons:
                 reasons.pop(flat, None)
     _enter(ledger, kind, cases, records)
     return n_line
+
+
+def _header_in(line: bytes) -> dict[str, Any] | None:
+    """The header in a line; None where it is damaged."""
+    if line[:8] != b"%08x" % crc32(line[9:-1]):
+        return None
+    try:
+        content = json.loads(line[9:-1])
+    except (ValueError, RecursionError):
+        return None
+    return content if isinstance(content, dict) else None
 
 
 def _enter(ledger: Ledger, kind: np.dtype[np.void] | None, cases: list[int], records: bytearray) -> None:

@@ -46,6 +46,7 @@ _PACKAGES = ("numpy", "numba", "scipy", "zarr")
 # The checksum has every reader notice a damaged byte, whatever it reads with.
 _CODECS = (BloscCodec(cname="lz4", clevel=5, shuffle="shuffle"), Crc32cCodec())
 _BLOSC = Blosc(cname="lz4", clevel=5, shuffle=Blosc.SHUFFLE)
+_LEAST, _AT_SIZE = 20, 4  # bytes of blosc's header and the checksum; where the header has the decoded size
 
 # For arrays being opened or made: a chunk of nothing but the fill value is written all the same, so that a
 # file that is absent has been lost.
@@ -59,7 +60,7 @@ def skeleton(grid: CaseGrid, manifest: Manifest) -> dict[str, bytes]:
         MemoryStore(files), zarr_format=3, attributes=_attributes(grid, accepted=manifest.accepted)
     )
     for variable in manifest.variables:
-        _create(group, variable, manifest, chunk=manifest.chunk)
+        _create(group, variable, manifest, chunk=manifest.chunk, shard=manifest.shard)
     for variable in manifest.packed:
         _create(group, variable, manifest, chunk=_packed_chunk(manifest.shape))
     with zarr.config.set(_WRITE_ALL):
@@ -94,9 +95,21 @@ def encode(chunk: NDArray[Any]) -> bytes:
 
 def decode(data: bytes, dtype: str, shape: tuple[int, ...]) -> NDArray[Any] | None:
     """A chunk from its bytes; None where these are damaged."""
-    if data[-4:] != struct.pack("<I", crc32c(data[:-4])):
+    kind = np.dtype(dtype).newbyteorder("<")
+    n_byte = math.prod(shape) * kind.itemsize
+    if len(data) < _LEAST or data[-4:] != struct.pack("<I", crc32c(data[:-4])):
         return None
-    return np.frombuffer(_BLOSC.decode(data[:-4]), np.dtype(dtype).newbyteorder("<")).reshape(shape)
+    if struct.unpack_from("<I", data, _AT_SIZE)[0] != n_byte:  # of another shape
+        return None
+    try:
+        return np.frombuffer(_BLOSC.decode(data[:-4]), kind).reshape(shape)
+    except (RuntimeError, ValueError):  # not what blosc has written, though its checksum is right
+        return None
+
+
+def most_bytes(dtype: str, shape: tuple[int, ...]) -> int:
+    """Size of an encoded chunk at most, bytes: what cannot be compressed is copied."""
+    return math.prod(shape) * np.dtype(dtype).itemsize + _LEAST
 
 
 def get_array(group: zarr.Group, name: str) -> zarr.Array[Any]:
@@ -113,7 +126,14 @@ def checksum(values: NDArray[Any], start: int = 0) -> int:
     return crc32(np.ascontiguousarray(values).data, start)
 
 
-def _create(group: zarr.Group, variable: Variable, manifest: Manifest, *, chunk: tuple[int, ...]) -> None:
+def _create(
+    group: zarr.Group,
+    variable: Variable,
+    manifest: Manifest,
+    *,
+    chunk: tuple[int, ...],
+    shard: tuple[int, ...] = (),
+) -> None:
     extent = manifest.extent(variable)
     attributes: dict[str, Any] = {"units": variable.unit, "long_name": variable.long_name}
     if "sample" in variable.dims:
@@ -124,6 +144,8 @@ def _create(group: zarr.Group, variable: Variable, manifest: Manifest, *, chunk:
         variable.name,
         shape=(*manifest.shape, *extent),
         chunks=(*chunk, *(max(n, 1) for n in extent)),
+        chunk_key_encoding={"name": "default", "separator": "." if shard else "/"},
+        shards=(*shard, *(max(n, 1) for n in extent)) if shard else None,
         dtype=variable.dtype,
         fill_value=variable.fill_value,
         compressors=_CODECS,

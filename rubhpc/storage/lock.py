@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from rubhpc.errors import StoreError
+from rubhpc.storage.disk import remove
+from rubhpc.storage.small_file import read_record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -28,6 +30,7 @@ HEARTBEAT = 10.0  # s between touches of the lock
 STALE_AFTER = (
     180.0  # s without a heartbeat, for holders on other hosts; network file systems cache for a minute
 )
+_LATEST = 4e9  # s since 1970: a later start is no time
 ORPHAN_PATIENCE = 15.0  # s to wait for a holder whose launcher is gone: it is about to stop
 
 
@@ -80,10 +83,10 @@ def process_state(pid: int) -> tuple[str, int, str] | None:
 
 def read_holder(path: Path) -> Holder | None:
     """Who holds the lock at `path`; None where nobody does."""
-    try:
-        return Holder(**json.loads(path.read_text()))
-    except (OSError, ValueError, TypeError):
+    holder = read_record(path, Holder)
+    if holder is None or not 0 < holder.pid < 2**31 or not 0 <= holder.since < _LATEST:
         return None
+    return holder
 
 
 def heartbeat_age(path: Path) -> float:
@@ -165,7 +168,7 @@ class Lock:
                 return False
             try:
                 ready.write_text(json.dumps(asdict(self._me)))
-                self.path.unlink(missing_ok=True)
+                remove(self.path)
                 _link(ready, self.path)
             except FileExistsError:  # taken between the look and the link
                 return False
@@ -196,7 +199,10 @@ def _link(ready: Path, path: Path) -> None:
 @contextmanager
 def _guard(path: Path) -> Iterator[None]:
     """Keep two runs on one host from reclaiming the same stale lock at once, where the file system can."""
-    with path.with_name(f"{path.name}.guard").open("w") as file:
+    guard = path.with_name(f"{path.name}.guard")
+    if guard.exists() and not guard.is_file():  # opening a pipe waits for its other end
+        remove(guard)
+    with guard.open("w") as file:
         with suppress(OSError):  # no flock on this file system
             fcntl.flock(file, fcntl.LOCK_EX)
         yield

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -11,7 +12,7 @@ from zlib import crc32
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import STATE, VARIABLES, case_measures
-from rubhpc.storage.disk import write_whole
+from rubhpc.storage.disk import read_regular, write_whole
 from rubhpc.storage.journal import Header
 from rubhpc.storage.measures import from_json, to_json, unlisted_measures
 from rubhpc.study.axes import FROM_REST, coordinate_of, meanings_of, written
@@ -26,9 +27,12 @@ if TYPE_CHECKING:
     from rubhpc.study.cases import CaseGrid
     from rubhpc.study.continuation import Continuation
 
-_FORMAT = 4
-_READABLE = (3, 4)  # format 3 does not list its measures
+_FORMAT, _SHARDED = 4, 5  # a store without shards can be read by versions that know none
+_READABLE = (3, _FORMAT, _SHARDED)  # format 3 does not list its measures
+_MOST_BLOCKS = 256  # of more blocks, one file each would be too many for file systems with a quota of files
+_SHARDS = 48  # of an array, at most, when the store is made: with some 17 arrays, under 1000 files
 PRIVATE = ".rubhpc"  # the directory of a store that zarr does not look into
+BLOCKS = "blocks"  # in it: blocks that have not been packed into shards yet
 GROWTH = "growth"  # in it: what a growth that was decided on has yet to move to its place
 _NAMES = ("manifest.json", "manifest.copy.json")  # one damaged byte must not cost a study
 
@@ -62,6 +66,8 @@ class Manifest:
         The grid; the only part that may grow.
     chunk : tuple of int
         Cases of one block along each dimension, fixed for the life of the store.
+    shard : tuple of int
+        Cases of one shard along each dimension, fixed likewise; () where every block has its own files.
     sizes : dict
         Lengths of the dimensions after the axes: stator, sample, order, section.
     keep : tuple of str
@@ -87,6 +93,7 @@ class Manifest:
     measures: tuple[Variable, ...]
     added: tuple[str, ...] = ()
     accepted: tuple[int, ...] = ()
+    shard: tuple[int, ...] = ()
 
     @cached_property
     def points(self) -> Points:
@@ -173,6 +180,7 @@ class Manifest:
                 for axis in study.axes
             ),
             chunk=tuple(grid.chunk),
+            shard=shard_of(grid.shape, grid.chunk),
             sizes={
                 "stator": grid.n_stator,
                 "sample": n_sample,
@@ -189,9 +197,13 @@ class Manifest:
         """Put the manifest into a store, twice."""
         content = {f.name: getattr(self, f.name) for f in fields(self)}
         axes = [{f.name: getattr(axis, f.name) for f in fields(axis)} for axis in self.axes]
-        text = json.dumps(content | {"axes": axes, "measures": to_json(self.measures)}).encode()
+        content |= {"axes": axes, "measures": to_json(self.measures)}
+        if not self.shard:
+            del content["shard"]
+        text = json.dumps(content).encode()
+        number = _SHARDED if self.shard else _FORMAT
         for name in _NAMES:
-            write_whole(store / PRIVATE / name, b"rubhpc %d %08x\n%s" % (_FORMAT, crc32(text), text))
+            write_whole(store / PRIVATE / name, b"rubhpc %d %08x\n%s" % (number, crc32(text), text))
 
     @classmethod
     def read(cls, store: Path) -> Self:
@@ -205,8 +217,7 @@ class Manifest:
         damaged, is_other = None, False
         for place in manifests(store):
             try:
-                text = _vouched(place)
-                content = json.loads(text)
+                return cls._of_json(json.loads(_vouched(place)))
             except (FileNotFoundError, NotADirectoryError):
                 continue
             except _OtherFormat:
@@ -214,11 +225,8 @@ class Manifest:
                 continue
             except (ValueError, OSError) as error:
                 damaged = error
-                continue
-            axes = (AxisRecord(**{**axis, "values": tuple(axis["values"])}) for axis in content["axes"])
-            tuples = {name: tuple(content.get(name, ())) for name in ("chunk", "keep", "added", "accepted")}
-            measures = from_json(content["measures"]) if "measures" in content else unlisted_measures()
-            return cls(**{**content, **tuples, "axes": tuple(axes), "measures": measures})
+            except (TypeError, KeyError, AttributeError):  # its checksum is right, its content is not
+                damaged = ValueError("unknown content")
         if is_other:
             raise StoreError(f"{store}: made by another version of rubhpc; use that one or another --output")
         if damaged is not None:
@@ -230,6 +238,15 @@ class Manifest:
             raise StoreError(f"{store}: is not a rubhpc store but a file")
         what = "is not a rubhpc store" if store.exists() else "no such store"
         raise StoreError(f"{store}: {what}; give the directory that a study was run into")
+
+    @classmethod
+    def _of_json(cls, content: dict[str, Any]) -> Self:
+        axes = (AxisRecord(**{**axis, "values": tuple(axis["values"])}) for axis in content["axes"])
+        tuples = {
+            name: tuple(content.get(name, ())) for name in ("chunk", "shard", "keep", "added", "accepted")
+        }
+        measures = from_json(content["measures"]) if "measures" in content else unlisted_measures()
+        return cls(**{**content, **tuples, "axes": tuple(axes), "measures": measures})
 
     def damaged_copies(self, store: Path) -> list[str]:
         """Names of the files of this manifest that are gone or damaged."""
@@ -280,6 +297,20 @@ class Manifest:
         )
 
 
+def shard_of(shape: tuple[int, ...], chunk: tuple[int, ...]) -> tuple[int, ...]:
+    """Cases of a shard along each dimension: whole blocks, along the last dimensions first; () without."""
+    n_block = [-(-n // c) for n, c in zip(shape, chunk, strict=True)]
+    if math.prod(n_block) <= _MOST_BLOCKS:
+        return ()
+    ratio = [1] * len(shape)
+    for i in reversed(range(len(shape))):
+        before = math.prod(n_block[:i])  # shards that are left if this dimension is spanned whole
+        ratio[i] = n_block[i] if before >= _SHARDS else -(-n_block[i] // (_SHARDS // before))
+        if before < _SHARDS:
+            break
+    return tuple(r * c for r, c in zip(ratio, chunk, strict=True))
+
+
 class _OtherFormat(Exception):  # noqa: N818 - becomes the text of a StoreError
     """A manifest that another version wrote."""
 
@@ -292,7 +323,7 @@ def manifests(store: Path) -> list[Path]:
 
 def _vouched(path: Path) -> bytes:
     """The text of a manifest, if its checksum is right."""
-    head, _, text = path.read_bytes().partition(b"\n")
+    head, _, text = read_regular(path).partition(b"\n")
     if found := re.fullmatch(rb"rubhpc (\d+) ([0-9a-f]{8})", head):
         if int(found[1]) not in _READABLE:
             raise _OtherFormat

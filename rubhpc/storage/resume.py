@@ -13,6 +13,7 @@ from rubhpc.storage.growth import finish_growth, grow
 from rubhpc.storage.manifest import Manifest, manifests
 from rubhpc.storage.measures import added_measures
 from rubhpc.storage.store import Store
+from rubhpc.storage.tidy import tidy
 from rubhpc.study.cases import CaseGrid
 
 if TYPE_CHECKING:
@@ -80,11 +81,11 @@ def bring_up_to_date(store: Store, grid: CaseGrid, *, accept_version: bool = Fal
 
     Returns a note on the measures that were added, "" without any.
     """
+    tidy(store.path, store.manifest)
     finish_growth(store.path)
     store.reopen()
     wanted = Manifest.of(grid)
     _refuse_other(store.manifest, wanted, store.path, accept_version=accept_version)
-    store.remove_partial_files()
     added = added_measures(store.manifest.measures)
     note = _note_on(added, store) if added else ""
     if added or store.manifest.axes != wanted.axes or store.manifest.identity != wanted.identity:

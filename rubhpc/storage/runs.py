@@ -12,6 +12,7 @@ from pathlib import Path
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.journal import journals
 from rubhpc.storage.manifest import PRIVATE
+from rubhpc.storage.small_file import read_record
 from rubhpc.version import __version__
 
 
@@ -63,11 +64,8 @@ def read_runs(store: Path) -> list[Run]:
         wrote[number] = max(wrote.get(number, 0.0), path.stat().st_mtime)
     runs = []
     for path in sorted((store / PRIVATE / "runs").glob("run*.json")):
-        try:
-            run = Run(**json.loads(path.read_bytes()))
-        except (ValueError, TypeError):
-            continue
-        if run.number in wrote:
+        run = read_record(path, Run)
+        if run is not None and run.number in wrote:
             runs.append(Run(**asdict(run) | {"wrote": wrote[run.number]}))
     return runs
 

@@ -1,7 +1,8 @@
 """The zarr store of a study: made whole, written block by block, packed from the journals.
 
-Every array has one chunk a block, and a block has one writer. Measures are lines of a journal first
-(`rubhpc.storage.journal`) and become arrays when a run ends. What is private lies under `.rubhpc`.
+Every array has one chunk a block, and a block has one writer (`rubhpc.storage.block_files`). Measures are
+lines of a journal first (`rubhpc.storage.journal`) and become arrays when a run ends. What is private lies
+under `.rubhpc`.
 """
 
 from __future__ import annotations
@@ -23,10 +24,11 @@ import zarr
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.storage import layout
-from rubhpc.storage.disk import disk_errors, write_whole
+from rubhpc.storage.block_files import BlockFiles
+from rubhpc.storage.disk import disk_errors, read_regular, remove, write_whole
 from rubhpc.storage.journal import Entry, Journal, Ledger, journals, replay
 from rubhpc.storage.lock import Lock, process_state
-from rubhpc.storage.manifest import PRIVATE, Manifest
+from rubhpc.storage.manifest import GROWTH, PRIVATE, Manifest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -46,7 +48,8 @@ class Store:
     def reopen(self) -> None:
         """Take the manifest as it now is."""
         self.manifest = Manifest.read(self.path)
-        self.__dict__.pop("arrays", None)
+        for name in ("arrays", "block_files"):
+            self.__dict__.pop(name, None)
 
     @classmethod
     def create(cls, path: Path, grid: CaseGrid) -> Self:
@@ -121,7 +124,7 @@ class Store:
         damaged = []
         for name, check in self.manifest.files.items():
             try:
-                if crc32((self.path / name).read_bytes()) == check:
+                if crc32(read_regular(self.path / name)) == check:
                     continue
             except OSError:
                 pass
@@ -177,20 +180,27 @@ class Store:
             flat = np.add.outer(flat * n, np.arange(window.start, window.stop)).ravel()
         return flat
 
+    @cached_property
+    def block_files(self) -> BlockFiles:
+        """Where the encoded chunks lie."""
+        return BlockFiles(self.path, self.manifest)
+
+    def _place(self, start: tuple[int, ...]) -> tuple[int, ...]:
+        return tuple(s // c for s, c in zip(start, self.manifest.chunk, strict=True))
+
     def chunk_files(self, start: tuple[int, ...]) -> list[Path]:
-        """The files that hold a block, one an array."""
-        place = [s // c for s, c in zip(start, self.manifest.chunk, strict=True)]
-        return [
-            self.path.joinpath(v.name, "c", *map(str, (*place, *[0] * len(v.dims))))
-            for v in self.manifest.variables
-        ]
+        """The files to which a block is written, one an array."""
+        return [self.block_files.own_file(v, self._place(start)) for v in self.manifest.variables]
 
     def has_files(self, start: tuple[int, ...]) -> bool:
-        """Whether all files of a block are there and hold something; a power cut may leave empty ones."""
-        try:
-            return all(path.stat().st_size for path in self.chunk_files(start))
-        except FileNotFoundError:
-            return False
+        """Whether all arrays of a block are there and hold something; a power cut may leave empty files."""
+        place = self._place(start)
+        return all(self.block_files.size(variable, place) for variable in self.manifest.variables)
+
+    def has_any_file(self, start: tuple[int, ...]) -> bool:
+        """Whether any array of a block is there."""
+        place = self._place(start)
+        return any(self.block_files.size(variable, place) for variable in self.manifest.variables)
 
     def empty_block(self, start: tuple[int, ...]) -> dict[str, NDArray[Any]]:
         """Arrays of a block in which every case is missing, (n_case of it, ...) each."""
@@ -204,13 +214,12 @@ class Store:
         """The arrays of a block as stored; None where a file is missing or cannot be decoded."""
         inside = tuple(slice(w.stop - w.start) for w in self.window(start))
         block = {}
-        for variable, path in zip(self.manifest.variables, self.chunk_files(start), strict=True):
+        for variable in self.manifest.variables:
             extent = self.manifest.extent(variable)
-            try:
-                data = path.read_bytes()
-            except OSError:
-                return None
-            chunk = layout.decode(data, variable.dtype, (*self.manifest.chunk, *extent))
+            shape = (*self.manifest.chunk, *extent)
+            most = layout.most_bytes(variable.dtype, shape)
+            data = self.block_files.read(variable, self._place(start), most)
+            chunk = None if data is None else layout.decode(data, variable.dtype, shape)
             if chunk is None:
                 return None
             block[variable.name] = np.ascontiguousarray(chunk[inside]).reshape(-1, *extent)
@@ -227,13 +236,6 @@ class Store:
                     inside = [(0, 0)] * len(variable.dims)
                     values = np.pad(values, beyond + inside, constant_values=variable.fill_value)
                 write_whole(path, layout.encode(values), is_synced=False)
-
-    def remove_partial_files(self) -> None:
-        """Remove unfinished files of killed writers."""
-        for directory, _, names in os.walk(self.path):
-            for name in names:
-                if name.endswith(".partial"):
-                    Path(directory, name).unlink(missing_ok=True)
 
     def pack(self, ledger: Ledger) -> None:
         """Write status and measures of every case as arrays, unless nothing has been journalled since."""
@@ -260,13 +262,13 @@ class Store:
     def is_packed(self) -> bool:
         """Whether the packed arrays are up to date with the journals."""
         try:
-            return (self.private / "packed.json").read_text() == self._journal_state()
-        except FileNotFoundError:
+            return read_regular(self.private / "packed.json") == self._journal_state().encode()
+        except OSError:
             return False
 
     def forget_packing(self) -> None:
         """Have the next run pack again."""
-        (self.private / "packed.json").unlink(missing_ok=True)
+        remove(self.private / "packed.json")
 
     def _journal_state(self) -> str:
         return json.dumps([[path.name, path.stat().st_size] for path in journals(self.journal_directory)])
@@ -278,6 +280,17 @@ def case_checksum(data: dict[str, NDArray[Any]], i_case: int) -> int:
     for values in data.values():
         check = layout.checksum(values[i_case], check)
     return check
+
+
+def is_damaged(path: Path) -> bool:
+    """Whether the metadata of the group at `path` differ from what its manifest lists; False without one."""
+    if (path / PRIVATE / GROWTH).is_dir():
+        return False  # a growth is under way
+    try:
+        check = Manifest.read(path).files.get("zarr.json")
+        return check is not None and crc32(read_regular(path / "zarr.json")) != check
+    except (StoreError, OSError):
+        return False
 
 
 def _remove_drafts(path: Path) -> None:

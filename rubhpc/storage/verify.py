@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,10 +11,13 @@ import zarr
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, MISSING
+from rubhpc.storage.disk import is_filled
 from rubhpc.storage.growth import finish_growth
 from rubhpc.storage.journal import next_run
-from rubhpc.storage.manifest import GROWTH
+from rubhpc.storage.manifest import GROWTH, PRIVATE
+from rubhpc.storage.regular_files import RegularFiles
 from rubhpc.storage.store import Store, case_checksum
+from rubhpc.storage.tidy import unfit
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -87,7 +91,9 @@ def verify(path: Path) -> Damage:
     return Damage(
         store=path,
         cases={i: f"{_name(store, i)}: {text}" for i, text in sorted((damaged | lost).items())},
-        arrays=(*files, *packed, *store.manifest.damaged_copies(path)),
+        arrays=tuple(
+            dict.fromkeys((*files, *packed, *store.manifest.damaged_copies(path), *_misplaced(store)))
+        ),
         n_checked=n_checked,
         note=note,
     )
@@ -117,12 +123,19 @@ def _damaged_cases(store: Store, ledger: Ledger) -> dict[int, str]:
         data = store.read_block(start)
         for i_case in there.tolist():
             if data is None:
-                damaged[int(flat[i_case])] = (
-                    "a file is gone" if not store.has_files(start) else "a chunk is garbled"
-                )
+                damaged[int(flat[i_case])] = _trouble(store, start)
             elif case_checksum(data, i_case) != ledger.checksum[flat[i_case]]:
                 damaged[int(flat[i_case])] = "its arrays have changed"
     return damaged
+
+
+def _trouble(store: Store, start: tuple[int, ...]) -> str:
+    """Why a block cannot be read."""
+    if store.has_files(start):
+        return "a chunk is garbled"
+    absent = [path for path in store.chunk_files(start) if not is_filled(path)]
+    is_gone = not any(os.path.lexists(path) for path in absent)
+    return "a file is gone" if is_gone else "a chunk is empty, or is not a regular file"
 
 
 def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:
@@ -133,6 +146,17 @@ def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:
     if packed is not None:
         lost |= set(np.flatnonzero((packed.ravel() != MISSING) & never).tolist())
     return {flat: "its line in the journal is damaged or gone" for flat in lost if never[flat]}
+
+
+def _misplaced(store: Store) -> list[str]:
+    """Names in the private directory that are of another kind of file than they must be, or gone."""
+    private = store.path / PRIVATE
+    places = unfit(store.path, store.manifest)
+    return [
+        str(place.relative_to(private))
+        for place in places
+        if place.is_relative_to(private) and not place.name.endswith(".partial")
+    ]
 
 
 def _damaged_packed(store: Store, ledger: Ledger) -> tuple[str, ...]:
@@ -149,6 +173,6 @@ def _damaged_packed(store: Store, ledger: Ledger) -> tuple[str, ...]:
 
 def _read(store: Store, name: str) -> NDArray[np.generic] | None:
     try:
-        return np.ascontiguousarray(zarr.open_array(store.path / name, mode="r")[...])
+        return np.ascontiguousarray(zarr.open_array(RegularFiles(store.path / name), mode="r")[...])
     except Exception:  # whatever zarr and its codecs raise on damaged bytes
         return None

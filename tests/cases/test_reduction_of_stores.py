@@ -139,7 +139,7 @@ def test_damaged_chunk_is_noticed(tmp_path: Path) -> None:
     content = bytearray(file.read_bytes())
     content[-20] ^= 1
     file.write_bytes(content)
-    with pytest.raises((ValueError, RuntimeError), match=r"(?i)checksum|crc"):
+    with pytest.raises((StoreError, ValueError, RuntimeError), match=r"(?i)checksum|crc"):
         mean_spectrum(open_in_pieces(damaged), "torsion").compute()
 
 

@@ -3,33 +3,30 @@
 from __future__ import annotations
 
 import math
-import os
 import tempfile
-from contextlib import contextmanager
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from running import write_study
+from running import killed_after, shards, write_study
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
 from rubhpc.storage.growth import origins
 from rubhpc.storage.journal import Entry, next_run
 from rubhpc.storage.manifest import Manifest
+from rubhpc.storage.regular_files import RegularFiles
 from rubhpc.storage.resume import bring_up_to_date, grid_for, open_store
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.storage.verify import verify
 from rubhpc.study import identity
 from rubhpc.study.study import Run, Study, make_axis, read_study
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 AXES = {
     "speed_ratio": [0.9, 1.5, 2.0, 2.5],
@@ -90,6 +87,7 @@ def compute(store: Store, *, all_of_it: bool = False) -> int:
                 journal.write(entries)
                 n_case += len(entries)
     store.pack(store.replay())
+    store.block_files.pack()
     return n_case
 
 
@@ -109,7 +107,7 @@ def known(store: Store) -> dict[tuple[float, ...], tuple[Any, ...]]:
 
 def check_arrays(study: Study) -> None:
     """Every stored number stands where its coordinates say, and readers see the study's own axes."""
-    dataset = xr.open_zarr(study.output).load()
+    dataset = xr.open_zarr(RegularFiles(study.output)).load()
     for axis in study.axes:
         assert tuple(dataset[axis.dimension].values) == axis.values
     for index in np.ndindex(dataset.status.shape):
@@ -122,38 +120,6 @@ def check_arrays(study: Study) -> None:
             values = dataset[name].values[index]
             expected = numbers(point, name, values.shape) if status == DONE else np.full(values.shape, np.nan)
             np.testing.assert_array_equal(values, expected)
-
-
-class Killed(BaseException):
-    """The process ends here."""
-
-
-@contextmanager
-def killed_after(n_call: int) -> Iterator[None]:
-    """Have everything that changes the disk refuse after so many calls, as for a process that is no more."""
-    names = ("replace", "rename", "unlink", "rmdir", "mkdir", "write")
-    real = {name: getattr(os, name) for name in names}
-    left = n_call
-
-    def guard(name: str) -> Any:
-        def call(*arguments: Any, **named: Any) -> Any:
-            nonlocal left
-            if left == 0:
-                raise Killed
-            left -= 1
-            return real[name](*arguments, **named)
-
-        return call
-
-    try:
-        for name in names:
-            setattr(os, name, guard(name))
-        yield
-    except Killed:
-        pass
-    finally:
-        for name, function in real.items():
-            setattr(os, name, function)
 
 
 @st.composite
@@ -172,17 +138,29 @@ def growths(draw: st.DrawFn) -> list[dict[str, list[float]]]:
 
 
 @settings(max_examples=4, phases=[Phase.generate])
-@given(grids=growths(), block=st.integers(1, 7), kills=st.lists(st.integers(0, 130), max_size=2))
-def test_growth_in_any_order_keeps_every_case_though_it_is_killed(grids, block, kills):
-    grow_and_kill(grids, block, kills)
+@given(
+    grids=growths(),
+    block=st.integers(1, 7),
+    kills=st.lists(st.integers(0, 130), max_size=2),
+    is_sharded=st.booleans(),
+)
+def test_growth_in_any_order_keeps_every_case_though_it_is_killed(grids, block, kills, is_sharded):
+    with shards() if is_sharded else nullcontext():
+        grow_and_kill(grids, block, kills)
 
 
 @pytest.mark.long
 @pytest.mark.timeout(3600)
 @settings(max_examples=60, phases=[Phase.generate])
-@given(grids=growths(), block=st.integers(1, 7), kills=st.lists(st.integers(0, 130), max_size=4))
-def test_growth_in_any_order_keeps_every_case_many_times(grids, block, kills):
-    grow_and_kill(grids, block, kills)
+@given(
+    grids=growths(),
+    block=st.integers(1, 7),
+    kills=st.lists(st.integers(0, 130), max_size=4),
+    is_sharded=st.booleans(),
+)
+def test_growth_in_any_order_keeps_every_case_many_times(grids, block, kills, is_sharded):
+    with shards() if is_sharded else nullcontext():
+        grow_and_kill(grids, block, kills)
 
 
 def grow_and_kill(grids: list[dict[str, list[float]]], block: int, kills: list[int]) -> None:
@@ -213,8 +191,14 @@ def grow_and_kill(grids: list[dict[str, list[float]]], block: int, kills: list[i
         assert not verify(study.output)
 
 
-def test_a_kill_at_every_step_of_a_growth_loses_nothing(tmp_path):
+@pytest.mark.parametrize("layout", [nullcontext, shards])
+def test_a_kill_at_every_step_of_a_growth_loses_nothing(tmp_path, layout):
     """Without draws: the process ends before the first, the second, ... change of the disk."""
+    with layout():
+        kill_at_every_step(tmp_path)
+
+
+def kill_at_every_step(tmp_path: Path) -> None:
     grid = {"speed_ratio": [0.9, 2.0], "clearance_ratio": [0.7], "friction": [0.1, 0.3, 0.5]}
     first = make_study(tmp_path, grid)
     compute(open_store(grid_for(first)), all_of_it=True)

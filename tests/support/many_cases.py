@@ -16,8 +16,10 @@ import numpy as np
 import zarr
 
 from rubhpc.rig.reading import read_rig
-from rubhpc.schema import DIVERGED, DONE
+from rubhpc.schema import DIVERGED, DONE, VARIABLES
+from rubhpc.storage.block_files import BlockFiles
 from rubhpc.storage.layout import build, encode
+from rubhpc.storage.manifest import Manifest
 from rubhpc.study.axes import Axis
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import Recording, Run, Study
@@ -60,6 +62,7 @@ def write(path: Path, shape: tuple[int, int, int] = SHAPE, revolutions: int = 64
     case_grid = case_grid_of(shape, revolutions, path)
     path.mkdir()
     build(path, case_grid)
+    files = BlockFiles(path, Manifest.read(path))
     group = zarr.open_group(path, mode="r+")
     is_done = np.ones(shape, dtype=bool)
     is_done[:, ::LOST] = False
@@ -74,10 +77,11 @@ def write(path: Path, shape: tuple[int, int, int] = SHAPE, revolutions: int = 64
         inside = tuple(slice(n) for n in block.shape)
         chunk[inside] = np.where(is_done[box][..., None], spectrum, np.nan)
         chunk[(*inside, order == LINE)] = np.where(is_done[box], 1 + friction[box[2]], np.nan)[..., None]
-        at = [str(s // c) for s, c in zip(block.start, case_grid.chunk, strict=True)]
-        file = path.joinpath(NAME, "c", *at, "0")
+        at = tuple(s // c for s, c in zip(block.start, case_grid.chunk, strict=True))
+        file = files.own_file(VARIABLES[NAME], at)
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(encode(chunk))
+    files.pack()
     return path
 
 

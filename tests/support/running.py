@@ -6,11 +6,18 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import psutil
 import pytest
+
+from rubhpc.storage import manifest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 ROOT = Path(__file__).parents[2]
 STUDY = """
@@ -69,6 +76,47 @@ def write_sample(
         "run": f"[sample]\nn = {n}\nseed = {seed}",
     }
     return write_study(folder, name, **(ranges | changes))
+
+
+@contextmanager
+def shards(most_blocks: int = 1, most_shards: int = 3) -> Iterator[None]:
+    """Have stores that are made within this context packed into shards, however small they are."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(manifest, "_MOST_BLOCKS", most_blocks)
+        patch.setattr(manifest, "_SHARDS", most_shards)
+        yield
+
+
+class Killed(BaseException):
+    """The process ends here."""
+
+
+@contextmanager
+def killed_after(n_call: int) -> Iterator[None]:
+    """Have everything that changes the disk refuse after so many calls, as for a process that is no more."""
+    names = ("replace", "rename", "unlink", "rmdir", "mkdir", "write")
+    real = {name: getattr(os, name) for name in names}
+    left = n_call
+
+    def guard(name: str) -> Any:
+        def call(*arguments: Any, **named: Any) -> Any:
+            nonlocal left
+            if left == 0:
+                raise Killed
+            left -= 1
+            return real[name](*arguments, **named)
+
+        return call
+
+    try:
+        for name in names:
+            setattr(os, name, guard(name))
+        yield
+    except Killed:
+        pass
+    finally:
+        for name, function in real.items():
+            setattr(os, name, function)
 
 
 @dataclass(frozen=True)
