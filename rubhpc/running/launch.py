@@ -77,6 +77,22 @@ def killed_with_launcher() -> Iterator[None]:
         libc.prctl(_PR_SET_PDEATHSIG, 0, 0, 0, 0)
 
 
+def _end_with_hydra() -> None:
+    """Have the kernel kill this process with the proxy of MPICH's launcher, whatever call it is in.
+
+    MPI waits for ranks that are gone, and holds the interpreter meanwhile. The proxy forks in its only
+    thread, so that the kernel's "parent" is the proxy, for as long as this process lives.
+    """
+    try:
+        name = Path(f"/proc/{_PARENT}/comm").read_text()
+    except OSError:
+        return
+    if sys.platform == "linux" and name.startswith("hydra"):
+        import ctypes  # not for --help
+
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
+
+
 def _is_orphan_from_birth() -> bool:
     """Whether the launcher died before this module was loaded: init is the parent, and is no launcher."""
     if _PARENT != 1:
@@ -97,6 +113,7 @@ def end_with_launcher() -> None:
     if _watching or not (by_mpirun or launch().size > 1):
         return
     _watching.append(True)
+    _end_with_hydra()
 
     def watch() -> None:
         while os.getppid() == _PARENT and not _is_orphan_from_birth():

@@ -9,6 +9,7 @@ import time
 from typing import TYPE_CHECKING, Self
 
 from rubhpc.errors import InputError
+from rubhpc.running.launch import launch
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
 _LOOK = 0.5  # s between looks for the file STOP
+_INTERRUPTED = b"stopping; the store keeps every finished case, run the same command again to continue\n"
 SLURM_MARGIN = 30.0  # s kept free before Slurm ends the job: a block's files, the packing, and slow disks
 
 
@@ -101,4 +103,6 @@ class Stopping:
             number == signal.SIGINT and self.reason == "SIGINT"
         ):  # a second SIGINT: do not even store the finished cases of this block
             raise KeyboardInterrupt
+        if number == signal.SIGINT and not self.reason and launch().size > 1 and launch().rank == 0:
+            os.write(2, _INTERRUPTED)  # the launcher kills without a word at the second
         self.ask(signal.Signals(number).name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from rubhpc.schema import DIVERGED, DONE
 from rubhpc.storage.growth import finish_growth, grow
 from rubhpc.storage.manifest import Manifest, manifests
 from rubhpc.storage.measures import added_measures
-from rubhpc.storage.store import Store
+from rubhpc.storage.store import Store, remove_drafts
 from rubhpc.storage.tidy import tidy
 from rubhpc.study.cases import CaseGrid
 
@@ -82,6 +83,8 @@ def bring_up_to_date(store: Store, grid: CaseGrid, *, accept_version: bool = Fal
     Returns a note on the measures that were added, "" without any.
     """
     tidy(store.path, store.manifest)
+    with suppress(OSError):  # the directory may be closed to this user
+        remove_drafts(store.path, is_made=True)
     finish_growth(store.path)
     store.reopen()
     wanted = Manifest.of(grid)

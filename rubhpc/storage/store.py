@@ -64,7 +64,7 @@ class Store:
             path.parent.mkdir(parents=True, exist_ok=True)
             place = Path(os.path.realpath(path))  # "." has no name
             draft = place.with_name(f".{place.name}.{socket.gethostname()}.{os.getpid()}.draft")
-            _remove_drafts(place)
+            remove_drafts(place)
             draft.mkdir()
             try:
                 layout.build(draft, grid)
@@ -293,11 +293,16 @@ def is_damaged(path: Path) -> bool:
         return False
 
 
-def _remove_drafts(path: Path) -> None:
-    """Remove drafts of this store that killed processes of this host left."""
+def remove_drafts(path: Path, *, is_made: bool = False) -> None:
+    """Remove drafts of this store that killed processes of this host left; once it is made, all of them.
+
+    A process that still writes one of those finds the store when it cannot rename its draft.
+    """
+    path = Path(os.path.realpath(path))
     prefix, host = f".{path.name}.", socket.gethostname()
     for name in os.listdir(path.parent):  # no pattern: a store's name may hold anything
         if name.startswith(f"{prefix}{host}.") and name.endswith(".draft"):
             pid = name.rsplit(".", 2)[1]
-            if pid.isdigit() and process_state(int(pid)) is None:
+            state = process_state(int(pid)) if pid.isdigit() else None
+            if pid.isdigit() and (is_made or state is None or state[0] in "ZX"):
                 shutil.rmtree(path.parent / name, ignore_errors=True)

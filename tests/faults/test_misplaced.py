@@ -179,7 +179,7 @@ def called(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int,
     return int(ended.value.code or 0), capsys.readouterr().err
 
 
-@pytest.mark.timeout(60)
+@pytest.mark.timeout(120, func_only=True)
 @pytest.mark.parametrize(("where", "how"), [d[1:] for d in DAMAGES], ids=[d[0] for d in DAMAGES])
 def test_a_damage_is_reported_in_a_line_and_repaired(finished, tmp_path, capsys, where, how):
     store = Path(shutil.copytree(finished / "tiny.zarr", tmp_path / "tiny.zarr"))

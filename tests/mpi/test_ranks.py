@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 from running import (
     command,
@@ -92,6 +93,22 @@ def test_a_sample_killed_on_its_way_and_resumed_on_two_ranks_stores_equal_bytes(
     done = run(study, ranks=2)
     assert done.returncode == 0, done.stderr
     assert stored_bytes(store) == stored_bytes(whole)
+
+
+def test_no_rank_outlives_the_daemon_that_started_it(tmp_path):
+    """Not even while MPI waits, at its start, for ranks that are gone: only the daemon is killed."""
+    study = write_slow_study(tmp_path, **LONG)
+    job = start(study, ranks=2)
+    while len(processes_of(study)) < 3:  # mpirun and the ranks
+        assert job.poll() is None
+        time.sleep(0.01)
+    psutil.Process(processes_of(study)[0].ppid()).kill()
+    job.communicate(timeout=20)
+    assert job.returncode != 0
+    began = time.monotonic()
+    while ranks := [p for number, p in processes_of(study).items() if number >= 0]:
+        assert time.monotonic() - began < 3, ranks
+        time.sleep(0.05)
 
 
 def test_ranks_share_the_work(tmp_path):

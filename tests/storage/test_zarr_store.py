@@ -251,6 +251,22 @@ def test_the_draft_of_a_killed_creation_is_removed(study):
     assert not draft.exists()
 
 
+def test_a_draft_is_removed_by_the_next_run_though_the_store_is_there(study, store):
+    """Its process may be a zombie, or its number in use again, when the store is made by another."""
+    import os
+    import socket
+
+    drafts = [
+        study.output.with_name(f".tiny.zarr.{socket.gethostname()}.{pid}.draft")
+        for pid in (os.getpid(), 2**22 + 1)
+    ]
+    for draft in drafts:
+        draft.mkdir()
+        (draft / "zarr.json").write_text("{}")
+    bring_up_to_date(store, CaseGrid(study))
+    assert not any(draft.exists() for draft in drafts)
+
+
 def test_gone_and_empty_files_are_found(store):
     for start in ((0, 0, 0), (0, 1, 0), (1, 1, 0)):
         journal(store, start, fill(store, start))
