@@ -125,6 +125,8 @@ _MEASURES = (
     _measure("lyapunov_exponent", "1", "largest Lyapunov exponent per revolution (NaN: not measured)"),
     _measure("whirl_ratio", "1", "whirl at the spin frequency (1: forward circle, -1: backward circle)"),
     _measure("contact_fraction", "1", "fraction of the time in contact", "stator"),
+    _measure("stick_fraction", "1", "fraction of the time in contact without slip", "stator"),
+    _measure("reversals_per_revolution", "1", "reversals of the slip per revolution", "stator"),
     _measure("contacts_per_revolution", "1", "contacts per revolution", "stator"),
     _measure("contact_duration", "s", "mean duration of a contact", "stator"),
     _measure("peak_contact_force", "N", "peak contact force", "stator"),
@@ -142,6 +144,7 @@ _MEASURES = (
     _measure("contact_residual", "1", "largest residual of the contact problems, relative"),
     _measure("transient_revolutions", "1", "revolutions thrown away", dtype="int64"),
     _measure("steps", "1", "integration steps", dtype="int64"),
+    _measure("left_closed_form", "1", "times that short steps took over from closed form", dtype="int64"),
     _measure("wall_time", "s", "wall time of the case"),
 )
 

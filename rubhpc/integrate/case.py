@@ -11,6 +11,7 @@ from rubhpc.integrate.central_difference_march import CentralDifferenceMarch
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
 from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.friction_march import FrictionMarch
 from rubhpc.integrate.initial_state import at_rest, fit_to_gaps, with_overlap
 from rubhpc.integrate.lyapunov import Marches, growth
 from rubhpc.integrate.measures import (
@@ -26,6 +27,7 @@ from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.setup import Scheme
 from rubhpc.integrate.transient import pass_transient
 from rubhpc.kernels.accumulators import IMPACT_STEPS
+from rubhpc.kernels.laws import is_set_valued
 from rubhpc.schema import DONE, SECTION_NAMES
 from rubhpc.spectra import amplitude_spectrum
 
@@ -49,6 +51,13 @@ MARCHES: dict[Scheme, Callable[..., March]] = {
     Scheme.CONTACT_STEPPING: ContactSteppingMarch,
     Scheme.CENTRAL_DIFFERENCE: CentralDifferenceMarch,
 }
+
+
+def march_of(scheme: Scheme, setup: Setup) -> Callable[..., March]:
+    """Return what integrates a case by a scheme."""
+    if scheme is Scheme.EVENT_DRIVEN and is_set_valued(setup.law):
+        return FrictionMarch
+    return MARCHES[scheme]
 
 
 def run_case(
@@ -78,13 +87,14 @@ def run_case(
     initial = at_rest(setup, clearance) if initial is None else fit_to_gaps(initial, setup, clearance)
 
     def starter(scheme: Scheme) -> Callable[[State], March]:
-        return lambda state: MARCHES[scheme](setup, clearance, friction, state, check)
+        return lambda state: march_of(scheme, setup)(setup, clearance, friction, state, check)
 
     try:
         record = _integrate(starter(setup.scheme), initial, setup, clearance, recording)
     except NoClosedForm:
-        # Contacts that chatter, or too many sets of them, or slip that turns: short steps need no events.
+        # Contacts that chatter, or too many sets of them: short steps need no events.
         record = _integrate(starter(Scheme.CONTACT_STEPPING), initial, setup, clearance, recording)
+        record.measures["left_closed_form"] = 1
     record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - seconds_compiling() - began
     return record
@@ -155,7 +165,9 @@ def _integrate(
         )
         if "waveform" not in recording.keep:
             record.signals.clear()
-    record.measures.update(transient_revolutions=n_transient, steps=march.n_step)
+    record.measures.update(
+        transient_revolutions=n_transient, steps=march.n_step, left_closed_form=march.n_left
+    )
     return record
 
 
@@ -163,7 +175,7 @@ def _neighbours(
     march: March, start: Callable[[State], March], final: State, setup: Setup, recording: Recording
 ) -> Neighbours:
     """The motion from where a march has ended, and one beside it."""
-    if isinstance(march, EventDrivenMarch):
+    if isinstance(march, EventDrivenMarch) and not isinstance(march, FrictionMarch):
         return NeighbourMotions(march)
     return Marches(start, final, setup, recording)
 

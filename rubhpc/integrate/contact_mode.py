@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
+    Solved = dict[bytes, tuple[Complexes, Complexes, Complexes]]  # parts, by the bytes of their matrices
 
 WORST_CONDITION = 1e11  # of the eigenvectors; beyond it modes coincide and their sum loses its digits
 
@@ -36,6 +37,11 @@ class ContactMode:
     enter: Complexes  # (m, 2 n)
     take_off: Complexes  # (2 + q, m), of the unbalance response, times cosine and sine; of unit clearances
     switch: Complexes  # (q, m + 1 + q), gap of an open pair or force of a closed one
+
+    @property
+    def n_eigenmode(self) -> int:
+        """How many of the coordinates are eigenmodes, m."""
+        return len(self.enter)
 
 
 def solve_contact_mode(
@@ -56,12 +62,12 @@ def solve_contact_mode(
     n, q = reduced.stiffness.shape[0], gap_jacobian.shape[0]
     closed = np.array([i for i in range(q) if mask >> i & 1], dtype=int)
     rate, force = gap_jacobian[closed], force_direction[closed].T
-    tangent, project, system = _confine(reduced, rate, force)
+    tangent, project, system = confine(reduced, rate, force)
     offset = np.zeros((q, n))  # displacement that closes a unit clearance
     if closed.size:
         offset[closed] = -np.linalg.pinv(rate).T
     n_free = tangent.shape[1]
-    exponent, shape, inverse = _modes(system)
+    exponent, shape, inverse = modes_of(system)
     phasor = reduced.force[0] - 1j * reduced.force[1]
     lower = np.concatenate([np.zeros(n_free), project @ phasor])
     response = np.linalg.solve(1j * reduced.spin * np.eye(2 * n_free) - system, lower)
@@ -92,7 +98,7 @@ def solve_contact_mode(
 def count_coordinates(reduced: ReducedModel, gap_jacobian: Floats, force_direction: Floats, mask: int) -> int:
     """Count the coordinates of the contact mode with the pairs of `mask` closed, m + 1 + q."""
     closed = [i for i in range(len(gap_jacobian)) if mask >> i & 1]
-    _, _, system = _confine(reduced, gap_jacobian[closed], force_direction[closed].T)
+    _, _, system = confine(reduced, gap_jacobian[closed], force_direction[closed].T)
     n_mode = 0
     for rows in _parts(system):
         exponent = np.linalg.eigvals(system[np.ix_(rows, rows)]).astype(np.complex128)
@@ -100,7 +106,7 @@ def count_coordinates(reduced: ReducedModel, gap_jacobian: Floats, force_directi
     return n_mode + 1 + len(gap_jacobian)
 
 
-def _confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats, Floats, Floats]:
+def confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats, Floats, Floats]:
     """Motions that keep gaps closed T (n, n_free), projection that no contact force passes, and the system.
 
     `rate` (r, n) is the gap Jacobian of the closed pairs and `force` (n, r) their contact-force directions;
@@ -129,29 +135,49 @@ def _null_space(rows: Floats) -> Floats:
     return columns
 
 
-def _modes(system: Floats) -> tuple[Complexes, Complexes, Complexes]:
+def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Complexes, Complexes]:
     """Exponents, shapes and inverse shapes of a first-order system; one of each conjugate pair, doubled.
 
     What nothing couples is solved by itself: of a ring of stators only those that touch move with the rotor.
+    Parts among those `known`, such as open stators, are not solved again.
     """
     n_state = len(system)
     exponents: list[Complexes] = [np.zeros(0, dtype=np.complex128)]  # a mass on a rigid wall has no modes
-    shapes, inverses = [np.zeros((n_state, 0))], [np.zeros((0, n_state))]
+    shapes: list[Complexes] = [np.zeros((n_state, 0), dtype=np.complex128)]
+    inverses: list[Complexes] = [np.zeros((0, n_state), dtype=np.complex128)]
     for rows in _parts(system):
-        exponent, shape = np.linalg.eig(system[np.ix_(rows, rows)])
-        if np.linalg.cond(shape) > WORST_CONDITION:
-            raise InputError(
-                "[integrator] method: modal cannot separate the modes of this rig, some of which coincide (a "
-                'free body, critical damping); take method = "central-difference"'
-            )
-        is_real, keep = _kept(exponent)
-        weight = np.where(is_real, 1.0, 2.0)
-        wide, tall = np.zeros((2, n_state, np.count_nonzero(keep)), dtype=np.complex128)
-        wide[rows], tall[rows] = (shape * weight)[:, keep], np.linalg.inv(shape)[keep].T
-        exponents.append(exponent[keep].astype(np.complex128))
+        part = system[np.ix_(rows, rows)]
+        solved = known.get(part.tobytes()) if known else None
+        exponent, shape, inverse = solved or solve_part(part)
+        wide, tall = np.zeros((2, n_state, exponent.size), dtype=np.complex128)
+        wide[rows], tall[rows] = shape, inverse.T
+        exponents.append(exponent)
         shapes.append(wide)
         inverses.append(tall.T)
     return np.concatenate(exponents), np.hstack(shapes), np.vstack(inverses)
+
+
+def solve_part(part: Floats) -> tuple[Complexes, Complexes, Complexes]:
+    """Exponents, shapes and inverse shapes of a part of a system that nothing couples to the rest."""
+    exponent, shape = np.linalg.eig(part)
+    if np.linalg.cond(shape) > WORST_CONDITION:
+        raise InputError(
+            "[integrator] method: modal cannot separate the modes of this rig, some of which coincide (a "
+            'free body, critical damping); take method = "central-difference"'
+        )
+    is_real, keep = _kept(exponent)
+    weight = np.where(is_real, 1.0, 2.0)
+    return (
+        exponent[keep].astype(np.complex128),
+        (shape * weight)[:, keep].astype(np.complex128),
+        np.linalg.inv(shape)[keep].astype(np.complex128),
+    )
+
+
+def solve_parts(system: Floats) -> Solved:
+    """All parts of a system, solved: what `modes_of` looks up, by the bytes of their matrices."""
+    parts = (system[np.ix_(rows, rows)] for rows in _parts(system))
+    return {part.tobytes(): solve_part(part) for part in parts}
 
 
 def _parts(system: Floats) -> list[NDArray[np.int64]]:

@@ -10,7 +10,10 @@ from rubhpc.integrate.march import NO_FORCES
 from rubhpc.integrate.modal_march import ModalMarch
 from rubhpc.integrate.packing import pairs_of
 from rubhpc.integrate.workspace import workspace
+from rubhpc.kernels.case_progress import FINISHED, NONE, shaft_angle
+from rubhpc.kernels.contact_modes import enter
 from rubhpc.kernels.contact_pairs import N_DEGREE
+from rubhpc.kernels.measuring import end_span
 from rubhpc.kernels.stepping_loop import ContactImpulses, advance_by_steps
 
 if TYPE_CHECKING:
@@ -21,6 +24,8 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.case_progress import Clock
+    from rubhpc.kernels.measuring import Recorder
 
     Floats = NDArray[np.float64]
 
@@ -69,6 +74,43 @@ class ContactSteppingMarch(ModalMarch):
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs pressed in the last step, (q,)."""
         return self._work.force > 0.0
+
+    @property
+    def coordinates(self) -> Floats:
+        """Modal coordinates (2, m)."""
+        return self._z
+
+    def take_over(self, clock: Clock, recorder: Recorder, motion: Floats) -> None:
+        """Begin at the tick of `progress` with a motion (2 n,) of another march, whose record goes on.
+
+        Up to the next whole step the motion is that of open contacts.
+        """
+        self.clock, self._recorder = clock, recorder
+        angle = shaft_angle(clock, self.progress.tick)
+        enter(self.tables, 0, self._clearance, np.cos(angle), np.sin(angle), motion, self._z)
+        level = 0
+        while self.progress.tick % (1 << self._impulses.level):
+            if self.progress.tick & 1 << level:
+                power = self.tables.power_re[0, level] + 1j * self.tables.power_im[0, level]
+                z = power * (self._z[0] + 1j * self._z[1])
+                self._z[0], self._z[1] = z.real, z.imag
+                self.progress.tick += 1 << level
+            level += 1
+        self._ends[:] = np.nan
+        for values in (self._work.force, self._work.traction, self._work.is_sticking):
+            values[:] = 0
+
+    def step_to(
+        self, last_tick: int, clock: Clock, samples: Samples, accumulator: Accumulator, is_recorded: bool
+    ) -> int:
+        """Advance to a tick for another march; returns an outcome of `kernels.case_progress`."""
+        self.clock = clock
+        outcome = self._kernel(last_tick, samples, accumulator, is_recorded)
+        if outcome == FINISHED:
+            if is_recorded:
+                end_span(self.tables, clock, self._z, self.progress, self._recorder, accumulator)
+            self.progress.energy_from = NONE
+        return outcome
 
     def _contact_force(self) -> Floats:
         return self._work.force.copy()

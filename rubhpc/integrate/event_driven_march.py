@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.mode_library import ModeLibrary
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -29,8 +30,7 @@ MOST_REFILLS = 8  # of tables that one case may meet; where it meets more, short
 class NoClosedForm(Exception):  # noqa: N818 - a state of the motion, never seen by users
     """What only short steps can follow.
 
-    Contacts open and close without end, or in too many combinations to tabulate; or set-valued friction
-    meets a slip that turns.
+    Contacts open and close without end, or in too many combinations to tabulate.
     """
 
 
@@ -47,9 +47,9 @@ class EventDrivenMarch(ModalMarch):
     ) -> None:
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(setup, clearance, friction, initial, check)
-        self._library = setup.library(friction)
-        self._met = {0, *(1 << i for i in range(self._clearance.size))}  # sets of closed contacts
-        mask = sum(1 << i for i, force in enumerate(initial.contact_force) if force > 0.0)
+        self._library = self._find_library(setup, friction)
+        self._met = {0, *self._library.alone}  # sets of closed contacts
+        mask = self._first_mask(initial)
         self.find(mask)
         self._start(find_mode(self.tables.mask, mask))
 
@@ -57,6 +57,14 @@ class EventDrivenMarch(ModalMarch):
         """Which pairs are closed, (q,)."""
         mask = closed_pairs(self.progress, self.tables)
         return np.array([bool(mask >> i & 1) for i in range(self._clearance.size)])
+
+    def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
+        """Contact modes of the case."""
+        return setup.library(friction)
+
+    def _first_mask(self, initial: State) -> int:
+        """Set of the contacts with which the case begins."""
+        return sum(1 << i for i, force in enumerate(initial.contact_force) if force > 0.0)
 
     def place(self) -> tuple[Progress, Floats]:
         """Where the case stands, and its modal coordinates (2, m)."""

@@ -25,6 +25,7 @@ class March(ABC):
     def __init__(self, check: Callable[[], None] | None, first_stride: int) -> None:
         """Take what is called between kernel calls, and the samples of the first call."""
         self.n_step = 0
+        self.n_left = 0  # times that closed-form motion was left for short steps
         self.sample = 0
         self.check = check
         self._stride = max(1, first_stride)

@@ -16,7 +16,6 @@ from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
     FINISHED,
-    SLIP_TURNED,
     Clock,
     begin_in,
     new_progress,
@@ -135,7 +134,7 @@ class ModalMarch(March):
             outcome = self._kernel(stop << sample_level, samples, accumulator, is_recorded)
             self.n_step = int(self.progress.n_step)
             self.sample = int(self.progress.tick) >> sample_level
-            if outcome in (CONTACT_UNSOLVED, SLIP_TURNED):
+            if outcome == CONTACT_UNSOLVED:
                 return self._unsolved()
             if outcome == DIVERGED or self._has_diverged(accumulator):
                 return f"a displacement passed {self._setup.displacement_limit:.3g} m"

@@ -5,19 +5,29 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rubhpc.integrate.contact_mode import ContactMode, count_coordinates, solve_contact_mode
-from rubhpc.integrate.mode_tables import TableStack, tabulate
+from rubhpc.integrate.friction_mode import solve_friction_mode
+from rubhpc.integrate.mode_tables import MOST_MODES, TableStack, tabulate
 from rubhpc.integrate.reduction import ReducedModel, directions
+from rubhpc.kernels.friction_states import FORWARD
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from rubhpc.fem.model import Model
+    from rubhpc.integrate.contact_mode import Solved
+    from rubhpc.integrate.friction_mode import FrictionMode, FrictionPairs
     from rubhpc.kernels import contact_modes as kernel
+
+    Floats = NDArray[np.float64]
 
 LANES = 8  # coordinates are padded to whole vectors
 # Coordinates that a set of several contacts may have beyond any single one. The width is settled before the
 # first case: that of the tables decides in which order sums are taken, and so the last bits of every case.
 SPARE = 8
+MOST_FRICTION_MODES = 1024  # sets of states of one speed and friction: up to four for each of closed pairs
 
 
 class ModeLibrary:
@@ -49,9 +59,10 @@ class ModeLibrary:
         self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self._opened = opened
-        modes = [opened, *(self._solved(1 << i) for i in range(len(self.gap_jacobian)))]
-        self.width = padded_width((mode.exponent.size for mode in modes), len(self.gap_jacobian))
-        self._tables = TableStack(len(modes))
+        self.alone = self._masks_alone()
+        modes = [opened, *(self._solved(mask) for mask in self.alone)]
+        self.width = self._width([mode.exponent.size for mode in modes])
+        self._tables = TableStack(len(modes), self._most_modes)
         self.masks = [mode.mask for mode in modes]
         for mode in modes:
             self._tabulate(mode)
@@ -85,23 +96,81 @@ class ModeLibrary:
         """All contact modes as arrays."""
         return self._tables.view()
 
+    _most_modes = MOST_MODES
+
+    def _masks_alone(self) -> list[int]:
+        """Sets in which one pair alone is closed."""
+        return [1 << i for i in range(len(self.gap_jacobian))]
+
+    def _width(self, sizes: list[int]) -> int:
+        """Width of tables for modes of these sizes and any set that is met later."""
+        return padded_width(sizes, len(self.gap_jacobian))
+
     def _solved(self, mask: int) -> ContactMode:
         if mask == 0:
             return self._opened
         return solve_contact_mode(self.reduced, self.gap_jacobian, self.force_direction, mask)
+
+    def _slip_rows(self) -> Floats:
+        """Slip speed with the motion of each pair that the switch functions do not hold."""
+        return self.slip
 
     def _tabulate(self, mode: ContactMode) -> None:
         self._tables.add(
             tabulate(
                 mode,
                 self.reduced,
-                self.slip,
+                self._slip_rows(),
                 width=self.width,
                 tick=self._tick,
                 sample_level=self._sample_level,
                 n_level=self._n_level,
             )
         )
+
+
+class FrictionLibrary(ModeLibrary):
+    """Contact modes of pairs that slide in either sense or stick; masks hold two bits a pair."""
+
+    _most_modes = MOST_FRICTION_MODES
+
+    def __init__(
+        self,
+        reduced: ReducedModel,
+        model: Model,
+        pairs: FrictionPairs,
+        *,
+        opened: FrictionMode,
+        known: Solved,
+        tick: float,
+        sample_level: int,
+        n_level: int,
+    ) -> None:
+        """Start with every pair open, and with each sliding alone; `known` are the parts of the open set."""
+        self._pairs, self._known = pairs, known
+        super().__init__(
+            reduced,
+            model,
+            pairs.friction,
+            opened=opened,
+            tick=tick,
+            sample_level=sample_level,
+            n_level=n_level,
+        )
+
+    def _masks_alone(self) -> list[int]:
+        return [FORWARD << 2 * i for i in range(len(self.gap_jacobian))]
+
+    def _width(self, sizes: list[int]) -> int:
+        return -(-(max(sizes) + SPARE) // LANES) * LANES
+
+    def _solved(self, mask: int) -> ContactMode:
+        if mask == 0:
+            return self._opened
+        return solve_friction_mode(self.reduced, self._pairs, mask, self._known)
+
+    def _slip_rows(self) -> Floats:
+        return self.slip[:0]
 
 
 def padded_width(sizes: Iterable[int], q: int) -> int:

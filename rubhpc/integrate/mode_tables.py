@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
 
+from rubhpc.integrate.friction_mode import FrictionMode
 from rubhpc.kernels import contact_modes as kernel
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from rubhpc.integrate.contact_mode import ContactMode
     from rubhpc.integrate.reduction import ReducedModel
 
@@ -31,11 +31,11 @@ class TableStack:
     ----------
     n_most : int
         ModeTables that there is room for: those of every pair closed by itself, and of as many more sets as
-        `MOST_MODES` and `MOST_BYTES` allow.
+        `n_most` and `MOST_BYTES` allow.
     """
 
-    def __init__(self, n_least: int) -> None:
-        self.n_most = max(n_least, MOST_MODES)
+    def __init__(self, n_least: int, n_most: int = MOST_MODES) -> None:
+        self.n_most = max(n_least, n_most)
         self._n_least, self._n_filled = n_least, 0
         self._room: list[Any] = []
         self._view: kernel.ModeTables | None = None
@@ -45,7 +45,7 @@ class TableStack:
         rows: list[Any] = list(row)
         if not self._room:
             n_bytes = sum(field.nbytes for field in rows)
-            self.n_most = max(self._n_least, min(MOST_MODES, MOST_BYTES // n_bytes))
+            self.n_most = max(self._n_least, min(self.n_most, MOST_BYTES // n_bytes))
             self._room = [np.empty((self._n_least, *field.shape[1:]), field.dtype) for field in rows]
         elif self._n_filled == len(self._room[0]):  # twice the room: most books never need it
             n_room = min(2 * self._n_filled, self.n_most)
@@ -81,30 +81,38 @@ def tabulate(
     Parameters
     ----------
     slip : (q, n)
-        Slip speed of each pair with the motion.
+        Slip speed of each pair with the motion; none where the switch functions hold it.
     tick : float, s
     sample_level, n_level : int
         As in `mode_library.ModeLibrary`.
     """
-    n, q, m = reduced.stiffness.shape[0], len(slip), width
-    end = mode.exponent.size
-    n_eigenmode = end - 1 - q
+    n, m = reduced.stiffness.shape[0], width
+    end, n_filled = mode.exponent.size, len(mode.enter)
     exponent, used = np.zeros(m, dtype=complex), np.zeros(m, dtype=bool)
     motion, enter = np.zeros((2, 2 * n, m), dtype=complex)
-    switch, take_off = np.zeros((q, m), dtype=complex), np.zeros((2 + q, m), dtype=complex)
+    switch = np.zeros((len(mode.switch), m), dtype=complex)
+    take_off = np.zeros((len(mode.take_off), m), dtype=complex)
     exponent[:end], used[:end] = mode.exponent, True
     motion[:, :end], switch[:, :end] = mode.motion, mode.switch
-    enter[:, :n_eigenmode], take_off[:, :n_eigenmode] = mode.enter.T, mode.take_off
+    enter[:, :n_filled], take_off[:, :n_filled] = mode.enter.T, mode.take_off
     steps = tick * 2.0 ** np.arange(n_level)
     growth = np.exp(np.maximum(exponent.real, 0.0) * steps[-1])
     power = np.exp(exponent * steps[:, None]) * used
     rate = switch * exponent
     sliding = slip @ motion[n:]
-    loss, work, steady_power = _energies(reduced, exponent, motion, n_eigenmode)
-    halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q, 2, m)
+    growing = Growth()
+    if isinstance(mode, FrictionMode):
+        growing = Growth(
+            np.flatnonzero(mode.growth),
+            mode.growth[mode.growth != 0.0],
+            mode.n_eigenmode + 1 + len(mode.switch) // 2,
+        )
+        rate[:, growing.steady] += switch[:, growing.which] @ growing.speed
+    loss, work, steady_power = _energies(reduced, exponent, motion, mode.n_eigenmode, growing)
+    halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q or more, 2, m)
     row = kernel.ModeTables(
         mask=np.array(mode.mask),
-        n_eigenmode=np.array(n_eigenmode),
+        n_eigenmode=np.array(mode.n_eigenmode),
         switch_re=switch.real,
         switch_im=switch.imag,
         rate_re=rate.real,
@@ -118,7 +126,6 @@ def tabulate(
         slip_im=sliding.imag,
         slip_rate_re=(sliding * exponent).real,
         slip_rate_im=(sliding * exponent).imag,
-        slip_bound=np.abs(sliding) * np.abs(exponent) ** 2 * growth,
         motion_re=motion.real,
         motion_im=motion.imag,
         enter_re=enter.real,
@@ -135,6 +142,14 @@ def tabulate(
     return kernel.ModeTables(*fields)
 
 
+class Growth(NamedTuple):
+    """Coordinates that grow linearly, in a mode in which pairs stick."""
+
+    which: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+    speed: NDArray[np.float64] = np.zeros(0)  # 1/s times their unit
+    steady: int = -1  # the coordinate that is 1
+
+
 def _outputs(reduced: ReducedModel, exponent: Complexes, motion: Complexes, interval: float) -> Floats:
     """Output rows (`kernels.contact_modes`) at coming samples, `interval` (s) apart: (2 m, samples o)."""
     n = reduced.stiffness.shape[0]
@@ -149,7 +164,7 @@ def _outputs(reduced: ReducedModel, exponent: Complexes, motion: Complexes, inte
 
 
 def _energies(
-    reduced: ReducedModel, exponent: Complexes, motion: Complexes, n_eigenmode: int
+    reduced: ReducedModel, exponent: Complexes, motion: Complexes, n_eigenmode: int, growing: Growth
 ) -> tuple[Floats, Complexes, Floats]:
     """Primitives of the powers of damping and unbalance: (2 m, 2 m), (2, m) and steady (2,), W.
 
@@ -165,7 +180,10 @@ def _energies(
     turning = np.full(exponent.shape, 1j * reduced.spin)
     forms = []
     for partner, other in ((resisting, exponent), (resisting.conj(), exponent.conj())):
-        forms.append(_primitive(rate.T @ partner, exponent[:, None] + other))
+        form = _primitive(rate.T @ partner, exponent[:, None] + other)
+        if growing.which.size:
+            _follow_growth(form, rate.T @ partner, exponent, n_eigenmode, growing)
+        forms.append(form)
     with_itself, with_conjugate = forms
     loss = 0.5 * np.block(
         [
@@ -181,7 +199,26 @@ def _energies(
     )
     response = rate[:, n_eigenmode]
     steady = np.array([response @ resisting[:, n_eigenmode].conj(), response @ phasor.conj()])
+    if growing.which.size:
+        steady[0] += 2.0 * rate[:, growing.steady] @ resisting[:, growing.steady]
     return 0.5 * (loss + loss.T), work, 0.5 * steady.real
+
+
+def _follow_growth(
+    form: Complexes, power: Complexes, exponent: Complexes, n_eigenmode: int, growing: Growth
+) -> None:
+    """Correct primitives for coordinates that grow: `int z phi = z phi / l - phi' z / l^2`.
+
+    Products of the coordinate that is 1 go as phi / phi' with a clearance, as phi^2 / (2 phi') with phi; that
+    with itself is left to the steady power.
+    """
+    moving, one = slice(n_eigenmode + 1), growing.steady
+    for phi, speed in zip(growing.which, growing.speed, strict=True):
+        form[moving, one] -= speed * power[moving, phi] / exponent[moving] ** 2
+        form[phi, phi] += 0.5 * power[one, phi] / speed
+    first, speed = growing.which[0], growing.speed[0]
+    clearances = slice(n_eigenmode + 1, one)
+    form[first, clearances] += power[one, clearances] / speed
 
 
 def _primitive(power: Complexes, exponent: Complexes) -> Complexes:

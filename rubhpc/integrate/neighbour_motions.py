@@ -16,7 +16,6 @@ from rubhpc.kernels.case_progress import (
     DIVERGED,
     FINISHED,
     MODE_WANTED,
-    SLIP_TURNED,
     ask_for,
     begin_in,
     closed_pairs,
@@ -81,7 +80,7 @@ class NeighbourMotions:
             if march.check is not None:
                 march.check()
             outcome = part(march.tables, march.bodies, march.clock, n_tick, pair, *self._unrecorded)
-            if outcome in (CONTACT_UNSOLVED, SLIP_TURNED):
+            if outcome == CONTACT_UNSOLVED:
                 raise NoClosedForm
             if outcome == DIVERGED:
                 return

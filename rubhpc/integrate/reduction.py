@@ -15,7 +15,6 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.packing import degrees_of, output_degrees, whole_system
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, N_DEGREE, V, W, rim_sense
-from rubhpc.kernels.laws import is_set_valued
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -267,7 +266,6 @@ def kernel_bodies(
         slip=slip,
         restitution=law.restitution,
         clearance=clearance,
-        is_set_valued=is_set_valued(law),
         translations=reduced.translations,
         displacement_limit=displacement_limit,
     )

@@ -8,11 +8,14 @@ from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
+import numpy as np
+
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.response import step_limit
-from rubhpc.integrate.contact_mode import ContactMode, solve_contact_mode
-from rubhpc.integrate.mode_library import ModeLibrary, width_without_modes
+from rubhpc.integrate.contact_mode import ContactMode, confine, solve_contact_mode, solve_parts
+from rubhpc.integrate.friction_mode import FrictionPairs, solve_friction_mode
+from rubhpc.integrate.mode_library import FrictionLibrary, ModeLibrary, width_without_modes
 from rubhpc.integrate.mode_tables import tabulate
 from rubhpc.integrate.packing import Packed, law_of, pack
 from rubhpc.integrate.reduction import ReducedModel, directions, reduce_model
@@ -22,6 +25,7 @@ from rubhpc.study.tables import SEARCH_STEP
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
+    from rubhpc.integrate.contact_mode import Solved
     from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.laws import Law
     from rubhpc.rig.rig import Rig
@@ -77,6 +81,7 @@ class ModalSetup:
     displacement_limit: float  # m
     law: Law = MULTIPLIER
     _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
+    _friction_libraries: dict[float, FrictionLibrary] = field(default_factory=dict)
     _open_tables: dict[float, ModeTables] = field(default_factory=dict)
 
     @cached_property
@@ -123,6 +128,40 @@ class ModalSetup:
                 n_level=self._n_level,
             )
         return self._libraries[friction]
+
+    @cached_property
+    def _known(self) -> Solved:
+        """The parts of the system with every pair open."""
+        n = self.reduced.stiffness.shape[0]
+        return solve_parts(confine(self.reduced, np.zeros((0, n)), np.zeros((n, 0)))[2])
+
+    def friction_pairs(self, friction: float) -> FrictionPairs:
+        """The pairs of a friction."""
+        gap_jacobian, _, slip = directions(self.reduced, self.model, friction)
+        radius = np.array([stator.radius for stator in self.model.stators])
+        return FrictionPairs(
+            gap_jacobian=gap_jacobian,
+            friction_direction=-slip,
+            friction=friction,
+            static_ratio=self.law.static_friction_ratio,
+            rim_speed=radius * abs(self.spin),
+        )
+
+    def friction_library(self, friction: float) -> FrictionLibrary:
+        """Contact modes of a friction whose slip may turn, shared by its cases."""
+        if friction not in self._friction_libraries:
+            pairs = self.friction_pairs(friction)
+            self._friction_libraries[friction] = FrictionLibrary(
+                self.reduced,
+                self.model,
+                pairs,
+                opened=solve_friction_mode(self.reduced, pairs, 0, self._known),
+                known=self._known,
+                tick=self.tick,
+                sample_level=self.sample_level,
+                n_level=self._n_level,
+            )
+        return self._friction_libraries[friction]
 
     def open_tables(self, friction: float) -> ModeTables:
         """Tables of the mode with every pair open alone, as wide as those of the friction's library."""

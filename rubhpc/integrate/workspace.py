@@ -11,7 +11,19 @@ from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_direct
 def workspace(pairs: Pairs, step: float) -> Workspace:
     """Arrays for q pairs and a step (s), with directions and compliance along the stators' axes filled in."""
     q = pairs.radius.size
-    work = Workspace(
+    work = empty_workspace(q)
+    for i in range(q):
+        fill_directions(
+            pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.force_direction[i], work.gap_jacobian[i]
+        )
+        fill_friction_direction(pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.friction_direction[i])
+    fill_compliances(pairs, work, step)
+    return work
+
+
+def empty_workspace(q: int) -> Workspace:
+    """Arrays for q pairs, all zero."""
+    return Workspace(
         at=np.zeros((q, N_DEGREE)),
         now=np.zeros((q, N_DEGREE)),
         rate=np.zeros((q, N_DEGREE)),
@@ -37,10 +49,3 @@ def workspace(pairs: Pairs, step: float) -> Workspace:
         members=np.zeros(q, dtype=np.int64),
         solution=np.zeros(3),
     )
-    for i in range(q):
-        fill_directions(
-            pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.force_direction[i], work.gap_jacobian[i]
-        )
-        fill_friction_direction(pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.friction_direction[i])
-    fill_compliances(pairs, work, step)
-    return work

@@ -37,6 +37,9 @@ class Accumulator(NamedTuple):
     n_contact: Ints  # (q,), contacts begun
     contact_time: Floats  # (q,), s
     impulse: Floats  # (q,), N s
+    stick_time: Floats  # (q,), s in contact without slip
+    sense: Ints  # (q,), 1 or -1: of the last slip in contact, positive in steady sliding; 0 before any
+    reversals: Ints  # (q,), changes of that sense
     friction_work: Floats  # (q,), J
     least_slip: Floats  # (q,), m/s
     peak_force: Floats  # (q,), N
@@ -132,6 +135,10 @@ def observe_contact(
             accumulator.n_contact[i] += 1
             accumulator.is_touching[i] = True
         accumulator.contact_time[i] += step
+        if work.is_sticking[i]:
+            accumulator.stick_time[i] += step
+        elif slip != 0.0:
+            observe_sense(i, 1 if slip > 0.0 else -1, accumulator)
         accumulator.impulse[i] += force * step
         accumulator.friction_work[i] += friction_force * slip * step
         accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
@@ -141,6 +148,14 @@ def observe_contact(
         accumulator.energy[DRIVE_WORK] += friction_force * pairs.radius[i] * abs(spin) * step
         accumulator.energy[FRICTION_LOSS] += friction_force * slip * step
         accumulator.energy[IMPACT_LOSS] -= force * opening * step
+
+
+@jit_inline
+def observe_sense(i: int, sense: int, accumulator: Accumulator) -> None:
+    """Note in which sense (1 or -1) pair i slides, and whether that is another than before."""
+    if accumulator.sense[i] == -sense:
+        accumulator.reversals[i] += 1
+    accumulator.sense[i] = sense
 
 
 @jit_inline

@@ -12,7 +12,7 @@ from rubhpc.kernels.contact_pairs import rim_sense
 if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
 
-FINISHED, DIVERGED, CONTACT_UNSOLVED, MODE_WANTED, SLIP_TURNED, PAUSED, UNDER_WAY = range(7)  # outcomes
+FINISHED, DIVERGED, CONTACT_UNSOLVED, MODE_WANTED, PAUSED, UNDER_WAY = range(6)  # outcomes
 MOST_STEPS = 50_000  # of one call: the caller checks for stop signals between calls
 NONE = -1  # no contact mode wanted, no energies to add, no halving
 
@@ -39,7 +39,8 @@ class Progress(Protocol):
     mode: int  # contact mode, as its index in the tables
     wanted: int  # set of pairs to close before the next step, or NONE
     n_step: int  # steps taken
-    n_event: int  # events since the call before began
+    n_event: int  # events since the call before began, or since the tick `counted_from`
+    counted_from: int  # tick within a revolution before the last event
     next_sample: int  # to be taken
     entered: int  # tick at which the contact mode was entered
     energy_from: int  # tick from which energies are still to be added, or NONE
@@ -64,6 +65,7 @@ def new_progress(n_case: int) -> Any:
 def restart_clock(progress: Progress, tick: int, sample: int, *, is_recorded: bool) -> None:
     """Count time anew: the case stands at `tick`, where `sample` is due."""
     progress.entered += tick - progress.tick
+    progress.counted_from += tick - progress.tick
     progress.tick, progress.next_sample, progress.n_event = tick, sample, 0
     if not is_recorded:
         progress.energy_from = NONE
@@ -77,6 +79,12 @@ def begin_in(progress: Progress, mode: int) -> None:
 def ask_for(progress: Progress, mask: int) -> None:
     """Have the case enter the contact mode with the pairs of `mask` closed, from its reduced motion."""
     progress.wanted = mask
+
+
+def follow(progress: Progress, other: Progress) -> None:
+    """Stand where another march of the same case stands; no energies are to be added."""
+    progress.tick, progress.next_sample, progress.n_step = other.tick, other.next_sample, other.n_step
+    progress.counted_from, progress.n_event, progress.energy_from = other.tick, 0, NONE
 
 
 def closed_pairs(progress: Progress, tables: ModeTables) -> int:

@@ -47,7 +47,6 @@ class ModeTables(NamedTuple):
     slip_im: Floats
     slip_rate_re: Floats  # (p, q, m), its time derivative
     slip_rate_im: Floats
-    slip_bound: Floats  # (p, q, m), bound on its second time derivative for a unit coordinate
     motion_re: Floats  # (p, 2 n, m), reduced displacements, then velocities
     motion_im: Floats
     enter_re: Floats  # (p, 2 n, m), modal coordinates of a unit displacement or velocity
@@ -76,7 +75,6 @@ class Reduced(NamedTuple):
     radius: Floats  # (q,), m
     restitution: float  # normal velocity after an impact over that before it
     clearance: Floats  # (q,), m
-    is_set_valued: bool  # friction, so that it is known only while the rim outruns the stator
     translations: Floats  # (r, n), displacements that none may pass the limit with
     displacement_limit: float  # m
 
@@ -179,31 +177,6 @@ def event_free_interval(
 
 
 @jit_inline_sum
-def reversal_free_interval(
-    steady: float,
-    slip_re: Floats,
-    slip_im: Floats,
-    rate_re: Floats,
-    rate_im: Floats,
-    bound: Floats,
-    z_re: Floats,
-    z_im: Floats,
-) -> float:
-    """Time, s, in which the slip of a pair cannot turn; negative where it has. `steady`: the spin's, m/s."""
-    s = steady + dot(slip_re, slip_im, z_re, z_im)
-    rate = dot(rate_re, rate_im, z_re, z_im)
-    b = bounded(bound, z_re, z_im)
-    if not s > 0.0:
-        return -1.0
-    proved = np.inf
-    if b > 0.0:
-        proved = (rate + np.sqrt(rate * rate + 2.0 * b * s)) / b
-    elif rate < 0.0:
-        proved = -s / rate
-    return float(proved)
-
-
-@jit_inline_sum
 def resolved_time(re: Floats, im: Floats, pace: Floats, z_re: Floats, z_im: Floats) -> float:
     """Time, s, over which Hermite's cubic follows a signal with these rows (m,) to 1e-4 of its size."""
     size, bend = 0.0, 0.0
@@ -226,21 +199,3 @@ def is_beyond(reduced: Reduced, displacement: Floats) -> bool:
         if not abs(seen) <= reduced.displacement_limit:
             return True
     return False
-
-
-@jit_inline_sum
-def has_turned(reduced: Reduced, i: int, spin: float, velocity: Floats) -> bool:
-    """Whether the stator outruns the rim at pair i, with the motion's velocity (n,)."""
-    s = abs(spin) * reduced.radius[i]
-    for k in range(velocity.size):
-        s += reduced.slip[i, k] * velocity[k]
-    return not s > 0.0
-
-
-@jit_inline_sum
-def has_any_turned(reduced: Reduced, mask: int, spin: float, velocity: Floats) -> bool:
-    """Whether the stator outruns the rim at a pair of `mask`."""
-    found = False
-    for i in range(reduced.radius.size):
-        found = found or ((mask >> i) & 1 == 1 and has_turned(reduced, i, spin, velocity))
-    return found

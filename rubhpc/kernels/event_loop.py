@@ -26,7 +26,6 @@ from rubhpc.kernels.case_progress import (
     MOST_STEPS,
     NONE,
     PAUSED,
-    SLIP_TURNED,
     UNDER_WAY,
     Clock,
     Progress,
@@ -42,10 +41,8 @@ from rubhpc.kernels.contact_modes import (
     event_free_interval,
     find_mode,
     floor_log2,
-    has_any_turned,
     is_beyond,
     propagate,
-    reversal_free_interval,
 )
 from rubhpc.kernels.measuring import (
     Recorder,
@@ -101,8 +98,7 @@ def advance(
     Returns
     -------
     int
-        FINISHED, DIVERGED (at an event), CONTACT_UNSOLVED, MODE_WANTED, PAUSED after many steps, or
-        SLIP_TURNED: set-valued friction has no closed form from there on.
+        FINISHED, DIVERGED (at an event), CONTACT_UNSOLVED, MODE_WANTED, or PAUSED after many steps.
     """
     # Tuples are opened here: a field read inside the loop would count a reference at every step.
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
@@ -110,7 +106,7 @@ def advance(
     rate_re, rate_im, bound = tables.rate_re, tables.rate_im, tables.bound
     power_re, power_im = tables.power_re, tables.power_im
     interval = clock.tick * (1 << clock.sample_level)
-    highest_level, is_set_valued = power_re.shape[1] - 1, reduced.is_set_valued
+    highest_level = power_re.shape[1] - 1
     work = event_work(reduced.radius.size)
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
@@ -161,10 +157,6 @@ def advance(
             interval_free = event_free_interval(
                 switch_re, switch_im, rate_re, rate_im, bound, mode, z_re, z_im
             )
-            if is_set_valued and not is_free:
-                interval_free = min(interval_free, steady_slip_interval(tables, reduced, clock.spin, mode, z))
-                if interval_free < 0.0:
-                    return SLIP_TURNED
         level, is_event_free = choose_step(clock, progress, longest, interval_free)
         propagate(power_re[mode, level], power_im[mode, level], z_re, z_im, next_re, next_im)
         progress.n_step += 1
@@ -279,28 +271,6 @@ def note_resolution(
     progress.contact_age, progress.resolved_level = age, floor_log2(int(max(1.0, resolved)))
 
 
-@jit_sum
-def steady_slip_interval(tables: ModeTables, reduced: Reduced, spin: float, mode: int, z: Floats) -> float:
-    """Time, s, in which no slip of a closed pair can turn; negative where one has."""
-    interval = np.inf
-    for i in range(reduced.radius.size):
-        if (tables.mask[mode] >> i) & 1:
-            interval = min(
-                interval,
-                reversal_free_interval(
-                    abs(spin) * reduced.radius[i],
-                    tables.slip_re[mode, i],
-                    tables.slip_im[mode, i],
-                    tables.slip_rate_re[mode, i],
-                    tables.slip_rate_im[mode, i],
-                    tables.slip_bound[mode, i],
-                    z[0],
-                    z[1],
-                ),
-            )
-    return interval
-
-
 @jit_inline_sum
 def choose_step(clock: Clock, progress: Progress, longest: int, interval: float) -> tuple[int, bool]:
     """Level of the next step, `longest` at most, and whether it is known to be free of events.
@@ -355,7 +325,7 @@ def take_event(
     Returns
     -------
     int
-        UNDER_WAY, DIVERGED, SLIP_TURNED or CONTACT_UNSOLVED.
+        UNDER_WAY, DIVERGED or CONTACT_UNSOLVED.
     """
     q, n = reduced.gap_jacobian.shape
     mode, spin = progress.mode, clock.spin
@@ -369,8 +339,6 @@ def take_event(
         end_span(tables, clock, z, progress, recorder, accumulator)
         for i in range(q):
             work.impulse[i] = accumulator.impulse[i]
-    if reduced.is_set_valued and has_any_turned(reduced, closed | crossing, spin, motion[n:]):
-        return SLIP_TURNED
     angle = shaft_angle(clock, progress.tick)
     moment = (1 << FORCED_LEVEL) * clock.tick
     progress.wanted = change_contacts(
@@ -389,8 +357,6 @@ def take_event(
         work.elimination,
         accumulator,
     )
-    if reduced.is_set_valued and has_any_turned(reduced, closed | crossing, spin, motion[n:]):
-        return SLIP_TURNED
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
         return CONTACT_UNSOLVED
     if is_recorded:

@@ -19,6 +19,7 @@ from rubhpc.kernels.accumulators import (
     VERTICAL,
     Accumulator,
     Samples,
+    observe_sense,
 )
 from rubhpc.kernels.case_progress import NONE, Clock, Progress
 from rubhpc.kernels.contact_modes import (
@@ -241,6 +242,8 @@ def observe_step(
         accumulator.impulse[i] += impulse
         accumulator.friction_work[i] += friction_work
         accumulator.least_slip[i] = min(accumulator.least_slip[i], slip_before, slip_after)
+        if slip_after != 0.0:
+            observe_sense(i, 1 if slip_after > 0.0 else -1, accumulator)
         accumulator.peak_force[i] = max(accumulator.peak_force[i], peak)
         accumulator.energy[FRICTION_LOSS] += friction_work
         accumulator.energy[DRIVE_WORK] += reduced.friction[i] * reduced.radius[i] * abs(spin) * impulse

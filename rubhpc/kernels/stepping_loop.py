@@ -1,7 +1,7 @@
 """The modal integrator in steps: closed-form motion between short contact steps, for every law and normal.
 
-With the updated normal the gap is no linear function of the motion, and with set-valued friction or a penalty
-a contact has more states than open and closed: closed contacts have no modes. The contact force of a step
+With the updated normal the gap is no linear function of the motion, and with a penalty forces act in open
+gaps: closed contacts have no modes. The contact force of a step
 acts as a kick at its beginning, as in the central difference, and the motion drifts freely (exactly, in the
 modes of the open system) to its end, where the laws of contact hold. Far from contact, bounded long steps are
 taken: the gap along the stator's axis is never the larger one.

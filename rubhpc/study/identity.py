@@ -13,8 +13,18 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before
+FRICTION_PHYSICS = 5  # that of set-valued friction from event to event; the next version of all is 6
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 _AXIS = "axis"  # in place of a value that every case sets
+
+
+def physics_of(study: Study) -> int:
+    """Version of the physics with which a study is computed."""
+    contact = study.contact
+    is_from_event_to_event = study.integrator.method == "modal" and contact.closed_form == "always"
+    if is_from_event_to_event and contact.friction_law != "sliding":
+        return max(PHYSICS, FRICTION_PHYSICS)
+    return PHYSICS
 
 
 def identity_parts(study: Study) -> dict[str, Any]:
@@ -34,7 +44,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
     contact |= {axis.name.removeprefix(PREFIX): _AXIS for axis in study.axes if axis.is_contact_key}
     swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
     parts = {
-        "physics": PHYSICS,
+        "physics": physics_of(study),
         "axes": [axis.name for axis in study.axes],
         **({"sweep": swept} if swept else {}),  # absent in older stores
         "rig": rig,

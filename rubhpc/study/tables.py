@@ -16,8 +16,8 @@ SEARCH_STEP = 1e-6  # s, of the modal scheme with the fixed normal
 SALTELLI, FEWEST_POINTS = "sobol", 8  # the design that Sobol' indices need
 TURNING_STEP = 0.25e-6  # s, with the updated one, set-valued friction or a penalty
 
-ClosedForm = Literal["always", "while sliding", "never"]
-CLOSED_FORM: dict[str, ClosedForm] = {"sliding": "always", "coulomb": "while sliding"}  # of friction laws
+ClosedForm = Literal["always", "never"]
+CLOSED_FORM: dict[str, ClosedForm] = {"sliding": "always", "coulomb": "always"}  # of friction laws
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +66,13 @@ class ContactKeys:
     def __post_init__(self) -> None:
         check_fields(self)
 
+    @property
+    def closed_form(self) -> ClosedForm:
+        """When the modal scheme has a closed form of contact; elsewhere it takes short steps."""
+        if self.normal == "updated" or self.law == "penalty":
+            return "never"
+        return CLOSED_FORM[self.friction_law]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(ContactKeys):
@@ -87,13 +94,6 @@ class Contact(ContactKeys):
         if self.static_friction_ratio is not None and self.friction_law != "coulomb":
             problem = 'steady sliding never sticks; take friction_law = "coulomb", or leave it out'
             raise FieldError("static_friction_ratio", problem)
-
-    @property
-    def closed_form(self) -> ClosedForm:
-        """When the modal scheme has a closed form of contact; elsewhere it takes short steps."""
-        if self.normal == "updated" or self.law == "penalty":
-            return "never"
-        return CLOSED_FORM[self.friction_law]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +134,8 @@ class Integrator:
         """Step in contact, s, of the modal scheme."""
         if self.step is not None:
             return self.step
-        return SEARCH_STEP if contact.closed_form == "always" else TURNING_STEP
+        is_steady = contact.closed_form == "always" and contact.friction_law == "sliding"
+        return SEARCH_STEP if is_steady else TURNING_STEP
 
     def step_within(self, limit: float) -> float:
         """Time step, s, of the central difference for matrices that are stable up to `limit`, s."""

@@ -32,7 +32,6 @@ def bodies(rng, q, friction=0.0, restitution=0.0):
         restitution=restitution,
         clearance=np.full(q, 1e-4),
         slip=np.zeros((q, N)),
-        is_set_valued=False,
         translations=np.eye(N),
         displacement_limit=np.inf,
     )

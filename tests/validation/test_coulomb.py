@@ -9,21 +9,29 @@ import pytest
 from lone_bodies import body, set_up, set_up_modal, tip
 
 from rubhpc import State, read_rig, simulate
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.response import first_lateral_frequency
 from rubhpc.integrate.case import run_case
+from rubhpc.integrate.friction_march import FrictionMarch
+from rubhpc.integrate.setup import Scheme, prepare
+from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DIVERGED, DONE
-from rubhpc.study.study import Contact, Recording
+from rubhpc.study.study import Contact, Integrator, Recording
 
 COULOMB = Contact(friction_law="coulomb")
 PRESSED = 10.0  # N, by which the rotor's vertical spring presses it onto a stator that is held
 
 
-def pressed_onto_a_rim(contact, friction, rim_speed, *, horizontal, velocity, duration, per_revolution=2000):
+def pressed_onto_a_rim(
+    contact, friction, rim_speed, scheme, *, horizontal, velocity, duration, per_revolution=2000
+):
     """Record and stiffness of 1 kg on 100 N/m that rubs, horizontally, on a stator that is held above it."""
     mass, stiffness = np.diag([1.0, 1.0]), np.diag([1e4, 100.0])
     rotor = body(mass, stiffness, ((1, "v"), (1, "w")))
     spin = 2 * math.pi / duration
     held = tip(body(1.0, 1.0, ((1, "axial"),)), 0.0, radius=rim_speed / spin, axial=-1)
-    setup = set_up(rotor, [held], spin, per_revolution, contact, steps_per_sample=5)
+    make = partial(set_up, steps_per_sample=5) if scheme == "central-difference" else set_up_modal
+    setup = make(rotor, [held], spin, per_revolution, contact)
     start = replace(
         State.at_rest(setup.model),
         rotor_displacement=np.array([-PRESSED / 1e4, horizontal]),
@@ -39,10 +47,11 @@ def pressed_onto_a_rim(contact, friction, rim_speed, *, horizontal, velocity, du
     )
 
 
-def test_oscillation_decays_in_a_straight_line_and_stops():
+@pytest.mark.parametrize("scheme", ["central-difference", "modal"])
+def test_oscillation_decays_in_a_straight_line_and_stops(scheme):
     """Each half swing is 2 mu N / k shorter; it stops once a swing ends within mu N / k of the middle."""
     shift = 0.3 * PRESSED / 100.0  # 30 mm
-    record = pressed_onto_a_rim(COULOMB, 0.3, 0.0, horizontal=0.2, velocity=0.0, duration=3.0)
+    record = pressed_onto_a_rim(COULOMB, 0.3, 0.0, scheme, horizontal=0.2, velocity=0.0, duration=3.0)
     half = math.pi / 10.0
     for i, amplitude in enumerate([0.2, 0.14, 0.08, 0.02]):
         at = round(i * half / 3.0 * 2000)
@@ -56,12 +65,13 @@ def test_oscillation_decays_in_a_straight_line_and_stops():
     assert record.energy_residual < 1e-4
 
 
-def test_stick_and_slip_on_a_moving_rim():
+@pytest.mark.parametrize("scheme", ["central-difference", "modal"])
+def test_stick_and_slip_on_a_moving_rim(scheme):
     """Sticking ends at mu_s N / k, sliding swings around mu N / k: period and amplitude in closed form."""
     rim, friction, ratio, omega = 0.1, 0.2, 2.0, 10.0
     contact = Contact(friction_law="coulomb", static_friction_ratio=ratio)
     record = pressed_onto_a_rim(
-        contact, friction, rim, horizontal=0.0, velocity=rim, duration=6.0, per_revolution=6000
+        contact, friction, rim, scheme, horizontal=0.0, velocity=rim, duration=6.0, per_revolution=6000
     )
     middle, over = friction * PRESSED / 100.0, (ratio - 1) * friction * PRESSED / 100.0
     amplitude = math.hypot(over, rim / omega)
@@ -147,12 +157,59 @@ def test_ordinary_rub_is_that_of_steady_sliding(normal):
             assert other == pytest.approx(one, rel=0, abs=1e-9 * abs(one).max()), (name, method)
 
 
-def test_modal_scheme_takes_short_steps_only_where_the_slip_turns():
-    """At r 1.5 the tip is thrown back faster than the rim goes: there alone, steps are short."""
-    given = {"transient": 30, "revolutions": 2, "friction_law": "coulomb", "step": "2 us", "keep": ()}
-    outrun = simulate("mokhtar2017", speed_ratio=0.75, clearance="84 um", **given)
+def test_modal_scheme_stays_in_closed_form_where_the_slip_turns():
+    """At r 1.5 the tip is thrown back faster than the rim goes."""
+    given = {"transient": 30, "revolutions": 2, "friction_law": "coulomb", "keep": ()}
     turned = simulate("mokhtar2017", speed_ratio=1.5, clearance="150 um", **given)
-    assert outrun.minimum_slip_speed > 0.0
-    assert outrun.steps < 5000
     assert turned.minimum_slip_speed <= 0.0
-    assert turned.steps > 10_000
+    assert turned.steps < 10_000
+    assert turned.left_closed_form == 0
+    assert turned.energy_residual < 1e-6
+
+
+def stiff_rub(scheme, step):
+    """The packaged rig with a stator of 30 GPa that slips, sticks and slips again, from rest."""
+    rig = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": "30 GPa"})
+    speed = 1.5 * first_lateral_frequency(assemble(rig))
+    setup = prepare(
+        rig,
+        speed,
+        contact=Contact(friction_law="coulomb"),
+        integrator=Integrator(step=step),
+        samples_per_revolution=64,
+    )
+    recording = Recording(transient=0, revolutions=2, samples_per_revolution=64)
+    record = run_case(replace(setup, scheme=scheme), clearance=60e-6, friction=0.6, recording=recording)
+    return record, np.array([record.vertical, record.horizontal, record.torsion, *record.stator_lateral])
+
+
+def test_short_steps_come_to_the_closed_form_as_they_are_halved():
+    exact, motion = stiff_rub(Scheme.EVENT_DRIVEN, None)
+    assert exact.stick_fraction[0] > 0.01
+    assert exact.energy_residual < 1e-6
+    distance = []
+    for step in (0.5e-6, 0.125e-6):
+        stepped, other = stiff_rub(Scheme.CONTACT_STEPPING, step)
+        distance.append((abs(other - motion).max(axis=1) / abs(motion).max(axis=1)).max())
+        assert stepped.stick_fraction == pytest.approx(exact.stick_fraction, rel=0.05)
+    assert distance[1] < 0.35 * distance[0]
+    assert distance[1] < 1e-3
+
+
+def test_contacts_that_chatter_are_left_to_short_steps_for_a_revolution(monkeypatch):
+    """A case that has had too many events when it first touches goes on in steps, then in closed form."""
+    exact, motion = stiff_rub(Scheme.EVENT_DRIVEN, None)
+    kernel, is_done = FrictionMarch._kernel, []
+
+    def exhausted(march, *args):
+        if not is_done:
+            is_done.append(True)
+            march.progress.n_event, march.progress.counted_from = 10**6, march.progress.tick + 2**40
+        return kernel(march, *args)
+
+    monkeypatch.setattr(FrictionMarch, "_kernel", exhausted)
+    stepped, other = stiff_rub(Scheme.EVENT_DRIVEN, 0.125e-6)
+    assert exact.left_closed_form == 0
+    assert stepped.left_closed_form == 1
+    assert stepped.energy_residual < 1e-3
+    assert abs(other - motion).max() < 1e-2 * abs(motion).max()

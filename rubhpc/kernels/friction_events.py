@@ -1,0 +1,228 @@
+"""Events under set-valued friction: impacts, and which pairs go on open, sliding or sticking."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit, jit_inline, jit_sum
+from rubhpc.kernels.accumulators import (
+    DRIVE_WORK,
+    FRICTION_LOSS,
+    IMPACT,
+    IMPACT_LOSS,
+    PRESSING,
+    Accumulator,
+    observe_sense,
+    observe_solution,
+)
+from rubhpc.kernels.complementarity import UNSOLVED, natural_residual
+from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - likewise
+from rubhpc.kernels.coulomb_friction import ROUNDING, UNNOTICED, friction_residual, solve_cones
+from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
+from rubhpc.kernels.mode_change import OPENING, product
+
+Floats = NDArray[np.float64]
+
+
+class FrictionWork(NamedTuple):
+    """Work space of an event, q pairs of n reduced degrees."""
+
+    solver: Workspace  # compliances are those of velocities, 1/kg
+    rate: Floats  # (q,), of gaps, m/s
+    slip: Floats  # (q,), m/s
+    acceleration: Floats  # (n,), without contact forces
+    impulse: Floats  # (q,), accumulated before the event, N s
+
+
+@jit
+def solve_event(bodies: FrictionBodies, work: FrictionWork, feeds_none: bool) -> int:
+    """Forces or impulses that obey the laws with `solver.gap` and `slip`; pivots taken, or UNSOLVED.
+
+    A pair that sticks holds up to the coefficient of rest; once that is passed it slides. With `feeds_none`,
+    a pair whose friction would feed energy in, because its slip turns round, has none.
+    """
+    solver = work.solver
+    q = solver.force.size
+    for i in range(q):
+        solver.cone[i] = bodies.static[i] if solver.is_sticking[i] else bodies.sliding[i]
+    pivots = 0
+    for _ in range(2 * q + 1):
+        taken = solve_cones(solver)
+        if taken == UNSOLVED:
+            return UNSOLVED
+        pivots += taken
+        is_settled = True
+        for i in range(q):
+            bound = solver.cone[i] * solver.force[i]
+            if solver.cone[i] > bodies.sliding[i] and abs(solver.traction[i]) >= bound * (1.0 - ROUNDING):
+                solver.cone[i] = bodies.sliding[i]
+                is_settled = False
+            elif feeds_none and bound > 0.0:
+                both = 2.0 * solver.slip[i] + slip_change(solver, i)
+                least = UNNOTICED * abs(solver.tangential[1, i, i]) * bound
+                if solver.traction[i] * both < -abs(solver.traction[i]) * least:
+                    solver.cone[i] = 0.0
+                    is_settled = False
+        if is_settled:
+            return pivots
+    return pivots
+
+
+@jit_inline
+def slip_change(solver: Workspace, i: int) -> float:
+    """Change of the slip of pair i by the forces found."""
+    change = 0.0
+    for j in range(solver.force.size):
+        change += (
+            solver.tangential[0, i, j] * solver.force[j] + solver.tangential[1, i, j] * solver.traction[j]
+        )
+    return change
+
+
+@jit_inline
+def gap_change(solver: Workspace, i: int) -> float:
+    """Change of the gap of pair i by the forces found."""
+    change = 0.0
+    for j in range(solver.force.size):
+        change += solver.matrix[i, j] * solver.force[j] + solver.coupling[i, j] * solver.traction[j]
+    return change
+
+
+@jit
+def observe_event(problem: int, pivots: int, solver: Workspace, accumulator: Accumulator) -> None:
+    """Note what a problem has taken, and how far its solution is from the laws."""
+    distance, moved = 0.0, 0.0
+    for i in range(solver.force.size):
+        if solver.force[i] > 0.0 or solver.active[i]:
+            end = solver.gap[i] - solver.target[i] + gap_change(solver, i)
+            distance = max(distance, natural_residual(solver.matrix[i, i], solver.force[i], end))
+            moved = max(moved, solver.matrix[i, i] * solver.force[i])
+            slipped, held = friction_residual(solver, i)
+            distance, moved = max(distance, slipped), max(moved, held)
+    observe_solution(problem, pivots, distance, moved, accumulator)
+
+
+@jit_sum
+def change_states(
+    reduced: Reduced,
+    bodies: FrictionBodies,
+    states: int,
+    crossing: int,
+    moment: float,
+    cosine: float,
+    sine: float,
+    motion: Floats,
+    is_recorded: bool,
+    work: FrictionWork,
+    accumulator: Accumulator,
+) -> int:
+    """Impact, then the states of all pairs that go on; -1 where there are none.
+
+    `crossing` has a bit for each switch function that turns negative, two a pair. Impulses obey Coulomb's law
+    with the velocities after them. What goes on follows from the forces of a virtual step of `moment` (s): a
+    pair whose normal force vanishes is open, one whose friction is within its cone sticks.
+    """
+    q, n = reduced.gap_jacobian.shape
+    velocity, solver = motion[n:], work.solver
+    is_impact = False
+    for i in range(q):
+        state = state_of(states, i)
+        first, second = (crossing >> (2 * i)) & 1, (crossing >> (2 * i + 1)) & 1
+        work.rate[i] = product(reduced.gap_jacobian[i], velocity)
+        work.slip[i] = bodies.rim_speed[i] + product(reduced.slip[i], velocity)
+        solver.slip[i] = work.slip[i]
+        solver.is_sticking[i] = state == STUCK and first == 0 and second == 0
+        solver.gap[i], solver.target[i] = np.inf, 0.0
+        if state == OPEN:
+            if first == 1:
+                solver.gap[i] = work.rate[i]
+                solver.target[i] = max(-reduced.restitution * work.rate[i], 0.0)
+                is_impact = is_impact or work.rate[i] < 0.0
+        elif state == STUCK or first == 0:
+            solver.gap[i] = 0.0
+    if is_impact:
+        pivots = solve_event(bodies, work, True)
+        if pivots == UNSOLVED:
+            return -1
+        if is_recorded:
+            observe_event(IMPACT, pivots, solver, accumulator)
+            observe_impacts(bodies, work, accumulator)
+        for i in range(q):
+            if solver.force[i] > 0.0:
+                force, traction = solver.force[i], solver.traction[i]
+                for k in range(n):
+                    velocity[k] += force * reduced.gap_jacobian[i, k] - traction * reduced.slip[i, k]
+                bound = solver.cone[i] * force * (1.0 - ROUNDING)
+                solver.is_sticking[i] = abs(traction) < bound
+    acceleration = work.acceleration
+    for k in range(n):
+        acceleration[k] = (
+            reduced.force_cosine[k] * cosine
+            + reduced.force_sine[k] * sine
+            - product(reduced.stiffness[k], motion[:n])
+            - product(reduced.damping[k], velocity)
+        )
+    for i in range(q):
+        if solver.gap[i] < np.inf:
+            opening = product(reduced.gap_jacobian[i], acceleration)
+            rate = product(reduced.gap_jacobian[i], velocity)
+            # A pair that parts so slowly that it is pressed together again at once has not parted.
+            if rate <= OPENING + max(-opening, 0.0) * moment:
+                solver.gap[i] = opening + (rate / moment if abs(rate) > OPENING else 0.0)
+                slip = bodies.rim_speed[i] + product(reduced.slip[i], velocity)
+                solver.slip[i] = slip / moment + product(reduced.slip[i], acceleration)
+            else:
+                solver.gap[i] = np.inf
+        solver.target[i] = 0.0
+    pivots = solve_event(bodies, work, False)
+    if pivots == UNSOLVED:
+        return -1
+    if is_recorded:
+        observe_event(PRESSING, pivots, solver, accumulator)
+    remaining = int(np.int64(0))
+    for i in range(q):
+        if solver.force[i] > 0.0:
+            traction, bound = solver.traction[i], solver.cone[i] * solver.force[i] * (1.0 - ROUNDING)
+            if abs(traction) < bound:
+                found = STUCK
+            elif traction != 0.0:
+                found = FORWARD if traction > 0.0 else BACKWARD
+            else:
+                found = FORWARD if solver.slip[i] >= 0.0 else BACKWARD
+            remaining |= found << (2 * i)
+        elif is_recorded and reduced.restitution > 0.0:
+            has_bounced = state_of(states, i) == OPEN and (crossing >> (2 * i)) & 1 == 1
+            accumulator.n_contact[i] += 1 if has_bounced else 0
+    return remaining
+
+
+@jit
+def observe_impacts(bodies: FrictionBodies, work: FrictionWork, accumulator: Accumulator) -> None:
+    """Add impulses and their work, which is that of the mean of the velocities before and after."""
+    solver = work.solver
+    for i in range(solver.force.size):
+        if solver.force[i] > 0.0:
+            change = slip_change(solver, i)
+            slip = work.slip[i] + 0.5 * change
+            friction_work = solver.traction[i] * slip
+            accumulator.impulse[i] += solver.force[i]
+            accumulator.friction_work[i] += friction_work
+            accumulator.least_slip[i] = min(accumulator.least_slip[i], work.slip[i], work.slip[i] + change)
+            accumulator.energy[FRICTION_LOSS] += friction_work
+            accumulator.energy[DRIVE_WORK] += solver.traction[i] * bodies.rim_speed[i]
+            accumulator.energy[IMPACT_LOSS] -= solver.force[i] * (work.rate[i] + 0.5 * gap_change(solver, i))
+
+
+@jit
+def observe_states(states: int, accumulator: Accumulator) -> None:
+    """Note the senses in which pairs slide in a set of states."""
+    for i in range(accumulator.sense.size):
+        state = state_of(states, i)
+        if state == FORWARD:
+            observe_sense(i, 1, accumulator)
+        elif state == BACKWARD:
+            observe_sense(i, -1, accumulator)

@@ -1,0 +1,35 @@
+"""States of a pair under set-valued friction, two bits a pair in a set of states."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline_sum
+
+Floats = NDArray[np.float64]
+
+OPEN, FORWARD, BACKWARD, STUCK = range(4)  # the rim outruns the tip, the tip outruns the rim
+MOST_PAIRS = 31  # whose states an integer holds
+
+
+class FrictionBodies(NamedTuple):
+    """What set-valued friction asks of the reduced bodies, q pairs."""
+
+    sliding: Floats  # (q,), coefficient
+    static: Floats  # (q,), coefficient of a pair that sticks
+    rim_speed: Floats  # (q,), m/s, not negative
+
+
+@jit_inline_sum
+def state_of(states: int, i: int) -> int:
+    """State of pair i in a set of states."""
+    return (states >> (2 * i)) & 3
+
+
+@jit_inline_sum
+def stuck_pairs(states: int) -> int:
+    """Bits of the pairs that stick, two places a pair; 0 where none does."""
+    return states & (states >> 1) & 0x1555555555555555
