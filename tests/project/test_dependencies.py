@@ -1,4 +1,4 @@
-"""Whatever the source imports is declared in pyproject.toml: an import that happens to be installed is no promise."""
+"""Whatever the source imports is declared in pyproject.toml; what happens to be installed is no promise."""
 
 from __future__ import annotations
 
