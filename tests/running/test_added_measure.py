@@ -19,8 +19,9 @@ from rubhpc.running import recompute, worker
 from rubhpc.running.driver import run
 from rubhpc.running.recompute import reproduce
 from rubhpc.schema import Variable
-from rubhpc.storage import growth
+from rubhpc.storage import growth, manifest, measures
 from rubhpc.storage.manifest import PRIVATE
+from rubhpc.storage.measures import added_measures, unlisted_measures
 from rubhpc.storage.resume import bring_up_to_date, grid_for
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
@@ -78,10 +79,16 @@ def as_format_3(store: Path) -> None:
 
 
 @pytest.mark.parametrize("is_format_3", [False, True])
-def test_a_store_without_a_measure_is_resumed_and_grown(study, request, capsys, is_format_3):
-    run(study, quiet=True)
+def test_a_store_without_a_measure_is_resumed_and_grown(study, request, capsys, monkeypatch, is_format_3):
+    with monkeypatch.context() as patch:
+        if is_format_3:  # with the measures of its time
+            for module in (manifest, measures):
+                patch.setattr(module, "case_measures", unlisted_measures)
+        run(study, quiet=True)
     if is_format_3:
         as_format_3(study.output)
+    added = [v.name for v in added_measures(unlisted_measures())] if is_format_3 else []
+    added += ["toy", "toy_count"]
     before = xr.open_zarr(study.output).load()
     request.getfixturevalue("toys")
     assert "4 done" in read_status(study.output).text()
@@ -92,12 +99,12 @@ def test_a_store_without_a_measure_is_resumed_and_grown(study, request, capsys, 
 
     assert run(study).computed == 0
     said = capsys.readouterr().out
-    assert said.count("was made before the measures toy, toy_count existed: its 4 cases have none") == 1
+    assert said.count(f"was made before the measures {', '.join(added)} existed: its 4 cases have none") == 1
     with xr.open_zarr(study.output, consolidated=True) as store:
         assert np.isnan(store.toy).all()
         assert (store.toy.attrs["units"], store.toy.dims[-1]) == ("m", "stator")
         assert (store.toy_count == -1).all()
-        assert store.load().drop_vars(["toy", "toy_count"]).identical(before)
+        assert store.load().drop_vars(added).identical(before)
     assert not verify(study.output)
 
     assert run(longer(study)).computed == 4
