@@ -38,10 +38,6 @@ def grids(draw):
         draw(st.sampled_from(["speed", "speed_ratio"])): draw(ratio),
         draw(st.sampled_from(["clearance", "clearance_ratio"])): draw(ratio),
         "friction": draw(st.lists(frictions, min_size=1, max_size=5, unique=True)),
-            st.lists(
-                st.floats(0, 1).filter(lambda x: x == 0 or x > 1e-30), min_size=1, max_size=5, unique=True
-            )
-        ),
     }
     if draw(st.booleans()):
         grid["stator.youngs_modulus"] = draw(st.permutations([3e9, 3e10]))
