@@ -40,6 +40,8 @@ class RecordVariables:
         lyapunov_exponent: float
         whirl_ratio: float
         contact_fraction: Floats  # (n_stator,)
+        stick_fraction: Floats  # (n_stator,)
+        reversals_per_revolution: Floats  # (n_stator,)
         contacts_per_revolution: Floats  # (n_stator,)
         contact_duration: Floats  # (n_stator,); s
         peak_contact_force: Floats  # (n_stator,); N
@@ -57,4 +59,5 @@ class RecordVariables:
         contact_residual: float
         transient_revolutions: int
         steps: int
+        left_closed_form: int
         wall_time: float  # s

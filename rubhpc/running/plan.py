@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 _LINE = 400  # bytes of a case in a journal, about, for one stator
-_FIXED_FILES = 85  # metadata, packed arrays and coordinates
+_OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the settings
+_PRIVATE_FILES = 8  # manifests, journals, records of runs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,6 +138,9 @@ def make_plan(study: Study) -> Plan:
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
     shards = zip(manifest.shape, manifest.shard, strict=False)
     n_shard = math.prod(-(-n // s) for n, s in shards) if manifest.shard else 0
+    # Metadata and values of each measure, of the status and of each coordinate; metadata of the arrays.
+    n_fixed = 2 * (len(manifest.measures) + 1 + len(manifest.axes) + _OWN_COORDINATES)
+    n_fixed += len(manifest.variables) + _PRIVATE_FILES
     names = {axis.coordinate: axis.name for axis in study.axes}  # a dimension as the study names its axis
     if study.sample is not None:
         n_range = sum(axis.drawn_from is not None for axis in study.axes)
@@ -149,8 +153,8 @@ def make_plan(study: Study) -> Plan:
         n_sequence=len(grid.sequences()),
         n_block=len(blocks),
         n_per_block=math.prod(grid.chunk),
-        n_file=(n_shard or len(blocks)) * len(manifest.variables) + _FIXED_FILES,
-        n_file_running=(n_shard + len(blocks)) * len(manifest.variables) + _FIXED_FILES,
+        n_file=(n_shard or len(blocks)) * len(manifest.variables) + n_fixed,
+        n_file_running=(n_shard + len(blocks)) * len(manifest.variables) + n_fixed,
         n_byte=grid.n_case * (per_case + 2 * _LINE),
         steps=round(steps),
         core_hours=seconds / 3600,

@@ -153,7 +153,7 @@ def test_damaged_chunk_is_noticed(tmp_path: Path) -> None:
         (lambda store: quantiles(store, "status", [0.5]), "status: is not a measure; choose"),
         (
             lambda store: histogram(store.assign(status=store["status"] * 0), "peak_torsion"),
-            "no case of this",
+            "no selected case has a value",
         ),
     ],
 )

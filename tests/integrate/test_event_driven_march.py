@@ -13,7 +13,7 @@ from rubhpc import State, read_rig, simulate
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import steady_response
-from rubhpc.integrate import event_driven_march, march, mode_tables
+from rubhpc.integrate import event_driven_march, march
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.march import NO_FORCES
 from rubhpc.integrate.mode_library import ModeLibrary
@@ -76,7 +76,7 @@ def test_case_does_not_depend_on_those_before_it():
 def test_sets_are_made_anew_where_there_is_no_room_for_all(monkeypatch):
     """What is forgotten and met again is tabulated to the same numbers."""
     usual = simulate(trial_rig(3), **CLOSE)
-    monkeypatch.setattr(mode_tables, "MOST_MODES", 4)
+    monkeypatch.setattr(ModeLibrary, "_most_modes", 4)
     monkeypatch.setattr(event_driven_march, "MOST_REFILLS", 1000)
     made = []
     add = ModeLibrary.add
@@ -105,7 +105,7 @@ def test_endless_events_are_left_to_short_steps(monkeypatch, too_many):
     """More sets of contacts, or more events, than allowed: the case is done in steps, to the same answer."""
     exact = simulate(trial_rig(3), **CLOSE)
     if too_many == "sets":
-        monkeypatch.setattr(mode_tables, "MOST_MODES", 4)
+        monkeypatch.setattr(ModeLibrary, "_most_modes", 4)
         monkeypatch.setattr(event_driven_march, "MOST_REFILLS", 1)
     else:
         monkeypatch.setattr(event_driven_march, "advance", lambda *_: CONTACT_UNSOLVED)

@@ -42,7 +42,7 @@ def test_wheel_holds_every_file_of_both_packages_and_no_other(shipped: set[str])
     "name",
     [
         "rubhpc/rigs/mokhtar2017.toml",
-        "postproc/rub.mplstyle",
+        "postproc/figures/rub.mplstyle",
         "rubhpc/py.typed",
         "postproc/py.typed",
         "rubhpc/kernels/central_difference.py",

@@ -64,7 +64,7 @@ def test_a_map_reads_only_its_scalar_the_status_and_the_monitors(store, chunks_r
     chosen = select(store, {"friction": 0.1, "stator.youngs_modulus": 3e9})
     chunks_read.clear()
     map_data(chosen, "peak_contact_force", ["speed_ratio", "clearance"])
-    monitors = {"minimum_slip_speed", "force_over_euler_load", "tip_deflection_ratio"}
+    monitors = {"minimum_slip_speed", "force_over_euler_load", "tip_deflection_ratio", "settled"}
     assert {key.split("/")[0] for key in chunks_read} == {"peak_contact_force", "status", *monitors}
 
 
