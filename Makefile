@@ -57,7 +57,7 @@ docs: $(VENV)/.docs ## the documentation as a site, in build/docs; warnings and 
 	@echo "Open $(CURDIR)/build/docs/index.html"
 
 bench: $(VENV)/.ready ## timings
-	$(BIN)/python -m pytest tests/bench -m bench --benchmark-columns=min,median,rounds
+	$(BIN)/python -m pytest tests/bench tests/faults/test_many_cases.py -m bench --benchmark-columns=min,median,rounds
 
 bench-scale: $(VENV)/.ready ## reductions of 100 000 cases: s, GB/s, share of the disk's rate, memory; into bench-scale.md
 	$(BIN)/python tests/bench/reductions.py --table bench-scale.md
