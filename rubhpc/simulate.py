@@ -10,16 +10,19 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.fem.stability import instability_message
-from rubhpc.input.quantity import parse_quantity
+from rubhpc.input.quantity import brief, parse_quantity
+from rubhpc.input.reading import build
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.rig import Rig
+from rubhpc.study.initial import Initial, check_initials
 from rubhpc.study.study import Contact, Integrator, Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from os import PathLike
 
     from rubhpc.integrate.record import Record
@@ -51,7 +54,7 @@ def simulate(
     revolutions: int = 64,
     samples_per_revolution: int = 256,
     keep: str | tuple[str, ...] = ("waveform", "spectrum", "section"),
-    initial: State | None = None,
+    initial: State | Mapping[str, float | str] | None = None,
 ) -> Record:
     """Simulate one case.
 
@@ -105,8 +108,9 @@ def simulate(
         Samples in each, an even number.
     keep : tuple of {"waveform", "spectrum", "section"}
         What the record holds besides its measures.
-    initial : State, optional
-        Where to start; default at rest.
+    initial : State or dict, optional
+        Where to start, by default at rest: a record's `final`, or keys of [initial] such as
+        `{"from": "contact_free", "impulse": "0.1 N*s"}`.
 
     Returns
     -------
@@ -128,8 +132,7 @@ def simulate(
     rig = with_keys(rig, overrides or {})
     if isinstance(keep, str):
         keep = (keep,)
-    if initial is not None and not isinstance(initial, State):
-        raise InputError(f"simulate: initial: {initial!r} is no State; give a record's `final`")
+    start = _read_initial(initial)
     if (speed is None) == (speed_ratio is None):
         raise InputError("simulate: give speed or speed_ratio, one of the two")
     if (clearance is None) == (clearance_ratio is None):
@@ -187,6 +190,21 @@ def simulate(
         samples_per_revolution=samples_per_revolution,
         keep=tuple(keep),
     )
-    record = run_case(setup, clearance=gap, friction=mu, recording=recording, initial=initial)
+    record = run_case(setup, clearance=gap, friction=mu, recording=recording, initial=start)
     record.settings["contact_free_amplitude"] = amplitude
     return replace(record, note=unstable)
+
+
+def _read_initial(initial: object) -> State | Initial:
+    """Where to start."""
+    if isinstance(initial, State):
+        return initial
+    if initial is not None and not isinstance(initial, dict):
+        problem = "is neither a State nor a dict"
+        raise InputError(f"simulate: initial: {brief(initial)} {problem}; give a record's `final`")
+    start = build(Initial, initial or {}, "simulate", "initial")
+    try:
+        check_initials(start, [])
+    except InputError as error:
+        raise InputError(f"simulate: {error}") from None
+    return start

@@ -18,9 +18,11 @@ import click
 import postproc
 import rubhpc
 from rubhpc.cli import commands
+from rubhpc.input.fields import key_of
 from rubhpc.rig.rig import Rig
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import OwnAxes
+from rubhpc.study.initial import Initial
 from rubhpc.study.tables import Contact, Integrator, Recording, Run, Sample
 
 if TYPE_CHECKING:
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 # Table of a file -> the dataclass that declares its keys, in the order of the pages.
 STUDY_TABLES = {
     "[contact]": Contact,
+    "[initial]": Initial,
     "[integrator]": Integrator,
     "[record]": Recording,
     "[sample]": Sample,
@@ -98,7 +101,7 @@ def _key_row(field: dataclasses.Field[Any]) -> tuple[str, ...]:
     meta = field.metadata
     example = meta.get("example")
     return (
-        f"`{field.name}`",
+        f"`{key_of(field)}`",
         _kind(meta),
         " ".join(f"`{unit}`" for unit in (meta.get("units") or (meta.get("unit"),)) if unit),
         _default(field),

@@ -9,8 +9,7 @@ import xarray as xr
 from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import rig_from_dict, with_keys
-from rubhpc.study.axes import coordinate_of
-from rubhpc.study.contact_axes import PREFIX
+from rubhpc.study.axes import coordinate_of, is_of_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -113,5 +112,5 @@ def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
 def rig_axes(case: xr.Dataset) -> dict[str, str]:
     """Return the axes of the study that are keys of the rig: coordinate to dotted key."""
     study: dict[str, Any] = case.attrs.get("study", {})
-    keys = (name for name in study.get("grid", {}) if "." in name and not name.startswith(PREFIX))
+    keys = (name for name in study.get("grid", {}) if "." in name and not is_of_table(name))
     return {coordinate_of(key): key for key in keys}

@@ -115,6 +115,11 @@ def degrees(*, doc: str, example: str) -> Any:
     return _declare("degrees", doc, example, MISSING)
 
 
+def key_of(declared: dataclasses.Field[Any]) -> str:
+    """Return the key of a field in a file: its name, without the underscore that keeps `from_` a name."""
+    return declared.name.rstrip("_")
+
+
 def table(*, doc: str, default: Any = MISSING, added: bool = False) -> Any:
     """Declare a field that holds another dataclass, or a tuple of them: a table of its own in the file.
 
@@ -160,7 +165,9 @@ def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> 
             raise InputError(f"{where}: {brief(value)} is not a list; write [{words}] or part of it")
         return tuple(value)
     if not isinstance(value, str):
-        raise InputError(f'{where}: {brief(value)} is not text; write it in quotes, {declared.name} = "..."')
+        raise InputError(
+            f'{where}: {brief(value)} is not text; write it in quotes, {key_of(declared)} = "..."'
+        )
     return value
 
 
@@ -175,7 +182,7 @@ def check_fields(owner: Any) -> None:
     for declared in dataclasses.fields(owner):
         problem = check_value(declared, getattr(owner, declared.name))
         if problem:
-            raise FieldError(declared.name, problem)
+            raise FieldError(key_of(declared), problem)
 
 
 def check_value(declared: dataclasses.Field[Any], value: Any) -> str:

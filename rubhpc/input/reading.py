@@ -11,7 +11,7 @@ import tomllib
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
 from rubhpc.errors import InputError, printable
-from rubhpc.input.fields import FieldError, check_value, nearest, parse_field, place
+from rubhpc.input.fields import FieldError, check_value, key_of, nearest, parse_field, place
 from rubhpc.input.matrix import encode_matrix
 from rubhpc.input.quantity import brief, parse_quantity
 
@@ -70,7 +70,7 @@ def build(cls: type[T], table: object, file: str, name: str = "") -> T:
         raise InputError(
             f"{place(file, name)}: {brief(table)} is not a table; write [{name}] and its keys below"
         )
-    fields = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    fields = {key_of(f): f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
     for key, declared in fields.items():  # first: an unknown choice explains unknown keys
         if declared.metadata.get("kind") == "choice" and (
             problem := check_value(declared, table.get(key, declared.default))
@@ -80,9 +80,11 @@ def build(cls: type[T], table: object, file: str, name: str = "") -> T:
     values, hints = {}, get_type_hints(cls)
     for key, declared in fields.items():
         if key in table:
-            values[key] = _parse(declared, hints[key], table[key], file, name)
+            values[declared.name] = _parse(declared, hints[declared.name], table[key], file, name)
         elif declared.default is dataclasses.MISSING:
-            raise InputError(f"{place(file, name, key)}: missing; add {_missing(declared, hints[key], name)}")
+            raise InputError(
+                f"{place(file, name, key)}: missing; add {_missing(declared, hints[declared.name], name)}"
+            )
     try:
         return cls(**values)
     except FieldError as error:
@@ -107,18 +109,18 @@ def plain(value: Any) -> Any:
     for declared in dataclasses.fields(value):
         entry, kind = getattr(value, declared.name), declared.metadata.get("kind")
         if kind == "matrix":
-            result[declared.name] = encode_matrix(entry)
+            result[key_of(declared)] = encode_matrix(entry)
         elif kind == "degrees":
-            result[declared.name] = [list(degree) for degree in entry]
+            result[key_of(declared)] = [list(degree) for degree in entry]
         elif kind == "pairs":
-            result[declared.name] = {repr(float(key)): float(number) for key, number in entry}
+            result[key_of(declared)] = {repr(float(key)): float(number) for key, number in entry}
         elif entry is not None and not (declared.metadata.get("added") and entry == declared.default):
-            result[declared.name] = float(entry) if kind == "quantity" else plain(entry)
+            result[key_of(declared)] = float(entry) if kind == "quantity" else plain(entry)
     return result
 
 
 def _parse(declared: dataclasses.Field[Any], hint: Any, value: object, file: str, name: str) -> Any:
-    where = place(file, name, declared.name)
+    where = place(file, name, key_of(declared))
     kind = declared.metadata.get("kind")
     inner = f"{name}.{declared.name}" if name else declared.name
     if kind == "pairs":

@@ -12,7 +12,7 @@ from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
 from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.friction_march import FrictionMarch
-from rubhpc.integrate.initial_state import at_rest, fit_to_gaps, with_overlap
+from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
 from rubhpc.integrate.lyapunov import Marches, growth
 from rubhpc.integrate.measures import (
     add_sag,
@@ -25,11 +25,13 @@ from rubhpc.integrate.measures import (
 from rubhpc.integrate.neighbour_motions import NeighbourMotions
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.setup import Scheme
+from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_transient
 from rubhpc.kernels.accumulators import IMPACT_STEPS
 from rubhpc.kernels.laws import is_set_valued
 from rubhpc.schema import DONE, SECTION_NAMES
 from rubhpc.spectra import amplitude_spectrum
+from rubhpc.study.initial import Initial
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -66,7 +68,7 @@ def run_case(
     clearance: float,
     friction: float,
     recording: Recording,
-    initial: State | None = None,
+    initial: State | Initial | None = None,
     check: Callable[[], None] | None = None,
 ) -> Record:
     """Integrate one case and measure it.
@@ -77,23 +79,26 @@ def run_case(
         Radial clearance at rest; a stator's `clearance_offset` is added.
     friction : float
         Coefficient of friction.
-    initial : State, optional
+    initial : State or Initial, optional
         Where to start, with the unbalance at its phase 0; default: at rest (`initial_state.at_rest`). The
         final state of another case is fitted to the gaps of this one (`initial_state.fit_to_gaps`).
     check : callable, optional
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
     """
     began = time.perf_counter() - seconds_compiling()
-    initial = at_rest(setup, clearance) if initial is None else fit_to_gaps(initial, setup, clearance)
+    if isinstance(initial, State):
+        state = fit_to_gaps(initial, setup, clearance)
+    else:
+        state = start_of(initial or Initial(), setup, clearance)
 
     def starter(scheme: Scheme) -> Callable[[State], March]:
         return lambda state: march_of(scheme, setup)(setup, clearance, friction, state, check)
 
     try:
-        record = _integrate(starter(setup.scheme), initial, setup, clearance, recording)
+        record = _integrate(starter(setup.scheme), state, setup, clearance, recording)
     except NoClosedForm:
         # Contacts that chatter, or too many sets of them: short steps need no events.
-        record = _integrate(starter(Scheme.CONTACT_STEPPING), initial, setup, clearance, recording)
+        record = _integrate(starter(Scheme.CONTACT_STEPPING), state, setup, clearance, recording)
         record.measures["left_closed_form"] = 1
     record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - seconds_compiling() - began

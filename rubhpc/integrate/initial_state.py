@@ -60,7 +60,7 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
     force = np.zeros_like(gap)
     if np.any(gap + allowed < -TOLERANCE):
         for _ in range(MOST_PASSES):
-            shape = _static_shapes(gap_jacobian.T, setup)
+            shape = static_shapes(gap_jacobian.T, setup)
             wanted = _least_forces(gap_jacobian @ shape, gap + allowed - gap_jacobian @ shape @ force)
             displacement, force = displacement + shape @ (wanted - force), wanted
             gap, gap_jacobian = gaps(displacement, setup, clearance)
@@ -118,7 +118,7 @@ def _as_seen(displacement: Floats, setup: Setup) -> Floats:
     return seen
 
 
-def _static_shapes(force: Floats, setup: Setup) -> Floats:
+def static_shapes(force: Floats, setup: Setup) -> Floats:
     """Static displacements (n_dof, k) under forces (n_dof, k); what nothing holds follows by its inertia."""
     if isinstance(setup, ModalSetup):
         basis, stiffness = setup.reduced.basis, setup.reduced.stiffness

@@ -143,7 +143,13 @@ def _pilot(grid: CaseGrid, index: tuple[int, ...], steps: float) -> Pace:
     def seconds(recording: Recording, setup: Setup) -> float:
         while True:
             compiled, began = seconds_compiling(), time.process_time()
-            run_case(setup, clearance=case.clearance, friction=case.friction, recording=recording)
+            run_case(
+                setup,
+                clearance=case.clearance,
+                friction=case.friction,
+                recording=recording,
+                initial=case.initial,
+            )
             if seconds_compiling() == compiled:
                 return max(time.process_time() - began, 1e-6)
 

@@ -111,7 +111,7 @@ def _compute(grid: CaseGrid, case: Case) -> Record:
         behind.append(before)
     for each in reversed(behind):
         setup = set_up(study, each)
-        initial = None if state is None else State.unpacked(state, setup.model)
+        initial = each.initial if state is None else State.unpacked(state, setup.model)
         record = run_case(
             setup,
             clearance=each.clearance,

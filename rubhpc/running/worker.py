@@ -246,7 +246,7 @@ class Worker:
             clearance=case.clearance,
             friction=case.friction,
             recording=study.recording,
-            initial=None if start.state is None else State.unpacked(start.state, setup.model),
+            initial=case.initial if start.state is None else State.unpacked(start.state, setup.model),
             check=check,
         )
 

@@ -12,7 +12,9 @@ from rubhpc.input.dotted import find_key
 from rubhpc.input.fields import check_value, nearest, parse_field, place, quantity
 from rubhpc.input.quantity import brief
 from rubhpc.input.ranges import MOST_VALUES, RANGE_KEYS, Range, read_ends, read_range
-from rubhpc.study.contact_axes import PREFIX, choices_of, contact_field
+from rubhpc.study import contact_axes, initial
+from rubhpc.study.contact_axes import choices_of, contact_field
+from rubhpc.study.initial import initial_field
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -48,7 +50,6 @@ SWEEPS = ("from_rest", "up", "down", "both")
 FROM_REST, UP, DOWN, BOTH = SWEEPS
 DIRECTION = "direction"  # the axis that a sweep in both directions adds
 DIRECTIONS = (UP, DOWN)  # meanings of 0 and 1 on it
-_NO_ORDER = "words have no order to sweep along; leave it out, or sweep another axis"
 NO_NEIGHBOURS = "the cases of a sample have no neighbours to start from; remove sweep or [sample]"
 
 
@@ -86,8 +87,8 @@ class Axis:
     def __post_init__(self) -> None:
         if self.sweep not in SWEEPS:
             raise InputError(f"{place('', 'grid', self.name)}: sweep: {_unknown_sweep(self.sweep)}")
-        if self.sweep != FROM_REST and choices_of(self.name):
-            raise InputError(f"{place('', 'grid', self.name)}: sweep: {_NO_ORDER}")
+        if self.sweep != FROM_REST and (problem := _why_not_swept(self.name)):
+            raise InputError(f"{place('', 'grid', self.name)}: sweep: {problem}")
         if self.sweep != FROM_REST:
             object.__setattr__(self, "values", tuple(sorted(self.values)))
         if problem := _problem(self.name, self.values, is_drawn=self.drawn_from is not None):
@@ -101,12 +102,17 @@ class Axis:
     @property
     def is_rig_key(self) -> bool:
         """Whether the axis sets a key of the rig."""
-        return self.name not in _OWN and self.name != DIRECTION and not self.is_contact_key
+        return self.name not in _OWN and self.name != DIRECTION and not is_of_table(self.name)
 
     @property
     def is_contact_key(self) -> bool:
         """Whether the axis sets a key of [contact]."""
-        return self.name.startswith(PREFIX)
+        return self.name.startswith(contact_axes.PREFIX)
+
+    @property
+    def is_initial_key(self) -> bool:
+        """Whether the axis sets a key of [initial]."""
+        return self.name.startswith(initial.PREFIX)
 
     @property
     def words(self) -> list[str]:
@@ -126,8 +132,8 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     Parameters
     ----------
     name : str
-        A dotted key of the rig, "contact." and a key of [contact], or one of speed_ratio, speed,
-        clearance_ratio, clearance, friction.
+        A dotted key of the rig, "contact." and a key of [contact], "initial." and one of [initial], or one of
+        speed_ratio, speed, clearance_ratio, clearance, friction.
     values : list, dict or single value
         A dict is a range, stop included: `{start, stop, step}`, or `{start, stop, num}` with the `scale`
         "lin" or "log"; or it holds `values`. Either may say how the axis is swept: `{values, sweep}`.
@@ -146,8 +152,8 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     sweep = FROM_REST
     if isinstance(values, dict):
         values, sweep = _read_table(values, where)
-    if sweep != FROM_REST and choices_of(name):
-        raise InputError(f"{where}: sweep: {_NO_ORDER}")
+    if sweep != FROM_REST and (problem := _why_not_swept(name)):
+        raise InputError(f"{where}: sweep: {problem}")
     return replace(_axis(name, declared, _read(declared, values, where), where), sweep=sweep)
 
 
@@ -181,6 +187,11 @@ def make_range(name: str, table: Mapping[str, object], rig: Rig, file: str = "")
             f"{where}: the range {span} contains 0, which is not a valid speed; use one sign only"
         )
     return replace(_axis(name, declared, (ends.start, ends.stop), where), drawn_from=ends)
+
+
+def is_of_table(name: str) -> bool:
+    """Whether an axis sets a key of [contact] or [initial]."""
+    return name.startswith((contact_axes.PREFIX, initial.PREFIX))
 
 
 def coordinate_of(name: str) -> str:
@@ -232,9 +243,9 @@ def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]
 def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
     if name in _OWN:
         return _OWN[name]
-    if name.startswith(PREFIX):
+    if is_of_table(name):
         try:
-            return contact_field(name)
+            return contact_field(name) if name.startswith(contact_axes.PREFIX) else initial_field(name)
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
     try:
@@ -267,6 +278,15 @@ def _read_table(table: Mapping[str, object], where: str) -> tuple[object, str]:
     if isinstance(rest["values"], dict):
         raise InputError(f"{where}: values: {brief(rest['values'])} is no list; write values = [...]")
     return rest["values"], str(sweep)
+
+
+def _why_not_swept(name: str) -> str:
+    """Why no sweep runs along an axis; "" where one may."""
+    if choices_of(name):
+        return "words have no order to sweep along; leave it out, or sweep another axis"
+    if name.startswith(initial.PREFIX):
+        return "in a sweep a case starts where another has ended; sweep another axis"
+    return ""
 
 
 def _unknown_sweep(sweep: object) -> str:
@@ -302,7 +322,7 @@ def _problem(name: str, values: tuple[float, ...], *, is_drawn: bool = False) ->
     """What is wrong with the values of an axis; "" when nothing is."""
     if not values:
         return "empty; give at least one value"
-    if name in _OWN or (name.startswith(PREFIX) and not choices_of(name)):
+    if name in _OWN or (name.startswith(contact_axes.PREFIX) and not choices_of(name)):
         declared = _OWN[name] if name in _OWN else contact_field(name)
         for value in (min(values), max(values)):
             if problem := check_value(declared, value):

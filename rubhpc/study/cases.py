@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.rig.rig import Rig
+    from rubhpc.study.initial import Initial
     from rubhpc.study.study import Study
     from rubhpc.study.tables import Contact
 
@@ -51,6 +52,7 @@ class Case:
     clearance: float  # m
     friction: float
     contact: Contact
+    initial: Initial
     contact_free_amplitude: float  # m
 
 
@@ -219,6 +221,7 @@ class CaseGrid:
             clearance=self._operating_points.clearance(index),
             friction=self._operating_points.friction(index),
             contact=self._operating_points.contact(index),
+            initial=self._operating_points.initial(index),
             contact_free_amplitude=amplitude,
         )
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from rubhpc.input.reading import plain
 from rubhpc.rig.reading import with_keys
+from rubhpc.study import contact_axes, initial
 from rubhpc.study.axes import FROM_REST
-from rubhpc.study.contact_axes import PREFIX
 
 if TYPE_CHECKING:
     from rubhpc.study.study import Study
@@ -41,7 +42,9 @@ def identity_parts(study: Study) -> dict[str, Any]:
         _blank(rig, key.split("."))
     del rig["name"]
     contact = asdict(study.contact)
-    contact |= {axis.name.removeprefix(PREFIX): _AXIS for axis in study.axes if axis.is_contact_key}
+    contact |= {
+        axis.name.removeprefix(contact_axes.PREFIX): _AXIS for axis in study.axes if axis.is_contact_key
+    }
     swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
     parts = {
         "physics": physics_of(study),
@@ -52,6 +55,9 @@ def identity_parts(study: Study) -> dict[str, Any]:
         "integrator": asdict(study.integrator),
         "record": asdict(study.recording) | {"keep": sorted(study.recording.keep)},
     }
+    starts = {axis.name.removeprefix(initial.PREFIX): _AXIS for axis in study.axes if axis.is_initial_key}
+    if starts or study.initial != initial.Initial():  # absent in older stores
+        parts["initial"] = plain(study.initial) | starts
     if study.sample is not None:
         ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
         parts["sample"] = {

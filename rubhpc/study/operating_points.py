@@ -15,9 +15,11 @@ from rubhpc.fem.constraints import find_rigid_body_mode
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
 from rubhpc.fem.stability import instability_message, is_passive
 from rubhpc.fem.statics import sag_at_stators
+from rubhpc.fem.unbalance_response import check_response_node
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.axes import CLEARANCE_AXES, SPEED_AXES
 from rubhpc.study.contact_axes import choices_of, contact_at
+from rubhpc.study.initial import CONTACT_FREE, KNOCKED, initial_at
 from rubhpc.study.points import Points
 
 if TYPE_CHECKING:
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.rig.rig import Rig
+    from rubhpc.study.initial import Initial
     from rubhpc.study.points import Index, Values
     from rubhpc.study.study import Study
     from rubhpc.study.tables import Contact
@@ -71,6 +74,7 @@ class OperatingPoints:
         self._is_speed_ratio = names[self._speed_axis] == "speed_ratio"
         self.is_clearance_ratio = names[self._clearance_axis] == "clearance_ratio"
         self._contact_axes = [i for i, axis in enumerate(study.axes) if axis.is_contact_key]
+        self._initial_axes = [i for i, axis in enumerate(study.axes) if axis.is_initial_key]
         self._rig_axes = [i for i, axis in enumerate(study.axes) if axis.is_rig_key]
         rotor_axes = [i for i in self._rig_axes if names[i].startswith("rotor.")]
         # The contact-free response depends on the rotor, and on the stator's node, at which it is evaluated.
@@ -83,6 +87,7 @@ class OperatingPoints:
         # Cached by value, not by index: of axes that share a dimension only some may matter here.
         self._rig_at = lru_cache(maxsize=256)(self._make_rig)
         self._contact_at = lru_cache(maxsize=4096)(self._make_contact)
+        self._initial_at = lru_cache(maxsize=4096)(self._make_initial)
         self._model_at = lru_cache(maxsize=4)(self._make_model)
         self._is_passive_at = lru_cache(maxsize=65536)(self._make_is_passive)
         self._unit_speed_at = lru_cache(maxsize=65536)(self._make_unit_speed)
@@ -92,6 +97,7 @@ class OperatingPoints:
             self._check_step(study.integrator.step)
         if study.integrator.method == "modal":
             self._check_held()
+        self._check_knocks()
 
     def rig(self, index: Index) -> Rig:
         """Rig of a case."""
@@ -127,6 +133,10 @@ class OperatingPoints:
     def contact(self, index: Index) -> Contact:
         """Contact of a case."""
         return self._contact_at(self._on(self._contact_axes, index))
+
+    def initial(self, index: Index) -> Initial:
+        """Where a case starts."""
+        return self._initial_at(self._on(self._initial_axes, index))
 
     def with_each_law(self, index: Index) -> list[Index]:
         """Index of a case and of those that differ from it in the words on contact axes only."""
@@ -237,6 +247,11 @@ class OperatingPoints:
         names = (self.study.axes[i].name for i in self._contact_axes)
         return contact_at(self.study.contact, dict(zip(names, values, strict=True)))
 
+    def _make_initial(self, values: Values) -> Initial:
+        """Start with these values on the initial axes."""
+        names = (self.study.axes[i].name for i in self._initial_axes)
+        return initial_at(self.study.initial, dict(zip(names, values, strict=True)))
+
     def _make_model(self, values: Values) -> Model:
         """Model with these values on the response axes, and the first ones on the other rig axes."""
         chosen = dict(zip(self._response_axes, values, strict=True))
@@ -258,6 +273,8 @@ class OperatingPoints:
         if problem := "" if is_stable else instability_message(self._model_at(values), speed):
             if self.is_clearance_ratio:
                 raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead")
+            if self.study.initial.from_ == CONTACT_FREE:
+                raise InputError(f'[initial] from: {problem}; take from = "rest"')
             amplitude = math.nan
         if self.is_clearance_ratio and not amplitude > 0:
             problem = f"no contact-free amplitude at {speed:.6g} rad/s to take it of"
@@ -291,6 +308,16 @@ class OperatingPoints:
                 raise InputError(
                     f'[integrator] method: {problem}; {hold}, or take method = "central-difference"'
                 )
+
+    def _check_knocks(self) -> None:
+        """Refuse an impulse on a node that does not move sideways."""
+        names = [axis.name for axis in self.study.axes]
+        nodes = self._values[names.index(KNOCKED)] if KNOCKED in names else [self.study.initial.impulse_node]
+        where = f"[grid] {KNOCKED}" if KNOCKED in names else "[initial] impulse_node"
+        first = self._model_at(self._on(self._response_axes, (0,) * len(self.points.dims)))
+        for node in nodes:
+            if node is not None:
+                check_response_node(first, int(node), where)
 
     def _check_gap(self, least: float) -> None:
         """Refuse a least clearance that a stator's own offset closes."""

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 from rubhpc.errors import InputError
 from rubhpc.input.fields import place
 from rubhpc.input.quantity import brief
-from rubhpc.input.reading import build, read_toml, refuse_unknown
+from rubhpc.input.reading import build, plain, read_toml, refuse_unknown
 from rubhpc.rig.reading import read_rig, with_keys
+from rubhpc.study import contact_axes
 from rubhpc.study.axes import (
     BOTH,
     DIRECTION,
@@ -22,7 +23,8 @@ from rubhpc.study.axes import (
     make_range,
 )
 from rubhpc.study.checks import check_axes, check_rigs
-from rubhpc.study.contact_axes import PREFIX, check_contacts
+from rubhpc.study.contact_axes import check_contacts
+from rubhpc.study.initial import Initial, check_initials
 from rubhpc.study.sampling import draw
 from rubhpc.study.tables import Contact, ContactKeys, Integrator, Recording, Run, Sample
 
@@ -45,12 +47,16 @@ __all__ = [
     "read_study",
 ]
 
-_TABLES = ("title", "rig", "output", "grid", "sample", "override", "contact", "integrator", "record", "run")
+_TABLES = (
+    *("title", "rig", "output", "grid", "sample", "override"),
+    *("contact", "initial", "integrator", "record", "run"),
+)
 _MOST_AXES = 32  # arrays have 64 dimensions at most
 
 
-DEFAULT_CONTACT, DEFAULT_INTEGRATOR, DEFAULT_RECORDING, DEFAULT_RUN = (
+DEFAULT_CONTACT, DEFAULT_INITIAL, DEFAULT_INTEGRATOR, DEFAULT_RECORDING, DEFAULT_RUN = (
     Contact(),
+    Initial(),
     Integrator(),
     Recording(),
     Run(),
@@ -74,6 +80,8 @@ class Study:
         How some of the axes have been drawn (`rubhpc.study.sampling.draw`).
     contact : ContactKeys
         A `Contact`; of a grid with contact axes what they leave open, as far as it applies to a case's law.
+    initial : Initial
+        Where cases start, but for what initial axes say.
     output : Path
         The store.
     source : Path or None
@@ -90,6 +98,7 @@ class Study:
     axes: tuple[Axis, ...]
     sample: Sample | None = None
     contact: ContactKeys = DEFAULT_CONTACT
+    initial: Initial = DEFAULT_INITIAL
     integrator: Integrator = DEFAULT_INTEGRATOR
     recording: Recording = DEFAULT_RECORDING
     run: Run = DEFAULT_RUN
@@ -104,6 +113,7 @@ class Study:
             object.__setattr__(self, "axes", (*self.axes, direction_axis()))
         check_axes(self.axes)
         check_contacts(self.contact, [axis for axis in self.axes if axis.is_contact_key])
+        check_initials(self.initial, [axis for axis in self.axes if axis.is_initial_key])
         check_rigs(self.rig, self.axes)
 
     def axis(self, *names: str) -> Axis:
@@ -129,8 +139,9 @@ class Study:
             "contact": {
                 key: value
                 for key, value in asdict(self.contact).items()
-                if value is not None and PREFIX + key not in {axis.name for axis in self.axes}
+                if value is not None and contact_axes.PREFIX + key not in {axis.name for axis in self.axes}
             },
+            **({"initial": plain(self.initial)} if self.initial != DEFAULT_INITIAL else {}),
             "integrator": asdict(self.integrator),
             "record": asdict(self.recording) | {"keep": list(self.recording.keep)},
         }
@@ -175,12 +186,13 @@ def read_study(
     axes = _read_axes(_table(table, "grid", file), rig, sample, file)
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
         raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
-    on_axes = {axis.name for axis in axes if axis.is_contact_key}
-    for name in on_axes & {PREFIX + key for key in _table(table, "contact", file)}:
-        raise InputError(
-            f"{place(file, 'contact', name.removeprefix(PREFIX))}: is an axis of the grid too; leave one out"
-        )
-    contact = build(ContactKeys if on_axes else Contact, table.get("contact", {}), file, "contact")
+    for name in ("contact", "initial"):
+        for key in _table(table, name, file):
+            if f"{name}.{key}" in {axis.name for axis in axes}:
+                raise InputError(f"{place(file, name, key)}: is an axis of the grid too; leave one out")
+    is_varied = any(axis.is_contact_key for axis in axes)
+    contact = build(ContactKeys if is_varied else Contact, table.get("contact", {}), file, "contact")
+    initial = build(Initial, table.get("initial", {}), file, "initial")
     integrator = build(Integrator, table.get("integrator", {}), file, "integrator")
     recording = build(Recording, table.get("record", {}), file, "record")
     run = build(Run, table.get("run", {}), file, "run")
@@ -191,6 +203,7 @@ def read_study(
             axes=axes,
             sample=sample,
             contact=contact,
+            initial=initial,
             integrator=integrator,
             recording=recording,
             run=run,

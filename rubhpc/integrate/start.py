@@ -1,0 +1,110 @@
+"""Where a case of a study starts: at rest or in the contact-free motion, displaced, moving or knocked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.fem.response import steady_response
+from rubhpc.fem.stability import instability_message
+from rubhpc.fem.unbalance_response import check_response_node
+from rubhpc.integrate.initial_state import at_rest, fit_to_gaps, static_shapes
+from rubhpc.integrate.record import State
+from rubhpc.study.initial import CONTACT_FREE
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+    from rubhpc.integrate.setup import Setup
+    from rubhpc.study.initial import Initial
+
+    Floats = NDArray[np.float64]
+
+
+def start_of(initial: Initial, setup: Setup, clearance: float) -> State:
+    """Return the state in which a case starts, the unbalance at its phase 0.
+
+    Parameters
+    ----------
+    initial : Initial
+        Displacement and velocity of the output node, and an impulse, on top of a motion.
+    clearance : float, m
+        Radial clearance at rest; a stator's `clearance_offset` is added. What overlaps it is pushed apart
+        (`initial_state.fit_to_gaps`).
+
+    Raises
+    ------
+    InputError
+        The rotor has no contact-free motion, the output node is held in a direction given, or the node of
+        the impulse does not move sideways.
+    """
+    state = _contact_free(setup) if initial.from_ == CONTACT_FREE else at_rest(setup, clearance)
+    if initial.is_disturbed:
+        state = _disturbed(state, initial, setup)
+    elif initial.from_ != CONTACT_FREE:
+        return state
+    return fit_to_gaps(state, setup, clearance)
+
+
+def _contact_free(setup: Setup) -> State:
+    """The steady unbalance response about the sagged shaft; no stator touches."""
+    model = setup.model
+    if problem := instability_message(model, setup.spin):
+        raise InputError(f'[initial] from: {problem}; take from = "rest"')
+    response = steady_response(model, setup.spin)
+    return replace(
+        State.at_rest(model),
+        rotor_displacement=model.sag + response.real,
+        rotor_velocity=(1j * setup.spin * response).real,
+    )
+
+
+def _disturbed(state: State, initial: Initial, setup: Setup) -> State:
+    """A state with displacement, velocity and impulse added; what touched is free to part."""
+    model = setup.model
+    displacement, velocity = state.displacement, state.velocity
+    moved = np.array([initial.vertical, initial.horizontal])
+    moving = np.array([initial.vertical_velocity, initial.horizontal_velocity])
+    if moved.any() or moving.any():
+        shape = _shapes_of_output(setup, np.flatnonzero((moved != 0.0) | (moving != 0.0)))
+        displacement = displacement + shape @ moved
+        velocity = velocity + shape @ moving
+    if initial.impulse != 0.0:
+        node = model.output_node if initial.impulse_node is None else initial.impulse_node
+        rotor = np.linalg.solve(model.rotor.mass, _impulse(model, node, initial))
+        velocity[: rotor.size] += rotor
+    return State.of_bodies(model, displacement, velocity, np.zeros_like(state.contact_force))
+
+
+def _shapes_of_output(setup: Setup, wanted: NDArray[np.intp]) -> Floats:
+    """Static shapes (n_dof, 2) of all bodies that move the output node by 1 m up, or sideways."""
+    model = setup.model
+    rows = [model.rotor.index(model.output_node, name) for name in ("v", "w")]
+    for i in wanted:
+        if rows[i] < 0:
+            key = ("vertical", "horizontal")[i]
+            raise InputError(f"[initial] {key}: the output node is held there; leave it out")
+    free = [i for i in (0, 1) if rows[i] >= 0]
+    seen = [rows[i] for i in free]
+    force = np.zeros((model.body_start[-1], len(free)))
+    force[seen, range(len(free))] = 1.0
+    follows = static_shapes(force, setup)
+    shape = np.zeros((len(force), 2))
+    shape[:, free] = np.linalg.solve(follows[seen].T, follows.T).T
+    return shape
+
+
+def _impulse(model: Model, node: int, initial: Initial) -> Floats:
+    """Impulse on the rotor, (n_rotor_dof,), N s."""
+    check_response_node(model, node, "[initial] impulse_node")
+    impulse = np.zeros(model.rotor.n_dof)
+    for name, share in (("v", math.cos(initial.impulse_angle)), ("w", math.sin(initial.impulse_angle))):
+        row = model.rotor.index(node, name)
+        if row >= 0:
+            impulse[row] = initial.impulse * share
+    return impulse

@@ -1,0 +1,118 @@
+"""Where cases start: the contact-free motion goes on, a displacement is met, a knock gives its momentum."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from trial_rig import trial_rig
+
+from rubhpc import simulate
+from rubhpc.errors import InputError
+from rubhpc.fem.response import contact_free_amplitude
+from rubhpc.integrate.initial_state import gaps
+from rubhpc.integrate.setup import prepare
+from rubhpc.integrate.start import start_of
+from rubhpc.study.initial import Initial
+from rubhpc.study.tables import Contact, Integrator
+
+SPIN = 220.0  # rad/s
+METHODS = {"modal": Integrator(), "central": Integrator(method="central-difference", step=1e-6)}
+SHORT = {"transient": 0, "revolutions": 4, "samples_per_revolution": 64, "friction": 0.1}
+
+
+def setup_of(method: str, n_stator: int = 2):
+    return prepare(
+        trial_rig(n_stator),
+        SPIN,
+        contact=Contact(),
+        integrator=METHODS[method],
+        samples_per_revolution=64,
+    )
+
+
+@pytest.mark.parametrize("speed", [150.0, -SPIN])
+def test_the_contact_free_motion_needs_no_transient(speed):
+    record = simulate(trial_rig(1), speed=speed, clearance="5 mm", initial={"from": "contact_free"}, **SHORT)
+    turns = record.signals["vertical"].reshape(4, 64), record.signals["horizontal"].reshape(4, 64)
+    size = contact_free_amplitude(prepare_model(speed), speed)
+    for turn in turns:
+        np.testing.assert_allclose(turn, turn[[0, 0, 0, 0]], atol=1e-6 * size)
+    assert np.hypot(*turns).max() <= size * (1 + 1e-6)
+
+
+def prepare_model(speed: float):
+    return prepare(
+        trial_rig(1), speed, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
+    ).model
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_output_node_starts_where_it_is_put(method):
+    setup = setup_of(method)
+    model = setup.model
+    state = start_of(
+        Initial(vertical=3e-5, horizontal=-2e-5, vertical_velocity=0.01, horizontal_velocity=0.02),
+        setup,
+        1e-3,
+    )
+    rows = [model.rotor.index(model.output_node, name) for name in ("v", "w")]
+    np.testing.assert_allclose(state.rotor_displacement[rows] - model.sag[rows], [3e-5, -2e-5], rtol=1e-9)
+    np.testing.assert_allclose(state.rotor_velocity[rows], [0.01, 0.02], rtol=1e-9)
+    bent = model.rotor.stiffness @ (state.rotor_displacement - model.sag)
+    bent[rows] = 0.0  # a force at the output node, and no other
+    assert np.abs(bent).max() < 1e-2 * np.abs(model.rotor.stiffness[rows]).max() * 3e-5
+    assert not any(u.any() for u in state.stator_displacement)
+
+
+@pytest.mark.parametrize("node", [None, 2])
+def test_a_knock_gives_its_momentum(node):
+    setup = setup_of("central")
+    rotor = setup.model.rotor
+    angle = 0.3
+    state = start_of(Initial(impulse=0.2, impulse_angle=angle, impulse_node=node), setup, 1e-3)
+    momentum = rotor.mass @ state.rotor_velocity
+    at = setup.model.output_node if node is None else node
+    for name, share in (("v", math.cos(angle)), ("w", math.sin(angle))):
+        row = rotor.index(at, name)
+        assert momentum[row] == pytest.approx(0.2 * share)
+        momentum[row] = 0.0
+    assert np.abs(momentum).max() < 1e-12
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_start_beyond_the_clearance_pushes_the_stator_back(method):
+    setup = setup_of(method)
+    state = start_of(Initial(vertical=4e-4, horizontal=1e-4), setup, 1e-4)
+    gap, _ = gaps(state.displacement, setup, 1e-4)
+    assert gap.min() == pytest.approx(0.0, abs=1e-12)
+    assert any(u.any() for u in state.stator_displacement)
+
+
+def test_a_record_goes_on_from_a_start_without_loss_of_energy():
+    record = simulate(
+        trial_rig(2),
+        speed=SPIN,
+        clearance="60 um",
+        initial={"impulse": "0.05 N*s", "vertical": 2e-4},
+        **SHORT,
+    )
+    assert record.peak_contact_force.max() > 1.0
+    assert record.measures["energy_residual"] < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("initial", "message"),
+    [
+        ({"from": "still"}, r'\[initial\] from: "still" is not available; choose one of "rest"'),
+        ({"form": "rest"}, "form: unknown key; did you mean from"),
+        ({"impulse_angle": 1.0}, "impulse_angle: there is no impulse; give one"),
+        ({"impulse": 1.0, "impulse_node": 99}, "impulse_node: 99 does not move sideways"),
+        ({"vertical": "3 kg"}, "vertical: .* is not in m"),
+        (5, "initial: 5 is neither a State nor a dict"),
+    ],
+)
+def test_what_cannot_be_is_refused(initial, message):
+    with pytest.raises(InputError, match=message):
+        simulate("mokhtar2017", speed_ratio=0.75, clearance=1e-4, initial=initial, transient=1, revolutions=1)
