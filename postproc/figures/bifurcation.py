@@ -15,6 +15,7 @@ from postproc.store.axes import find_axis, ordered_axes, source
 from postproc.store.select import first_of_rest
 from postproc.store.units import displayed, meanings, scale_of, short_name
 from postproc.store.variables import require_results
+from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE
 from rubhpc.study.axes import DIRECTION
@@ -62,7 +63,10 @@ def bifurcation(
     over = coloring if coloring == DIRECTION else None
     name = f"section_{signal}"
     kept = [axis] if over is None else [axis, over]
-    cases, notes = first_of_rest(cases.assign({name: section_of(cases, signal)}), kept, name)
+    cases = cases.assign({name: section_of(cases, signal)})
+    if "stator" in cases[name].dims:
+        cases = at_most_loaded_stator(cases)
+    cases, notes = first_of_rest(cases, kept, name)
     shown = sections_along(cases, signal, axis, over)
     return Drawing(
         shown=shown,

@@ -19,6 +19,7 @@ from postproc.signals.hilbert_huang import (
 )
 from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
 from postproc.store.units import scale_for, scale_of, short_name
+from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -66,6 +67,8 @@ def hht(
         End of the ordinate [default: twice the natural frequency].
     """
     limit = None if max_frequency is None else hertz(max_frequency, "--max-frequency")
+    if signal in cases and "stator" in cases[signal].dims:  # its contacts and natural frequency too
+        cases = at_most_loaded_stator(cases)
     shown = hilbert_huang(cases, signal, contact=contact, revolutions=revolutions, n_mode=mode)
     natural: dict[str, Any] = {}
     if signal == "stator_lateral":

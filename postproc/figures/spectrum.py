@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from postproc.figures.options import Axis, Bounds, Positive
 
+_LABEL_WIDTH = 38  # characters that fit beside a panel
 _FLOOR = 1e-5  # of the highest line, on a log scale
 _NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
 
@@ -116,7 +118,7 @@ def draw_spectrum(
     if amplitude.ndim > 1:
         ax.legend(loc="upper right")
     ax.set_xlabel(_NAMES[abscissa])
-    ax.set_ylabel(scale.label(f"{short_name(amplitude)} amplitude"))
+    ax.set_ylabel(fill(scale.label(f"{short_name(amplitude)} amplitude"), _LABEL_WIDTH))
     if is_full:
         for side, x in (("backward", 0.02), ("forward", 0.98)):
             ax.text(x, 0.96, side, ha="left" if x < 0.5 else "right", va="top", transform=ax.transAxes)

@@ -10,6 +10,7 @@ import numpy as np
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.units import meanings, scale_for, typed
 from postproc.store.variables import require_variables
+from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.study.axes import coordinate_of
@@ -56,7 +57,8 @@ def select(store: xr.Dataset, choice: Mapping[str, Any]) -> xr.Dataset:
 def narrow(store: xr.Dataset, names: Iterable[str], spread: Iterable[str] = ()) -> xr.Dataset:
     """Return only the variables named, over the axes a figure spreads over and their own sample or order.
 
-    Axes of one value are dropped; any other that is left must have been selected.
+    Axes of one value are dropped; any other that is left must have been selected. Of several stators, the one
+    with the largest contact force is taken.
 
     Raises
     ------
@@ -67,6 +69,8 @@ def narrow(store: xr.Dataset, names: Iterable[str], spread: Iterable[str] = ()) 
     require_variables(store, names)
     spread = set(spread)
     data = store[names]
+    if "stator" in data.dims and "stator" not in spread:
+        data = at_most_loaded_stator(store)[names]
     free = [a for a in (*axes_of(store), "stator") if a in data.dims and a not in spread]
     several = [a for a in free if data.sizes[a] > 1]
     if several:

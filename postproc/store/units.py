@@ -110,6 +110,7 @@ class Scale:
 _SPEEDS = ("speed", "spin_speed")
 _CAPTION_WIDTH = 56  # characters that a column takes
 _MARKUP = re.compile(r"[$\\_]")  # of symbols, which takes no room
+_DEGREES = Scale(180 / math.pi, "°")
 _RPM = Scale(60 / (2 * math.pi), "rpm")  # as speeds are read on a test bench
 
 
@@ -180,9 +181,11 @@ def written_value(coordinate: xr.DataArray) -> str:
     name, value = str(coordinate.name), float(coordinate.values)
     if names := meanings(coordinate):
         return f"{name.replace('_', ' ')} {names[int(value)]}"
-    scale = _RPM if name in _SPEEDS else scale_for(str(coordinate.attrs.get("units", "1")), abs(value))
+    scale = scale_for(str(coordinate.attrs.get("units", "1")), abs(value))
+    scale = _RPM if name in _SPEEDS else _DEGREES if name.endswith("angle") else scale
     symbol = f"${_SYMBOLS[name]}$" if name in _SYMBOLS else name.replace("_", " ")
-    return f"{symbol} = {value * scale.factor:.4g} {scale.unit}".rstrip()
+    text = f"{symbol} = {value * scale.factor:.4g} {scale.unit}".rstrip()
+    return f"{text} ({of_stators})" if (of_stators := coordinate.attrs.get("of_stators")) else text
 
 
 def caption(data: xr.DataArray | xr.Dataset) -> str:

@@ -1,8 +1,10 @@
-"""The worst stator: a measure with a value for each stator as one value of the case."""
+"""The worst stator: measures of several stators as one value of the case, signals as those of one stator."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from rubhpc.schema import VARIABLES
 
@@ -26,6 +28,22 @@ def worst_of_stators(store: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
         return store
     found = {name: _worst(store[name]) for name in names if "stator" in store[name].dims}
     return store.assign(found)
+
+
+def at_most_loaded_stator(cases: xr.Dataset) -> xr.Dataset:
+    """Return the cases at the stator that has the largest contact force in any of them; lazy.
+
+    The attribute `of_stators` of the coordinate `stator` ("largest force of 16") becomes a part of
+    captions. Cases of a single stator, or without `peak_contact_force`, are unchanged.
+    """
+    n_stator = cases.sizes.get("stator", 1)
+    if n_stator == 1 or "peak_contact_force" not in cases:
+        return cases
+    force = cases["peak_contact_force"]
+    largest = force.max([dim for dim in force.dims if dim != "stator"]).fillna(0.0).compute()
+    text = f"largest force of {n_stator}" if largest.any() else f"none of {n_stator} in contact"
+    stator = cases["stator"].assign_attrs(of_stators=text)
+    return cases.assign_coords(stator=stator).isel(stator=int(np.argmax(largest.values)))
 
 
 def worst_word(name: str) -> str:

@@ -17,6 +17,7 @@ from rubhpc.fem.separation_margin import amplitude_over_speed, grid_through, res
 from rubhpc.fem.stability import logarithmic_decrement, threshold_speed
 from rubhpc.fem.unbalance_response import check_response_node, response_nodes, unbalance_response
 from rubhpc.rig.rotors import Rotor
+from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,6 +32,7 @@ N_SPEED = 61  # on which modes are followed; the response has more, close to its
 MOST_RATIO = 6.0  # of the first lateral frequency, where the range ends by default
 
 
+@on_one_thread
 def linear_design(
     rig: Rig,
     speed_range: tuple[float, float] | None = None,

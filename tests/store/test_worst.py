@@ -10,7 +10,8 @@ from postproc.cases.reduction import quantiles
 from postproc.cases.sensitivity import sensitivity
 from postproc.catalogue import figures
 from postproc.figures.map import map as map_of
-from postproc.store.select import select
+from postproc.store.select import narrow, select
+from postproc.store.units import caption
 from postproc.store.worst import worst_of_stators
 from rubhpc.commands.figures import figure_command
 from rubhpc.schema import VARIABLES
@@ -96,3 +97,21 @@ def test_the_command_names_what_it_draws(ring, tmp_path):
     assert done.exit_code == 0
     assert "stator = 1" not in done.output
     assert "largest of 4 stators" in (tmp_path / "map.svg").read_text()
+
+
+def test_a_signal_is_that_of_the_stator_with_the_largest_force(ring):
+    rest = {**ONE_PLANE, "clearance": 84e-6}
+    waves = synthetic_store.make(n_stator=N_STATOR)[["stator_lateral", "section_vertical", "contact_force"]]
+    several = waves * xr.DataArray([1.0, 2.0, 3.0, 4.0], dims="stator")
+    cases = select(ring.assign(stator_lateral=several["stator_lateral"].assign_attrs(units="m")), rest)
+    taken = narrow(select(cases, {"speed_ratio": 1.5}), ["stator_lateral"])
+    third = narrow(select(cases, {"speed_ratio": 1.5, "stator": 3}), ["stator_lateral"])
+    assert taken["stator_lateral"].equals(third["stator_lateral"])
+    assert "stator = 3 (largest force of 4)" in caption(taken)
+    assert "largest" not in caption(third)
+    along = narrow(cases, ["stator_lateral"], ["speed_ratio"])  # one stator for all
+    assert int(along["stator"]) == 3
+    no_contact = cases.assign(peak_contact_force=0 * cases["peak_contact_force"])
+    assert "stator = 1 (none of 4 in contact)" in caption(
+        narrow(no_contact, ["stator_lateral"], ["speed_ratio"])
+    )

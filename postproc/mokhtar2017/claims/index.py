@@ -11,11 +11,11 @@ from postproc.mokhtar2017.claims import (
     discrepancies,
     friction,
     models,
+    natural_frequencies,
     ringing,
     rub,
     speed,
     stiffness,
-    table1,
 )
 from postproc.mokhtar2017.claims.cases import CaseFailed
 from postproc.mokhtar2017.claims.claim import Claim, Finding
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-_MODULES = (table1, models, speed, rub, ringing, friction, clearance, stiffness, discrepancies)
+_MODULES = (natural_frequencies, models, speed, rub, ringing, friction, clearance, stiffness, discrepancies)
 # C before D, then by number.
 CLAIMS: tuple[Claim, ...] = tuple(
     sorted((c for module in _MODULES for c in module.CLAIMS), key=lambda c: (c.id[0], int(c.id[1:])))
