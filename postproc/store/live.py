@@ -40,7 +40,8 @@ def open_live(path: Path) -> xr.Dataset:
         ledger = store.replay(with_measures=not is_packed)
         lock = path / PRIVATE / "lock"
         holder = read_holder(lock)
-        running = str(holder) if holder is not None and is_alive(holder, lock) else ""
+        holders = [holder] if holder is not None and is_alive(holder, lock) else store.parts.running()
+        running = "; ".join(map(str, holders))
         runs = [asdict(run) for run in read_runs(path)]
     if not is_packed:
         packed = store.packed_values(ledger)

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from rubhpc.commands.quantity import quantity
-from rubhpc.errors import RubError, StoreError
+from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.running.launch import end_with_launcher, launch
 
 _OUTPUT = click.option(
@@ -32,6 +32,11 @@ _TRUST = click.option(
     metavar="N",
     help="Share the work among N processes of this machine, without MPI.",
 )
+@click.option(
+    "--part",
+    metavar="K/N",
+    help="Compute part K of N only; parts may run at the same time, on machines that share the disk.",
+)
 @click.option("--time-limit", metavar="TIME", help='Stop after TIME: "2 h", or seconds.')
 @click.option(
     "--accept-version",
@@ -51,6 +56,7 @@ def run(
     retry_failed: bool,
     max_failures: int | None,
     workers: int | None,
+    part: str | None,
     time_limit: str | None,
     accept_version: bool,
     only: str | None,
@@ -58,10 +64,13 @@ def run(
 ) -> int:
     """Run STUDY.toml, or what is left of it; with --workers, or under mpirun, on several processes.
 
+    With --part 3/64, as of an array of jobs, only a share of it; the last part to end completes the store.
     It stops cleanly, with code 75, on SIGTERM, SIGINT or SIGUSR1, at its time limit, or when a file STOP is
     created in the store; the same command resumes it.
     """
     if only is not None:
+        if part is not None:
+            raise InputError("--only computes one case; leave --part out")
         return _reproduce(study, output, only, trust_rig=trust_rig)
     from rubhpc.running.stopping import Stopping
 
@@ -78,6 +87,7 @@ def run(
             time_limit=None if time_limit is None else quantity(time_limit, "s", "--time-limit"),
             accept_version=accept_version,
             workers=workers,
+            part=part,
             quiet=quiet,
             stopping=stopping,
         )
@@ -103,7 +113,8 @@ def _reproduce(study: Path, output: Path | None, name: str, *, trust_rig: bool) 
 @click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
 @_OUTPUT
 @_TRUST
-def plan(study: Path, output: Path | None, trust_rig: bool) -> int:
+@click.option("--part", metavar="K/N", help="Of what part K of N computes.")
+def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) -> int:
     """Estimate the cost of STUDY.toml and show what is done; writes nothing.
 
     Core-hours come from a few short pilot cases, timed on this machine and scaled by the predicted steps.
@@ -111,7 +122,7 @@ def plan(study: Path, output: Path | None, trust_rig: bool) -> int:
     from rubhpc.running.plan import make_plan
     from rubhpc.study.study import read_study
 
-    click.echo(make_plan(read_study(study, output, trust_rig=trust_rig)).text())
+    click.echo(make_plan(read_study(study, output, trust_rig=trust_rig), part).text())
     return 0
 
 

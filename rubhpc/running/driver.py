@@ -14,6 +14,7 @@ import numpy as np
 from rubhpc.errors import RubError, StoppedEarly
 from rubhpc.integrate.compilation import announced_by, seconds_compiling
 from rubhpc.running.crash import crash
+from rubhpc.running.finish import finish_part, finish_run
 from rubhpc.running.job import RunRequest, prepare_job
 from rubhpc.running.pool import Pool, RankLost, Totals, connect
 from rubhpc.running.progress import Progress
@@ -21,15 +22,14 @@ from rubhpc.running.stopping import Stopping
 from rubhpc.running.watchdog import Watchdog
 from rubhpc.running.worker import Worker
 from rubhpc.running.workers import start_workers
-from rubhpc.schema import DONE, FAILED, MISSING
-from rubhpc.storage.disk import disk_errors, remove
-from rubhpc.storage.in_progress import InProgress, forget
-from rubhpc.storage.journal import count
+from rubhpc.schema import MISSING
+from rubhpc.storage.disk import disk_errors
+from rubhpc.storage.in_progress import InProgress
 from rubhpc.storage.manifest import PRIVATE
 from rubhpc.storage.resume import missing_share
 from rubhpc.storage.store import Store
-from rubhpc.storage.summary import Summary
 from rubhpc.study.cases import CaseGrid
+from rubhpc.study.parts import Part
 from rubhpc.study.study import Study, read_study
 from rubhpc.threads import on_one_thread
 
@@ -38,10 +38,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rubhpc.running.job import Job
+    from rubhpc.storage.summary import Summary
     from rubhpc.study.cases import Block
 
 _PACKING_GAP = 600.0  # s between packings while a run is on; one takes 5 s for a million cases
-_REASONS = 100  # failed cases a summary names, at most
 
 
 @on_one_thread
@@ -55,6 +55,7 @@ def run(
     accept_version: bool = False,
     trust_rig: bool = False,
     workers: int | None = None,
+    part: str | None = None,
     quiet: bool = False,
     stopping: Stopping | None = None,
 ) -> Summary:
@@ -78,6 +79,9 @@ def run(
         Whether a rig that is Python code, `rig = "my_rig.py:build"`, may be run.
     workers : int, optional
         Processes of this machine that share the work, this one among them; they need no MPI.
+    part : str, optional
+        Compute this part of the study only, as "3/64": the third of 64, which may be computed at the same
+        time, on other machines, or one after another, into one store.
     quiet : bool
         Print no progress.
     stopping : Stopping, optional
@@ -96,6 +100,7 @@ def run(
     StoppedEarly
         A signal, the file STOP or the time limit came before the end.
     """
+    chosen = None if part is None else Part.parse(part)
 
     def resolve() -> Study:
         found = study if isinstance(study, Study) else read_study(Path(study), trust_rig=trust_rig)
@@ -113,6 +118,7 @@ def run(
             stopping or Stopping(),
             retry_failed=retry_failed,
             accept_version=accept_version,
+            part=chosen,
             quiet=quiet,
         )
 
@@ -135,6 +141,7 @@ def _run_in(
     retry_failed: bool,
     accept_version: bool,
     quiet: bool,
+    part: Part | None = None,
 ) -> Summary:
     """Run what the first rank resolves, on all ranks of a pool."""
     resolved: Study | None = None
@@ -150,6 +157,7 @@ def _run_in(
                 retry_failed=retry_failed,
                 accept_version=accept_version,
                 quiet=quiet,
+                part=part,
                 held=held,
             )
             summary = _run(request, pool)
@@ -200,18 +208,20 @@ def _round(request: RunRequest, pool: Pool, began: float) -> Summary:
     """Compute what is missing, together."""
     job = pool.from_first(lambda: prepare_job(request, pool.size))
     request.token = job.token
-    _together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=False))
+    if job.part is None:
+        _together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=False))
     _together(pool, lambda: _compute(job, pool, request))
     if job.suspect and not request.stopping.look():
         _together(pool, lambda: _try_suspects(job, pool, request.stopping))
     reason = next((reason for reason in pool.gather(request.stopping.verdict) if reason), "")
-    if not reason:
+    if not reason and job.part is None:
         _together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=True))
-    summary = pool.from_first(lambda: _finish(job, pool.totals().n_case, _clock() - began))
+    finish = finish_run if job.part is None else finish_part
+    summary = pool.from_first(lambda: finish(job, request, pool.totals().n_case, _clock() - began))
     n_missing = summary.counts[MISSING]
     if n_missing and reason:
         raise StoppedEarly(
-            f"{summary.store}: stopped by {reason} with {n_missing} of {sum(summary.counts)} cases missing; "
+            f"{summary.name}: stopped by {reason} with {n_missing} of {sum(summary.counts)} cases missing; "
             "run the same command again"
         )
     return summary
@@ -248,7 +258,7 @@ def _compute(job: Job, pool: Pool, request: RunRequest) -> None:
         for block in _claimed(job, grid, sequences, pool, stopping):
             worker.work(block)
             worker.attend()
-            if pool.rank == 0 and time.monotonic() > next_packing:
+            if pool.rank == 0 and job.part is None and time.monotonic() > next_packing:
                 store.pack(store.replay())  # for readers who look on
                 next_packing = time.monotonic() + _PACKING_GAP
     if stopping.reason:
@@ -336,28 +346,9 @@ def _progress(
 ) -> Progress:
     is_missing = job.missing.reshape(grid.shape)
     return Progress(
-        grid.n_case,
+        n_case := int(job.share.sum()),
         sum(block.cost * missing_share(block, is_missing) for sequence in sequences for block in sequence),
-        n_done=grid.n_case - int(job.missing.sum()),
+        n_done=n_case - int(job.missing.sum()),
         quiet=quiet,
         has_bar=has_bar,
-    )
-
-
-def _finish(job: Job, computed: int, seconds: float) -> Summary:
-    """Pack the journals into arrays and count the cases: the first rank's part."""
-    store = Store(job.study.output)
-    ledger = store.replay()
-    store.pack(ledger)
-    with disk_errors(store.path):
-        remove(store.path / "STOP")
-        forget(store.in_progress_directory, ledger.status != MISSING)
-    failed = np.flatnonzero(ledger.status == FAILED)[:_REASONS].tolist()
-    return Summary(
-        store=store.path,
-        counts=count(ledger.status),
-        computed=computed,
-        seconds=seconds,
-        reasons=tuple((store.manifest.name_case(i), ledger.reasons.get(i, "")) for i in failed),
-        flawed=sum(1 for i in ledger.reasons if ledger.status[i] == DONE),
     )

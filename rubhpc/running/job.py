@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.errors import StoppedEarly, StoreError
 from rubhpc.integrate.case import compile_kernels
 from rubhpc.running.stopping import Stopped, Stopping
 from rubhpc.running.worker import set_up
@@ -15,15 +16,27 @@ from rubhpc.schema import FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.in_progress import forget, read_deaths
 from rubhpc.storage.journal import Entry, Ledger, next_run
-from rubhpc.storage.resume import bring_up_to_date, cases_without_files, grid_for, missing_share, open_store
-from rubhpc.storage.runs import record_run
+from rubhpc.storage.lock import InUse
+from rubhpc.storage.parts import Shares
+from rubhpc.storage.resume import (
+    bring_up_to_date,
+    cases_without_files,
+    grid_for,
+    missing_share,
+    must_be_grown,
+    open_store,
+)
+from rubhpc.storage.runs import free_number, record_run
+from rubhpc.study.cases import CaseGrid
+from rubhpc.study.parts import share_out
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.storage.lock import Lock
     from rubhpc.storage.store import Store
-    from rubhpc.study.cases import Block, CaseGrid
+    from rubhpc.study.cases import Block
+    from rubhpc.study.parts import Part
     from rubhpc.study.study import Study
 
 
@@ -33,6 +46,10 @@ class RunRequest:
 
     Attributes
     ----------
+    part : Part, optional
+        What is to be computed of the study; all of it by default.
+    lock : Lock, optional
+        On the store, or on the part, on the rank that has taken it.
     token : str
         That of the lock, once it was taken by any rank: whoever becomes the first inherits it.
     """
@@ -42,6 +59,7 @@ class RunRequest:
     retry_failed: bool
     accept_version: bool
     quiet: bool
+    part: Part | None = None
     held: ExitStack = field(default_factory=ExitStack)
     lock: Lock | None = None
     token: str = ""
@@ -53,8 +71,12 @@ class Job:
 
     Attributes
     ----------
+    part : Part, optional
+        What is computed of the study.
+    share : (n_case,) bool
+        Cases of the part; all without one.
     missing : (n_case,) bool
-        Cases to be computed, but for the suspect ones.
+        Cases of it to be computed, but for the suspect ones.
     pending : (n,) int
         Positions in `CaseGrid.sequences()` of those that hold one.
     suspect : dict
@@ -67,7 +89,9 @@ class Job:
     study: Study
     chunk: tuple[int, ...]
     run: int
+    part: Part | None
     ledger: Ledger
+    share: NDArray[np.bool_]
     missing: NDArray[np.bool_]
     pending: NDArray[np.int64]
     suspect: dict[int, int]
@@ -79,28 +103,26 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
     study, stopping = request.study, request.stopping
     grid = grid_for(study, accept_version=request.accept_version)
     store = open_store(grid)
+    if grid.chunk != store.manifest.chunk:  # another run was quicker to make it
+        grid = CaseGrid(study, chunk=store.manifest.chunk)
     with disk_errors(study.output):
-        if request.lock is None:
-            request.lock = request.held.enter_context(
-                store.lock(on_loss=lambda: stopping.ask("the loss of its lock"), heir_of=request.token)
-            )
-        note = bring_up_to_date(store, grid, accept_version=request.accept_version)
-        if note and not request.quiet:
-            print(note, flush=True)
-        ledger = store.replay(with_measures=not store.is_packed())
-        store.pack(ledger)  # readers see what a killed run has left, from now on
+        run, share = (_begin if request.part is None else _begin_part)(request, store, grid, n_rank)
+        ledger = store.replay(with_measures=request.part is None and not store.is_packed())
+        if request.part is None:
+            store.pack(ledger)  # readers see what a killed run has left, from now on
         ledger.measures = None  # the other ranks need none
-        run = next_run(store.journal_directory)
-        record_run(store.path, run, n_rank)
-        store.mark_missing(ledger, cases_without_files(store, ledger), run, "gone")
-        missing = ledger.status == MISSING
+        own = replace(ledger, status=np.where(share, ledger.status, MISSING))
+        store.mark_missing(ledger, cases_without_files(store, own), run, "gone")
+        missing = share & (ledger.status == MISSING)
         if request.retry_failed:
-            failed = np.flatnonzero(ledger.status == FAILED).tolist()
+            failed = np.flatnonzero(share & (ledger.status == FAILED)).tolist()
             store.mark_missing(
                 ledger, _with_dependants(grid, failed), run, "anew"
             )  # a name that comes before those of ranks
-            missing = (ledger.status == MISSING) | (ledger.status == FAILED)
-        suspect = _with_followers(grid, _fail_killers(store, ledger, missing, run), missing)
+            missing = share & ((ledger.status == MISSING) | (ledger.status == FAILED))
+        among = None if request.part is None else share
+        deaths = _fail_killers(store, ledger, missing, run, among)
+        suspect = _with_followers(grid, deaths, missing)
     missing[list(suspect)] = False
     sequences = grid.sequences()
     is_missing = missing.reshape(grid.shape)
@@ -118,17 +140,84 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
         study=study,
         chunk=grid.chunk,
         run=run,
+        part=request.part,
         ledger=ledger,
+        share=share,
         missing=missing,
         pending=np.array(pending, dtype=np.int64),
         suspect=suspect,
-        token=request.lock.token,
+        token=request.token,
     )
 
 
-def _fail_killers(store: Store, ledger: Ledger, missing: NDArray[np.bool_], run: int) -> dict[int, int]:
+def _begin(request: RunRequest, store: Store, grid: CaseGrid, n_rank: int) -> tuple[int, NDArray[np.bool_]]:
+    """Begin a whole run: lock the store and bring it up to date; number of the run, and all cases."""
+    stopping = request.stopping
+    if request.lock is None:
+        request.lock = request.held.enter_context(
+            store.lock(on_loss=lambda: stopping.ask("the loss of its lock"), heir_of=request.token)
+        )
+        request.token = request.lock.token
+    _bring_up_to_date(request, store, grid)
+    store.parts.forget()
+    run = next_run(store.journal_directory)
+    record_run(store.path, run, n_rank)
+    return run, np.ones(grid.n_case, bool)
+
+
+def _begin_part(
+    request: RunRequest, store: Store, grid: CaseGrid, n_rank: int
+) -> tuple[int, NDArray[np.bool_]]:
+    """Begin a part: lock it, bring the store up to date if no other part is at work; also its cases."""
+    part, stopping, parts = request.part, request.stopping, store.parts
+    assert part is not None
+    with ExitStack() as alone:
+        try:
+            alone.enter_context(parts.alone(part, stopping.look))
+        except InUse:
+            if stopping.look():
+                raise StoppedEarly(
+                    f"{store.path}: part {part}: stopped by {stopping.reason} before it began; "
+                    "run the same command again"
+                ) from None
+            raise
+        others = [holder for holder in parts.running() if holder.token != request.token]
+        if not others:
+            _bring_up_to_date(request, store, grid)
+        else:
+            store.reopen()
+            if must_be_grown(store, grid, accept_version=request.accept_version):
+                raise StoreError(
+                    f"{store.path}: cannot take up the study as it now is while {others[0]} computes it "
+                    "as it was; wait for all parts, or stop them"
+                )
+        run = free_number(store.path)
+        if request.lock is None:
+            request.lock = request.held.enter_context(
+                parts.lock(part, run, lambda: stopping.ask("the loss of its lock"), request.token)
+            )
+            request.token = request.lock.token
+        shares = parts.read_shares(store.manifest)
+        if shares is None and others:
+            raise StoreError(f"{store.path}: the shares of its parts are damaged; wait for {others[0]}")
+        if shares is None or shares.count != part.total:
+            shares = Shares(part.total, share_out(grid, part.total))
+            parts.write_shares(shares, store.manifest)
+        record_run(store.path, run, n_rank, str(part))
+    return run, shares.cases(part.number, store.manifest)
+
+
+def _bring_up_to_date(request: RunRequest, store: Store, grid: CaseGrid) -> None:
+    note = bring_up_to_date(store, grid, accept_version=request.accept_version)
+    if note and not request.quiet:
+        print(note, flush=True)
+
+
+def _fail_killers(
+    store: Store, ledger: Ledger, missing: NDArray[np.bool_], run: int, among: NDArray[np.bool_] | None
+) -> dict[int, int]:
     """Mark the cases as failed that kill their ranks; returns the suspect ones with their deaths."""
-    suspects = read_deaths(store.in_progress_directory, store.manifest, missing)
+    suspects = read_deaths(store.in_progress_directory, store.manifest, missing, among)
     if suspects.failed:
         with store.journal(run, "killed") as journal:
             journal.write(
@@ -140,7 +229,7 @@ def _fail_killers(store: Store, ledger: Ledger, missing: NDArray[np.bool_], run:
         ledger.status[failed] = FAILED
         ledger.reasons |= suspects.failed
         missing[failed] = False
-        forget(store.in_progress_directory, ~missing)
+        forget(store.in_progress_directory, ~missing, among)
     return suspects.suspect
 
 

@@ -14,8 +14,10 @@ from rubhpc.storage.duration import duration
 from rubhpc.storage.growth import origins
 from rubhpc.storage.journal import count
 from rubhpc.storage.manifest import Manifest
+from rubhpc.storage.parts import Shares
 from rubhpc.storage.resume import cases_without_files, grid_for, is_store, missing_share
 from rubhpc.storage.store import Store
+from rubhpc.study.parts import Part, share_out
 from rubhpc.study.sampling import CASE
 from rubhpc.threads import on_one_thread
 
@@ -51,6 +53,8 @@ class Plan:
         Coordinates of the pilot cases that failed, and why.
     warnings : tuple of str
         Unstable speeds, and a sag beyond the clearance.
+    part : str
+        The part of the study to which counts, steps and core-hours refer, as "3/64"; "" for all of it.
     """
 
     title: str
@@ -67,6 +71,7 @@ class Plan:
     core_hours: float
     failures: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    part: str = ""
 
     @property
     def _files(self) -> str:
@@ -86,7 +91,7 @@ class Plan:
 
     def text(self) -> str:
         """The plan for people, a few lines."""
-        n_case = sum(self.counts)
+        n_case = math.prod(self.shape.values())
         sizes = " x ".join(f"{n} {name}" for name, n in self.shape.items())
         cost = (
             f"{self.core_hours:.3g} core-hours ({duration(self.core_hours * 3600)} on one core)"
@@ -99,6 +104,7 @@ class Plan:
                 f"cases       {n_case} = {sizes}",
                 f"blocks      {self.n_block}, at most {self.n_per_block} cases each; {self._idle}",
                 f"store       {_size(self.n_byte)} before compression, {self._files}",
+                *([f"part        {self.part}: {sum(self.counts)} cases"] if self.part else []),
                 "so far      "
                 + ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING)),
                 f"to compute  {self.steps:.3g} steps, {cost}",
@@ -109,8 +115,10 @@ class Plan:
 
 
 @on_one_thread
-def make_plan(study: Study) -> Plan:
+def make_plan(study: Study, part: str | None = None) -> Plan:
     """Count, look into the store if there is one, and time pilot cases; writes nothing.
+
+    With a part, as "3/64", what is left of it is counted and timed.
 
     Raises
     ------
@@ -119,9 +127,11 @@ def make_plan(study: Study) -> Plan:
     StoreError
         The store at its output is of another study.
     """
+    chosen = None if part is None else Part.parse(part)
     grid = grid_for(study)
     manifest = Manifest.of(grid)
     blocks = grid.blocks()
+    shares = None
     status = np.zeros(grid.n_case, np.int8)
     if is_store(study.output):
         store = Store(study.output)
@@ -130,7 +140,13 @@ def make_plan(study: Study) -> Plan:
         ledger.status[cases_without_files(store, ledger)] = MISSING
         origin = origins(store.manifest, manifest)
         status = np.where(origin < 0, MISSING, ledger.status[origin])
-    missing = (status == MISSING).reshape(grid.shape)
+        shares = store.parts.read_shares(manifest)
+    is_in_part = np.ones(grid.n_case, bool)
+    if chosen is not None:
+        if shares is None or shares.count != chosen.total:
+            shares = Shares(chosen.total, share_out(grid, chosen.total))
+        is_in_part = shares.cases(chosen.number, manifest)
+    missing = (is_in_part & (status == MISSING)).reshape(grid.shape)
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
     steps = sum(block.cost * share for block, share in left)
     pace, failures = time_pilots(grid, manifest, [block for block, _ in left])
@@ -149,7 +165,7 @@ def make_plan(study: Study) -> Plan:
         title=study.title,
         store=study.output,
         shape=dict(zip((names.get(dim, dim) for dim in grid.dims), grid.shape, strict=True)),
-        counts=count(status),
+        counts=count(status[is_in_part]),
         n_sequence=len(grid.sequences()),
         n_block=len(blocks),
         n_per_block=math.prod(grid.chunk),
@@ -160,6 +176,7 @@ def make_plan(study: Study) -> Plan:
         core_hours=seconds / 3600,
         failures=tuple(failures),
         warnings=grid.warnings(),
+        part="" if chosen is None else str(chosen),
     )
 
 

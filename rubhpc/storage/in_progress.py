@@ -83,14 +83,25 @@ class RankDeaths:
     suspect: dict[int, int]
 
 
-def read_deaths(directory: Path, manifest: Manifest, is_missing: NDArray[np.bool_]) -> RankDeaths:
-    """Missing cases that were being computed when ranks died; records of other cases are removed."""
+def read_deaths(
+    directory: Path,
+    manifest: Manifest,
+    is_missing: NDArray[np.bool_],
+    share: NDArray[np.bool_] | None = None,
+) -> RankDeaths:
+    """Missing cases that were being computed when ranks died; records of other cases are removed.
+
+    With a `share` of the cases, (n_case,), records of no case or of others are left alone: their ranks may
+    be at work.
+    """
     crashes: Counter[int] = Counter()
     deaths: Counter[int] = Counter()
     causes: dict[int, str] = {}
     failed: dict[int, str] = {}
     for record in sorted(directory.glob("run*")) if directory.is_dir() else ():
         found = _read(record)
+        if not _is_among(found, share):
+            continue
         if found is None or not _is_open(*found[:2], manifest, is_missing):
             remove(record)  # it died before its first case, or that has been computed since
             continue
@@ -110,12 +121,21 @@ def read_deaths(directory: Path, manifest: Manifest, is_missing: NDArray[np.bool
     return RankDeaths(failed, suspect)
 
 
-def forget(directory: Path, is_judged: NDArray[np.bool_]) -> None:
-    """Remove the records of cases that have an outcome, (n_case,), and of those that are of no case."""
+def forget(directory: Path, is_judged: NDArray[np.bool_], share: NDArray[np.bool_] | None = None) -> None:
+    """Remove the records of cases that have an outcome, (n_case,), and of those that are of no case.
+
+    With a `share`, only of its cases.
+    """
     for record in directory.glob("run*"):
         found = _read(record)
+        if not _is_among(found, share):
+            continue
         if found is None or found[0] >= len(is_judged) or is_judged[found[0]]:
             remove(record)
+
+
+def _is_among(found: tuple[int, str, str] | None, share: NDArray[np.bool_] | None) -> bool:
+    return share is None or (found is not None and found[0] < len(share) and bool(share[found[0]]))
 
 
 def _is_open(flat: int, name: str, manifest: Manifest, is_missing: NDArray[np.bool_]) -> bool:

@@ -13,6 +13,7 @@ import binascii
 import json
 import os
 import re
+from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
@@ -184,8 +185,10 @@ class Ledger:
         Lines that were skipped because they are damaged or truncated.
     damaged_cases : set
         Flat indices that can still be read in such lines.
-    n_recent : int
-        Lines of the latest run.
+    n_lines : Counter
+        Number of a run -> its lines.
+    state : str
+        Of the journals, as `Store.replay` found them.
     """
 
     status: NDArray[np.int8]
@@ -195,7 +198,13 @@ class Ledger:
     reasons: dict[int, str] = field(default_factory=dict)
     n_damaged: int = 0
     damaged_cases: set[int] = field(default_factory=set)
-    n_recent: int = 0
+    n_lines: Counter[int] = field(default_factory=Counter)
+    state: str = ""
+
+    @property
+    def n_recent(self) -> int:
+        """Lines of the latest run."""
+        return self.n_lines[max(self.n_lines, default=0)]
 
 
 def count(status: NDArray[np.int8]) -> tuple[int, ...]:
@@ -224,11 +233,8 @@ def replay(directory: Path, header: Header, *, with_measures: bool = True) -> Le
         is_known=np.zeros(n_case, bool),
         measures=measures,
     )
-    paths = journals(directory)
-    for path in paths:
-        n_line = _replay_file(path, header, ledger)
-        if path.name[:9] == paths[-1].name[:9]:
-            ledger.n_recent += n_line
+    for path in journals(directory):
+        ledger.n_lines[int(path.name[3:9])] += _replay_file(path, header, ledger)
     return ledger
 
 

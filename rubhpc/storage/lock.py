@@ -34,9 +34,16 @@ _LATEST = 4e9  # s since 1970: a later start is no time
 ORPHAN_PATIENCE = 15.0  # s to wait for a holder whose launcher is gone: it is about to stop
 
 
+class InUse(StoreError):  # noqa: N818 - it is a state, not an error
+    """The store, or the part of a study, is another process's for now."""
+
+
 @dataclass(frozen=True)
 class Holder:
-    """The process that holds a lock; `born` and `parent` identify it among others with its number."""
+    """The process that holds a lock; `born` and `parent` identify it among others with its number.
+
+    `part` is the part of the study that it computes, in run number `run`; "" and 0 of a whole run.
+    """
 
     host: str
     pid: int
@@ -44,13 +51,16 @@ class Holder:
     parent: int
     since: float
     token: str
+    part: str = ""
+    run: int = 0
 
     def __str__(self) -> str:
         since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(self.since))
-        return f"process {self.pid} on {self.host} since {since}"
+        process = f"process {self.pid} on {self.host} since {since}"
+        return f"part {self.part} ({process})" if self.part else process
 
     @classmethod
-    def myself(cls) -> Self:
+    def myself(cls, part: str = "", run: int = 0) -> Self:
         """Return the description of this process."""
         pid = os.getpid()
         state = process_state(pid)
@@ -61,6 +71,8 @@ class Holder:
             parent=os.getppid(),
             since=time.time(),
             token=uuid.uuid4().hex,
+            part=part,
+            run=run,
         )
 
 
@@ -114,16 +126,48 @@ def _is_orphan(holder: Holder) -> bool:
 
 
 class Lock:
-    """Exclusive use of a store, as a context; `on_loss` is called if another run has taken it over.
+    """Exclusive use of a store, or of a part of a study, as a context.
 
-    A holder with the token `heir_of` is a lost rank of this very run: its lock passes on at once.
+    Parameters
+    ----------
+    on_loss : callable
+        Called if another run has taken it over.
+    heir_of : str
+        A holder with this token is a lost rank of this very run: its lock passes on at once.
+    part, run : str, int
+        Of the holder.
+    what : str
+        What is locked, for messages; by default the store.
+    is_over : callable, optional
+        Wait for a holder that is a part, as long as this is not true.
+    find_rival : callable
+        Who prevents exclusive use though the lock is free.
+
+    Raises
+    ------
+    InUse
+        On entering, when another process has it.
     """
 
-    def __init__(self, path: Path, on_loss: Callable[[], None] = lambda: None, heir_of: str = "") -> None:
+    def __init__(
+        self,
+        path: Path,
+        on_loss: Callable[[], None] = lambda: None,
+        heir_of: str = "",
+        *,
+        part: str = "",
+        run: int = 0,
+        what: str = "",
+        is_over: Callable[[], object] | None = None,
+        find_rival: Callable[[], Holder | None] = lambda: None,
+    ) -> None:
         self.path = path
         self._on_loss = on_loss
         self._heir_of = heir_of
-        self._me = Holder.myself()
+        self._what = what or str(path.parent.parent)
+        self._is_over = is_over
+        self._find_rival = find_rival
+        self._me = Holder.myself(part, run)
         self._ended = threading.Event()
         self._heart = threading.Thread(target=self._beat, name="lock heartbeat", daemon=True)
 
@@ -133,17 +177,33 @@ class Lock:
             holder = read_holder(self.path)
             if holder is None:  # it has just ended
                 continue
-            if not _is_orphan(holder) or time.monotonic() > deadline:
-                raise StoreError(f"{self.path.parent.parent}: in use by {holder}; wait for it or stop it")
+            is_brief = holder.part and self._is_over is not None and not self._is_over()
+            if not is_brief and (not _is_orphan(holder) or time.monotonic() > deadline):
+                raise self._in_use(holder)
             time.sleep(0.1)
+        if rival := self._find_rival():
+            self._unlink()
+            raise self._in_use(rival)
         self._heart.start()
         return self
+
+    def _in_use(self, holder: Holder) -> InUse:
+        return InUse(f"{self._what}: in use by {holder}; wait for it or stop it")
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Give it up, if that has not been done."""
+        if self._ended.is_set():
+            return
         self._ended.set()
         self._heart.join()
+        self._unlink()
+
+    def _unlink(self) -> None:
         if self._is_mine():
             with suppress(
                 OSError

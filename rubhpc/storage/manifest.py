@@ -33,6 +33,7 @@ _MOST_BLOCKS = 256  # of more blocks, one file each would be too many for file s
 _SHARDS = 48  # of an array, at most, when the store is made: with some 17 arrays, under 1000 files
 PRIVATE = ".rubhpc"  # the directory of a store that zarr does not look into
 BLOCKS = "blocks"  # in it: blocks that have not been packed into shards yet
+PARTS = "parts"  # in it: locks and shares of parts that are computed apart
 GROWTH = "growth"  # in it: what a growth that was decided on has yet to move to its place
 _NAMES = ("manifest.json", "manifest.copy.json")  # one damaged byte must not cost a study
 

@@ -87,14 +87,27 @@ def bring_up_to_date(store: Store, grid: CaseGrid, *, accept_version: bool = Fal
         remove_drafts(store.path, is_made=True)
     finish_growth(store.path)
     store.reopen()
-    wanted = Manifest.of(grid)
-    _refuse_other(store.manifest, wanted, store.path, accept_version=accept_version)
+    must_grow = must_be_grown(store, grid, accept_version=accept_version)
     added = added_measures(store.manifest.measures)
     note = _note_on(added, store) if added else ""
-    if added or store.manifest.axes != wanted.axes or store.manifest.identity != wanted.identity:
+    if must_grow:
         grow(store, grid)
     store.repair_files(grid)
     return note
+
+
+def must_be_grown(store: Store, grid: CaseGrid, *, accept_version: bool) -> bool:
+    """Whether the store lacks values or measures of `grid`, or has another order of them.
+
+    Raises
+    ------
+    StoreError
+        It is of another study.
+    """
+    mine, wanted = store.manifest, Manifest.of(grid)
+    _refuse_other(mine, wanted, store.path, accept_version=accept_version)
+    is_same = mine.axes == wanted.axes and mine.identity == wanted.identity
+    return not is_same or bool(added_measures(mine.measures))
 
 
 def _note_on(added: tuple[Variable, ...], store: Store) -> str:

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from rubhpc.storage.disk import write_whole
-from rubhpc.storage.journal import journals
+from rubhpc.storage.journal import journals, next_run
 from rubhpc.storage.manifest import PRIVATE
 from rubhpc.storage.small_file import read_record
 from rubhpc.version import __version__
@@ -26,6 +26,8 @@ class Run:
         Cores of the first rank's machine.
     began, wrote : float
         Seconds since 1970: when it began, and when it last put a case down.
+    part : str
+        Of the study, as "3/64"; "" of a run of all of it.
     """
 
     number: int
@@ -37,9 +39,17 @@ class Run:
     version: str
     began: float
     wrote: float = 0.0
+    part: str = ""
 
 
-def record_run(store: Path, number: int, n_rank: int) -> None:
+def free_number(store: Path) -> int:
+    """Number of a run that no other has, not even one that has left no journal yet."""
+    folder = store / PRIVATE
+    recorded = [run.number for path in (folder / "runs").glob("run*.json") if (run := read_record(path, Run))]
+    return max(next_run(folder / "journal"), *(number + 1 for number in recorded), 1)
+
+
+def record_run(store: Path, number: int, n_rank: int, part: str = "") -> None:
     """Put down where a run takes place, as it begins."""
     run = Run(
         number=number,
@@ -50,6 +60,7 @@ def record_run(store: Path, number: int, n_rank: int) -> None:
         n_rank=n_rank,
         version=__version__,
         began=time.time(),
+        part=part,
     )
     folder = store / PRIVATE / "runs"
     folder.mkdir(exist_ok=True)

@@ -29,6 +29,7 @@ from rubhpc.storage.disk import disk_errors, read_regular, remove, write_whole
 from rubhpc.storage.journal import Entry, Journal, Ledger, journals, replay
 from rubhpc.storage.lock import Lock, process_state
 from rubhpc.storage.manifest import GROWTH, PRIVATE, Manifest
+from rubhpc.storage.parts import Parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -98,9 +99,19 @@ class Store:
         """Where each rank records the case it computes."""
         return self.private / "in_progress"
 
+    @property
+    def parts(self) -> Parts:
+        """Parts of the study that are computed apart."""
+        return Parts(self.path)
+
     def lock(self, on_loss: Callable[[], None] = lambda: None, heir_of: str = "") -> Lock:
-        """Exclusive use of the store, as a context."""
-        return Lock(self.private / "lock", on_loss, heir_of)
+        """Exclusive use of the store, as a context; refused while parts of the study are computed."""
+        return Lock(
+            self.private / "lock",
+            on_loss,
+            heir_of,
+            find_rival=lambda: next(iter(self.parts.running()), None),
+        )
 
     def journal(self, run: int, writer: str) -> Journal:
         """A new journal of this store."""
@@ -109,7 +120,10 @@ class Store:
     def replay(self, *, with_measures: bool = True) -> Ledger:
         """What the journals say."""
         with disk_errors(self.journal_directory):
-            return replay(self.journal_directory, self.manifest.header, with_measures=with_measures)
+            state = self._journal_state()
+            ledger = replay(self.journal_directory, self.manifest.header, with_measures=with_measures)
+        ledger.state = state  # that of before: parts of the study may write while this one reads
+        return ledger
 
     def mark_missing(self, ledger: Ledger, flat: Sequence[int], run: int, writer: str) -> None:
         """Declare cases missing, in the ledger and by a journal of their own."""
@@ -240,11 +254,10 @@ class Store:
     def pack(self, ledger: Ledger) -> None:
         """Write status and measures of every case as arrays, unless nothing has been journalled since."""
         with disk_errors(self.path):
-            if not self.is_packed():
-                state = self._journal_state()
+            if self._packed_state() != ledger.state.encode():
                 for name, values in self.packed_values(ledger).items():
                     self.arrays[name][...] = values
-                write_whole(self.private / "packed.json", state.encode())
+                write_whole(self.private / "packed.json", ledger.state.encode())
 
     def packed_values(self, ledger: Ledger) -> dict[str, NDArray[Any]]:
         """Status and measures as the packed arrays are to hold them."""
@@ -261,10 +274,14 @@ class Store:
 
     def is_packed(self) -> bool:
         """Whether the packed arrays are up to date with the journals."""
+        return self._packed_state() == self._journal_state().encode()
+
+    def _packed_state(self) -> bytes | None:
+        """State of the journals when they were packed; None where that is unknown."""
         try:
-            return read_regular(self.private / "packed.json") == self._journal_state().encode()
+            return read_regular(self.private / "packed.json")
         except OSError:
-            return False
+            return None
 
     def forget_packing(self) -> None:
         """Have the next run pack again."""

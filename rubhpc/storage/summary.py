@@ -22,7 +22,7 @@ class Summary:
     Attributes
     ----------
     counts : tuple of int
-        Cases of the whole study that are missing, done, failed and diverged, in this order.
+        Cases of the study, or of its part, that are missing, done, failed and diverged, in this order.
     computed : int
         Cases this run computed.
     seconds : float
@@ -33,6 +33,10 @@ class Summary:
         Cases that are done with a remark: a poor energy balance, or a start at rest within a sweep.
     lost : int
         Ranks that died during the run; the others did their work.
+    part : str
+        What was run of the study, as "3/64"; "" where it was all of it.
+    n_elsewhere : int
+        Cases of other parts that are missing.
     """
 
     store: Path
@@ -42,6 +46,13 @@ class Summary:
     reasons: tuple[tuple[str, str], ...] = ()
     lost: int = 0
     flawed: int = 0
+    part: str = ""
+    n_elsewhere: int = 0
+
+    @property
+    def name(self) -> str:
+        """The store, and the part of the study."""
+        return f"{self.store}: part {self.part}" if self.part else str(self.store)
 
     @property
     def exit_code(self) -> int:
@@ -53,20 +64,25 @@ class Summary:
         states = [i for i in (DONE, FAILED, DIVERGED, MISSING) if self.counts[i]]
         counts = ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in states)
         flaw = f"; {self.flawed} done with a remark, rubhpc status names them" if self.flawed else ""
-        return f"{self.store}: {counts}; {self.computed} computed in {duration(self.seconds)}{flaw}"
+        rest = ""
+        if self.part:
+            missing = f"{self.n_elsewhere} cases of other parts are missing"
+            rest = f"; {missing}" if self.n_elsewhere else "; no case of another part is missing"
+        done = f"{counts or 'no cases'}; {self.computed} computed in {duration(self.seconds)}"
+        return f"{self.name}: {done}{flaw}{rest}"
 
     def complaint(self) -> str:
         """What failed and how to proceed, in one line."""
         if not self.counts[FAILED]:
             lost = "a rank was lost" if self.lost == 1 else f"{self.lost} ranks were lost"
             return (
-                f"{self.store}: {lost} on the way, the others finished the study; nothing is left to be done"
+                f"{self.name}: {lost} on the way, the others finished the study; nothing is left to be done"
             )
         case, reason = self.reasons[0]
         rest = (
             f" and {self.counts[MISSING]} were not computed (--max-failures)" if self.counts[MISSING] else ""
         )
         return (
-            f"{self.store}: {self.counts[FAILED]} of {sum(self.counts)} cases failed{rest}; "
+            f"{self.name}: {self.counts[FAILED]} of {sum(self.counts)} cases failed{rest}; "
             f"the first, {case}: {reason}; rubhpc status lists them, --retry-failed computes them again"
         )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rubhpc.storage.disk import disk_errors, remove
-from rubhpc.storage.manifest import BLOCKS, GROWTH, PRIVATE
+from rubhpc.storage.manifest import BLOCKS, GROWTH, PARTS, PRIVATE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rubhpc.storage.manifest import Manifest
 
 _FOLDERS = ("journal", "logs")  # of the private directory, always there
-_LATER = ("in_progress", "runs", BLOCKS, GROWTH)  # made when they are needed
+_LATER = ("in_progress", "runs", PARTS, BLOCKS, GROWTH)  # made when they are needed
 _FILES = ("zarr.json", "manifest.json", "manifest.copy.json", "packed.json")
 
 
@@ -51,6 +51,7 @@ def unfit(path: Path, manifest: Manifest) -> Iterator[Path]:
         yield from _unfit_files(folder, lambda name: name in _FILES)
     for name in (*_FOLDERS, "in_progress", "runs"):
         yield from _unfit_files(private / name, lambda name: name.startswith("run"))
+    yield from _unfit_files(private / PARTS, lambda _: True)
     for variable in manifest.variables:
         waiting = private / BLOCKS / variable.name
         if os.path.lexists(waiting) and not waiting.is_dir():

@@ -40,9 +40,11 @@ def slurm(tmp_path: Path) -> dict[str, str]:
     return {"PATH": f"{commands}:{os.environ['PATH']}", "SLURM_JOB_ID": "4711", "CODE": ""}
 
 
-def start(arguments: list[str], environment: dict[str, str], folder: Path) -> subprocess.Popen[str]:
+def start(
+    arguments: list[str], environment: dict[str, str], folder: Path, script: Path = SWEEP
+) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        ["bash", SWEEP, *arguments],
+        ["bash", script, *arguments],
         cwd=folder,
         env=environment,
         text=True,
@@ -63,7 +65,7 @@ def requeued(folder: Path) -> list[str]:
     return path.read_text().splitlines() if path.exists() else []
 
 
-@pytest.mark.parametrize("script", sorted(SCRIPTS.glob("*.sh")), ids=lambda path: path.name)
+@pytest.mark.parametrize("script", sorted(SCRIPTS.parent.glob("*/*.sh")), ids=lambda path: path.name)
 def test_script_is_bash_and_asks_for_its_argument(script: Path) -> None:
     subprocess.run(["bash", "-n", script], check=True)
     done = subprocess.run(["bash", script], capture_output=True, text=True, check=False)
@@ -113,6 +115,22 @@ def test_cancelled_job_stays_cancelled(slurm: dict[str, str], tmp_path: Path) ->
     assert (tmp_path / "step.signals").read_text() == "TERM\n"
     assert job.returncode == 75
     assert requeued(tmp_path) == []
+
+
+@pytest.mark.parametrize(("signal_", "again"), [(signal.SIGUSR1, ["requeue 4711"]), (signal.SIGTERM, [])])
+def test_a_part_that_stops_early_is_queued_again_unless_it_was_cancelled(
+    signal_: signal.Signals, again: list[str], slurm: dict[str, str], tmp_path: Path
+) -> None:
+    (tmp_path / "bin" / "rubhpc").write_text(SRUN)
+    (tmp_path / "bin" / "rubhpc").chmod(0o755)
+    script = SCRIPTS.parent / "cluster" / "parts.sh"
+    job = start(["64", "my study.toml", "--quiet"], slurm | {"SLURM_ARRAY_TASK_ID": "3"}, tmp_path, script)
+    wait_for(tmp_path / "step.running")
+    job.send_signal(signal_)
+    job.communicate(timeout=60)
+    assert (tmp_path / "step.arguments").read_text() == "my study.toml --quiet --part 3/64\n"
+    assert job.returncode == 75
+    assert requeued(tmp_path) == again
 
 
 def test_requeueing_has_an_end(slurm: dict[str, str], tmp_path: Path) -> None:
