@@ -28,6 +28,18 @@ PERIOD_COLORS = ("#D55E00", "#88CCEE", "#332288", "#999933", "#CC79A7")  # none,
 SETTLED_COLORS = ("#D55E00", "#56B4E9")
 NOT_SETTLED = SETTLED[0].replace("_", " ")
 STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
+# Motions that starts reach, by number; the contact-free one has the colour of its regime.
+MOTION_COLORS = (
+    "#E69F00",
+    "#009E73",
+    "#CC79A7",
+    "#0072B2",
+    "#D55E00",
+    "#F0E442",
+    "#332288",
+    "#999933",
+    "#882255",
+)
 WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
 CATEGORIES = ("status", "regime", "period", "settled")
 _FLAGS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {

@@ -1,0 +1,301 @@
+"""Which motion each start reaches: cases sorted by period and Poincaré section; basins and their sizes.
+
+Cases that differ in nothing but their start (axes `initial_*`) share a setting. In each setting the settled
+motions are distinguished, and a motion keeps its number from one setting to the next.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from postproc.store.axes import axes_of, drawn_axes, source
+from postproc.store.variables import require_variables
+from rubhpc.errors import InputError
+from rubhpc.schema import DONE, REGIME, SECTION_NAMES
+from rubhpc.study.axes import coordinate_of
+from rubhpc.study.initial import PREFIX
+from rubhpc.study.sampling import CASE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+TOLERANCE = 0.01  # of the section's size: periodic motions that differ by less are one
+SPREAD_TOLERANCE = 0.25  # of the same: mean and spread of a section without a period, of a record's length
+SAME_MOTION = 1.0  # of the same: largest change of a motion from one setting to the next
+NO_MOTION = 0  # of a case that is not done, or had not settled
+ENTROPY_BOX = 5  # starts along each side of the boxes of the basin entropy
+_SECTIONS = tuple(f"section_{name}" for name in SECTION_NAMES)
+_START = coordinate_of(PREFIX)
+
+
+class Motions(NamedTuple):
+    """The motions of one setting.
+
+    Attributes
+    ----------
+    label : (n_case,)
+        1, 2, ... in the order of `key`; `NO_MOTION` where there is none.
+    key : list of (is_contact, period)
+        Of each motion; period 0 where there is none up to 16.
+    feature : list of (n_section, n_feature)
+        What distinguishes motions of one key, SI units.
+    size : (n_section,)
+        Largest coordinates of the section in the setting, SI units.
+    """
+
+    label: Ints
+    key: list[tuple[bool, int]]
+    feature: list[Floats]
+    size: Floats
+
+
+def start_axes(store: xr.Dataset) -> list[str]:
+    """Return the dimensions along which starts differ: axes `initial_*`, or `case` where starts were drawn.
+
+    Raises
+    ------
+    InputError
+        There are none of several values, or what was drawn is not a start alone.
+    """
+    starts = [axis for axis in axes_of(store) if axis.startswith(_START) and store.sizes[axis] > 1]
+    if drawn := drawn_axes(store):
+        others = [name for name in drawn if not name.startswith(_START)]
+        if others:
+            problem = f"{others[0]} was drawn along with the starts, so that no two cases share a setting"
+            raise InputError(f"{source(store)}: basins: {problem}; make it an axis of the grid")
+        starts.append(CASE)
+    if not starts:
+        raise InputError(
+            f"{source(store)}: basins need starts that differ: an axis of [grid] such as "
+            f'"{PREFIX}vertical" = {{ start = "-1 mm", stop = "1 mm", num = 21 }}'
+        )
+    return starts
+
+
+def attractors(store: xr.Dataset, tolerance: float = TOLERANCE) -> xr.DataArray:
+    """Return the number of the motion that each case has reached, over the axes of the store.
+
+    Parameters
+    ----------
+    store : Dataset
+        With the sections kept.
+    tolerance : float
+        Relative to the largest coordinate of the section in the setting: periodic motions of one period are
+        one where their last points, in any order, differ by less.
+
+    Returns
+    -------
+    DataArray of int
+        1, 2, ...; `NO_MOTION` (0) where the case is not done, or had not settled. A motion has the number of
+        the motion most like it in the setting before, on the last axis that has one, if both have the same
+        period and are near (`SAME_MOTION`), or the only ones of that period. Numbers do not depend on the
+        order of the cases.
+
+    Notes
+    -----
+    Motions without a period up to 16, on a torus or chaotic, are compared by mean and standard deviation of
+    their section, to `SPREAD_TOLERANCE`, whatever their regime: a torus may pass for a long period. Two tori
+    of about one place and size count as one motion. Cases are joined by single linkage.
+    """
+    require_variables(store, ["regime", "period", *_SECTIONS])
+    starts = start_axes(store)
+    dims = [str(d) for d in store["status"].dims]
+    settings = [d for d in dims if d not in starts]
+    ordered = store.sortby([d for d in settings if store[d].dtype.kind in "fiu"]) if settings else store
+    names = ["status", "regime", "period", *_SECTIONS, *(n for n in ("settled",) if n in store)]
+    cases = ordered[names].load().transpose(*settings, *starts, ...)
+    shape = tuple(cases.sizes[d] for d in settings)
+    number = np.zeros((*shape, int(np.prod([cases.sizes[d] for d in starts]))), dtype=np.int64)
+    known: dict[tuple[int, ...], tuple[Motions, list[int]]] = {}
+    n_known = 0
+    for place in np.ndindex(*shape):
+        motions = motions_of(cases.isel(dict(zip(settings, place, strict=True))), tolerance)
+        before = _before(place)
+        given = _carried_on(motions, *known[before]) if before is not None else [0] * len(motions.key)
+        for i, n in enumerate(given):
+            if n == 0:
+                n_known += 1
+                given[i] = n_known
+        known[place] = motions, given
+        number[place] = np.array([NO_MOTION, *given])[motions.label]
+    found = xr.DataArray(
+        number.reshape(cases["status"].shape).astype(np.int16),
+        dims=cases["status"].dims,
+        coords=cases["status"].coords,
+        name="attractor",
+        attrs={"units": "1", "long_name": "Motion reached"},
+    )
+    indexes = {d: store.indexes[d] for d in dims if d in store.indexes}
+    return found.reindex(indexes).transpose(*dims)
+
+
+def motions_of(setting: xr.Dataset, tolerance: float = TOLERANCE) -> Motions:
+    """Distinguish the motions of one setting: loaded cases that differ in their starts alone."""
+    status, regime, period = (setting[n].values.ravel() for n in ("status", "regime", "period"))
+    sections = np.stack([setting[n].values.reshape(status.size, -1) for n in _SECTIONS], axis=1)
+    has_motion = status == DONE
+    if "settled" in setting:
+        has_motion &= setting["settled"].values.ravel() != 0
+    size = np.zeros(sections.shape[1])
+    if has_motion.any():
+        size = np.abs(sections[has_motion]).max(axis=(0, 2))
+    size = np.where(size > 0.0, size, 1.0)
+    label = np.zeros(status.size, dtype=np.int64)
+    keys: list[tuple[bool, int]] = []
+    features: list[Floats] = []
+    is_contact = regime != REGIME.index("no_contact")
+    for key in sorted({*zip(is_contact[has_motion].tolist(), period[has_motion].tolist(), strict=True)}):
+        members = np.flatnonzero(has_motion & (is_contact == key[0]) & (period == key[1]))
+        scaled = sections[members] / size[:, np.newaxis]
+        feature, within = _features(scaled, key[1], tolerance)
+        group = _joined(feature, within)
+        middles = [np.median(feature[group == g], axis=0) for g in range(group.max() + 1)]
+        order = sorted(range(len(middles)), key=lambda g: tuple(np.round(middles[g] / within)))
+        for g in order:
+            keys.append(key)
+            features.append(middles[g].reshape(size.size, -1) * size[:, np.newaxis])
+            label[members[group == g]] = len(keys)
+    return Motions(label, keys, features, size)
+
+
+def _features(sections: Floats, period: int, tolerance: float) -> tuple[Floats, float]:
+    """What distinguishes motions of one period (n_case, n_feature), and how near counts as one.
+
+    The points of a periodic motion are sorted, coordinate by coordinate: a shift by revolutions, which a
+    start may cause, changes nothing.
+    """
+    if 0 < period <= sections.shape[2]:
+        return np.sort(sections[:, :, -period:], axis=2).reshape(len(sections), -1), tolerance
+    both = np.stack([sections.mean(axis=2), sections.std(axis=2)], axis=2)
+    return both.reshape(len(sections), -1), SPREAD_TOLERANCE
+
+
+def _joined(feature: Floats, within: float) -> Ints:
+    """Groups of single linkage in the largest coordinate difference, numbered from 0, (n_case,)."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    # Of the many starts that reach the same motion one stands for all: pairs would be counted by its square.
+    cells, at = np.unique(np.round(feature / (0.125 * within)), axis=0, return_inverse=True)
+    pairs = cKDTree(cells).query_pairs(8.0, p=np.inf, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells),) * 2)
+    group: Ints = connected_components(graph, directed=False)[1][at.ravel()].astype(np.int64)
+    return group
+
+
+def _before(place: tuple[int, ...]) -> tuple[int, ...] | None:
+    """Place of the setting before: one step back on the last axis that has one; None of the first."""
+    for i in reversed(range(len(place))):
+        if place[i]:
+            return (*place[:i], place[i] - 1, *place[i + 1 :])
+    return None
+
+
+def _carried_on(motions: Motions, before: Motions, numbers: Sequence[int]) -> list[int]:
+    """Number of each motion: that of the motion most like it in the setting before; 0 where it is new."""
+    from scipy.optimize import linear_sum_assignment
+
+    cost = np.full((len(motions.key), len(before.key)), 2.0 * SAME_MOTION)
+    size = np.maximum(motions.size, before.size)[:, np.newaxis]
+    for i, key in enumerate(motions.key):
+        for j, other in enumerate(before.key):
+            if key == other:
+                change = np.abs((motions.feature[i] - before.feature[j]) / size).max()
+                is_only = motions.key.count(key) == before.key.count(key) == 1
+                cost[i, j] = 0.0 if is_only else change
+    given = [0] * len(motions.key)
+    for i, j in zip(*linear_sum_assignment(cost), strict=True):
+        if cost[i, j] < SAME_MOTION:
+            given[i] = numbers[j]
+    return given
+
+
+def fractions(attractor: xr.DataArray, starts: Sequence[str], store: xr.Dataset) -> xr.Dataset:
+    """Return how many starts reach each motion, with 95 % intervals, and what the motion is.
+
+    Parameters
+    ----------
+    attractor : DataArray
+        From `attractors`.
+    starts : sequence of str
+        Dimensions over which starts differ.
+
+    Returns
+    -------
+    Dataset over (*settings, attractor)
+        `count`; `fraction` of the starts with a motion, its interval from `fraction_low` to `fraction_high`;
+        `motion_regime` and `motion_period`; over settings alone `n_start` with a motion, and
+        `n_without_motion`: not done, or not settled.
+    """
+    present = np.unique(attractor.values)
+    numbers = present[present != NO_MOTION]
+    is_of = attractor == xr.DataArray(numbers, dims="attractor", coords={"attractor": numbers})
+    count = is_of.sum(starts)
+    n_start = (attractor != NO_MOTION).sum(starts)
+    low, high = wilson(count, n_start)
+    return xr.Dataset(
+        {
+            "count": count.assign_attrs(units="1", long_name="Starts that reach the motion"),
+            "fraction": (count / n_start).assign_attrs(units="1", long_name="Basin fraction"),
+            "fraction_low": low.assign_attrs(units="1", long_name="Lower end of the 95 % interval"),
+            "fraction_high": high.assign_attrs(units="1", long_name="Upper end of the 95 % interval"),
+            "motion_regime": _most_common(store["regime"], is_of, starts, len(REGIME)),
+            "motion_period": store["period"].where(is_of, -1).max(starts).assign_attrs(store["period"].attrs),
+            "n_start": n_start.assign_attrs(units="1", long_name="Starts with a motion"),
+            "n_without_motion": (attractor == NO_MOTION)
+            .sum(starts)
+            .assign_attrs(units="1", long_name="Starts not done or not settled"),
+        }
+    )
+
+
+def _most_common(flag: xr.DataArray, is_of: xr.DataArray, starts: Sequence[str], n: int) -> xr.DataArray:
+    """Flag, of `n`, that most cases of each motion have; -1 where no case has the motion."""
+    counts = xr.concat([(is_of & (flag == code)).sum(starts) for code in range(n)], "code")
+    found = counts.argmax("code").where(counts.max("code") > 0, -1)
+    return found.astype(np.int8).assign_attrs(flag.attrs)
+
+
+def wilson(count: xr.DataArray, n: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    """Return Wilson's 95 % interval of a share, of `count` out of `n` (Wilson, 1927)."""
+    z = 1.959963984540054
+    share = count / n
+    middle = (share + z**2 / (2 * n)) / (1 + z**2 / n)
+    half = z * np.sqrt(share * (1 - share) / n + z**2 / (4 * n**2)) / (1 + z**2 / n)
+    return (middle - half).clip(0.0, 1.0), (middle + half).clip(0.0, 1.0)
+
+
+def basin_entropy(attractor: xr.DataArray, x: str, y: str) -> tuple[float, float]:
+    """Return basin entropy and boundary basin entropy of starts on a grid, nat.
+
+    The mean Gibbs entropy of the motions in boxes of `ENTROPY_BOX` by `ENTROPY_BOX` starts, over all boxes,
+    and over those of more than one motion: above ln 2 the boundary is fractal (Daza and others, Sci. Rep. 6,
+    31416, 2016). NaN where the grid is smaller than a box, or no box has more than one motion.
+    """
+    grid = attractor.transpose(y, x).values
+    boxes = []
+    for i in range(0, grid.shape[0] - ENTROPY_BOX + 1, ENTROPY_BOX):
+        for j in range(0, grid.shape[1] - ENTROPY_BOX + 1, ENTROPY_BOX):
+            box = grid[i : i + ENTROPY_BOX, j : j + ENTROPY_BOX]
+            _, n = np.unique(box[box != NO_MOTION], return_counts=True)
+            share = n / max(n.sum(), 1)
+            boxes.append(float(-(share * np.log(share)).sum()) if n.size else np.nan)
+    found = np.array(boxes)
+    found = found[np.isfinite(found)]
+    mixed = found[found > 0.0]
+    return (float(found.mean()) if found.size else np.nan, float(mixed.mean()) if mixed.size else np.nan)
+
+
+def name_of(regime: int, period: int) -> str:
+    """Return what a motion is in words: "no contact", "P2", "chaotic"."""
+    text = REGIME[regime].replace("quasi_periodic", "quasi-periodic").replace("_", " ")
+    return f"P{period}" if text == "periodic" and period > 0 else text

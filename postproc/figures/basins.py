@@ -1,0 +1,300 @@
+"""Basins of attraction: the motion that each start reaches, and the share of the starts of each motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from postproc.cases.attractors import (
+    NO_MOTION,
+    attractors,
+    basin_entropy,
+    fractions,
+    name_of,
+    start_axes,
+)
+from postproc.cases.saltelli import is_log
+from postproc.figures.cells import cell_edges, hatch_cells, is_geometric
+from postproc.figures.drawing import Drawing
+from postproc.figures.palette import MOTION_COLORS, NOT_DONE, NOT_SETTLED, REGIME_COLORS
+from postproc.figures.small_multiples import legend_below
+from postproc.figures.ticks import tick_levels
+from postproc.store.axes import axes_of, drawn_axes, find_axis, source
+from postproc.store.select import first_of_rest
+from postproc.store.units import displayed, scale_for, written_value
+from postproc.store.worst import worst_of_stators
+from rubhpc.errors import InputError
+from rubhpc.schema import DONE, REGIME
+from rubhpc.study.sampling import CASE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from postproc.figures.options import Axis, Share
+
+    Floats = NDArray[np.float64]
+    Edges = tuple[Floats, Floats]
+
+_MEASURES = ("peak_contact_force", "peak_to_peak_vertical")  # of a motion, by the mean over its cases
+_WIDE = 130.0  # mm
+
+
+def basins(
+    cases: xr.Dataset,
+    *,
+    x: Axis | None = None,
+    y: Axis | None = None,
+    along: Axis | None = None,
+    tolerance: Share = 0.01,
+) -> Drawing:
+    """Basins of attraction: the motion that each start reaches.
+
+    The starts are axes of the study such as initial.vertical, or drawn from ranges of them. Cases are sorted
+    by period and Poincaré section; the share of the starts that reach each motion has a 95 % interval. Along
+    an axis, the shares are stacked.
+
+    Parameters
+    ----------
+    cases
+        Axes that are not drawn are taken at their first value.
+    x
+        Axis across [default: the longest of the starts, or of all where starts differ along one axis only].
+    y
+        Axis up [default: the next longest of the starts].
+    along
+        Draw the share of each motion along AXIS, over all starts, instead.
+    tolerance
+        Share of the section's size within which periodic motions are one.
+    """
+    starts = start_axes(cases)
+    if along is not None:
+        axis = find_axis(cases, along)
+        if axis in starts:
+            raise InputError(f"{source(cases)}: --along {along}: is a start; name an axis such as a speed")
+        return _along(cases, axis, starts, tolerance)
+    across, up = _plane(cases, starts, x, y)
+    spread = [CASE] if drawn_axes(cases) else [across, up]
+    cases, notes = first_of_rest(cases, [*spread, *starts], "status")
+    found = attractors(cases, tolerance)
+    over = [d for d in starts if d in found.dims]
+    shown = fractions(found, over, cases).assign(_measures(found, cases, over) | {"attractor_reached": found})
+    shown["status"] = cases["status"].load()
+    beyond = [d for d in over if d not in spread]
+    shown = shown.isel(dict.fromkeys(beyond, 0))  # drawn at the first; counted over all
+    notes += [f"drawn at {written_value(cases[d][0])}: the first of {cases.sizes[d]}" for d in beyond]
+    is_plane = not drawn_axes(cases) and {across, up} == set(starts)
+    if is_plane:
+        entropy, boundary = basin_entropy(found, across, up)
+        shown["basin_entropy"], shown["boundary_basin_entropy"] = entropy, boundary
+        notes.append(f"basin entropy {entropy:.3g}, on the boundaries {boundary:.3g} (fractal above 0.693)")
+    return Drawing(
+        shown=shown,
+        draw=lambda axes: draw_basins(shown, across, up, axes[0]),
+        height=80.0,
+        lines=(*notes, *_described(shown)),
+    )
+
+
+def _plane(cases: xr.Dataset, starts: Sequence[str], x: str | None, y: str | None) -> tuple[str, str]:
+    """Axes across and up: those named, or the longest starts, else a start over the longest of the others."""
+    drawn = drawn_axes(cases)
+    known = drawn or [a for a in axes_of(cases) if cases.sizes[a] > 1]
+    named = [name.replace(".", "_") if name else None for name in (x, y)]
+    for name in named:
+        if name is not None and name not in known:
+            raise InputError(
+                f"{source(cases)}: basins: no axis {name} of several values; choose {', '.join(known)}"
+            )
+    ordered = sorted(known, key=lambda a: (a not in (drawn or starts), -cases[a].size))
+    free = [a for a in ordered if a not in named]
+    if len(free) + sum(name is not None for name in named) < 2:
+        raise InputError(
+            f"{source(cases)}: basins: a picture needs two axes of several values; there is {known[0]} alone"
+        )
+    if named == [None, None] and not drawn and len(starts) == 1:
+        return free[1], free[0]  # a start up, a parameter across
+    across, up = (name or free.pop(0) for name in named)
+    if across == up:
+        raise InputError(f"{source(cases)}: --x and --y are both {across}; a picture needs two axes")
+    return across, up
+
+
+def _measures(found: xr.DataArray, cases: xr.Dataset, starts: Sequence[str]) -> dict[str, xr.DataArray]:
+    """Means over the cases of each motion."""
+    names = [name for name in _MEASURES if name in cases]
+    cases = worst_of_stators(cases, names)[names]
+    cases = cases.isel(stator=0, drop=True, missing_dims="ignore")  # there is one, or they have been reduced
+    numbers = np.unique(found.values[found.values != NO_MOTION])
+    is_of = found == xr.DataArray(numbers, dims="attractor", coords={"attractor": numbers})
+    return {
+        f"mean_{name}": cases[name].where(is_of).mean(starts).assign_attrs(cases[name].attrs).load()
+        for name in names
+    }
+
+
+def _along(cases: xr.Dataset, axis: str, starts: Sequence[str], tolerance: float) -> Drawing:
+    """Shares of the motions along an axis."""
+    cases, notes = first_of_rest(cases, [axis, *starts], "status")
+    found = attractors(cases, tolerance)
+    shown = fractions(found, starts, cases).assign(_measures(found, cases, starts)).sortby(axis)
+    return Drawing(
+        shown=shown,
+        draw=lambda axes: draw_fractions(shown, axis, axes[0]),
+        height=70.0,
+        width=_WIDE,
+        lines=tuple(notes),
+    )
+
+
+def draw_basins(data: xr.Dataset, x: str, y: str, ax: Axes) -> Axes:
+    """Draw which motion each start reaches: cells over two axes of a grid, or points of a sample."""
+    colors = _colors(data)
+    values, status = data["attractor_reached"], data["status"]
+    across, x_label = displayed(data[x])
+    up, y_label = displayed(data[y])
+    handles: list[Artist] = []
+    if values.dims == (CASE,):
+        handles += _scatter(data, across, up, colors, ax)
+        for name, set_scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
+            if is_log(data, name):
+                set_scale("log")
+    else:
+        values = values.transpose(y, x).sortby([y, x])
+        codes = status.transpose(y, x).sortby([y, x]).values
+        edges = cell_edges(np.sort(across)), cell_edges(np.sort(up))
+        handles += _cells(values.values, edges, colors, data, ax)
+        unsettled = (codes == DONE) & (values.values == NO_MOTION)
+        for mask, (name, grey, hatch) in [
+            *((codes == code, style) for code, style in NOT_DONE.items()),
+            (unsettled, (NOT_SETTLED, "white", "||||")),
+        ]:
+            handles += hatch_cells(ax, edges, mask, name, hatch, facecolor=grey)
+        for numbers, letter in ((across, "x"), (up, "y")):
+            if is_geometric(numbers):
+                getattr(ax, f"set_{letter}scale")("log")
+        ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+        tick_levels(ax, "x", data[x])
+        tick_levels(ax, "y", data[y])
+    ax.set(xlabel=x_label, ylabel=y_label)
+    legend_below(ax, handles)
+    return ax
+
+
+def draw_fractions(data: xr.Dataset, axis: str, ax: Axes) -> Axes:
+    """Draw the shares of the motions along an axis as stacked areas, with their 95 % intervals as bars."""
+    x, x_label = displayed(data[axis])
+    bottom = np.zeros(x.size)
+    for number, color in _colors(data).items():
+        motion = data.sel(attractor=number)
+        share = np.nan_to_num(motion["fraction"].transpose(axis).values)
+        label = f"{number}: {_name(data, number)}"
+        ax.fill_between(x, bottom, bottom + share, color=color, label=label, linewidth=0.4, edgecolor="white")
+        top = bottom + share
+        inner = (share > 0.0) & (top < 1.0 - 1e-9)
+        low, high = ((motion[f"fraction_{end}"].values - share)[inner] for end in ("low", "high"))
+        ax.errorbar(
+            x[inner],
+            top[inner],
+            yerr=np.abs([low, high]),
+            fmt="none",
+            ecolor="0.15",
+            elinewidth=0.5,
+            capsize=1.2,
+        )
+        bottom = top
+    if is_geometric(np.sort(x)):
+        ax.set_xscale("log")
+    ax.set(xlabel=x_label, ylabel="Share of the starts", ylim=(0.0, 1.0), xlim=(x.min(), x.max()))
+    tick_levels(ax, "x", data[axis])
+    legend_below(ax, ax.get_legend_handles_labels()[0])
+    return ax
+
+
+def _cells(
+    values: NDArray[np.int16], edges: Edges, colors: dict[int, str], data: xr.Dataset, ax: Axes
+) -> list[Artist]:
+    """Draw cells of motions, and return a handle for each."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    numbers = [*colors]
+    index = np.searchsorted(numbers, values).clip(max=max(len(numbers) - 1, 0))
+    cells = np.ma.masked_where(values == NO_MOTION, index)
+    if numbers:
+        paint = ListedColormap([*colors.values()])
+        ax.pcolormesh(*edges, cells, cmap=paint, vmin=-0.5, vmax=len(numbers) - 0.5, rasterized=True)
+    return [Patch(facecolor=color, label=_legend(data, number)) for number, color in colors.items()]
+
+
+def _scatter(data: xr.Dataset, x: Floats, y: Floats, colors: dict[int, str], ax: Axes) -> list[Artist]:
+    """Draw a point a start, and return a handle for each motion."""
+    found = data["attractor_reached"].values
+    size = float(np.clip(5000.0 / found.size, 3.0, 24.0))
+    handles: list[Artist] = [
+        ax.scatter(x[found == n], y[found == n], size, color=color, linewidths=0, label=_legend(data, n))
+        for n, color in colors.items()
+    ]
+    none = found == NO_MOTION
+    if none.any():
+        handles.append(
+            ax.scatter(x[none], y[none], size, color="0.5", marker="x", linewidths=0.6, label="no motion")
+        )
+    return handles
+
+
+def _colors(data: xr.Dataset) -> dict[int, str]:
+    """Colour of each motion that occurs, by its number."""
+    numbers = [int(n) for n in data["attractor"].values if int(data["count"].sel(attractor=n).max()) > 0]
+    shades = iter(MOTION_COLORS * (len(numbers) // len(MOTION_COLORS) + 1))
+    return {n: REGIME_COLORS[0] if _is_free(data, n) else next(shades) for n in numbers}
+
+
+def _of(data: xr.Dataset, name: str, number: int) -> int:
+    """What a motion is where it occurs; of several settings the most common."""
+    values = data[name].sel(attractor=number).values
+    values = values[data["count"].sel(attractor=number).values > 0]
+    found, n = np.unique(values, return_counts=True)
+    return int(found[n.argmax()])
+
+
+def _is_free(data: xr.Dataset, number: int) -> bool:
+    return REGIME[_of(data, "motion_regime", number)] == "no_contact"
+
+
+def _name(data: xr.Dataset, number: int) -> str:
+    return name_of(_of(data, "motion_regime", number), _of(data, "motion_period", number))
+
+
+def _legend(data: xr.Dataset, number: int) -> str:
+    """Number, name and share of a motion; the share is of one setting."""
+    text = f"{number}: {_name(data, number)}"
+    motion = data.sel(attractor=number)
+    if motion["fraction"].size > 1:
+        return text
+    low, high = (100 * float(motion[f"fraction_{end}"].squeeze()) for end in ("low", "high"))
+    return f"{text}, {100 * float(motion['fraction'].squeeze()):.3g} % ({low:.3g} to {high:.3g})"
+
+
+def _described(data: xr.Dataset) -> list[str]:
+    """A line for each motion, where there is one setting."""
+    if data["fraction"].dims != ("attractor",):
+        return []
+    lines = []
+    for number in _colors(data):
+        motion = data.sel(attractor=number)
+        means = []
+        for name in (n for n in _MEASURES if f"mean_{n}" in data):
+            value, about = float(motion[f"mean_{name}"]), data[f"mean_{name}"].attrs
+            scale = scale_for(str(about.get("units", "1")), abs(value))
+            means.append(f"{about.get('long_name', name)} {value * scale.factor:.4g} {scale.unit}")
+        count = f"{int(motion['count'])} of {int(motion['n_start'])} starts"
+        lines.append("; ".join([f"motion {_legend(data, number)}", count, *means]))
+    if left := int(data["n_without_motion"]):
+        lines.append(f"without a motion: {left} starts, not done or not settled")
+    return lines

@@ -1,0 +1,76 @@
+"""Figures of basins: cells, shares along an axis, points of a sample; what the command prints and refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.collections import PolyCollection
+from motions_store import store_of
+
+from postproc.catalogue import figures
+from rubhpc.errors import InputError
+from rubhpc.study.sampling import CASE
+
+FIGURE = figures()["basins"]
+
+
+@pytest.fixture
+def plane() -> xr.Dataset:
+    kinds = np.where(np.indices((6, 7)).sum(axis=0) < 6, "free", "P1")
+    store = store_of(
+        kinds, initial_vertical=np.linspace(-1, 1, 6) * 1e-4, initial_horizontal=np.linspace(-1, 1, 7) * 1e-4
+    )
+    store["peak_contact_force"] = store.regime * 120.0
+    store["peak_contact_force"].attrs = {"units": "N", "long_name": "peak contact force"}
+    return store
+
+
+def test_cells_have_the_colour_of_their_motion(plane, tmp_path):
+    drawing = FIGURE.of(plane)
+    ax = drawing.show()
+    cells = ax.collections[0].get_array()
+    reached = drawing.shown["attractor_reached"].transpose("initial_vertical", "initial_horizontal").values
+    assert (np.asarray(cells).reshape(6, 7) + 1 == reached).all()
+    assert ax.get_xlabel().startswith("Initial horizontal displacement")
+    labels = [text.get_text() for text in ax.figure.legends[0].get_texts()]
+    assert labels[0].startswith("1: no contact, 50 % (35.5 to 64.5)")
+    assert any("21 of 42 starts; peak contact force 120 N" in line for line in drawing.lines)
+    assert drawing.save(tmp_path / "basins.png").stat().st_size > 5000
+
+
+def test_shares_are_stacked_along_an_axis(plane):
+    stores = [plane.assign(regime=plane.regime), plane]
+    both = xr.concat(stores, xr.DataArray([1.0, 1.2], dims="speed_ratio", name="speed_ratio"), join="exact")
+    both = both.transpose("speed_ratio", ...)
+    drawing = FIGURE.of(both, along="speed_ratio")
+    assert drawing.shown["fraction"].sum("attractor").values == pytest.approx([1.0, 1.0])
+    ax = drawing.show()
+    areas = [area for area in ax.collections if isinstance(area, PolyCollection)]
+    tops = [area.get_paths()[0].vertices[:, 1].max() for area in areas]
+    assert tops[-1] == pytest.approx(1.0)
+    with pytest.raises(InputError, match="is a start"):
+        FIGURE.of(both, along="initial.vertical")
+
+
+def test_points_of_a_sample(plane):
+    stacked = plane.stack({CASE: ("initial_vertical", "initial_horizontal")}).reset_index(CASE)
+    stacked = stacked.assign_coords({CASE: np.arange(stacked.sizes[CASE])}).transpose(CASE, ...)
+    stacked.attrs["study"] = {"grid": {"initial.vertical": {}, "initial.horizontal": {}}}
+    ax = FIGURE.of(stacked).show()
+    assert sum(len(points.get_offsets()) for points in ax.collections) == 42
+
+
+def test_a_start_and_a_parameter_make_a_plane(plane):
+    line = plane.isel(initial_horizontal=0, drop=True)
+    both = xr.concat([line] * 3, xr.DataArray([1.0, 1.1, 1.2], dims="speed_ratio", name="speed_ratio"))
+    ax = FIGURE.of(both.transpose("speed_ratio", ...)).show()
+    assert ax.get_xlabel() == "Speed ratio $r$"
+    assert ax.get_ylabel().startswith("Initial vertical displacement")
+
+
+def test_one_axis_is_no_picture(plane):
+    with pytest.raises(InputError, match="a picture needs two axes"):
+        FIGURE.of(plane.isel(initial_horizontal=0, drop=True))
+    with pytest.raises(InputError, match="no axis speed"):
+        FIGURE.of(plane, x="speed")
