@@ -36,7 +36,7 @@ _SECTIONS = tuple(f"section_{name}" for name in SECTION_NAMES)
 _START = coordinate_of(PREFIX)
 
 
-class Motions(NamedTuple):
+class _Motions(NamedTuple):
     """The motions of one setting.
 
     Attributes
@@ -101,7 +101,7 @@ def attractors(store: xr.Dataset, tolerance: float = TOLERANCE) -> xr.DataArray:
 
     Notes
     -----
-    Motions without a period up to 16, on a torus or chaotic, are compared by mean and standard deviation of
+    _Motions without a period up to 16, on a torus or chaotic, are compared by mean and standard deviation of
     their section, to `SPREAD_TOLERANCE`, whatever their regime: a torus may pass for a long period. Two tori
     of about one place and size count as one motion. Cases are joined by single linkage.
     """
@@ -114,10 +114,10 @@ def attractors(store: xr.Dataset, tolerance: float = TOLERANCE) -> xr.DataArray:
     cases = ordered[names].load().transpose(*settings, *starts, ...)
     shape = tuple(cases.sizes[d] for d in settings)
     number = np.zeros((*shape, int(np.prod([cases.sizes[d] for d in starts]))), dtype=np.int64)
-    known: dict[tuple[int, ...], tuple[Motions, list[int]]] = {}
+    known: dict[tuple[int, ...], tuple[_Motions, list[int]]] = {}
     n_known = 0
     for place in np.ndindex(*shape):
-        motions = motions_of(cases.isel(dict(zip(settings, place, strict=True))), tolerance)
+        motions = _motions_of(cases.isel(dict(zip(settings, place, strict=True))), tolerance)
         before = _before(place)
         given = _carried_on(motions, *known[before]) if before is not None else [0] * len(motions.key)
         for i, n in enumerate(given):
@@ -137,7 +137,7 @@ def attractors(store: xr.Dataset, tolerance: float = TOLERANCE) -> xr.DataArray:
     return found.reindex(indexes).transpose(*dims)
 
 
-def motions_of(setting: xr.Dataset, tolerance: float = TOLERANCE) -> Motions:
+def _motions_of(setting: xr.Dataset, tolerance: float = TOLERANCE) -> _Motions:
     """Distinguish the motions of one setting: loaded cases that differ in their starts alone."""
     status, regime, period = (setting[n].values.ravel() for n in ("status", "regime", "period"))
     sections = np.stack([setting[n].values.reshape(status.size, -1) for n in _SECTIONS], axis=1)
@@ -163,7 +163,7 @@ def motions_of(setting: xr.Dataset, tolerance: float = TOLERANCE) -> Motions:
             keys.append(key)
             features.append(middles[g].reshape(size.size, -1) * size[:, np.newaxis])
             label[members[group == g]] = len(keys)
-    return Motions(label, keys, features, size)
+    return _Motions(label, keys, features, size)
 
 
 def _features(sections: Floats, period: int, tolerance: float) -> tuple[Floats, float]:
@@ -200,7 +200,7 @@ def _before(place: tuple[int, ...]) -> tuple[int, ...] | None:
     return None
 
 
-def _carried_on(motions: Motions, before: Motions, numbers: Sequence[int]) -> list[int]:
+def _carried_on(motions: _Motions, before: _Motions, numbers: Sequence[int]) -> list[int]:
     """Number of each motion: that of the motion most like it in the setting before; 0 where it is new."""
     from scipy.optimize import linear_sum_assignment
 
