@@ -1,6 +1,7 @@
 """Parallel parameter studies of rotor-stator rub.
 
-`rubhpc.simulate` computes one case, `rubhpc.run` a study, `rubhpc.open` opens a store as a lazy dataset.
+`rubhpc.simulate` computes one case, `rubhpc.periodic` solves for a periodic motion, `rubhpc.run` computes a
+study, `rubhpc.open` opens a store as a lazy dataset.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from rubhpc.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from postproc.accessor import open  # noqa: A004 - the public name
-    from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
+    from rubhpc.errors import InputError, NoPeriodicMotion, RubError, StoppedEarly, StoreError
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.linear_design import linear_design
+    from rubhpc.integrate.periodic_motion import PeriodicMotion
     from rubhpc.integrate.record import Record, State
+    from rubhpc.periodic import periodic
     from rubhpc.rig.forces import Load, Unbalance
     from rubhpc.rig.reading import read_rig
     from rubhpc.rig.rig import Rig
@@ -32,6 +35,8 @@ __all__ = [
     "Load",
     "LumpedStator",
     "MatrixStator",
+    "NoPeriodicMotion",
+    "PeriodicMotion",
     "Record",
     "Rig",
     "RubError",
@@ -45,6 +50,7 @@ __all__ = [
     "assemble",
     "linear_design",
     "open",
+    "periodic",
     "read_rig",
     "read_study",
     "run",
@@ -57,6 +63,8 @@ _HOMES = {
     "Load": "rubhpc.rig.forces:Load",
     "LumpedStator": "rubhpc.rig.stators:LumpedStator",
     "MatrixStator": "rubhpc.rig.stators:MatrixStator",
+    "NoPeriodicMotion": "rubhpc.errors:NoPeriodicMotion",
+    "PeriodicMotion": "rubhpc.integrate.periodic_motion:PeriodicMotion",
     "Record": "rubhpc.integrate.record:Record",
     "Rig": "rubhpc.rig.rig:Rig",
     "RubError": "rubhpc.errors:RubError",
@@ -70,6 +78,7 @@ _HOMES = {
     "assemble": "rubhpc.fem.assemble:assemble",
     "linear_design": "rubhpc.fem.linear_design:linear_design",
     "open": "postproc.accessor:open",
+    "periodic": "rubhpc.periodic:periodic",
     "read_rig": "rubhpc.rig.reading:read_rig",
     "read_study": "rubhpc.study.study:read_study",
     "run": "rubhpc.running.driver:run",
@@ -78,11 +87,11 @@ _HOMES = {
 
 
 class _Package(ModuleType):
-    """The package; the module `simulate`, once imported, does not hide the function of that name."""
+    """The package; a module, once imported, does not hide the function of its name."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        is_module = isinstance(value, ModuleType)
-        super().__setattr__(name, value.simulate if is_module and name == "simulate" else value)
+        is_hiding = isinstance(value, ModuleType) and name in ("periodic", "simulate")
+        super().__setattr__(name, getattr(value, name) if is_hiding else value)
 
 
 sys.modules[__name__].__class__ = _Package

@@ -25,6 +25,10 @@ class InputError(RubError):
     exit_code = 2
 
 
+class NoPeriodicMotion(RubError):  # noqa: N818 - it is named for what was asked for
+    """A search for a periodic motion that found none; its text says why."""
+
+
 class StoreError(RubError):
     """A store that cannot be used: of another study, locked, full, read-only or damaged."""
 

@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rubhpc.errors import InputError
-from rubhpc.fem.assemble import assemble
-from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
-from rubhpc.fem.stability import instability_message
-from rubhpc.input.quantity import brief, parse_quantity
-from rubhpc.input.reading import build
+from rubhpc.case_arguments import case_of
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.record import State
-from rubhpc.integrate.setup import prepare
-from rubhpc.rig.reading import read_rig, with_keys
-from rubhpc.rig.rig import Rig
-from rubhpc.study.initial import Initial, check_initials
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from os import PathLike
 
-    from rubhpc.integrate.record import Record
+    from rubhpc.integrate.record import Record, State
+    from rubhpc.rig.rig import Rig
 
 
 @on_one_thread
@@ -127,60 +117,29 @@ def simulate(
     >>> record.period
     2
     """
-    if not isinstance(rig, Rig):
-        rig = read_rig(rig)
-    rig = with_keys(rig, overrides or {})
     if isinstance(keep, str):
         keep = (keep,)
-    start = _read_initial(initial)
-    if (speed is None) == (speed_ratio is None):
-        raise InputError("simulate: give speed or speed_ratio, one of the two")
-    if (clearance is None) == (clearance_ratio is None):
-        raise InputError("simulate: give clearance or clearance_ratio, one of the two")
-    model = assemble(rig)
-    if speed_ratio is not None:
-        ratio = parse_quantity(speed_ratio, "", "simulate: speed_ratio")
-        spin = ratio * first_lateral_frequency(model)
-    else:
-        spin = parse_quantity(speed, "rad/s", "simulate: speed")
-    unstable = instability_message(model, spin)
-    amplitude = math.nan if unstable else contact_free_amplitude(model, spin)
-    if clearance_ratio is not None:
-        ratio = parse_quantity(clearance_ratio, "", "simulate: clearance_ratio")
-        if unstable:
-            raise InputError(f"simulate: clearance_ratio: {unstable}; give clearance instead")
-        gap = ratio * amplitude
-    else:
-        gap = parse_quantity(clearance, "m", "simulate: clearance")
-    for stator in model.stators:
-        if gap + stator.clearance_offset <= 0:
-            offset = stator.clearance_offset
-            problem = f"{gap:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
-            raise InputError(f"simulate: clearance: {problem}; take a larger one")
-    mu = parse_quantity(friction, "", "simulate: friction")
-    if mu < 0:
-        raise InputError(f"simulate: friction: {mu:g} is out of range; it must be at least 0")
-    numbers = {
-        name: None if value is None else parse_quantity(value, unit, f"simulate: {name}")
-        for name, value, unit in (
-            ("stiffness", stiffness, "N/m"),
-            ("damping", damping, "N*s/m"),
-            ("restitution", restitution, ""),
-            ("static_friction_ratio", static_friction_ratio, ""),
-        )
-    }
-    contact = Contact(law=law, friction_law=friction_law, normal=normal, **numbers)
-    setup = prepare(
+    case = case_of(
+        "simulate",
         rig,
-        spin,
-        contact=contact,
-        integrator=Integrator(
-            method=method,
-            step=None if step is None else parse_quantity(step, "s", "simulate: step"),
-            accuracy=accuracy,
-        ),
         samples_per_revolution=samples_per_revolution,
-        model=model,
+        initial=initial,
+        speed=speed,
+        speed_ratio=speed_ratio,
+        clearance=clearance,
+        clearance_ratio=clearance_ratio,
+        friction=friction,
+        overrides=overrides,
+        law=law,
+        stiffness=stiffness,
+        damping=damping,
+        restitution=restitution,
+        friction_law=friction_law,
+        static_friction_ratio=static_friction_ratio,
+        normal=normal,
+        method=method,
+        step=step,
+        accuracy=accuracy,
     )
     recording = Recording(
         transient=transient,
@@ -190,21 +149,12 @@ def simulate(
         samples_per_revolution=samples_per_revolution,
         keep=tuple(keep),
     )
-    record = run_case(setup, clearance=gap, friction=mu, recording=recording, initial=start)
-    record.settings["contact_free_amplitude"] = amplitude
-    return replace(record, note=unstable)
-
-
-def _read_initial(initial: object) -> State | Initial:
-    """Where to start."""
-    if isinstance(initial, State):
-        return initial
-    if initial is not None and not isinstance(initial, dict):
-        problem = "is neither a State nor a dict"
-        raise InputError(f"simulate: initial: {brief(initial)} {problem}; give a record's `final`")
-    start = build(Initial, initial or {}, "simulate", "initial")
-    try:
-        check_initials(start, [])
-    except InputError as error:
-        raise InputError(f"simulate: {error}") from None
-    return start
+    record = run_case(
+        case.setup,
+        clearance=case.clearance,
+        friction=case.friction,
+        recording=recording,
+        initial=case.initial,
+    )
+    record.settings["contact_free_amplitude"] = case.contact_free_amplitude
+    return replace(record, note=case.note)

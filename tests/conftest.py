@@ -24,6 +24,8 @@ SLOW = (
     "integrate/test_event_driven_march.py::test_endless_events_are_left_to_short_steps",
     "integrate/test_event_driven_march.py::test_shorter_kernel_calls_change_nothing_but_rounding",
     "integrate/test_initial_state.py",
+    "integrate/test_periodic.py::test_motion_beside_it_draws_near_by_the_largest_multiplier",
+    "integrate/test_periodic.py::test_failure_says_why",
     "integrate/test_regimes_lyapunov.py",
     "kernels/test_coulomb_friction.py",
     "kernels/test_jit.py",

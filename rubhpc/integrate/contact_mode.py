@@ -43,6 +43,11 @@ class ContactMode:
         """How many of the coordinates are eigenmodes, m."""
         return len(self.enter)
 
+    @property
+    def drift(self) -> Floats:
+        """How fast coordinates grow linearly, their unit per second: none does here."""
+        return np.zeros(self.exponent.size)
+
 
 def solve_contact_mode(
     reduced: ReducedModel, gap_jacobian: Floats, force_direction: Floats, mask: int

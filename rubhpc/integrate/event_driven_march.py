@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.integrate.measures import new_accumulator
 from rubhpc.integrate.modal_march import ModalMarch
 from rubhpc.kernels.case_progress import MODE_WANTED, closed_pairs
-from rubhpc.kernels.contact_modes import find_mode
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, find_mode
 from rubhpc.kernels.event_loop import advance
+from rubhpc.kernels.mode_change import change_contacts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -55,8 +57,45 @@ class EventDrivenMarch(ModalMarch):
 
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs are closed, (q,)."""
-        mask = closed_pairs(self.progress, self.tables)
+        return self.closed(closed_pairs(self.progress, self.tables))
+
+    def closed(self, mask: int) -> NDArray[np.bool_]:
+        """Which pairs are closed in a contact mode, (q,)."""
         return np.array([bool(mask >> i & 1) for i in range(self._clearance.size)])
+
+    def forces(self, mode: int, z: Floats) -> Floats:
+        """Forces (q,), N, at coordinates (2, m) of a contact mode, given by its index in the tables."""
+        force = self.tables.switch_re[mode] @ z[0] - self.tables.switch_im[mode] @ z[1]
+        return np.where(self.closed(int(self.tables.mask[mode])), force, 0.0)
+
+    def exponents(self, mask: int) -> tuple[Floats, Floats]:
+        """Exponents of the coordinates of a contact mode and their drift (`ModeLibrary.exponents`)."""
+        return self._library.exponents(mask)
+
+    def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
+        """Take an event: `motion` (2 n,) after it, in place, and the contact mode that goes on, or -1.
+
+        `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft.
+        """
+        q = self._clearance.size
+        return int(
+            change_contacts(
+                self.bodies,
+                mask,
+                crossing,
+                self.clock.spin,
+                self.clock.tick * 2**FORCED_LEVEL,
+                np.cos(angle),
+                np.sin(angle),
+                motion,
+                False,
+                np.zeros(q),
+                np.zeros(q),
+                np.zeros(q, dtype=np.bool_),
+                np.zeros((q, q + 1)),
+                new_accumulator(q),
+            )
+        )
 
     def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
         """Contact modes of the case."""
@@ -116,6 +155,4 @@ class EventDrivenMarch(ModalMarch):
         raise NoClosedForm
 
     def _contact_force(self) -> Floats:
-        mode = self.progress.mode
-        force = self.tables.switch_re[mode] @ self._z[0] - self.tables.switch_im[mode] @ self._z[1]
-        return np.where(self.touching(), force, 0.0)
+        return self.forces(self.progress.mode, self._z)

@@ -17,7 +17,6 @@ from rubhpc.kernels.case_progress import (
     FINISHED,
     MODE_WANTED,
     ask_for,
-    closed_pairs,
     follow,
     shaft_angle,
 )
@@ -64,9 +63,8 @@ class FrictionMarch(EventDrivenMarch):
         self._n_short = 0  # ticks to be taken in short steps
         super().__init__(setup, clearance, friction, initial, check)
 
-    def touching(self) -> NDArray[np.bool_]:
-        """Which pairs are closed, (q,)."""
-        mask = closed_pairs(self.progress, self.tables)
+    def closed(self, mask: int) -> NDArray[np.bool_]:
+        """Which pairs are closed in a contact mode, (q,)."""
         return np.array([state != OPEN for state in states_of(mask, self._clearance.size)])
 
     def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
@@ -95,28 +93,34 @@ class FrictionMarch(EventDrivenMarch):
 
     def _states_after(self, is_pressed: NDArray[np.bool_], angle: float) -> int:
         """States that go on from the motion, with the shaft at an angle, rad, and some gaps closed."""
-        q, n = self.bodies.gap_jacobian.shape
+        n = self.bodies.stiffness.shape[0]
         slip = self._friction.rim_speed + self.bodies.slip @ self._motion[n:]
         sliding = np.where(slip >= 0.0, FORWARD, BACKWARD)
         states = np.where(
             is_pressed, np.where(np.abs(slip) <= AT_REST * self._friction.rim_speed, STUCK, sliding), OPEN
         )
-        found = change_states(
-            self.bodies,
-            self._friction,
-            mask_of(states.tolist()),
-            0,
-            self.clock.tick * 2**FORCED_LEVEL,
-            np.cos(angle),
-            np.sin(angle),
-            self._motion,
-            False,
-            self._work,
-            new_accumulator(q),
-        )
+        found = self.change(mask_of(states.tolist()), 0, angle, self._motion)
         if found < 0:
             raise NoClosedForm
-        return int(found)
+        return found
+
+    def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
+        """Take an event: `motion` (2 n,) after it, in place, and the states that go on, or -1."""
+        return int(
+            change_states(
+                self.bodies,
+                self._friction,
+                mask,
+                crossing,
+                self.clock.tick * 2**FORCED_LEVEL,
+                np.cos(angle),
+                np.sin(angle),
+                motion,
+                False,
+                self._work,
+                new_accumulator(self._clearance.size),
+            )
+        )
 
     def _start(self, mode: int) -> None:
         super()._start(mode)
@@ -178,11 +182,11 @@ class FrictionMarch(EventDrivenMarch):
     def _unsolved(self) -> str:
         return NO_FORCES
 
-    def _contact_force(self) -> Floats:
-        mode, q = self.progress.mode, self._clearance.size
-        tables = self.tables
-        value = (tables.switch_re[mode] @ self._z[0] - tables.switch_im[mode] @ self._z[1]).reshape(q, 2)
-        states = np.array(states_of(closed_pairs(self.progress, tables), q))
+    def forces(self, mode: int, z: Floats) -> Floats:
+        """Normal forces (q,), N, at coordinates (2, m) of a contact mode, by its index in the tables."""
+        q, tables = self._clearance.size, self.tables
+        value = (tables.switch_re[mode] @ z[0] - tables.switch_im[mode] @ z[1]).reshape(q, 2)
+        states = np.array(states_of(int(tables.mask[mode]), q))
         static = np.where(self._friction.static > 0.0, self._friction.static, 1.0)
         pressed = np.where(states == STUCK, 0.5 * value.sum(axis=1) / static, value[:, 0])
         return np.where(states == OPEN, 0.0, np.maximum(pressed, np.finfo(float).tiny))

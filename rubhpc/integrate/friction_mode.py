@@ -40,6 +40,11 @@ class FrictionMode(ContactMode):
         """How many of the coordinates are eigenmodes, m."""
         return self.n_mode
 
+    @property
+    def drift(self) -> Floats:
+        """How fast coordinates grow linearly, m/s."""
+        return self.growth
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrictionPairs:

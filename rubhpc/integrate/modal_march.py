@@ -96,11 +96,14 @@ class ModalMarch(March):
 
     def final(self) -> State:
         """State at the sample reached, as far as contact and outputs see it."""
+        return self.state_of(self.motion_of(self.progress, self._z), self._contact_force())
+
+    def state_of(self, motion: Floats, contact_force: Floats) -> State:
+        """State of a reduced motion (2 n,) and of the forces (q,), N, at a whole revolution."""
         setup = self._setup
-        motion = self.motion_of(self.progress, self._z)
         displacement, velocity = (setup.reduced.basis @ motion.reshape(2, -1).T).T.copy()
         displacement[: setup.model.rotor.n_dof] += setup.model.sag
-        return State.of_bodies(setup.model, displacement, velocity, self._contact_force())
+        return State.of_bodies(setup.model, displacement, velocity, contact_force)
 
     def motion_of(self, progress: Progress, z: Floats) -> Floats:
         """Reduced displacements, then velocities (2 n,), of modal coordinates (2, m)."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rubhpc.integrate.contact_mode import ContactMode, count_coordinates, solve_contact_mode
 from rubhpc.integrate.friction_mode import solve_friction_mode
 from rubhpc.integrate.mode_tables import MOST_MODES, TableStack, tabulate
@@ -13,7 +15,6 @@ from rubhpc.kernels.friction_states import FORWARD
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
@@ -64,6 +65,7 @@ class ModeLibrary:
         self.width = self._width([mode.exponent.size for mode in modes])
         self._tables = TableStack(len(modes), self._most_modes)
         self.masks = [mode.mask for mode in modes]
+        self._exponents: dict[int, tuple[Floats, Floats]] = {}
         for mode in modes:
             self._tabulate(mode)
 
@@ -89,12 +91,17 @@ class ModeLibrary:
     def forget(self) -> None:
         """Make room: keep no mode but that with every pair open."""
         self._tables.clear()
+        self._exponents.clear()
         self.masks = [0]
         self._tabulate(self._opened)
 
     def tables(self) -> kernel.ModeTables:
         """All contact modes as arrays."""
         return self._tables.view()
+
+    def exponents(self, mask: int) -> tuple[Floats, Floats]:
+        """Of the coordinates of a mode, 1/s: (2, m), real and imaginary, and the drift (m,) of those of 0."""
+        return self._exponents[mask]
 
     _most_modes = MOST_MODES
 
@@ -116,6 +123,9 @@ class ModeLibrary:
         return self.slip
 
     def _tabulate(self, mode: ContactMode) -> None:
+        n_blank = self.width - mode.exponent.size
+        exponent = np.pad(np.stack([mode.exponent.real, mode.exponent.imag]), ((0, 0), (0, n_blank)))
+        self._exponents[mode.mask] = exponent, np.pad(mode.drift, (0, n_blank))
         self._tables.add(
             tabulate(
                 mode,

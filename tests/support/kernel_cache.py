@@ -21,6 +21,9 @@ rubhpc.simulate("mokhtar2017", **case)
 rubhpc.simulate("mokhtar2017", **case, friction_law="coulomb")
 rubhpc.simulate("mokhtar2017", **case, normal="updated")
 rubhpc.simulate("mokhtar2017", **case, method="central-difference")
+periodic = dict(speed_ratio=0.75, clearance_ratio=0.9, transient=1, samples_per_revolution=32)
+rubhpc.periodic("mokhtar2017", **periodic)
+rubhpc.periodic("mokhtar2017", **periodic, friction_law="coulomb")
 from rubhpc.integrate.event_driven_march import EventDrivenMarch
 from rubhpc.integrate.neighbour_motions import NeighbourMotions
 from rubhpc.integrate.record import State

@@ -1,0 +1,258 @@
+"""A periodic motion of a case, found from rest or from a state: solution, stability and record."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.errors import InputError, NoPeriodicMotion
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.event_driven_march import NoClosedForm
+from rubhpc.integrate.initial_state import fit_to_gaps
+from rubhpc.integrate.piecewise_motion import Change, PiecewiseMotion
+from rubhpc.integrate.record import Record, State
+from rubhpc.integrate.setup import ModalSetup, Scheme
+from rubhpc.integrate.shooting import NotConverged, Orbit, shoot
+from rubhpc.integrate.start import start_of
+from rubhpc.integrate.transient import pass_revolutions
+from rubhpc.schema import REGIME
+from rubhpc.spectra import amplitude_spectrum
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.setup import Setup
+    from rubhpc.study.initial import Initial
+    from rubhpc.study.tables import Recording
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+SPANS = (30, 60, 120, 240)  # revolutions simulated further where no motion is found
+
+
+class ContactEvent(NamedTuple):
+    """An event of a motion.
+
+    Attributes
+    ----------
+    time : float, s
+        Since the shaft was at angle 0 at the beginning of the period.
+    stator : int
+        From 0.
+    kind : {"touch", "release", "slip", "stick"}
+        A gap closes; a force vanishes; a slip turns or begins; it ends.
+    approach : float, m/s
+        Speed with which the gap closes; NaN of other events.
+    """
+
+    time: float
+    stator: int
+    kind: Change
+    approach: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PeriodicMotion:
+    """A motion that repeats itself exactly, stable or not.
+
+    Attributes
+    ----------
+    period : int
+        Revolutions: the shortest after which it repeats itself.
+    state : State
+        Motion with the shaft at its angle 0.
+    record : Record
+        As of a simulation that starts there: signals, spectra, sections and measures.
+    multipliers : (n_state,)
+        Floquet multipliers over a period, complex, largest first: by these numbers small disturbances grow.
+        n_state is twice the number of reduced degrees of freedom.
+    is_stable : bool
+        Whether all multipliers lie within the unit circle.
+    monodromy : (n_state, n_state)
+        The matrix whose eigenvalues they are, in reduced displacements (sqrt(kg) m) and velocities.
+    residual : float
+        Distance of the motion after a period from that before it, over its size.
+    iterations : int
+        Of Newton's method.
+    least_gap : (n_stator,), m
+        Least gap of each stator where it turns between contacts: how far it is from touching once more; inf
+        where none turns.
+    least_force : (n_stator,), N
+        Least force of each contact where it turns: how far it is from opening once more; inf where none does.
+    events : tuple of ContactEvent
+        Touches, releases and changes of slip over a period.
+    """
+
+    period: int
+    state: State
+    record: Record
+    multipliers: Complexes
+    is_stable: bool
+    monodromy: Floats
+    residual: float
+    iterations: int
+    least_gap: Floats
+    least_force: Floats
+    events: tuple[ContactEvent, ...]
+
+    def __repr__(self) -> str:
+        """One line: period, stability and contacts."""
+        size, kind = abs(self.multipliers[0]), "stable" if self.is_stable else "unstable"
+        touches = sum(event.kind == "touch" for event in self.events)
+        about = f"period {self.period}, {kind} (largest multiplier {size:.4g}), {touches} touches"
+        return f"<PeriodicMotion: {about}>"
+
+
+def find_periodic_motion(
+    setup: Setup,
+    *,
+    clearance: float,
+    friction: float,
+    period: int,
+    repeat: int,
+    recording: Recording,
+    initial: State | Initial,
+) -> PeriodicMotion:
+    """Solve for a periodic motion and record it.
+
+    From a state the search begins there. Else it begins where a simulation has come to after the transient,
+    and takes the first stable motion. Where it fails, the simulation goes on for up to 450 revolutions, from
+    which the search begins anew.
+
+    Parameters
+    ----------
+    clearance : float, m
+        Radial clearance at rest; a stator's `clearance_offset` is added.
+    period : int
+        Revolutions after which the motion is to close.
+    repeat : int
+        Periods recorded, whatever `recording.revolutions`.
+
+    Raises
+    ------
+    InputError
+        The laws of the case have no closed form.
+    NoPeriodicMotion
+        None was found; its text says why.
+    """
+    if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
+        raise InputError(
+            "periodic: it needs motion in closed form between events; take method modal, normal fixed and "
+            "law lagrange"
+        )
+    try:
+        piecewise, orbit = _search(setup, clearance, friction, period, recording, initial)
+    except NoClosedForm:
+        problem = "contacts open and close without end, or in too many combinations"
+        raise NoPeriodicMotion(f"periodic: {problem}; take another case") from None
+    multipliers = orbit.multipliers
+    state = piecewise.march.state_of(orbit.motion, piecewise.contact_force(orbit.states, orbit.motion))
+    growth = math.log(abs(multipliers[0])) / orbit.period if multipliers[0] else -math.inf
+    return PeriodicMotion(
+        period=orbit.period,
+        state=state,
+        record=_record(setup, clearance, friction, state, orbit.period, growth, repeat, recording),
+        multipliers=multipliers,
+        is_stable=bool(abs(multipliers[0]) < 1.0),
+        monodromy=orbit.monodromy,
+        residual=orbit.residual,
+        iterations=orbit.iterations,
+        least_gap=np.min([revolution.least_gap for revolution in orbit.revolutions], axis=0),
+        least_force=np.min([revolution.least_force for revolution in orbit.revolutions], axis=0),
+        events=tuple(_events(piecewise, orbit)),
+    )
+
+
+def _search(
+    setup: ModalSetup,
+    clearance: float,
+    friction: float,
+    period: int,
+    recording: Recording,
+    initial: State | Initial,
+) -> tuple[PiecewiseMotion, Orbit]:
+    """Shoot from the state, then from where a simulation leads to."""
+    if isinstance(initial, State):
+        state, first = fit_to_gaps(initial, setup, clearance), 0
+    else:
+        state, first = start_of(initial, setup, clearance), recording.longest_transient
+    unstable: tuple[PiecewiseMotion, Orbit] | None = None
+    reason = ""
+    for span in (first, *SPANS):
+        piecewise = PiecewiseMotion(setup, clearance, friction, state)
+        if span:
+            ended = pass_revolutions(piecewise.march, recording, span)
+            if ended is not None:
+                reason = ended
+                break
+            state = fit_to_gaps(piecewise.march.final(), setup, clearance)
+            piecewise = PiecewiseMotion(setup, clearance, friction, state)
+        try:
+            orbit = shoot(piecewise, piecewise.start, piecewise.states, period)
+        except NotConverged as problem:
+            reason = reason or str(problem)
+            continue
+        if isinstance(initial, State) or abs(orbit.multipliers[0]) < 1.0:
+            return piecewise, orbit
+        unstable = unstable or (piecewise, orbit)
+    if unstable is not None:
+        return unstable
+    text = f"no motion of period {period} was found: {reason}"
+    raise NoPeriodicMotion(f"periodic: {text}; give another period, or a state near one as initial")
+
+
+def _record(
+    setup: ModalSetup,
+    clearance: float,
+    friction: float,
+    state: State,
+    period: int,
+    growth: float,
+    repeat: int,
+    recording: Recording,
+) -> Record:
+    """Record a period, and repeat it: what is unstable would not stay where it is."""
+    once = replace(
+        recording,
+        transient=0,
+        transient_limit=None,
+        transient_tolerance=None,
+        revolutions=period,
+        keep=("waveform", "section"),
+    )
+    record = run_case(setup, clearance=clearance, friction=friction, recording=once, initial=state)
+    signals = {name: np.tile(v, repeat) for name, v in record.signals.items()}
+    sections = {name: np.tile(v, repeat) for name, v in record.sections.items()}
+    spectra = {f"spectrum_{name}": amplitude_spectrum(values) for name, values in signals.items()}
+    has_touched = bool((record.measures["contact_impulse"] > 0.0).any())
+    measures = record.measures | {
+        "period": period,
+        "regime": REGIME.index("periodic" if has_touched else "no_contact"),
+        "lyapunov_exponent": growth,
+        "settled": 1,
+        "transient_revolutions": 0,
+    }
+    return replace(
+        record,
+        signals=signals if "waveform" in recording.keep else {},
+        spectra=spectra if "spectrum" in recording.keep else {},
+        sections=sections if "section" in recording.keep else {},
+        measures=measures,
+    )
+
+
+def _events(piecewise: PiecewiseMotion, orbit: Orbit) -> list[ContactEvent]:
+    """Events of a period in the order of time."""
+    found = []
+    for i_revolution, revolution in enumerate(orbit.revolutions):
+        for piece in revolution.pieces:
+            time = i_revolution * piecewise.turn + piece.begin + piece.duration
+            if not piece.crossing:
+                continue
+            approach = dict(zip(piece.touching.tolist(), piece.approach.tolist(), strict=True))
+            for i, kind in piecewise.what_changes(piece):
+                found.append(ContactEvent(time, i, kind, approach.get(i, math.nan)))
+    return found

@@ -1,0 +1,104 @@
+"""Derivative of a piecewise motion by its beginning: exponentials, and saltation matrices at events."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.piecewise_motion import Mode, Piece, PiecewiseMotion, Revolution
+
+    Floats = NDArray[np.float64]
+
+NO_IMPULSE = 1e-12  # of the largest impulse of an event
+STOPPED = 1e-9  # of the rim's speed: what slips less after an impact sticks
+
+
+def monodromy(motion: PiecewiseMotion, revolutions: Iterable[Revolution]) -> Floats:
+    """Derivative (2 n, 2 n) of a motion's end by its beginning.
+
+    The product of `exp(A tau)` over the pieces and of the saltation matrices of the events between.
+    """
+    tangent: Floats | None = None
+    for revolution in revolutions:
+        for piece, following in pairwise([*revolution.pieces, None]):
+            assert piece is not None
+            moved = propagator(motion.mode(piece.states), piece.duration)
+            tangent = moved if tangent is None else moved @ tangent
+            if following is not None:
+                tangent = saltate(motion, piece, following, tangent)
+    assert tangent is not None
+    return tangent
+
+
+def propagator(mode: Mode, duration: float) -> Floats:
+    """Derivative (2 n, 2 n) of the motion by that a time (s) before; it keeps closed gaps closed."""
+    size, turn = np.exp(mode.exponent[0] * duration), mode.exponent[1] * duration
+    re, im = size * np.cos(turn), size * np.sin(turn)
+    moved_re, moved_im = mode.shape_re * re - mode.shape_im * im, mode.shape_re * im + mode.shape_im * re
+    return np.asarray(moved_re @ mode.enter_re.T - moved_im @ mode.enter_im.T)
+
+
+def saltate(motion: PiecewiseMotion, piece: Piece, following: Piece, tangent: Floats) -> Floats:
+    """Apply the saltation matrix of the event between two pieces to columns (2 n, k).
+
+    `S = DR + (f+ - DR f-) (grad h)^T / (dh/dt)`, with h the switch function that vanishes, dh/dt its rate
+    before the event, f the rate of the motion and DR the derivative of the impact (Leine and Nijmeijer 2004).
+    """
+    if not motion.has_states and not piece.touching.size:
+        return tangent  # a release: the forces are continuous
+    gradient = motion.gradient(motion.mode(piece.states), piece.crossing) @ tangent
+    impact = Impact(motion, piece)
+    jump = following.rate_begun - impact.apply(piece.rate_before)
+    return impact.apply(tangent) + np.multiply.outer(jump, gradient / piece.switch_rate)
+
+
+class Impact:
+    """Derivative of the velocities after an event by those before: `dv+ = dv- - F (R F)^-1 R dv-`.
+
+    The rows R are those of the gap velocities that impulses change, each times 1 + restitution, and of the
+    slips that they stop; F (n, r) are the directions of these impulses, friction in proportion included.
+    """
+
+    def __init__(self, motion: PiecewiseMotion, piece: Piece) -> None:
+        """Find the impulses behind the change of the velocities."""
+        self._n, bodies = motion.n, motion.bodies
+        change = (piece.after - piece.before)[self._n :]
+        self._direction: Floats | None = None
+        if not piece.touching.size or not change.any():
+            return
+        normal, along = bodies.gap_jacobian, -bodies.slip
+        if motion.has_states:
+            both = np.linalg.lstsq(np.concatenate([normal, along]).T, change, rcond=1e-12)[0]
+            force, traction = np.split(both, 2)
+        else:
+            force = np.linalg.lstsq(bodies.delassus, normal @ change, rcond=1e-12)[0]
+        hit = np.flatnonzero(force > NO_IMPULSE * np.abs(force).max())
+        rows = normal[hit]
+        if motion.has_states:
+            share = traction[hit] / force[hit]
+            moved = bodies.slip[hit] @ piece.after[self._n :]
+            held = np.abs(motion.rim_speed[hit] + moved) <= STOPPED * motion.rim_speed[hit]
+            direction = normal[hit] + np.where(held, 0.0, share)[:, None] * along[hit]
+            direction = np.concatenate([direction, along[hit[held]]])
+            stopped = np.concatenate([rows, along[hit[held]]])
+        else:
+            direction, stopped = bodies.force_direction[hit], rows
+        scale = np.ones(len(stopped))
+        scale[: hit.size] += bodies.restitution
+        self._direction = direction.T
+        self._gain = np.linalg.solve(stopped @ direction.T, scale[:, None] * stopped)
+
+    def apply(self, columns: Floats) -> Floats:
+        """Return columns (2 n, ...) of displacements and velocities after the impact."""
+        if self._direction is None:
+            return columns
+        moved = columns.copy()
+        moved[self._n :] -= self._direction @ (self._gain @ columns[self._n :])
+        return moved

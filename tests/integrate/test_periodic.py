@@ -1,0 +1,118 @@
+"""Periodic motions of the packaged rig: found, recorded, stable or not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import rubhpc
+from rubhpc import LumpedStator, NoPeriodicMotion, RubError, read_rig, simulate
+from rubhpc.errors import InputError
+from rubhpc.schema import REGIME
+
+BITES = {"speed_ratio": 0.75, "clearance": "100 um"}
+SPRINGS = LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)
+RING = replace(read_rig("mokhtar2017"), stator=(SPRINGS,))
+JUMP = {"clearance": 3e-4, "friction": 0.0, "keep": ()}
+
+
+def test_solution_is_what_a_long_simulation_settles_on():
+    motion = rubhpc.periodic("mokhtar2017", **BITES, period=2)
+    record = simulate("mokhtar2017", **BITES, transient=200, revolutions=2)
+    assert (motion.period, motion.is_stable, record.period) == (2, True, 0)
+    assert motion.residual < 1e-10
+    for name in ("vertical", "horizontal", "torsion", "contact_force", "spectrum_torsion"):
+        found, expected = getattr(motion.record, name), getattr(record, name)
+        assert found == pytest.approx(expected, abs=2e-6 * np.abs(expected).max())
+    assert motion.record.peak_contact_force == pytest.approx(record.peak_contact_force, rel=1e-6)
+    assert motion.record.regime == REGIME.index("periodic")
+    assert motion.record.lyapunov_exponent == pytest.approx(np.log(abs(motion.multipliers[0])) / 2)
+    assert [event.kind for event in motion.events] == ["touch", "release"] * 2
+    assert np.array_equal(np.abs(motion.multipliers), np.sort(np.abs(motion.multipliers))[::-1])
+
+
+def test_shortest_period_is_found_and_records_repeat():
+    motion = rubhpc.periodic("mokhtar2017", **BITES, period=4, repeat=3)
+    assert motion.period == 2
+    assert motion.record.vertical.size == 3 * 2 * 256
+    assert np.array_equal(motion.record.vertical[:512], motion.record.vertical[512:1024])
+    amplitude = motion.record.spectrum_vertical
+    assert amplitude[np.arange(amplitude.size) % 3 != 0].max() < 1e-9 * amplitude.max()
+
+
+def test_two_motions_of_one_case():
+    """Besides the motion that repeats itself after two revolutions there is a stable one of a single."""
+    twice = rubhpc.periodic("mokhtar2017", **BITES, period=2)
+    once = rubhpc.periodic("mokhtar2017", **BITES, period=1, initial=twice.state)
+    assert (once.period, once.is_stable) == (1, True)
+    assert simulate("mokhtar2017", **BITES, initial=once.state, transient=20, revolutions=4).period == 1
+
+
+def test_motion_beside_it_draws_near_by_the_largest_multiplier():
+    """From beside the solution along its first direction, over a few periods."""
+    case = {"speed_ratio": 1.32, "keep": ()} | JUMP
+    rub = rubhpc.periodic(RING, **case, initial=followed(RING, 1.32).state)
+    growth = rub.multipliers[0]
+    assert abs(growth.imag) < 1e-12
+    assert rub.is_stable
+    later = [
+        simulate(RING, **case, initial=nudged(rub.state, 1e-3), transient=k, revolutions=1).final
+        for k in (19, 27)
+    ]
+    distance = [np.abs(state.velocity - rub.state.velocity).max() for state in later]
+    assert (distance[1] / distance[0]) ** (1 / 8) == pytest.approx(growth.real, rel=2e-3)
+
+
+def followed(rig, last):
+    """The rub followed up in speed."""
+    motion = None
+    for ratio in np.arange(1.17, last + 1e-9, 0.03):
+        motion = rubhpc.periodic(rig, speed_ratio=ratio, initial=motion and motion.state, **JUMP)
+    return motion
+
+
+def nudged(state, share):
+    return replace(
+        state,
+        rotor_velocity=state.rotor_velocity * (1 + share),
+        stator_velocity=tuple(v * (1 + share) for v in state.stator_velocity),
+    )
+
+
+def test_motion_without_contact_is_the_steady_response():
+    motion = rubhpc.periodic("mokhtar2017", speed_ratio=0.75, clearance="300 um", period=1)
+    assert motion.iterations <= 1
+    assert motion.events == ()
+    assert motion.record.regime == REGIME.index("no_contact")
+    amplitude = motion.record.contact_free_amplitude
+    assert motion.record.peak_to_peak_vertical == pytest.approx(2 * amplitude, rel=1e-3)
+    assert motion.least_gap == pytest.approx([3e-4 - amplitude], rel=1e-2)
+    assert np.isinf(motion.least_force).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"period": 0}, "period: 0 is out of range; it must be from 1 to 64"),
+        ({"repeat": 0}, "repeat: 0 is out of range"),
+        ({"law": "penalty", "stiffness": 1e8}, "it needs motion in closed form"),
+        ({"normal": "updated"}, "it needs motion in closed form"),
+        ({"method": "central-difference"}, "it needs motion in closed form"),
+        ({"initial": 1.0}, "periodic: initial: 1.0 is neither a State nor a dict"),
+        ({"friction": -1.0}, "periodic: friction: -1 is out of range"),
+    ],
+)
+def test_bad_arguments_are_refused(arguments, text):
+    with pytest.raises(InputError, match=text) as caught:
+        rubhpc.periodic("mokhtar2017", **BITES | arguments)
+    assert "\n" not in str(caught.value)
+
+
+def test_failure_says_why():
+    """Near the onset of chaos at 30 GPa nothing of seven revolutions is found."""
+    case = {"speed_ratio": 4.55, "clearance_ratio": 0.7, "friction": 0.3}
+    with pytest.raises(NoPeriodicMotion, match="no motion of period 7 was found: ") as caught:
+        rubhpc.periodic(
+            "mokhtar2017", **case, overrides={"stator.youngs_modulus": "30 GPa"}, period=7, transient=30
+        )
+    assert isinstance(caught.value, RubError)

@@ -1,0 +1,73 @@
+"""Derivatives of a revolution by its beginning, against an integration in all degrees of freedom."""
+
+import numpy as np
+import pytest
+from full_order_flow import FullOrder
+from trial_rig import trial_rig
+
+from rubhpc.fem.assemble import assemble, model_at
+from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
+from rubhpc.fem.statics import sag_at_stators
+from rubhpc.integrate.periodic_motion import find_periodic_motion
+from rubhpc.integrate.piecewise_motion import PiecewiseMotion
+from rubhpc.integrate.saltation import monodromy
+from rubhpc.integrate.setup import prepare
+from rubhpc.rig.reading import with_keys
+from rubhpc.study.initial import Initial
+from rubhpc.study.study import Contact, Integrator, Recording
+
+ALL_MODES = Integrator(accuracy=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("rig", "ratio", "clearance_ratio", "friction"),
+    [
+        (trial_rig(1), 1.4, 0.6, 0.3),
+        (trial_rig(3), 1.3, 0.8, 0.1),
+        (with_keys(trial_rig(2), {"rotor.gravity": "9.81 m/s^2"}), 1.2, 0.7, 0.2),
+        (trial_rig(2, lateral=False), -1.3, 0.7, 0.2),
+    ],
+    ids=["one", "three", "gravity", "backward"],
+)
+def test_periodic_motion_and_its_monodromy_are_those_of_all_degrees_of_freedom(
+    rig, ratio, clearance_ratio, friction
+):
+    model = assemble(rig)
+    spin = ratio * first_lateral_frequency(model)
+    clearance = clearance_ratio * contact_free_amplitude(model, spin)
+    setup = prepare(
+        rig, spin, contact=Contact(), integrator=ALL_MODES, samples_per_revolution=64, model=model
+    )
+    case = {"clearance": clearance, "friction": friction}
+    motion = find_periodic_motion(
+        setup, **case, period=1, repeat=1, recording=Recording(transient=40, keep=()), initial=Initial()
+    )
+    piecewise = PiecewiseMotion(setup, clearance, friction, motion.state)
+    whole = FullOrder(model_at(model, spin), spin, clearance - sag_at_stators(model)[0], friction)
+    basis, n, start = setup.reduced.basis, piecewise.n, piecewise.start
+    closed = tuple(np.flatnonzero(motion.state.contact_force > 0).tolist())
+    size, scale = piecewise.size(start), np.repeat([1 / abs(spin), 1.0], n)
+
+    def follow(reduced):
+        u, v, passed = whole.revolve(basis @ reduced[:n], basis @ reduced[n:], closed)
+        return np.concatenate([setup.reduced.project @ u, setup.reduced.project @ v]), passed
+
+    end, passed = follow(start)
+    assert any(passed)
+    assert passed[0] == passed[-1]
+    assert piecewise.size(end - start) < 1e-7 * size
+
+    mono = monodromy(piecewise, [piecewise.revolve(start, piecewise.states)])
+    random = np.random.default_rng(1)
+    for _ in range(2):
+        direction = random.standard_normal(2 * n) * scale
+        if closed:  # neighbours that keep the closed gaps closed
+            mode = piecewise.mode(piecewise.states)
+            direction = mode.shape_re @ (direction @ mode.enter_re) - mode.shape_im @ (
+                direction @ mode.enter_im
+            )
+        step = 1e-6 * size / piecewise.size(direction) * direction
+        ahead, _ = follow(start + step)
+        behind, _ = follow(start - step)
+        change = piecewise.size((ahead - behind) / 2 - mono @ step)
+        assert change < 1e-5 * piecewise.size(mono @ step)
