@@ -201,7 +201,8 @@ def _linear(inverse: Floats, stiffness: Floats, damping: Floats, force: Floats, 
     damping_values, damping_span = _diagonals(damping)
     skew = 0.5 * (stiffness - stiffness.T)
     skew[abs(skew) <= 1e-12 * abs(stiffness).max()] = 0.0  # rounding of the assembly
-    skew_row, skew_column = np.nonzero(skew)
+    # Contiguous, or the kernels are compiled once more for such rigs.
+    skew_row, skew_column = (np.ascontiguousarray(index) for index in np.nonzero(skew))
     force_row = np.flatnonzero(np.any(force != 0, axis=0))
     return Linear(
         start=start,
