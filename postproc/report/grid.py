@@ -65,10 +65,11 @@ class Measures:
 
     def values(self, name: str) -> NDArray[np.float64]:
         """Return a variable in SI units over the axes, and the stators where it depends on them."""
-        data = self._data[name]
         by_stator = self.is_by_stator(name)
-        dims = (*self._dims, *(("stator",) if by_stator else ()))
-        full = data.broadcast_like(self._data["status"]).transpose(*dims).values.astype(float)
+        sizes = {dim: self._data.sizes[dim] for dim in (*self._dims, *(["stator"] if by_stator else []))}
+        # Coordinates are left out: to align them with themselves takes most of the time of a page.
+        whole = self._data[name].variable.set_dims(sizes)  # type: ignore[no-untyped-call]
+        full: NDArray[np.float64] = whole.values.astype(float)
         if name != "status" and not self._is_setting(name):
             done = self._has_result[..., None] if by_stator else self._has_result
             full = np.where(done & ~self._is_fill(name, full), full, np.nan)
