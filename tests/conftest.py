@@ -41,11 +41,12 @@ SLOW = (
     "storage/test_growth.py",
     "validation/",
 )
-# These start several processes at once, or have deadlines: nothing else may run at the same time.
+# These have deadlines, or start ranks that wait for each other busily: nothing else may run at the same time.
 SERIAL = (
-    "browser/",
     "commands/test_cli.py::test_help_takes_no_time",
-    "faults/",
+    "faults/test_deaths.py::test_a_case",
+    "faults/test_kill_storm.py",
+    "faults/test_stops.py",
     "integrate/test_event_driven_march.py::test_signals_are_answered_however_long_a_revolution_lasts",
     "mpi/",
 )

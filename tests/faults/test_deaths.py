@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from running import each_launcher, run, stored_bytes, write_study
+from running import LAUNCHERS, OWN, each_launcher, run, stored_bytes, write_study
 
 from rubhpc.schema import DONE, FAILED
 from rubhpc.storage.in_progress import InProgress, read_deaths
@@ -38,12 +38,19 @@ def check_outcome(store: Path, reason: str) -> None:
     assert list((store / ".rubhpc" / "in_progress").iterdir()) == []
 
 
-@each_launcher
-def test_a_case_with_a_segmentation_fault_fails_after_two_of_them(tmp_path, launcher):
+@pytest.mark.parametrize(
+    ("launcher", "ranks"),
+    [
+        pytest.param(OWN, 0, id="no launcher"),
+        *(pytest.param(launcher, 2, id=launcher.name, marks=pytest.mark.long) for launcher in LAUNCHERS),
+    ],
+)
+def test_a_case_with_a_segmentation_fault_fails_after_two_of_them(tmp_path, launcher, ranks):
     study, store = write_study(tmp_path, speed_ratio=[0.9]), tmp_path / "tiny.zarr"
-    n_death = runs_until_the_end("segfault", study, store, 2 * GUILTY, ranks=2, launcher=launcher)
+    n_death = runs_until_the_end("segfault", study, store, 2 * GUILTY, ranks=ranks, launcher=launcher)
     check_outcome(store, "its rank died in it 2 times: segmentation fault")
-    print(f"\n{launcher.name}: {GUILTY} cases with a segmentation fault failed after {n_death} deaths")
+    where = f"{launcher.name}, {ranks} ranks"
+    print(f"\n{where}: {GUILTY} cases with a segmentation fault failed after {n_death} deaths")
     healthy = run(study, "--retry-failed")
     assert healthy.returncode == 0, healthy.stderr
     whole = write_study(tmp_path, "whole.toml", speed_ratio=[0.9], output=tmp_path / "whole.zarr")

@@ -30,15 +30,10 @@ def times(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, float], d
     return few, many
 
 
-# Microseconds a case are a timing: they are held on an idle machine, with -m bench.
+# Microseconds a case are a timing: they are held on an idle machine, with `make bench`.
+@pytest.mark.bench
 @pytest.mark.parametrize(
-    ("what", "most"),
-    [
-        ("plan", 10.0),
-        pytest.param("run", 50.0, marks=pytest.mark.bench),
-        ("plan_again", 10.0),
-        ("status", 5.0),
-    ],
+    ("what", "most"), [("plan", 10.0), ("run", 50.0), ("plan_again", 10.0), ("status", 5.0)]
 )
 def test_a_million_cases_take(times, what, most):
     """Plan under 10 s, status under 5 s, and 50 us of a run's time a case."""

@@ -7,7 +7,16 @@ import time
 from typing import TYPE_CHECKING
 
 import pytest
-from running import complaint, each_launcher, journalled_cases, run, start, wait_for_a_case, write_slow_study
+from running import (
+    complaint,
+    each_launcher,
+    journalled_cases,
+    other_launchers,
+    run,
+    start,
+    wait_for_a_case,
+    write_slow_study,
+)
 
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
@@ -59,10 +68,13 @@ def test_a_signal_stops_a_run(tmp_path, number, ranks):
     complete(study, store, ranks=ranks)
 
 
-@each_launcher
+@other_launchers
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGUSR1])
 def test_a_signal_under_any_launcher_loses_nothing(tmp_path, launcher, number):
-    """Open MPI's own mpirun ends with 1 on TERM, whatever its ranks say, and gives them half a second."""
+    """The program's own launcher is in the test above, too.
+
+    Open MPI's own mpirun ends with 1 on TERM, whatever its ranks say, and gives them half a second.
+    """
     study, store = write_slow_study(tmp_path, transient=LONG, block=1), tmp_path / "tiny.zarr"
     job = start(study, ranks=2, launcher=launcher)
     wait_for_a_case(job, store)

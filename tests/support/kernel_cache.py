@@ -14,37 +14,92 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 KERNELS = ROOT / "rubhpc" / "kernels"
 CACHES = ROOT / ".pytest_cache" / "kernels"
-EVERY_SCHEME = """
-import rubhpc
-case = dict(speed_ratio=0.75, clearance_ratio=0.7, transient=1, revolutions=2, samples_per_revolution=32)
-rubhpc.simulate("mokhtar2017", **case)
-rubhpc.simulate("mokhtar2017", **case, friction_law="coulomb")
-rubhpc.simulate("mokhtar2017", **case, normal="updated")
-rubhpc.simulate("mokhtar2017", **case, method="central-difference")
-periodic = dict(speed_ratio=0.75, clearance_ratio=0.9, transient=1, samples_per_revolution=32)
-rubhpc.periodic("mokhtar2017", **periodic)
-rubhpc.periodic("mokhtar2017", **periodic, friction_law="coulomb")
-from rubhpc.integrate.event_driven_march import EventDrivenMarch
-from rubhpc.integrate.neighbour_motions import NeighbourMotions
-from rubhpc.integrate.record import State
-from rubhpc.integrate.setup import prepare
-from rubhpc.study.study import Contact, Integrator
-shared = dict(contact=Contact(), integrator=Integrator(), samples_per_revolution=32)
-setup = prepare(rubhpc.read_rig("mokhtar2017"), 150.0, **shared)
-march = EventDrivenMarch(setup, 1e-4, 0.3, State.at_rest(setup.model), None)
-NeighbourMotions(march).part(1)
-"""
+# What all schemes share is compiled with the first; then two processes compile some 40 s each.
+FIRST = "events"
+SHARES = (
+    ("neighbours", "short steps", "periodic"),
+    ("stick and slip", "central differences", "periodic stick and slip"),
+)
 
 
 def compile_once() -> None:
-    """Compile the kernels into the cache beside their sources, unless it is up to date."""
+    """Compile the kernels into the cache beside their sources, in two processes, unless it is up to date."""
     stamp = CACHES / "compiled"
     if _is_current(stamp):
         return
+    if not _is_begun():
+        assert _start(FIRST).wait() == 0
+        beside, apart = SHARES
+        folder = CACHES / "apart"
+        shutil.rmtree(folder, ignore_errors=True)
+        _copy_to(folder)
+        started = [_start(*beside), _start(*apart, folder=folder)]
+        assert [process.wait() for process in started] == [0, 0]
+        _take_over(folder)
+        shutil.rmtree(folder)
+    assert _start(FIRST, *sum(SHARES, ())).wait() == 0  # loads what there is, compiles what is missing
+    _mark(stamp)
+
+
+def _is_begun() -> bool:
+    """Whether kernels of these sources lie in the cache beside them."""
+    from rubhpc.kernels._jit import _SOURCES
+
+    return any(KERNELS.glob(f"__pycache__/kernels-{_SOURCES[:16]}/*.nbi"))
+
+
+def _start(*schemes: str, folder: Path | None = None) -> subprocess.Popen[bytes]:
+    """Start a process that uses some schemes, with a cache in a folder or else beside the sources."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     environment.pop("NUMBA_CACHE_DIR", None)
-    subprocess.run([sys.executable, "-c", EVERY_SCHEME], env=environment, cwd=ROOT, check=True)
-    _mark(stamp)
+    if folder is not None:
+        environment["NUMBA_CACHE_DIR"] = str(folder)
+    return subprocess.Popen([sys.executable, __file__, *schemes], env=environment, cwd=ROOT)
+
+
+def _take_over(folder: Path) -> None:
+    """Copy the kernels that do not lie beside the sources yet."""
+    for index in folder.rglob("*.nbi"):
+        place = KERNELS / "__pycache__" / index.parent.name
+        place.mkdir(parents=True, exist_ok=True)
+        if not (place / index.name).exists():
+            for file in index.parent.glob(f"{index.stem}.*.nbc"):
+                shutil.copy(file, place)
+            shutil.copy(index, place)
+
+
+def use(scheme: str) -> None:
+    """Compute a short case that needs the kernels of a scheme."""
+    import rubhpc
+
+    case = {"speed_ratio": 0.75, "transient": 1, "samples_per_revolution": 32}
+    options = {
+        "events": {},
+        "stick and slip": {"friction_law": "coulomb"},
+        "short steps": {"normal": "updated"},
+        "central differences": {"method": "central-difference"},
+    }
+    if scheme == "neighbours":
+        _use_neighbours()
+    elif scheme.startswith("periodic"):
+        law = {"friction_law": "coulomb"} if scheme.endswith("slip") else {}
+        rubhpc.periodic("mokhtar2017", **case, clearance_ratio=0.9, **law)
+    else:
+        rubhpc.simulate("mokhtar2017", **case, clearance_ratio=0.7, revolutions=2, **options[scheme])
+
+
+def _use_neighbours() -> None:
+    import rubhpc
+    from rubhpc.integrate.event_driven_march import EventDrivenMarch
+    from rubhpc.integrate.neighbour_motions import NeighbourMotions
+    from rubhpc.integrate.record import State
+    from rubhpc.integrate.setup import prepare
+    from rubhpc.study.study import Contact, Integrator
+
+    shared = {"contact": Contact(), "integrator": Integrator(), "samples_per_revolution": 32}
+    setup = prepare(rubhpc.read_rig("mokhtar2017"), 150.0, **shared)
+    march = EventDrivenMarch(setup, 1e-4, 0.3, State.at_rest(setup.model), None)
+    NeighbourMotions(march).part(1)
 
 
 def use_own_cache(worker: str) -> None:
@@ -80,4 +135,7 @@ def _mark(stamp: Path) -> None:
 
 
 if __name__ == "__main__":
-    compile_once()
+    for name in sys.argv[1:]:
+        use(name)
+    if not sys.argv[1:]:
+        compile_once()

@@ -5,6 +5,7 @@ anisotropic, cross-coupled and damped, several stators, at one node or at many, 
 A few revolutions from rest are compared sample by sample, before any two trajectories could drift apart.
 """
 
+import itertools
 import math
 from functools import lru_cache
 
@@ -68,6 +69,7 @@ def stator(node, degrees, **changed):
 
 MOTIONS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral")
 STIFF = {"youngs_modulus": 2e10, "lateral": False}
+RING = "a ring, and one at another node"
 # name: rotor, stators, speed (rad/s), clearance (m), friction
 CASES = {
     "stepped shaft": (ROTOR, [stator(3, 70)], 300.0, 80e-6, 0.3),
@@ -81,7 +83,7 @@ CASES = {
         0.2,
     ),
     "at two nodes": (ROTOR, [stator(6, 10, radius=0.05), stator(3, 130)], -280.0, 90e-6, 0.25),
-    "a ring, and one at another node": (
+    RING: (
         ROTOR,
         [
             *(stator(3, 120 * i, clearance_offset=(i - 1) * 1e-5) for i in range(3)),
@@ -147,9 +149,20 @@ def check_contacts(record, known):
         assert known["overlap"] > 0.01  # of the time two touch at once
 
 
-@pytest.mark.parametrize("method", ["central-difference", "modal"])
-@pytest.mark.parametrize("normal", ["fixed", "updated"])
-@pytest.mark.parametrize("name", CASES)
+# With several stators and turning normals these take most of the time: `make validation` has them.
+SLOWEST = {
+    *((name, "updated", "central-difference") for name in ("stepped shaft", *list(CASES)[2:4], RING)),
+    (RING, "updated", "usual"),
+}
+
+
+def combinations(*methods):
+    """Every case and normal by some methods; the slowest marked as such."""
+    every = itertools.product(CASES, ("fixed", "updated"), methods)
+    return [pytest.param(*one, marks=[pytest.mark.long] if one in SLOWEST else []) for one in every]
+
+
+@pytest.mark.parametrize(("name", "normal", "method"), combinations("central-difference", "modal"))
 def test_case_follows_the_full_order_solution(name, normal, method):
     known, record = expected(name, normal), solve(name, normal, method)
     for signal in (*MOTIONS, "contact_force"):
@@ -165,11 +178,10 @@ def test_central_difference_is_closer_still_with_the_fixed_normal(name):
         assert distance(getattr(record, signal), known[signal]) < 5e-4, signal
 
 
-@pytest.mark.parametrize("normal", ["fixed", "updated"])
-@pytest.mark.parametrize("name", CASES)
-def test_usual_accuracy_gives_amplitudes_and_impulses(name, normal):
+@pytest.mark.parametrize(("name", "normal", "method"), combinations("usual"))
+def test_usual_accuracy_gives_amplitudes_and_impulses(name, normal, method):
     """By default fast axial waves of the stator are left out: 2 % of its motion at some instants."""
-    known, record = expected(name, normal), solve(name, normal, "usual")
+    known, record = expected(name, normal), solve(name, normal, method)
     for signal in MOTIONS[:3]:
         assert distance(getattr(record, signal), known[signal]) < TOLERANCE, signal
     for signal in MOTIONS:

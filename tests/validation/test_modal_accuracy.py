@@ -72,6 +72,7 @@ def test_central_difference_tends_to_the_modal_answer():
     assert error[-1] < 1e-6
 
 
+@pytest.mark.long
 def test_chaotic_motion_has_the_same_statistics():
     """Two runs part for good; means over blocks of 20 revolutions agree within their own scatter."""
     given = {"speed_ratio": 2.25, "clearance_ratio": 0.95, "samples_per_revolution": 64}
