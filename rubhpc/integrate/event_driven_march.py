@@ -10,7 +10,7 @@ from rubhpc.integrate.measures import new_accumulator
 from rubhpc.integrate.modal_march import ModalMarch
 from rubhpc.kernels.case_progress import MODE_WANTED, closed_pairs
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, find_mode
-from rubhpc.kernels.event_loop import advance
+from rubhpc.kernels.event_loop import advance, event_work
 from rubhpc.kernels.mode_change import change_contacts
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ class EventDrivenMarch(ModalMarch):
     ) -> None:
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(setup, clearance, friction, initial, check)
+        self._event_work = event_work(self._clearance.size)
         self._library = self._find_library(setup, friction)
         self._met = {0, *self._library.alone}  # sets of closed contacts
         mask = self._first_mask(initial)
@@ -143,6 +144,7 @@ class EventDrivenMarch(ModalMarch):
                 self._z,
                 self._z_next,
                 self._motion,
+                self._event_work,
                 self._recorder,
                 samples,
                 accumulator,

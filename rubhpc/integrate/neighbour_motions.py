@@ -21,6 +21,7 @@ from rubhpc.kernels.case_progress import (
     closed_pairs,
     new_progress,
 )
+from rubhpc.kernels.event_loop import event_work
 from rubhpc.kernels.measuring import recorder
 from rubhpc.kernels.separation import Pair, part
 
@@ -51,7 +52,7 @@ class NeighbourMotions:
         self._n_read = N_SPAN
         progress, self._pair.z[0] = march.place()
         begin_in(self._pair.progress[0], progress.mode)
-        self._unrecorded = recorder(q), empty_samples(q, 0), new_accumulator(q)
+        self._unrecorded = event_work(q), recorder(q), empty_samples(q, 0), new_accumulator(q)
 
     def part(self, n_revolution: int) -> float | None:
         """Go on with both; see `lyapunov.Neighbours`. Several spans are passed ahead, all of one length.

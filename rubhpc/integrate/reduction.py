@@ -253,6 +253,7 @@ def kernel_bodies(
 ) -> Reduced:
     """Return the reduced bodies of a case as kernels take them; clearance (q,) and limit in m."""
     gap_jacobian, force_direction, slip = directions(reduced, model, friction)
+    radius = np.array([stator.radius for stator in model.stators])
     return Reduced(
         stiffness=reduced.stiffness,
         damping=reduced.damping,
@@ -262,7 +263,8 @@ def kernel_bodies(
         force_direction=force_direction,
         delassus=gap_jacobian @ force_direction.T,
         friction=np.full(clearance.size, friction),
-        radius=np.array([stator.radius for stator in model.stators]),
+        radius=radius,
+        rim_speed=radius * abs(reduced.spin),
         slip=slip,
         restitution=law.restitution,
         clearance=clearance,

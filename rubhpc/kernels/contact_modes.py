@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -73,13 +73,14 @@ class Reduced(NamedTuple):
     delassus: Floats  # (q, q), gap_jacobian @ force_direction.T, 1/kg
     friction: Floats  # (q,), coefficient, not negative
     radius: Floats  # (q,), m
+    rim_speed: Floats  # (q,), of the steady spin, m/s, not negative
     restitution: float  # normal velocity after an impact over that before it
     clearance: Floats  # (q,), m
     translations: Floats  # (r, n), displacements that none may pass the limit with
     displacement_limit: float  # m
 
 
-@jit_inline_sum
+@jit_lean_sum
 def dot(re: Floats, im: Floats, z_re: Floats, z_im: Floats) -> float:
     """Real part of a row's product with the modal coordinates."""
     total = 0.0
@@ -106,7 +107,7 @@ def propagate(re: Floats, im: Floats, z_re: Floats, z_im: Floats, next_re: Float
         next_im[k] = re[k] * b + im[k] * a
 
 
-@jit_sum
+@jit_lean_sum
 def enter(
     tables: ModeTables, mode: int, clearance: Floats, cosine: float, sine: float, motion: Floats, z: Floats
 ) -> None:
@@ -132,7 +133,7 @@ def enter(
         z[0, first + 1 + i], z[1, first + 1 + i] = clearance[i], 0.0
 
 
-@jit_sum
+@jit_lean_sum
 def find_mode(mask: Ints, wanted: int) -> int:
     """Index of the mode with the wanted set of closed pairs; -1 where it is not tabulated yet."""
     for mode in range(mask.size):

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -64,7 +64,7 @@ MOST_EVENTS = 200_000  # of one call; more is chatter without end
 GAP_TOLERANCE = 1e-13  # m
 
 
-@jit_sum
+@jit_lean_sum
 def advance(
     tables: ModeTables,
     reduced: Reduced,
@@ -75,6 +75,7 @@ def advance(
     z: Floats,
     z_next: Floats,
     motion: Floats,
+    work: EventWork,
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
@@ -107,18 +108,14 @@ def advance(
     power_re, power_im = tables.power_re, tables.power_im
     interval = clock.tick * (1 << clock.sample_level)
     highest_level = power_re.shape[1] - 1
-    work = event_work(reduced.radius.size)
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
-    if is_recorded and progress.wanted < 0:
-        if progress.energy_from < 0:
-            begin_span(tables, z, progress, recorder)
-        begin_contact(tables, reduced, progress.mode, clock.spin, z, z_next, recorder)
+    is_begun = False
     while True:
-        if progress.wanted >= 0 and not enter_wanted(
-            tables, reduced, clock, is_recorded, progress, z, z_next, motion, recorder
-        ):
-            return MODE_WANTED
+        if progress.wanted >= 0 or not is_begun:
+            if not begin_mode(tables, reduced, clock, is_recorded, progress, z, z_next, motion, recorder):
+                return MODE_WANTED
+            is_begun = True
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
         if progress.tick >= last_tick:
             if is_recorded and progress.tick == clock.n_sample << clock.sample_level:
@@ -129,7 +126,7 @@ def advance(
                         z_re,
                         z_im,
                         clock.n_sample,
-                        1,
+                        clock.n_sample + 1 - progress.next_sample,
                         interval,
                         recorder,
                         samples,
@@ -220,14 +217,13 @@ class EventWork(NamedTuple):
     elimination: Floats  # (q, q + 1)
 
 
-@jit_sum
 def event_work(q: int) -> EventWork:
-    """Make the work space of events of q pairs."""
+    """Work space of the events of q pairs."""
     return EventWork(np.zeros(q), np.zeros(q), np.zeros(q), np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1)))
 
 
-@jit_sum
-def enter_wanted(
+@jit_lean_sum
+def begin_mode(
     tables: ModeTables,
     reduced: Reduced,
     clock: Clock,
@@ -238,17 +234,22 @@ def enter_wanted(
     motion: Floats,
     recorder: Recorder,
 ) -> bool:
-    """Enter the contact mode wanted with the reduced motion (2 n,); False where it is not tabulated."""
-    found = find_mode(tables.mask, progress.wanted)
-    if found < 0:
-        return False
-    angle = shaft_angle(clock, progress.tick)
-    enter(tables, found, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
-    progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
-    progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
+    """Enter the contact mode wanted, if any, with the reduced motion (2 n,), and begin to measure it.
+
+    Returns False where the mode is not tabulated.
+    """
+    if progress.wanted >= 0:
+        found = find_mode(tables.mask, progress.wanted)
+        if found < 0:
+            return False
+        angle = shaft_angle(clock, progress.tick)
+        enter(tables, found, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
+        progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
+        progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
     if is_recorded:
-        begin_span(tables, z, progress, recorder)
-        begin_contact(tables, reduced, found, clock.spin, z, z_next, recorder)
+        if progress.energy_from < 0:
+            begin_span(tables, z, progress, recorder)
+        begin_contact(tables, reduced, progress.mode, z, z_next, recorder)
     return True
 
 
@@ -261,7 +262,7 @@ def contact_age(progress: Progress) -> int:
     return floor_log2(max(1, progress.tick - progress.entered))
 
 
-@jit_sum
+@jit_lean_sum
 def note_resolution(
     tables: ModeTables, clock: Clock, highest_level: int, age: int, progress: Progress, z: Floats
 ) -> None:
@@ -305,7 +306,7 @@ def find_crossing(
     return crossing
 
 
-@jit_sum
+@jit_lean_sum
 def take_event(
     tables: ModeTables,
     reduced: Reduced,

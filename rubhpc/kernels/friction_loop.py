@@ -137,7 +137,7 @@ def advance_with_friction(
                         z_re,
                         z_im,
                         clock.n_sample,
-                        1,
+                        clock.n_sample + 1 - progress.next_sample,
                         interval,
                         recorder,
                         samples,

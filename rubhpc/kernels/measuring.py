@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     DRIVE_WORK,
@@ -111,17 +111,46 @@ def take_samples(
 
     `interval` (s) is that between samples, `z` the coordinates at the first of them.
     """
-    q = samples.axial.shape[0]
-    n_row, n_sample = N_ROTOR_ROW + 3 * q, samples.rotor.shape[1]
-    value, last, rotor, axial, lateral = (
+    read_samples(
+        tables.output,
+        mode,
+        z_re,
+        z_im,
+        first,
+        count,
         recorder.value,
-        recorder.last,
         samples.rotor,
         samples.axial,
         samples.lateral,
     )
-    lowest, highest, peak_lateral = accumulator.lowest, accumulator.highest, accumulator.peak_lateral
-    read_outputs(tables.output, mode, z_re, z_im, -(-count * n_row // LANES) * LANES, value)
+    widen_extrema(
+        recorder.value,
+        count,
+        interval,
+        recorder.last,
+        accumulator.lowest,
+        accumulator.highest,
+        accumulator.peak_lateral,
+    )
+
+
+@jit_lean_sum
+def read_samples(
+    output: Floats,
+    mode: int,
+    z_re: Floats,
+    z_im: Floats,
+    first: int,
+    count: int,
+    value: Floats,
+    rotor: Floats,
+    axial: Floats,
+    lateral: Floats,
+) -> None:
+    """Fill `value` with the outputs of `count` samples, and those of the record with the samples."""
+    q = axial.shape[0]
+    n_row, n_sample = N_ROTOR_ROW + 3 * q, rotor.shape[1]
+    read_outputs(output, mode, z_re, z_im, -(-count * n_row // LANES) * LANES, value)
     for j in range(min(count, n_sample - first)):
         start = j * n_row
         rotor[VERTICAL, first + j] = value[start + VERTICAL]
@@ -132,6 +161,21 @@ def take_samples(
             tip = start + N_ROTOR_ROW + 3 * i
             axial[i, first + j] = value[tip]
             lateral[i, first + j] = value[tip + LATERAL_ROW]
+
+
+@jit_lean_sum
+def widen_extrema(
+    value: Floats,
+    count: int,
+    interval: float,
+    last: Floats,
+    lowest: Floats,
+    highest: Floats,
+    peak_lateral: Floats,
+) -> None:
+    """Widen the extrema of the watched signals by `count` samples, an `interval` (s) apart."""
+    q = peak_lateral.size
+    n_row = N_ROTOR_ROW + 3 * q
     for k in range(3 + q):
         tip = N_ROTOR_ROW + 3 * (k - 3)
         row, rate_row = (k, 3 + k) if k < 3 else (tip + LATERAL_ROW, tip + LATERAL_RATE)
@@ -155,18 +199,18 @@ def take_samples(
 
 @jit_inline_sum
 def read_contact(
-    tables: ModeTables, reduced: Reduced, mode: int, i: int, spin: float, z_re: Floats, z_im: Floats
+    tables: ModeTables, reduced: Reduced, mode: int, i: int, z_re: Floats, z_im: Floats
 ) -> tuple[float, float, float, float]:
     """Force (N), its rate, slip speed (m/s) and its rate, of pair i, closed in contact mode `mode`."""
     return (
         dot(tables.switch_re[mode, i], tables.switch_im[mode, i], z_re, z_im),
         dot(tables.rate_re[mode, i], tables.rate_im[mode, i], z_re, z_im),
-        abs(spin) * reduced.radius[i] + dot(tables.slip_re[mode, i], tables.slip_im[mode, i], z_re, z_im),
+        reduced.rim_speed[i] + dot(tables.slip_re[mode, i], tables.slip_im[mode, i], z_re, z_im),
         dot(tables.slip_rate_re[mode, i], tables.slip_rate_im[mode, i], z_re, z_im),
     )
 
 
-@jit_sum
+@jit_inline_sum
 def resolved_contact(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
     """Time, s, over which cubics follow force and slip of the pairs closed in contact mode `mode`."""
     time = np.inf
@@ -181,9 +225,9 @@ def resolved_contact(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) 
     return time
 
 
-@jit_sum
+@jit_inline_sum
 def begin_contact(
-    tables: ModeTables, reduced: Reduced, mode: int, spin: float, z: Floats, calm: Floats, recorder: Recorder
+    tables: ModeTables, reduced: Reduced, mode: int, z: Floats, calm: Floats, recorder: Recorder
 ) -> None:
     """Read the pairs closed in contact mode `mode`, at its beginning or where a record begins.
 
@@ -194,7 +238,7 @@ def begin_contact(
         calm[0, k], calm[1, k] = (0.0, 0.0) if dies else (z[0, k], z[1, k])
     for i in range(reduced.radius.size):
         if (tables.mask[mode] >> i) & 1:
-            force, rate, slip, slip_rate = read_contact(tables, reduced, mode, i, spin, calm[0], calm[1])
+            force, rate, slip, slip_rate = read_contact(tables, reduced, mode, i, calm[0], calm[1])
             recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = force, rate
             recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip, slip_rate
 
@@ -223,9 +267,7 @@ def observe_step(
             continue
         before, rate_before = recorder.node[FORCE, i], recorder.node[FORCE_RATE, i]
         slip_before, slip_rate_before = recorder.node[SLIP, i], recorder.node[SLIP_RATE, i]
-        after, rate_after, slip_after, slip_rate_after = read_contact(
-            tables, reduced, mode, i, spin, z_re, z_im
-        )
+        after, rate_after, slip_after, slip_rate_after = read_contact(tables, reduced, mode, i, z_re, z_im)
         recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = after, rate_after
         recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip_after, slip_rate_after
         bend = step * (rate_before - rate_after)
@@ -249,33 +291,37 @@ def observe_step(
         accumulator.energy[DRIVE_WORK] += reduced.friction[i] * reduced.radius[i] * abs(spin) * impulse
 
 
-@jit_sum
-def energy_forms(tables: ModeTables, mode: int, z: Floats, entry: Floats) -> None:
-    """Fill `entry` (2,), J, with what grows by damping loss and unbalance work in a contact mode."""
+@jit_lean_sum
+def energy_forms(
+    loss_form: Floats, work_re: Floats, work_im: Floats, first: int, mode: int, z: Floats, entry: Floats
+) -> None:
+    """Fill `entry` (2,), J, with what grows by damping loss and unbalance work in a contact mode.
+
+    The arrays are `loss`, `work_re` and `work_im` of the tables, `first` is the mode's number of eigenmodes.
+    """
     m = z.shape[1]
     loss = 0.0
     for part in range(2):
         for k in range(m):
             if z[part, k] != 0.0:
-                row = tables.loss[mode, part * m + k]
+                row = loss_form[mode, part * m + k]
                 along = 0.0
                 for j in range(m):
                     along += row[j] * z[0, j] + row[m + j] * z[1, j]
                 loss += along * z[part, k]
-    first = tables.n_eigenmode[mode]
     cosine, sine = z[0, first], z[1, first]
     work = 0.0
     for part in range(2):  # exp(i angle), then its conjugate
         real, imaginary = 0.0, 0.0
         for k in range(m):
-            a, b = tables.work_re[mode, part, k], tables.work_im[mode, part, k]
+            a, b = work_re[mode, part, k], work_im[mode, part, k]
             real += a * z[0, k] - b * z[1, k]
             imaginary += a * z[1, k] + b * z[0, k]
         work += cosine * real - (sine if part == 0 else -sine) * imaginary
     entry[0], entry[1] = loss, work
 
 
-@jit_sum
+@jit_lean_sum
 def end_span(
     tables: ModeTables,
     clock: Clock,
@@ -290,14 +336,17 @@ def end_span(
     mode = progress.mode
     time = (progress.tick - progress.energy_from) * clock.tick
     loss, work = recorder.entry[0], recorder.entry[1]
-    energy_forms(tables, mode, z, recorder.entry)
+    first = tables.n_eigenmode[mode]
+    energy_forms(tables.loss, tables.work_re, tables.work_im, first, mode, z, recorder.entry)
     accumulator.energy[DAMPING_LOSS] += recorder.entry[0] - loss + tables.steady_power[mode, 0] * time
     accumulator.energy[UNBALANCE_WORK] += recorder.entry[1] - work + tables.steady_power[mode, 1] * time
     progress.energy_from = NONE
 
 
-@jit_sum
+@jit_inline_sum
 def begin_span(tables: ModeTables, z: Floats, progress: Progress, recorder: Recorder) -> None:
     """Begin to add up energies at the tick reached, in the contact mode entered."""
-    energy_forms(tables, progress.mode, z, recorder.entry)
+    mode = progress.mode
+    first = tables.n_eigenmode[mode]
+    energy_forms(tables.loss, tables.work_re, tables.work_im, first, mode, z, recorder.entry)
     progress.energy_from = progress.tick

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import (
     DRIVE_WORK,
     FRICTION_LOSS,
@@ -32,7 +32,7 @@ def product(a: Floats, b: Floats) -> float:
     return total
 
 
-@jit_sum
+@jit_lean_sum
 def change_contacts(
     reduced: Reduced,
     closed: int,
@@ -105,7 +105,7 @@ def change_contacts(
     return remaining
 
 
-@jit_sum
+@jit_inline_sum
 def observe_impact(
     reduced: Reduced, i: int, spin: float, impulse: float, velocity: Floats, accumulator: Accumulator
 ) -> None:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_sum
+from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.case_progress import FINISHED, Clock
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot
 from rubhpc.kernels.event_loop import advance
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.event_loop import EventWork
     from rubhpc.kernels.measuring import Recorder
 
 Floats = NDArray[np.float64]
@@ -35,13 +36,14 @@ class Pair(NamedTuple):
     n_done: Ints  # (1,), spans passed
 
 
-@jit_sum
+@jit_lean_sum
 def part(
     tables: ModeTables,
     reduced: Reduced,
     clock: Clock,
     n_tick: int,
     pair: Pair,
+    work: EventWork,
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
@@ -74,6 +76,7 @@ def part(
                     pair.z[k],
                     pair.z_next,
                     pair.motion[k],
+                    work,
                     recorder,
                     samples,
                     accumulator,
@@ -94,14 +97,14 @@ def part(
     return FINISHED
 
 
-@jit_sum
+@jit_lean_sum
 def read_motion(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
     """Fill `motion` (2 n,) from the modal coordinates of contact mode `mode`."""
     for k in range(motion.size):
         motion[k] = dot(tables.motion_re[mode, k], tables.motion_im[mode, k], z[0], z[1])
 
 
-@jit_sum
+@jit_lean_sum
 def distance(motion: Floats, spin: float) -> float:
     """Root of v'v + spin^2 u'u of the difference of two motions (2, 2 n)."""
     n = motion.shape[1] // 2
@@ -112,7 +115,7 @@ def distance(motion: Floats, spin: float) -> float:
     return float(np.sqrt(square))
 
 
-@jit_sum
+@jit_lean_sum
 def displace(tables: ModeTables, spin: float, pair: Pair) -> None:
     """Make the neighbour the motion itself, a little faster, so that closed gaps stay closed."""
     n = pair.motion.shape[1] // 2
@@ -123,7 +126,7 @@ def displace(tables: ModeTables, spin: float, pair: Pair) -> None:
     pair.progress[1].wanted = tables.mask[pair.progress[0].mode]
 
 
-@jit_sum
+@jit_lean_sum
 def bring_back(tables: ModeTables, ratio: float, pair: Pair) -> None:
     """Take the neighbour to 1 / ratio of its distance from the motion, and the contact forces with it."""
     wanted = 0

@@ -170,7 +170,10 @@ def advance_by_steps(
         is_end = t >= last_tick
         if is_sample and (not is_end or t == end_tick):
             i_sample = t >> clock.sample_level
-            take_samples(tables, 0, z_re, z_im, i_sample, 1, interval, recorder, samples, accumulator)
+            n_taken = i_sample + 1 - progress.next_sample  # 1; the callee would be compiled for a literal
+            take_samples(
+                tables, progress.mode, z_re, z_im, i_sample, n_taken, interval, recorder, samples, accumulator
+            )
             progress.next_sample = i_sample + 1
         if is_end:
             if is_recorded and t == end_tick:

@@ -197,6 +197,12 @@ def read(table, z):
     return table[0].T @ z.real + table[1].T @ z.imag
 
 
+def forms(tables, p, z, entry):
+    """Fill what grows by damping loss and unbalance work, in mode p at the coordinates z."""
+    first = tables.n_eigenmode[p]
+    energy_forms(tables.loss, tables.work_re, tables.work_im, first, p, np.stack([z.real, z.imag]), entry)
+
+
 @pytest.mark.parametrize("mask", MASKS)
 def test_forms_grow_by_the_energy_lost_and_given(case, mask):
     """Powers of damping (with cross-coupled bearings) and unbalance, by Gauss's rule along a motion."""
@@ -220,9 +226,9 @@ def test_forms_grow_by_the_energy_lost_and_given(case, mask):
         "it,it->t", v, np.outer(reduced.force[0], np.cos(turn)) + np.outer(reduced.force[1], np.sin(turn))
     )
     before, after = np.empty(2), np.empty(2)
-    energy_forms(tables, p, np.stack([z.real, z.imag]), before)
+    forms(tables, p, z, before)
     z = z * np.exp(exponent * duration)
-    energy_forms(tables, p, np.stack([z.real, z.imag]), after)
+    forms(tables, p, z, after)
     grown = after - before + tables.steady_power[p] * duration
     assert grown == pytest.approx([lost, given], rel=1e-6)
 

@@ -66,6 +66,12 @@ def test_change_of_a_callee_in_another_file_outdates_the_cache(probe):
     assert end(probe(5, "jit_inline")) == ["10", "0", "twice"]
 
 
+def test_what_only_kernels_call_lies_in_no_cache(probe, tmp_path):
+    """It is compiled into its callers, which are cached."""
+    end(probe(3))
+    assert {path.name.split("-")[0] for path in tmp_path.rglob("*.nb?")} == {"caller.twice"}
+
+
 def test_versions_that_take_turns_keep_their_caches(probe, tmp_path):
     """As installations of two versions in one environment do; of many, the latest four are kept."""
     assert end(probe(3)) == ["6", "0", "twice"]

@@ -29,6 +29,7 @@ def bodies(rng, q, friction=0.0, restitution=0.0):
         delassus=gap_jacobian @ force_direction.T,
         friction=np.full(q, friction),
         radius=np.full(q, 0.06),
+        rim_speed=np.full(q, 0.06 * abs(SPIN)),
         restitution=restitution,
         clearance=np.full(q, 1e-4),
         slip=np.zeros((q, N)),
