@@ -117,7 +117,6 @@ class Scale:
 _SPEEDS = ("speed", "spin_speed")
 _CAPTION_WIDTH = 56  # characters that a column takes
 _MARKUP = re.compile(r"[$\\_]")  # of symbols, which takes no room
-_DEGREES = Scale(180 / math.pi, "°")
 _RPM = Scale(60 / (2 * math.pi), "rpm")  # as speeds are read on a test bench
 
 
@@ -188,8 +187,10 @@ def written_value(coordinate: xr.DataArray) -> str:
     name, value = str(coordinate.name), float(coordinate.values)
     if names := meanings(coordinate):
         return f"{name.replace('_', ' ')} {names[int(value)]}"
-    scale = scale_for(str(coordinate.attrs.get("units", "1")), abs(value))
-    scale = _RPM if name in _SPEEDS else _DEGREES if name.endswith("angle") else scale
+    unit = str(coordinate.attrs.get("units", "1"))
+    if name.endswith("angle") and unit == "rad":
+        return f"{name.replace('_', ' ')} = {math.degrees(value):.4g}°"
+    scale = _RPM if name in _SPEEDS else scale_for(unit, abs(value))
     symbol = f"${_SYMBOLS[name]}$" if name in _SYMBOLS else name.replace("_", " ")
     text = f"{symbol} = {value * scale.factor:.4g} {scale.unit}".rstrip()
     return f"{text} ({of_stators})" if (of_stators := coordinate.attrs.get("of_stators")) else text

@@ -70,6 +70,11 @@ def test_a_long_caption_takes_as_many_lines_as_it_needs():
     ]
 
 
+def test_angles_of_a_caption_are_in_degrees():
+    angle = xr.Dataset(coords={"stator_angle": ((), np.pi / 4, {"units": "rad"})})
+    assert caption(angle) == "stator angle = 45°"
+
+
 @pytest.mark.parametrize("unit", ["m s-1", "kg m-3", "rad s-2", "N m-1", "m", "Pa"])
 def test_a_displayed_unit_can_be_typed_back(unit):
     scale = scale_for(unit, 5e-5 if unit == "m" else 5e5)
