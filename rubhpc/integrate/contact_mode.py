@@ -50,7 +50,11 @@ class ContactMode:
 
 
 def solve_contact_mode(
-    reduced: ReducedModel, gap_jacobian: Floats, force_direction: Floats, mask: int
+    reduced: ReducedModel,
+    gap_jacobian: Floats,
+    force_direction: Floats,
+    mask: int,
+    known: Solved | None = None,
 ) -> ContactMode:
     """Solve the linear system with the pairs of `mask` closed.
 
@@ -72,14 +76,22 @@ def solve_contact_mode(
     if closed.size:
         offset[closed] = -np.linalg.pinv(rate).T
     n_free = tangent.shape[1]
-    exponent, shape, inverse = modes_of(system)
+    exponent, shape, inverse = modes_of(system, known)
     phasor = reduced.force[0] - 1j * reduced.force[1]
     lower = np.concatenate([np.zeros(n_free), project @ phasor])
-    response = np.linalg.solve(1j * reduced.spin * np.eye(2 * n_free) - system, lower)
+    parts = _parts(system) if q > 1 else [np.arange(2 * n_free)]
+    response = np.zeros(2 * n_free, dtype=np.complex128)
+    for rows in parts:
+        if np.any(lower[rows] != 0.0):
+            turned = 1j * reduced.spin * np.eye(rows.size) - system[np.ix_(rows, rows)]
+            response[rows] = np.linalg.solve(turned, lower[rows])
     constant = np.zeros((q, 2 * n_free))
     if closed.size:
         load = -project @ reduced.stiffness @ offset[closed].T
-        constant[closed] = -np.linalg.solve(system, np.vstack([np.zeros_like(load), load])).T
+        loads = np.vstack([np.zeros_like(load), load])
+        for rows in parts:
+            if np.any(loads[rows] != 0.0):
+                constant[np.ix_(closed, rows)] = -np.linalg.solve(system[np.ix_(rows, rows)], loads[rows]).T
     expand = block_diag(tangent, tangent)
     still = constant @ expand.T + np.hstack([offset, np.zeros((q, n))])  # (q, 2 n)
     motion = np.hstack([expand @ shape, (expand @ response)[:, None], still.T])
@@ -182,7 +194,7 @@ def solve_part(part: Floats) -> tuple[Complexes, Complexes, Complexes]:
 def solve_parts(system: Floats) -> Solved:
     """All parts of a system, solved: what `modes_of` looks up, by the bytes of their matrices."""
     parts = (system[np.ix_(rows, rows)] for rows in _parts(system))
-    return {part.tobytes(): solve_part(part) for part in parts}
+    return {key: solve_part(part) for key, part in {part.tobytes(): part for part in parts}.items()}
 
 
 def _parts(system: Floats) -> list[NDArray[np.int64]]:

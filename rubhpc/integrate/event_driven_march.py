@@ -51,7 +51,7 @@ class EventDrivenMarch(ModalMarch):
         super().__init__(setup, clearance, friction, initial, check)
         self._event_work = event_work(self._clearance.size)
         self._library = self._find_library(setup, friction)
-        self._met = {0, *self._library.alone}  # sets of closed contacts
+        self._met = set(self._library.first_masks)  # sets of closed contacts
         mask = self._first_mask(initial)
         self.find(mask)
         self._start(find_mode(self.tables.mask, mask))

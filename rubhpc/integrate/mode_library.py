@@ -13,8 +13,6 @@ from rubhpc.integrate.reduction import ReducedModel, directions
 from rubhpc.kernels.friction_states import FORWARD
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
@@ -38,6 +36,8 @@ class ModeLibrary:
     ----------
     opened : ContactMode
         That with every pair open, which friction does not change.
+    known : Solved
+        The parts of the open set.
     tick : float, s
     sample_level, n_level : int
         2^sample_level ticks are the interval of samples; exponentials are tabulated over 1, 2, ...,
@@ -51,19 +51,21 @@ class ModeLibrary:
         friction: float,
         *,
         opened: ContactMode,
+        known: Solved,
         tick: float,
         sample_level: int,
         n_level: int,
     ) -> None:
-        """Start with every pair open, and with each closed alone."""
+        """Start with every pair open; of one pair also with it closed."""
         self.reduced = reduced
         self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
-        self._opened = opened
-        self.alone = self._masks_alone()
-        modes = [opened, *(self._solved(mask) for mask in self.alone)]
+        self._opened, self._known = opened, known
+        q = len(self.gap_jacobian)
+        self.first_masks = [0] if q > 1 else [0, self._closed]
+        modes = [self._solved(mask) for mask in self.first_masks]
         self.width = self._width([mode.exponent.size for mode in modes])
-        self._tables = TableStack(len(modes), self._most_modes)
+        self._tables = TableStack(1 + q, self._most_modes)
         self.masks = [mode.mask for mode in modes]
         self._exponents: dict[int, tuple[Floats, Floats]] = {}
         for mode in modes:
@@ -104,19 +106,16 @@ class ModeLibrary:
         return self._exponents[mask]
 
     _most_modes = MOST_MODES
-
-    def _masks_alone(self) -> list[int]:
-        """Sets in which one pair alone is closed."""
-        return [1 << i for i in range(len(self.gap_jacobian))]
+    _closed = 1  # set of one pair that is closed
 
     def _width(self, sizes: list[int]) -> int:
         """Width of tables for modes of these sizes and any set that is met later."""
-        return padded_width(sizes, len(self.gap_jacobian))
+        return padded_width(max(sizes), len(self.gap_jacobian))
 
     def _solved(self, mask: int) -> ContactMode:
         if mask == 0:
             return self._opened
-        return solve_contact_mode(self.reduced, self.gap_jacobian, self.force_direction, mask)
+        return solve_contact_mode(self.reduced, self.gap_jacobian, self.force_direction, mask, self._known)
 
     def _slip_rows(self) -> Floats:
         """Slip speed with the motion of each pair that the switch functions do not hold."""
@@ -156,20 +155,20 @@ class FrictionLibrary(ModeLibrary):
         sample_level: int,
         n_level: int,
     ) -> None:
-        """Start with every pair open, and with each sliding alone; `known` are the parts of the open set."""
-        self._pairs, self._known = pairs, known
+        """Start as `ModeLibrary` does, with one pair sliding forward."""
+        self._pairs = pairs
         super().__init__(
             reduced,
             model,
             pairs.friction,
             opened=opened,
+            known=known,
             tick=tick,
             sample_level=sample_level,
             n_level=n_level,
         )
 
-    def _masks_alone(self) -> list[int]:
-        return [FORWARD << 2 * i for i in range(len(self.gap_jacobian))]
+    _closed = FORWARD
 
     def _width(self, sizes: list[int]) -> int:
         return -(-(max(sizes) + SPARE) // LANES) * LANES
@@ -183,15 +182,21 @@ class FrictionLibrary(ModeLibrary):
         return self.slip[:0]
 
 
-def padded_width(sizes: Iterable[int], q: int) -> int:
-    """Width of tables for modes of these sizes: every pair open, and each of the q pairs closed alone."""
-    widest = max(sizes) + (SPARE if q > 1 else 0)
-    return -(-widest // LANES) * LANES
+def padded_width(widest: int, q: int) -> int:
+    """Width of tables for modes of q pairs, up to one of this size; of more pairs the open mode is taken.
+
+    Closing a gap removes a degree of freedom. It adds a coordinate only where a vibration becomes two decays.
+    """
+    return -(-(widest + (SPARE if q > 1 else 0)) // LANES) * LANES
 
 
-def width_without_modes(reduced: ReducedModel, model: Model, friction: float) -> int:
-    """Return the width that the tables of a library would have, which solves no contact mode for it."""
+def width_without_modes(reduced: ReducedModel, model: Model, friction: float, n_open: int) -> int:
+    """Return the width that the tables of a library would have, which solves no contact mode for it.
+
+    `n_open` is the number of coordinates with every pair open.
+    """
     gap_jacobian, force_direction, _ = directions(reduced, model, friction)
     q = len(gap_jacobian)
-    masks = (0, *(1 << i for i in range(q)))
-    return padded_width((count_coordinates(reduced, gap_jacobian, force_direction, m) for m in masks), q)
+    if q > 1:
+        return padded_width(n_open, q)
+    return padded_width(max(n_open, count_coordinates(reduced, gap_jacobian, force_direction, 1)), q)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 MOST_MODES = 256  # sets of closed contacts of one speed and friction
+FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
 MOST_BYTES = 2**30  # of their tables
 GONE = -40.0  # exponent of what has died away
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
@@ -46,7 +47,8 @@ class TableStack:
         if not self._room:
             n_bytes = sum(field.nbytes for field in rows)
             self.n_most = max(self._n_least, min(self.n_most, MOST_BYTES // n_bytes))
-            self._room = [np.empty((self._n_least, *field.shape[1:]), field.dtype) for field in rows]
+            n_room = min(self._n_least, FIRST_ROOM)
+            self._room = [np.empty((n_room, *field.shape[1:]), field.dtype) for field in rows]
         elif self._n_filled == len(self._room[0]):  # twice the room: most books never need it
             n_room = min(2 * self._n_filled, self.n_most)
             self._room = [np.resize(field, (n_room, *field.shape[1:])) for field in self._room]

@@ -107,7 +107,7 @@ class ModalSetup:
     def _opened(self) -> ContactMode:
         """Motion with every pair open, whatever the friction."""
         gap_jacobian, force_direction, _ = directions(self.reduced, self.model, 0.0)
-        return solve_contact_mode(self.reduced, gap_jacobian, force_direction, 0)
+        return solve_contact_mode(self.reduced, gap_jacobian, force_direction, 0, self._known_of_ring)
 
     @cached_property
     def _n_level(self) -> int:
@@ -123,6 +123,7 @@ class ModalSetup:
                 self.model,
                 friction,
                 opened=self._opened,
+                known=self._known_of_ring,
                 tick=self.tick,
                 sample_level=self.sample_level,
                 n_level=self._n_level,
@@ -134,6 +135,11 @@ class ModalSetup:
         """The parts of the system with every pair open."""
         n = self.reduced.stiffness.shape[0]
         return solve_parts(confine(self.reduced, np.zeros((0, n)), np.zeros((n, 0)))[2])
+
+    @property
+    def _known_of_ring(self) -> Solved:
+        """The same of several stators; of one there is little to look up."""
+        return self._known if len(self.model.stators) > 1 else {}
 
     def friction_pairs(self, friction: float) -> FrictionPairs:
         """The pairs of a friction."""
@@ -171,7 +177,9 @@ class ModalSetup:
                 self._opened,
                 self.reduced,
                 directions(self.reduced, self.model, friction)[2],
-                width=library.width if library else width_without_modes(self.reduced, self.model, friction),
+                width=library.width
+                if library
+                else width_without_modes(self.reduced, self.model, friction, self._opened.exponent.size),
                 tick=self.tick,
                 sample_level=self.sample_level,
                 n_level=self._n_level,

@@ -8,9 +8,10 @@ from scipy.linalg import expm
 from trial_rig import trial_rig
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.integrate.contact_mode import solve_contact_mode
+from rubhpc.integrate.contact_mode import confine, solve_contact_mode, solve_parts
 from rubhpc.integrate.mode_library import ModeLibrary
 from rubhpc.integrate.reduction import directions, reduce_model
+from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.contact_modes import (
     LATERAL_RATE,
     LATERAL_ROW,
@@ -23,6 +24,7 @@ from rubhpc.kernels.contact_modes import (
     floor_log2,
 )
 from rubhpc.kernels.measuring import energy_forms
+from rubhpc.study.study import Contact, Integrator
 
 CLEARANCE = np.array([80e-6, 95e-6])
 FRICTION = 0.3
@@ -38,10 +40,12 @@ def case(request):
     reduced = reduce_model(model, spin, 1e-30)
     gap_jacobian, force_direction, _ = directions(reduced, model, FRICTION)
     opened = solve_contact_mode(reduced, gap_jacobian, force_direction, 0)
-    library = ModeLibrary(
-        reduced, model, FRICTION, opened=opened, tick=TICK, sample_level=SAMPLE_LEVEL, n_level=N_LEVEL
-    )
-    library.add(3)
+    n = len(reduced.stiffness)
+    known = solve_parts(confine(reduced, np.zeros((0, n)), np.zeros((n, 0)))[2])
+    settings = {"known": known, "tick": TICK, "sample_level": SAMPLE_LEVEL, "n_level": N_LEVEL}
+    library = ModeLibrary(reduced, model, FRICTION, opened=opened, **settings)
+    for mask in MASKS[1:]:
+        assert library.add(mask)
     return SimpleNamespace(spin=spin, model=model, reduced=reduced, library=library, tables=library.tables())
 
 
@@ -262,6 +266,18 @@ def test_no_switch_function_vanishes_in_the_time_proved(case, mask):
         assert later[:, :-1].min() > 0.0
         granted.append(proved)
     assert len(granted) > 5
+
+
+def test_modes_of_a_ring_are_solved_when_first_met():
+    """Room for them is settled before: the width decides in which order sums are taken."""
+    setup = prepare(
+        trial_rig(3), 150.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
+    )
+    width = setup.open_tables(FRICTION).bound.shape[2]
+    library = setup.library(FRICTION)
+    assert library.masks == [0]
+    assert library.width == width
+    assert all(library.add(mask) for mask in range(1, 8))
 
 
 def test_phase_is_found_by_its_set(case):

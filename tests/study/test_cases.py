@@ -18,6 +18,7 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.rig.reading import read_rig, with_key, with_keys
 from rubhpc.study.cases import CaseGrid
+from rubhpc.study.identity import FRICTION_PHYSICS, PHYSICS, RING_PHYSICS, physics_of
 from rubhpc.study.study import Contact, Integrator, Recording, Run, Study, make_axis
 
 RIG = read_rig("mokhtar2017")
@@ -128,6 +129,15 @@ def test_what_the_rig_says_of_a_key_that_is_an_axis_leaves_the_identity(key, uni
     assert CaseGrid(study(SMALL | {key: [0.06 * unit, 0.07 * unit, 0.05 * unit]})).identity == identity
     assert CaseGrid(study(grid, with_key(RIG, "stator.width", 0.004))).identity != identity
     assert CaseGrid(study(SMALL)).identity != identity
+
+
+def test_versions_of_the_physics_hold_for_what_they_change():
+    """Modes of a ring are solved otherwise than before; results of one stator are what they were."""
+    ring = replace(RIG, stator=(*RIG.stator, replace(RIG.stator[0], angle=1.0)))
+    assert physics_of(study()) == PHYSICS
+    assert physics_of(study(contact=Contact(friction_law="coulomb"))) == FRICTION_PHYSICS
+    assert physics_of(study(rig=ring)) == RING_PHYSICS
+    assert physics_of(study(rig=ring, integrator=Integrator(method="central-difference"))) == PHYSICS
 
 
 def test_ids_do_not_depend_on_the_machine():
