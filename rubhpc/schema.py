@@ -121,8 +121,10 @@ _FLAGS = (
     Variable(name="regime", role="flag", dtype="int8", long_name="regime of the motion", flags=REGIME),
 )
 _MEASURES = (
-    _measure("period", "1", "period in revolutions (0: none up to 16)", dtype="int16"),
+    _measure("period", "1", "period in revolutions (0: none found)", dtype="int16"),
     _measure("lyapunov_exponent", "1", "largest Lyapunov exponent per revolution (NaN: not measured)"),
+    _measure("largest_multiplier", "1", "modulus of the largest Floquet multiplier (NaN: not solved for)"),
+    _measure("multiplier_angle", "rad", "angle of the largest Floquet multiplier, 0 to pi"),
     _measure("whirl_ratio", "1", "whirl at the spin frequency (1: forward circle, -1: backward circle)"),
     _measure("contact_fraction", "1", "fraction of the time in contact", "stator"),
     _measure("stick_fraction", "1", "fraction of the time in contact without slip", "stator"),

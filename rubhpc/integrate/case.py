@@ -23,8 +23,9 @@ from rubhpc.integrate.measures import (
     new_accumulator,
 )
 from rubhpc.integrate.neighbour_motions import NeighbourMotions
+from rubhpc.integrate.proof import Solver
 from rubhpc.integrate.record import Record, State
-from rubhpc.integrate.setup import Scheme
+from rubhpc.integrate.setup import ModalSetup, Scheme
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_transient
 from rubhpc.kernels.accumulators import IMPACT_STEPS
@@ -95,10 +96,10 @@ def run_case(
         return lambda state: march_of(scheme, setup)(setup, clearance, friction, state, check)
 
     try:
-        record = _integrate(starter(setup.scheme), state, setup, clearance, recording)
+        record = _integrate(starter(setup.scheme), state, setup, clearance, friction, recording)
     except NoClosedForm:
         # Contacts that chatter, or too many sets of them: short steps need no events.
-        record = _integrate(starter(Scheme.CONTACT_STEPPING), state, setup, clearance, recording)
+        record = _integrate(starter(Scheme.CONTACT_STEPPING), state, setup, clearance, friction, recording)
         record.measures["left_closed_form"] = 1
     record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - seconds_compiling() - began
@@ -119,11 +120,18 @@ def compile_kernels(
     of them does.
     """
     short = replace(recording, transient=1, revolutions=1)
-    run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)
+    record = run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)
+    if isinstance(setup, ModalSetup) and setup.scheme is Scheme.EVENT_DRIVEN and record.status == DONE:
+        Solver(setup, clearance, friction, record.final)(1)
 
 
 def _integrate(
-    start: Callable[[State], March], initial: State, setup: Setup, clearance: float, recording: Recording
+    start: Callable[[State], March],
+    initial: State,
+    setup: Setup,
+    clearance: float,
+    friction: float,
+    recording: Recording,
 ) -> Record:
     """March through transient and record, then measure."""
     march = start(initial)
@@ -148,6 +156,7 @@ def _integrate(
     else:
         add_sag(samples, accumulator, setup.model)
         signals, final = by_name(samples.whole), march.final()
+        solver = _solver(march, setup, clearance, friction, final)
         record = Record(
             status=DONE,
             samples_per_revolution=per_revolution,
@@ -163,7 +172,8 @@ def _integrate(
                 stators=setup.model.stators,
                 spin=setup.spin,
                 samples_per_revolution=per_revolution,
-                growth=growth(lambda: _neighbours(march, start, final, setup, recording)),
+                growth=growth(lambda: _neighbours(march, solver, start, final, setup, recording)),
+                solve=solver,
             ),
             settings=settings,
             final=final,
@@ -176,10 +186,24 @@ def _integrate(
     return record
 
 
+def _solver(march: March, setup: Setup, clearance: float, friction: float, final: State) -> Solver | None:
+    """What finds periodic motions next to where a march has ended; None where it has no closed form."""
+    if isinstance(march, EventDrivenMarch) and isinstance(setup, ModalSetup):
+        return Solver(setup, clearance, friction, final)
+    return None
+
+
 def _neighbours(
-    march: March, start: Callable[[State], March], final: State, setup: Setup, recording: Recording
+    march: March,
+    solver: Solver | None,
+    start: Callable[[State], March],
+    final: State,
+    setup: Setup,
+    recording: Recording,
 ) -> Neighbours:
     """The motion from where a march has ended, and one beside it."""
+    if solver is not None and solver.has_begun:
+        march = start(final)  # the tables may have been filled anew
     if isinstance(march, EventDrivenMarch) and not isinstance(march, FrictionMarch):
         return NeighbourMotions(march)
     return Marches(start, final, setup, recording)

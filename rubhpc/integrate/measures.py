@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,11 +28,12 @@ from rubhpc.kernels.accumulators import (
 from rubhpc.schema import DIVERGED, VARIABLES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model, StatorModel
+    from rubhpc.integrate.regimes import Solution
     from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
@@ -105,6 +107,7 @@ def measures_of(
     spin: float,
     samples_per_revolution: int,
     growth: Iterable[float],
+    solve: Callable[[int], Solution | None] | None,
 ) -> dict[str, Any]:
     """Measures of a finished case; those of a contact that never happened are zero, or NaN where undefined.
 
@@ -115,6 +118,8 @@ def measures_of(
     spin : float, rad/s
     growth : iterable of float
         How a small displacement grows after the record (`lyapunov.growth`); read where it decides the regime.
+    solve : callable, optional
+        Finds periodic motions (`proof.Solver`).
     """
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution
@@ -123,8 +128,7 @@ def measures_of(
     is_contact = bool(has_touched.any())
     n_contact = np.maximum(accumulator.n_contact, 1)  # one that lasts throughout never begins in the record
     orbit = signals["vertical"], signals["horizontal"], samples_per_revolution
-    orbit_period = period(*orbit)
-    flag, exponent = regime(*orbit, period=orbit_period, is_contact=is_contact, growth=growth)
+    verdict = regime(*orbit, period=period(*orbit), is_contact=is_contact, growth=growth, solve=solve)
     rim = stators[0].radius * signals["torsion"]  # m, as the orbit
     force = signals["contact_force"].reshape(len(stators), n_revolution, samples_per_revolution)
     # Drive and friction exchange a hundred times what the vibration feels of them: only their difference
@@ -138,9 +142,11 @@ def measures_of(
     distance, moved = accumulator.residual.T
     exchanged = max(0.5 * np.abs(flows).sum(), LEAST_EXCHANGE * max(energy), np.finfo(float).tiny)
     return {
-        "period": orbit_period,
-        "regime": flag,
-        "lyapunov_exponent": exponent,
+        "period": verdict.period,
+        "regime": verdict.flag,
+        "lyapunov_exponent": verdict.exponent,
+        "largest_multiplier": abs(verdict.multiplier),
+        "multiplier_angle": cmath.phase(verdict.multiplier),
         "whirl_ratio": whirl_ratio(*orbit, spin),
         "contact_fraction": accumulator.contact_time / duration,
         "stick_fraction": np.divide(
@@ -166,9 +172,11 @@ def measures_of(
             np.stack([*orbit[:2], rim]),
             force.mean(axis=2),
             samples_per_revolution,
-            period=orbit_period,
+            period=verdict.period,
             is_contact=is_contact,
-        ),
+        )
+        if verdict.is_reached
+        else 0,
         "contact_iterations": int(accumulator.pivots[0]),
         "contact_residual": float(np.divide(distance, moved, out=np.zeros(3), where=moved > 0.0).max()),
     }

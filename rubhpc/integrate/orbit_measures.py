@@ -44,6 +44,19 @@ def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) ->
     return 0
 
 
+def ends_change(cycles: Floats, period: int) -> float:
+    """Root mean square distance of the first cycles from those as many whole periods later as there are.
+
+    Parameters
+    ----------
+    cycles : (n_revolution, n)
+        The distance of two is their Euclidean one.
+    """
+    shift = period * ((len(cycles) - 1) // period)
+    change = cycles[shift:] - cycles[: len(cycles) - shift]
+    return math.sqrt((change**2).sum() / len(change))
+
+
 def whirl_ratio(vertical: Floats, horizontal: Floats, samples_per_revolution: int, spin: float) -> float:
     """Sense of the whirl at the spin frequency: 1 on a forward circle, 0 on a line, -1 on a backward circle.
 

@@ -182,7 +182,7 @@ class PiecewiseMotion:
         z[1] += motion @ mode.enter_im
         return z
 
-    def revolve(self, motion: Floats, states: int) -> Revolution:
+    def revolve(self, motion: Floats, states: int, most_events: int = MOST_EVENTS) -> Revolution:
         """Follow a motion (2 n,) with the pairs in these states through one revolution.
 
         Raises
@@ -253,8 +253,8 @@ class PiecewiseMotion:
                 return Revolution(
                     pieces=pieces, end=motion, states=states, least_gap=least_gap, least_force=least_force
                 )
-            if len(pieces) > MOST_EVENTS:
-                raise Unfollowed(f"more than {MOST_EVENTS} events in a revolution")
+            if len(pieces) > most_events:
+                raise Unfollowed(f"more than {most_events} events in a revolution")
 
     def contact_force(self, states: int, motion: Floats) -> Floats:
         """Force of each pair (q,), N, at the angle 0; of a closed one at least the smallest number."""

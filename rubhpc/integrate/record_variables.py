@@ -38,6 +38,8 @@ class RecordVariables:
         regime: int
         period: int
         lyapunov_exponent: float
+        largest_multiplier: float
+        multiplier_angle: float  # rad
         whirl_ratio: float
         contact_fraction: Floats  # (n_stator,)
         stick_fraction: Floats  # (n_stator,)

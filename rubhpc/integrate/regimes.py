@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 from itertools import islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rubhpc.integrate.orbit_measures import LONGEST_PERIOD, PERIOD_TOLERANCE
+from rubhpc.integrate.orbit_measures import LONGEST_PERIOD, PERIOD_TOLERANCE, ends_change
 from rubhpc.schema import REGIME
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
-    from numpy.typing import NDArray
+Floats = NDArray[np.float64]
 
-    Floats = NDArray[np.float64]
-
+MOST_DOUBLED = 2 * LONGEST_PERIOD  # revolutions, to which period doublings are followed
+MOST_DISTANT = 0.1  # of the orbit's size: a record that is farther from a motion does not settle on it
 LEAST_REVOLUTIONS = LONGEST_PERIOD  # of a record without a period that is worth following further
 TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may show a torus, or a longer period, by itself
 N_FIRST, N_ALL, N_MOST = 16, 64, 256  # spans whose growth is measured, each where the last left it open
@@ -29,6 +30,26 @@ SURE = 2.0  # standard errors: an exponent within that is none, too
 NEAR, TWICE, EVEN = 0.21, (1.85, 2.16), 1.5
 
 
+class Solution(NamedTuple):
+    """A periodic motion."""
+
+    period: int  # revolutions
+    multiplier: complex  # the largest
+    section: (
+        Floats  # (period, 2), m, vertical and horizontal at the shaft's angle 0, the end of a record first
+    )
+
+
+class Verdict(NamedTuple):
+    """What a motion is."""
+
+    flag: int  # of `schema.REGIME`
+    period: int  # revolutions; 0: none found
+    exponent: float = math.nan  # largest Lyapunov exponent per revolution, where it had to be measured
+    multiplier: complex = complex(math.nan, math.nan)  # largest, where the periodic motion was solved for
+    is_reached: bool = True  # false where the record still settles on it
+
+
 def regime(
     vertical: Floats,
     horizontal: Floats,
@@ -37,9 +58,12 @@ def regime(
     period: int,
     is_contact: bool,
     growth: Iterable[float],
-) -> tuple[int, float]:
-    """Flag of `schema.REGIME`, and the largest Lyapunov exponent where that had to be measured (else NaN).
+    solve: Callable[[int], Solution | None] | None = None,
+) -> Verdict:
+    """Judge a record.
 
+    A record that looks periodic is so if a stable periodic motion is found next to its end, which the record
+    agrees with or draws near to. Where motions cannot be solved for, it is taken for what it looks like.
     A record shorter than 16 revolutions without a period leaves the motion undecided: it is too short for
     some periods. From 16 to 31 the growth alone decides, for it is measured beyond the record; a longer
     record may show a torus, or a period beyond 16, by itself.
@@ -48,22 +72,94 @@ def regime(
     ----------
     vertical, horizontal : (n_revolution * samples_per_revolution,), m
     period : int
-        Revolutions, or 0 where there is no period up to 16.
+        Revolutions after which the record looks the same, or 0 where there are none up to 16.
     growth : iterable of float
         Growth of a small displacement per revolution, span by span; read only where it is needed.
+    solve : callable, optional
+        Finds the motion of a period next to the end of the record (`proof.Solver`).
     """
     if not is_contact:
-        return REGIME.index("no_contact"), math.nan
+        return Verdict(REGIME.index("no_contact"), period)
+    orbit = _Orbit(vertical, horizontal, samples_per_revolution)
+    periodic = REGIME.index("periodic")
+    is_open = False  # looks periodic, but no solution is found that would decide
     if period > 0:
-        return REGIME.index("periodic"), math.nan
-    if vertical.size < LEAST_REVOLUTIONS * samples_per_revolution:
-        return REGIME.index("undecided"), math.nan
-    distances = None
-    if vertical.size >= TORUS_REVOLUTIONS * samples_per_revolution:
+        verdict = _proved(orbit, period, solve)
+        is_open = verdict is not None and solve is not None and math.isnan(abs(verdict.multiplier))
+        if verdict is not None and (not is_open or orbit.n_revolution < LEAST_REVOLUTIONS):
+            return verdict
+    if orbit.n_revolution < LEAST_REVOLUTIONS:
+        return Verdict(REGIME.index("undecided"), 0)
+    distances, nearest = None, 0
+    if orbit.n_revolution >= TORUS_REVOLUTIONS:
         distances = cycle_distances(vertical, horizontal, samples_per_revolution)
-        size = float(np.var(vertical) + np.var(horizontal))
-        if returns(distances).min() <= PERIOD_TOLERANCE**2 * size:
-            return REGIME.index("periodic"), math.nan  # of more than 16 revolutions
+        square = returns(distances)
+        nearest = int(square.argmin()) + 1
+        if period == 0 and square.min() <= PERIOD_TOLERANCE**2 * orbit.size**2:
+            verdict = _proved(orbit, nearest, solve)
+            if verdict is not None:
+                is_solved = not math.isnan(abs(verdict.multiplier))
+                return verdict if is_solved else Verdict(periodic, 0)
+    flag, exponent = by_growth(growth, None if is_open else distances)
+    if is_open and flag != REGIME.index("chaotic"):
+        return Verdict(periodic, period, exponent)
+    is_regular = flag in (periodic, REGIME.index("quasi_periodic"))
+    if solve and is_regular and period == 0 and nearest > LONGEST_PERIOD // 2:
+        verdict = _proved(orbit, nearest, solve)
+        if verdict is not None and not math.isnan(abs(verdict.multiplier)):
+            return verdict._replace(exponent=exponent)
+    return Verdict(flag, 0, exponent)
+
+
+class _Orbit:
+    """A recorded orbit, its section and size."""
+
+    def __init__(self, vertical: Floats, horizontal: Floats, samples_per_revolution: int) -> None:
+        self.signals = np.stack([vertical, horizontal])
+        self.n_revolution = vertical.size // samples_per_revolution
+        self.size = math.sqrt(float(self.signals.var(axis=1).sum()))
+        self.section = self.signals[:, ::samples_per_revolution].T
+        self.cycles = self.signals.reshape(2, self.n_revolution, -1).swapaxes(0, 1)
+
+    def distances(self, solution: Solution) -> Floats:
+        """Distance of each section point from that of a solution, over the size of the orbit."""
+        place = (np.arange(self.n_revolution) - self.n_revolution) % solution.period
+        apart = np.linalg.norm(self.section - solution.section[place], axis=1)
+        return np.asarray(apart / max(self.size, np.finfo(float).tiny))
+
+    def has_equal_ends(self, period: int) -> bool:
+        """Whether the first cycles are those as many whole periods later as there are."""
+        change = ends_change(self.cycles.reshape(self.n_revolution, -1), period)
+        return change <= PERIOD_TOLERANCE * self.size * math.sqrt(self.cycles.shape[2])
+
+
+def _proved(orbit: _Orbit, period: int, solve: Callable[[int], Solution | None] | None) -> Verdict | None:
+    """Judge a record that looks periodic; None where it is not.
+
+    An unstable motion whose disturbances change sides in every period is followed to twice its period.
+    """
+    periodic = REGIME.index("periodic")
+    if solve is None:
+        return Verdict(periodic, period)
+    found = solve(period)
+    asked = period
+    while found is not None and found.multiplier.real < -1.0 and asked < MOST_DOUBLED:
+        asked = 2 * asked
+        found = solve(asked)
+    if found is None:
+        return Verdict(periodic, period) if orbit.has_equal_ends(period) else None
+    if abs(found.multiplier) >= 1.0:
+        return None
+    apart = orbit.distances(found)
+    first, last = apart[: found.period].max(), apart[-found.period :].max()
+    if last > PERIOD_TOLERANCE and (last > MOST_DISTANT or last > first):
+        return None
+    upper = complex(found.multiplier.real, abs(found.multiplier.imag))
+    return Verdict(periodic, found.period, multiplier=upper, is_reached=last <= PERIOD_TOLERANCE)
+
+
+def by_growth(growth: Iterable[float], distances: Floats | None) -> tuple[int, float]:
+    """Judge by how neighbours part: flag of `schema.REGIME`, and the largest Lyapunov exponent or NaN."""
     spans = iter(growth)
     grown = list(islice(spans, N_FIRST))
     if len(grown) == N_FIRST and abs(np.mean(grown)) < CLEAR:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.orbit_measures import PERIOD_TOLERANCE
+from rubhpc.integrate.orbit_measures import PERIOD_TOLERANCE, ends_change
 from rubhpc.integrate.regimes import LEAST_REVOLUTIONS
 
 if TYPE_CHECKING:
@@ -64,19 +64,6 @@ def settled(
         least = MOST_CHANGE * float(impulse.mean(axis=1).sum())
         is_settled = is_settled and shift <= max(MOST_SHIFT * _typical(deviation), least)
     return int(is_settled)
-
-
-def ends_change(cycles: Floats, period: int) -> float:
-    """Root mean square distance of the first cycles from those as many whole periods later as there are.
-
-    Parameters
-    ----------
-    cycles : (n_revolution, n)
-        The distance of two is their Euclidean one.
-    """
-    shift = period * ((len(cycles) - 1) // period)
-    change = cycles[shift:] - cycles[: len(cycles) - shift]
-    return math.sqrt((change**2).sum() / len(change))
 
 
 def halves(values: Floats) -> tuple[float, tuple[float, float]]:

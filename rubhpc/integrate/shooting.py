@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.piecewise_motion import PiecewiseMotion, Revolution, Unfollowed
+from rubhpc.integrate.piecewise_motion import MOST_EVENTS, PiecewiseMotion, Revolution, Unfollowed
 from rubhpc.integrate.saltation import monodromy
 
 if TYPE_CHECKING:
@@ -67,12 +67,14 @@ class Orbit:
 class _Trial:
     """A beginning, where it leads in the revolutions asked for, and how far that is from it."""
 
-    def __init__(self, piecewise: PiecewiseMotion, motion: Floats, states: int, period: int) -> None:
+    def __init__(
+        self, piecewise: PiecewiseMotion, motion: Floats, states: int, period: int, most_events: int
+    ) -> None:
         self.motion, self.states = motion, states
         self.revolutions: list[Revolution] = []
         self.end, self.end_states = motion, states
         for _ in range(period):
-            revolution = piecewise.revolve(self.end, self.end_states)
+            revolution = piecewise.revolve(self.end, self.end_states, most_events)
             self.revolutions.append(revolution)
             self.end, self.end_states = revolution.end, revolution.states
         self.defect = self.end - motion
@@ -80,7 +82,16 @@ class _Trial:
         self.residual = piecewise.size(self.defect) / scale
 
 
-def shoot(piecewise: PiecewiseMotion, motion: Floats, states: int, period: int) -> Orbit:
+def shoot(
+    piecewise: PiecewiseMotion,
+    motion: Floats,
+    states: int,
+    period: int,
+    *,
+    most_iterations: int = MOST_ITERATIONS,
+    least_step: float = LEAST_STEP,
+    most_events: int = MOST_EVENTS,
+) -> Orbit:
     """Find the periodic motion near a beginning.
 
     Newton's method on `P(x) - x = 0`, with the exact derivative of P, the motion after `period` revolutions.
@@ -90,6 +101,12 @@ def shoot(piecewise: PiecewiseMotion, motion: Floats, states: int, period: int) 
     ----------
     motion : (2 n,)
         Reduced displacements and velocities at the shaft's angle 0; `states` are those of the pairs.
+    most_iterations : int
+        Newton steps after which the search is given up.
+    least_step : float
+        Share of Newton's step that is tried last.
+    most_events : int
+        In a revolution; a motion with more is not followed.
 
     Returns
     -------
@@ -103,17 +120,17 @@ def shoot(piecewise: PiecewiseMotion, motion: Floats, states: int, period: int) 
     """
     identity = np.eye(2 * piecewise.n)
     try:
-        trial = _Trial(piecewise, motion, states, period)
+        trial = _Trial(piecewise, motion, states, period, most_events)
     except Unfollowed as problem:
         raise NotConverged(str(problem)) from None
     derivative, is_fresh = None, False
-    for iteration in range(MOST_ITERATIONS):
+    for iteration in range(most_iterations):
         if trial.end_states == trial.states and trial.residual <= CONVERGED:
             return _settled(piecewise, trial, derivative if is_fresh else None, iteration)
         if derivative is None:
             derivative, is_fresh = monodromy(piecewise, trial.revolutions), True
         step = _solved(identity - derivative, trial.defect)
-        better = _shortened(piecewise, trial, step, period)
+        better = _shortened(piecewise, trial, step, least_step, most_events)
         if better is None:
             if not is_fresh:
                 derivative = None
@@ -124,7 +141,7 @@ def shoot(piecewise: PiecewiseMotion, motion: Floats, states: int, period: int) 
         if better.residual > FAST * trial.residual:
             derivative = None
         is_fresh, trial = False, better
-    raise NotConverged(f"no convergence within {MOST_ITERATIONS} iterations, residual {trial.residual:.2g}")
+    raise NotConverged(f"no convergence within {most_iterations} iterations, residual {trial.residual:.2g}")
 
 
 def _solved(matrix: Floats, defect: Floats) -> Floats:
@@ -135,16 +152,18 @@ def _solved(matrix: Floats, defect: Floats) -> Floats:
         return np.asarray(np.linalg.lstsq(matrix, defect, rcond=1e-12)[0])
 
 
-def _shortened(piecewise: PiecewiseMotion, trial: _Trial, step: Floats, period: int) -> _Trial | None:
+def _shortened(
+    piecewise: PiecewiseMotion, trial: _Trial, step: Floats, least_step: float, most_events: int
+) -> _Trial | None:
     """Return the trial a share of a step further that is nearer to closing; None where none is.
 
     It begins with the states of the trial before, or with those in which that ended.
     """
-    share = 1.0
-    while share >= LEAST_STEP:
+    share, period = 1.0, len(trial.revolutions)
+    while share >= least_step:
         for states in dict.fromkeys((trial.end_states, trial.states)):
             try:
-                found = _Trial(piecewise, trial.motion + share * step, states, period)
+                found = _Trial(piecewise, trial.motion + share * step, states, period, most_events)
             except Unfollowed:
                 continue
             if found.residual < (1.0 - 0.25 * share) * trial.residual:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before
-FRICTION_PHYSICS = 5  # that of set-valued friction from event to event
-RING_PHYSICS = 6  # that of several stators in the modal scheme; the next version of all is 7
+RING_PHYSICS = 6  # that of several stators in the modal scheme
+CLOSED_FORM_PHYSICS = 7  # that of motion from event to event; the next version of all is 8
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 _AXIS = "axis"  # in place of a value that every case sets
 
@@ -24,10 +24,10 @@ def physics_of(study: Study) -> int:
     """Version of the physics with which a study is computed."""
     contact = study.contact
     is_modal = study.integrator.method == "modal"
+    if is_modal and contact.closed_form == "always":
+        return max(PHYSICS, CLOSED_FORM_PHYSICS)
     if is_modal and len(study.rig.stator) > 1:
         return max(PHYSICS, RING_PHYSICS)
-    if is_modal and contact.closed_form == "always" and contact.friction_law != "sliding":
-        return max(PHYSICS, FRICTION_PHYSICS)
     return PHYSICS
 
 

@@ -6,7 +6,7 @@ from itertools import repeat
 import numpy as np
 import pytest
 
-from rubhpc.integrate.regimes import cycle_distances, is_torus, regime
+from rubhpc.integrate.regimes import Solution, cycle_distances, is_torus, regime
 from rubhpc.schema import REGIME
 
 SAMPLES, REVOLUTIONS = 64, 64
@@ -44,10 +44,8 @@ def unread():
 
 
 def of(whirl, growth, *, period=0, is_contact=True):
-    flag, exponent = regime(
-        whirl.real, whirl.imag, SAMPLES, period=period, is_contact=is_contact, growth=growth
-    )
-    return REGIME[flag], exponent
+    verdict = regime(whirl.real, whirl.imag, SAMPLES, period=period, is_contact=is_contact, growth=growth)
+    return REGIME[verdict.flag], verdict.exponent
 
 
 @pytest.mark.parametrize("period", [0, 1, 16])
@@ -152,3 +150,93 @@ def test_motion_next_to_one_that_runs_away_stays_undecided():
     name, exponent = of(swollen(logistic(4.0)), iter([0.3] * 5))
     assert name == "undecided"
     assert math.isnan(exponent)
+
+
+def closing(period, multiplier, whirl, shift=0.0):
+    """Solver that finds the motion of these cycles, `shift` (of the whirl's size) apart from its section."""
+    section = whirl[::SAMPLES][-period:] + shift
+    return lambda asked: Solution(period, multiplier, np.column_stack([section.real, section.imag]))
+
+
+def judged(whirl, solve, *, period=3, growth=None):
+    verdict = regime(
+        whirl.real,
+        whirl.imag,
+        SAMPLES,
+        period=period,
+        is_contact=True,
+        growth=unread() if growth is None else growth,
+        solve=solve,
+    )
+    return REGIME[verdict.flag], verdict
+
+
+def test_record_that_agrees_with_a_stable_solution_is_periodic():
+    whirl = torus(1 / 3)
+    name, verdict = judged(whirl, closing(3, 0.3 - 0.4j, whirl))
+    assert (name, verdict.period, verdict.is_reached) == ("periodic", 3, True)
+    assert verdict.multiplier == 0.3 + 0.4j
+    assert math.isnan(verdict.exponent)
+
+
+def test_period_is_that_of_the_solution():
+    """What looks like six revolutions within 1 % is one of three."""
+    whirl = torus(1 / 3)
+    assert judged(whirl, closing(3, 0.9, whirl), period=6)[1].period == 3
+
+
+def test_orbit_that_drifts_along_a_torus_is_not_periodic():
+    """What it looks like for neighbouring cycles is an unstable motion inside."""
+    whirl = torus(1 / 3 + 1e-4)
+    name, verdict = judged(whirl, closing(3, 1.02j, whirl), growth=iter([0.0] * 64))
+    assert (name, verdict.period) == ("quasi_periodic", 0)
+    assert math.isnan(abs(verdict.multiplier))
+
+
+def test_weak_chaos_is_not_periodic_for_a_tolerance():
+    whirl = torus(1 / 3)
+    for solve in (lambda asked: None, closing(3, 1.1, whirl)):
+        name, verdict = judged(whirl, solve, growth=iter([0.1] * 16))
+        assert (name, verdict.period, verdict.exponent) == ("chaotic", 0, pytest.approx(0.1))
+
+
+def test_another_motion_proves_nothing():
+    whirl = torus(1 / 3)
+    name, verdict = judged(whirl, closing(3, 0.5, whirl, shift=0.5), growth=iter([0.1] * 16))
+    assert (name, verdict.period) == ("chaotic", 0)
+
+
+def test_record_that_draws_near_is_periodic_but_has_not_settled():
+    decay = np.exp(-TURN / (2 * math.pi * 40))  # to 0.2 within the record
+    steady = np.exp(1j * TURN)
+    name, verdict = judged(steady * (1 + 0.2 * decay), closing(1, 0.98, steady), period=1)
+    assert (name, verdict.period, verdict.is_reached) == ("periodic", 1, False)
+
+
+def test_motion_that_has_doubled_its_period_is_followed():
+    whirl, asked = torus(1 / 2, amount=0.004), []
+
+    def solve(period):
+        asked.append(period)
+        return closing(period, -1.2 if period == 1 else 0.7, whirl)(period)
+
+    assert judged(whirl, solve, period=1)[1].period == 2
+    assert asked == [1, 2]
+    asked.clear()
+    name, _ = judged(
+        whirl, lambda n: asked.append(n) or closing(1, -1.2, whirl)(n), period=1, growth=iter([])
+    )
+    assert name == "undecided"
+    assert asked == [1, 2, 4, 8, 16, 32]
+
+
+def test_without_a_solution_the_growth_has_the_last_word():
+    whirl = torus(1 / 3)
+    name, verdict = judged(whirl, lambda asked: None, growth=iter([-0.1] * 16))
+    assert (name, verdict.period, verdict.exponent) == ("periodic", 3, pytest.approx(-0.1))
+
+
+def test_short_record_with_a_period_and_no_solution_is_what_it_looks_like():
+    whirl = torus(1 / 3)[: 8 * SAMPLES]
+    name, verdict = judged(whirl, lambda asked: None)
+    assert (name, verdict.period) == ("periodic", 3)
