@@ -129,7 +129,7 @@ def test_a_study_of_laws_runs_is_selected_by_name_and_recomputed(tmp_path):
     assert run(study, quiet=True).counts[1] == 2
     assert not verify(study.output)
     with xr.open_zarr(study.output) as store:
-        assert store.contact_law.attrs["flag_meanings"] == "lagrange penalty"
+        assert store.contact_law.attrs["flag_meanings"].split()[:2] == ["lagrange", "penalty"]
         assert store.attrs["study"]["grid"]["contact.law"]["values"] == ["lagrange", "penalty"]
         for i, (law, stated) in enumerate(
             (("lagrange", ""), ("penalty", 'law = "penalty"\nstiffness = 1e7'))
