@@ -9,14 +9,14 @@ import numpy as np
 from rubhpc.schema import DONE, FAILED, MISSING
 from rubhpc.storage.disk import disk_errors, remove
 from rubhpc.storage.in_progress import forget
-from rubhpc.storage.journal import count
+from rubhpc.storage.ledger import count
 from rubhpc.storage.lock import InUse
 from rubhpc.storage.store import Store
 from rubhpc.storage.summary import Summary
 
 if TYPE_CHECKING:
     from rubhpc.running.job import Job, RunRequest
-    from rubhpc.storage.journal import Ledger
+    from rubhpc.storage.ledger import Ledger
 
 _REASONS = 100  # failed cases a summary names, at most
 

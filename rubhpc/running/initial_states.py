@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.storage.journal import Entry, Ledger
+    from rubhpc.storage.journal import Entry
+    from rubhpc.storage.ledger import Ledger
     from rubhpc.storage.store import Store
     from rubhpc.study.cases import Case, CaseGrid
 

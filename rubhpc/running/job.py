@@ -15,7 +15,7 @@ from rubhpc.running.worker import set_up
 from rubhpc.schema import FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.in_progress import forget, read_deaths
-from rubhpc.storage.journal import Entry, Ledger, next_run
+from rubhpc.storage.journal import Entry, next_run
 from rubhpc.storage.lock import InUse
 from rubhpc.storage.parts import Shares
 from rubhpc.storage.resume import (
@@ -33,6 +33,7 @@ from rubhpc.study.parts import share_out
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from rubhpc.storage.ledger import Ledger
     from rubhpc.storage.lock import Lock
     from rubhpc.storage.store import Store
     from rubhpc.study.cases import Block

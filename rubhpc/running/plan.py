@@ -12,7 +12,7 @@ from rubhpc.running.pilots import count_preparations, seconds_of, time_pilots
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 from rubhpc.storage.duration import duration
 from rubhpc.storage.growth import origins
-from rubhpc.storage.journal import count
+from rubhpc.storage.ledger import count
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.parts import Shares
 from rubhpc.storage.resume import cases_without_files, grid_for, is_store, missing_share

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from rubhpc.rig.rig import Rig
     from rubhpc.running.stopping import Stopping
     from rubhpc.running.watchdog import Watchdog
-    from rubhpc.storage.journal import Journal, Ledger
+    from rubhpc.storage.journal import Journal
+    from rubhpc.storage.ledger import Ledger
     from rubhpc.storage.store import Store
     from rubhpc.study.cases import Block, Case, CaseGrid
     from rubhpc.study.study import Study

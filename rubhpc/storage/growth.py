@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.storage.journal import Ledger
+    from rubhpc.storage.ledger import Ledger
     from rubhpc.study.cases import CaseGrid
 
 _HELD = 64  # blocks of the old grid kept in memory: a new block is made of few old ones

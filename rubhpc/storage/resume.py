@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.schema import Variable
-    from rubhpc.storage.journal import Ledger
+    from rubhpc.storage.ledger import Ledger
     from rubhpc.study.cases import Block
     from rubhpc.study.study import Study
 

@@ -11,7 +11,7 @@ import numpy as np
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
 from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.duration import duration
-from rubhpc.storage.journal import count, replay
+from rubhpc.storage.ledger import count, replay
 from rubhpc.storage.lock import is_alive, read_holder
 from rubhpc.storage.manifest import PRIVATE, Manifest
 from rubhpc.storage.parts import Parts
@@ -19,7 +19,7 @@ from rubhpc.storage.parts import Parts
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rubhpc.storage.journal import Ledger
+    from rubhpc.storage.ledger import Ledger
     from rubhpc.storage.lock import Holder
 
 _SHOWN = 10  # failed cases named

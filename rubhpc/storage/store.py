@@ -26,7 +26,8 @@ from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.storage import layout
 from rubhpc.storage.block_files import BlockFiles
 from rubhpc.storage.disk import disk_errors, read_regular, remove, write_whole
-from rubhpc.storage.journal import Entry, Journal, Ledger, journals, replay
+from rubhpc.storage.journal import Entry, Journal, journals
+from rubhpc.storage.ledger import Ledger, replay
 from rubhpc.storage.lock import Lock, process_state
 from rubhpc.storage.manifest import GROWTH, PRIVATE, Manifest
 from rubhpc.storage.parts import Parts

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.storage.journal import Ledger
+    from rubhpc.storage.ledger import Ledger
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, case_measures
-from rubhpc.storage.journal import Entry, Header, Journal, journals, next_run, replay
+from rubhpc.storage.journal import Entry, Header, Journal, journals, next_run
+from rubhpc.storage.ledger import replay
 from rubhpc.storage.measures import measures_type, unlisted_measures
 from rubhpc.study.points import Points
 
