@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import click
@@ -13,6 +14,7 @@ from rubhpc.running.launch import end_with_launcher, launch
 _OUTPUT = click.option(
     "--output", type=click.Path(path_type=Path), metavar="STORE", help="The store, instead of the study's."
 )
+_WHOLE_START = 1.5  # over reading a study: kernels loaded, the store made and ended
 _TRUST = click.option(
     "--trust-rig", is_flag=True, help='Run the Python code of a study whose rig is "FILE.py:FUNCTION".'
 )
@@ -122,7 +124,9 @@ def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) ->
     from rubhpc.running.plan import make_plan
     from rubhpc.study.study import read_study
 
-    click.echo(make_plan(read_study(study, output, trust_rig=trust_rig), part).text())
+    what = read_study(study, output, trust_rig=trust_rig)
+    start_up = _WHOLE_START * time.process_time()
+    click.echo(make_plan(what, part, start_up=start_up).text())
     return 0
 
 

@@ -49,6 +49,8 @@ class Plan:
         Predicted integration steps of what is missing.
     core_hours : float
         For what is missing, from the pilot cases; NaN where they failed.
+    start_up : float
+        Processor seconds that each process takes to start and to end, about; 0 where that is unknown.
     failures : tuple of str
         Coordinates of the pilot cases that failed, and why.
     warnings : tuple of str
@@ -69,6 +71,7 @@ class Plan:
     n_byte: int
     steps: int
     core_hours: float
+    start_up: float = 0.0
     failures: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     part: str = ""
@@ -98,6 +101,8 @@ class Plan:
             if math.isfinite(self.core_hours)
             else "core-hours unknown: the pilot cases failed"
         )
+        if self.start_up > 0.0 and self.counts[MISSING]:
+            cost += f", and {self.start_up:.1f} s to start each process"
         return "\n".join(
             [
                 f"{self.title} -> {self.store}",
@@ -115,10 +120,11 @@ class Plan:
 
 
 @on_one_thread
-def make_plan(study: Study, part: str | None = None) -> Plan:
+def make_plan(study: Study, part: str | None = None, *, start_up: float = 0.0) -> Plan:
     """Count, look into the store if there is one, and time pilot cases; writes nothing.
 
-    With a part, as "3/64", what is left of it is counted and timed.
+    With a part, as "3/64", what is left of it is counted and timed. `start_up` is that of the plan, in
+    processor seconds.
 
     Raises
     ------
@@ -174,6 +180,7 @@ def make_plan(study: Study, part: str | None = None) -> Plan:
         n_byte=grid.n_case * (per_case + 2 * _LINE),
         steps=round(steps),
         core_hours=seconds / 3600,
+        start_up=start_up,
         failures=tuple(failures),
         warnings=grid.warnings(),
         part="" if chosen is None else str(chosen),

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import time
@@ -223,6 +224,14 @@ def test_plan_foresees_the_time_of_the_cases(tmp_path):
     run(study, quiet=True)
     taken = float(xr.open_zarr(study.output).wall_time.sum())
     assert taken / 5 < foreseen < 5 * taken
+
+
+def test_plan_names_the_start_of_a_process(tmp_path, capsys):
+    code, out, _ = call(capsys, "plan", write_study(tmp_path))
+    assert code == 0
+    found = re.search(r"core-hours \(.* on one core\), and (\d+\.\d) s to start each process", out)
+    assert found is not None
+    assert float(found[1]) > 0.0
 
 
 def test_plan_times_a_transient_that_ends_by_itself(tmp_path, capsys):
