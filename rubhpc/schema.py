@@ -137,6 +137,12 @@ _MEASURES = (
     _measure("minimum_slip_speed", "m s-1", "lowest slip speed in contact", "stator", worst="min"),
     _measure("force_over_euler_load", "1", "peak contact force over the stator's Euler load", "stator"),
     _measure("tip_deflection_ratio", "1", "peak lateral tip deflection over the stator's length", "stator"),
+    _measure(
+        "carrier_displacement",
+        "m",
+        "peak displacement of what the stator stands on (0: the ground)",
+        "stator",
+    ),
     _measure("peak_torsion", "rad", "peak torsional displacement"),
     _measure("peak_to_peak_vertical", "m", "peak-to-peak vertical displacement"),
     _measure("peak_to_peak_horizontal", "m", "peak-to-peak horizontal displacement"),

@@ -68,7 +68,7 @@ def stator_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str, 
     return _over_rig(
         case,
         along,
-        lambda rig: _first_of_kinds(modes(assemble(rig).stators[i_stator].body), ("lateral",)),
+        lambda rig: _first_of_kinds(modes(assemble(rig).stators[i_stator].held.body), ("lateral",)),
     )
 
 

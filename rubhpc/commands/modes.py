@@ -13,7 +13,7 @@ from rubhpc.errors import InputError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rubhpc.fem.model import Model
+    from rubhpc.fem.model import CarrierModel, Model
     from rubhpc.fem.modes import Mode
 
 N_TABLE = 12  # modes of the rotor in a table, by default
@@ -97,7 +97,8 @@ def modes(
     read = read_rig(rig, trust_rig=trust_rig)
     model = assemble(read)
     # stators do not spin: their modes hold at every speed
-    stators = [find_modes(stator.body)[:count] for stator in model.stators]
+    stators = [find_modes(stator.held.body)[:count] for stator in model.stators]
+    carriers = [(carrier, find_modes(carrier.body)[:count]) for carrier in model.carriers]
     found = [(spin, find_modes(model.rotor, spin)[:count]) for spin in spins]
     for spin in spins:
         if message := instability_message(model, spin):
@@ -112,13 +113,20 @@ def modes(
         )
     if as_json:
         standing = [[_plain(mode) for mode in stator] for stator in stators]
+        carried: dict[str, Any] = {}
+        if carriers:
+            carried["carriers"] = [
+                {"name": carrier.name, "stators": carrier.stators, "modes": [_plain(m) for m in of]}
+                for carrier, of in carriers
+            ]
         points = [
-            {"speed": spin, "rotor": [_plain(m) for m in rotor], "stators": standing} for spin, rotor in found
+            {"speed": spin, "rotor": [_plain(m) for m in rotor], "stators": standing} | carried
+            for spin, rotor in found
         ]
         added = plain_design(design, list(nodes)) if design is not None else {}
         click.echo(json.dumps({"speeds": points} | added))
     else:
-        _print_tables(found, stators, count or N_TABLE)
+        _print_tables(found, stators, carriers, count or N_TABLE)
         if design is not None:
             print_design(design)
     drawing = None
@@ -147,11 +155,23 @@ def _plain(mode: Mode) -> dict[str, Any]:
     }
 
 
-def _print_tables(found: list[tuple[float, list[Mode]]], stators: list[list[Mode]], count: int) -> None:
+def _print_tables(
+    found: list[tuple[float, list[Mode]]],
+    stators: list[list[Mode]],
+    carriers: list[tuple[CarrierModel, list[Mode]]],
+    count: int,
+) -> None:
     import math
 
     tables = [(f"Rotor at {spin * 30 / math.pi:g} rpm ({spin:.6g} rad/s)", rotor) for spin, rotor in found]
-    tables += [(f"Stator {number}", stator) for number, stator in enumerate(stators, start=1)]
+    for carrier, listed in carriers:
+        numbers = ", ".join(map(str, carrier.stators))
+        tables.append((f"Carrier {carrier.name} with stators {numbers}", listed))
+    on = {number: carrier.name for carrier, _ in carriers for number in carrier.stators}
+    tables += [
+        (f"Stator {number}" + (f", while carrier {on[number]} is held" if number in on else ""), stator)
+        for number, stator in enumerate(stators, start=1)
+    ]
     click.echo("Natural and damped frequency in Hz, damping as a fraction of critical.")
     for title, listed in tables:
         if not listed:

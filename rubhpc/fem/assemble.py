@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rubhpc.errors import InputError
+from rubhpc.fem.carrier import assemble_carrier
 from rubhpc.fem.computable import MOST_DEGREES, check_computable, computable
 from rubhpc.fem.forces import forces_on
 from rubhpc.fem.model import Model
@@ -14,7 +15,7 @@ from rubhpc.fem.statics import sag_under
 from rubhpc.fem.stator import assemble_stator
 
 if TYPE_CHECKING:
-    from rubhpc.fem.model import StatorModel
+    from rubhpc.fem.model import CarrierModel, StatorModel
     from rubhpc.rig.rig import Rig
     from rubhpc.rig.stators import AnyStator
 
@@ -47,6 +48,7 @@ def assemble(rig: Rig) -> Model:
         if n_degree > MOST_DEGREES:
             problem = f"rotor and {len(rig.stator)} stators have more than {MOST_DEGREES} degrees of freedom"
             raise InputError(f"rig {rig.name}: {problem}; use fewer elements")
+    stators, carriers = _on_carriers(rig, stators)
     return Model(
         rotor=body,
         unbalance_cosine=cosine,
@@ -55,6 +57,7 @@ def assemble(rig: Rig) -> Model:
         output_node=rig.rotor.recorded_node([stator.node for stator in rig.stator]),
         sag=sag_under(body, constant),
         load=constant,
+        carriers=tuple(carriers),
     )
 
 
@@ -70,6 +73,24 @@ def model_at(model: Model, spin: float) -> Model:
         return model
     rotor = model.rotor.at(spin)
     return replace(model, rotor=rotor, sag=sag_under(rotor, model.load))
+
+
+def _on_carriers(rig: Rig, stators: list[StatorModel]) -> tuple[list[StatorModel], list[CarrierModel]]:
+    """Put the stators that stand on carriers there; all stators, and the carriers."""
+    placed, carriers = list(stators), []
+    for number, carrier in enumerate(rig.carrier, 1):
+        on_it = [
+            (i, stator, model)
+            for i, (stator, model) in enumerate(zip(rig.stator, stators, strict=True), 1)
+            if stator.carrier == carrier.name
+        ]
+        with computable(f"[carrier.{number}]"):
+            whole, moved = assemble_carrier(carrier, on_it)
+        check_computable(f"[carrier.{number}]", whole.body)
+        carriers.append(whole)
+        for (i, _, _), model in zip(on_it, moved, strict=True):
+            placed[i - 1] = model
+    return placed, carriers
 
 
 def _stator(rig: Rig, stator: AnyStator) -> StatorModel:

@@ -26,7 +26,8 @@ def find_rigid_body_mode(model: Model) -> str:
         return f"the rotor is free to {motion}"
     for i, stator in enumerate(model.stators, 1):
         if rigid_body_row(stator.body, [row for row in (stator.axial, stator.lateral) if row >= 0]):
-            return f"stator {i} is free to move"
+            on = next((carrier.name for carrier in model.carriers if i in carrier.stators), "")
+            return f"{f'carrier {on}' if on else f'stator {i}'} is free to move"
     return ""
 
 

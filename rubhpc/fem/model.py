@@ -159,6 +159,21 @@ class StatorModel:
     euler_load: float  # N
     axial: int  # row of the tip's axial displacement in the body
     lateral: int  # row of the tip's lateral displacement; -1 without lateral freedom
+    alone: StatorModel | None = None  # on a carrier: while that is held; `body` is all that stands on it
+
+    @property
+    def held(self) -> StatorModel:
+        """The stator by itself, with what it stands on held."""
+        return self if self.alone is None else self.alone
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CarrierModel:
+    """A carrier with the stators on it, as one body."""
+
+    name: str
+    body: Body
+    stators: tuple[int, ...]  # numbers, from 1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -175,16 +190,40 @@ class Model:
     output_node: int  # whose motion is recorded: the first stator's, or else the first disc's
     sag: NDArray[np.float64]  # (n_dof,), of the rotor under its constant loads, no stator touching, m or rad
     load: NDArray[np.float64]  # (n_dof,), constant loads on the rotor, N or N m
+    carriers: tuple[CarrierModel, ...] = ()
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """Rotor, then stators: the order of every vector over all bodies."""
-        return (self.rotor, *(stator.body for stator in self.stators))
+        """Rotor, then stators: the order of every vector over all bodies.
+
+        Stators on a carrier are one body with it, in the place of the first of them.
+        """
+        return (self.rotor, *(self.stators[i].body for i in self._first_on_body))
+
+    @property
+    def stator_start(self) -> tuple[int, ...]:
+        """First row of the body of each stator among all degrees of freedom, (n_stator,)."""
+        starts = dict(zip(self._first_on_body, self.body_start[1:-1], strict=True))
+        leader = {
+            number - 1: carrier.stators[0] - 1 for carrier in self.carriers for number in carrier.stators
+        }
+        return tuple(starts[leader.get(i, i)] for i in range(len(self.stators)))
+
+    @property
+    def _first_on_body(self) -> list[int]:
+        """Positions of the stators but those that share a body with an earlier one."""
+        later = {number - 1 for carrier in self.carriers for number in carrier.stators[1:]}
+        return [i for i in range(len(self.stators)) if i not in later]
 
     @property
     def body_start(self) -> tuple[int, ...]:
         """First row of each body among all degrees of freedom, and the number of all: (n_body + 1,)."""
         return tuple(accumulate((body.n_dof for body in self.bodies), initial=0))
+
+    @property
+    def n_place(self) -> int:
+        """Places whose motion is recorded besides the output node's: tips of stators, then carriers."""
+        return len(self.stators) + len(self.carriers)
 
     def split(self, values: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Views of a vector over all bodies, (n_all,), one for each body."""

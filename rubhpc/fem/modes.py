@@ -135,6 +135,8 @@ def _kind(shape: Vector, mass: NDArray[np.float64], names: list[str]) -> str:
 def _turns(degrees: list[tuple[int, str]]) -> bool:
     """Whether all nodes with a lateral degree have it in both planes, in the same order."""
     places = {name: [node for node, n in degrees if n == name] for name in ("v", "w", "thy", "thz")}
+    if any(name == "axial" for _, name in degrees):  # a carrier with stators, which are in no plane
+        return False
     return bool(places["v"]) and places["v"] == places["w"] and places["thy"] == places["thz"]
 
 

@@ -112,7 +112,7 @@ def step_limit(model: Model) -> float:
     For speed-dependent bearings it is the minimum over the speeds of their tables.
     """
     rotors = [model.rotor, *(model.rotor.at(speed) for speed in model.rotor.tabulated_speeds)]
-    bodies = [*rotors, *(stator.body for stator in model.stators if stator.body.n_dof)]
+    bodies = [*rotors, *(body for body in model.bodies[1:] if body.n_dof)]
     return 2.0 / math.sqrt(max(_spectral_radius(body) for body in bodies))
 
 

@@ -17,6 +17,7 @@ from rubhpc.integrate.lyapunov import Marches, growth
 from rubhpc.integrate.measures import (
     add_sag,
     by_name,
+    carrier_displacement,
     diverged_record,
     empty_samples,
     measures_of,
@@ -138,7 +139,7 @@ def _integrate(
     per_revolution = setup.samples_per_revolution
     n_stator = len(setup.model.stators)
     n_sample = recording.revolutions * per_revolution
-    samples, accumulator = empty_samples(n_stator, n_sample), new_accumulator(n_stator)
+    samples, accumulator = empty_samples(march.n_place, n_sample), new_accumulator(n_stator, march.n_place)
     settings = {"spin_speed": setup.spin, "clearance": clearance}
 
     reason, n_transient = pass_transient(march, recording)
@@ -155,13 +156,13 @@ def _integrate(
         )
     else:
         add_sag(samples, accumulator, setup.model)
-        signals, final = by_name(samples.whole), march.final()
+        signals, final = by_name(samples.whole, n_stator), march.final()
         solver = _solver(march, setup, clearance, friction, final)
         record = Record(
             status=DONE,
             samples_per_revolution=per_revolution,
             signals=signals,
-            spectra=_spectra(samples) if "spectrum" in recording.keep else {},
+            spectra=_spectra(samples, n_stator) if "spectrum" in recording.keep else {},
             sections={f"section_{name}": signals[name][::per_revolution].copy() for name in SECTION_NAMES}
             if "section" in recording.keep
             else {},
@@ -174,7 +175,8 @@ def _integrate(
                 samples_per_revolution=per_revolution,
                 growth=growth(lambda: _neighbours(march, solver, start, final, setup, recording)),
                 solve=solver,
-            ),
+            )
+            | {"carrier_displacement": carrier_displacement(samples, setup.model)},
             settings=settings,
             final=final,
         )
@@ -209,7 +211,7 @@ def _neighbours(
     return Marches(start, final, setup, recording)
 
 
-def _spectra(samples: Samples) -> dict[str, Floats]:
+def _spectra(samples: Samples, n_stator: int) -> dict[str, Floats]:
     """Spectra of all signals, by their names in the schema."""
-    spectra = by_name(amplitude_spectrum(samples.whole))
+    spectra = by_name(amplitude_spectrum(samples.whole), n_stator)
     return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items()}

@@ -41,11 +41,11 @@ class CentralDifferenceMarch(March):
         check: Callable[[], None] | None,
     ) -> None:
         """Start from `initial`, in a first kernel call of some 20 000 steps."""
-        super().__init__(check, FIRST_STEPS // setup.steps_per_sample)
+        super().__init__(check, FIRST_STEPS // setup.steps_per_sample, setup.model.n_place)
         self._setup = setup
         self._pairs = pairs_of(
             setup.model,
-            row=setup.packed.degree_row,
+            row=setup.packed.recorded_row,
             block=setup.packed.degree_block,
             compliance=setup.packed.compliance,
             clearance=clearance,
@@ -54,7 +54,7 @@ class CentralDifferenceMarch(March):
             is_updated=setup.is_updated,
             law=setup.law,
         )
-        self._work = workspace(self._pairs, setup.step)
+        self._work = workspace(self._pairs, setup.step, setup.model.n_place)
         self._state = _start(setup, initial, self._pairs, self._work)
         self._scratch = np.zeros((3, self._state.shape[1]))
         self._reached = np.zeros(1, dtype=np.int64)

@@ -22,8 +22,9 @@ NO_FORCES = "no contact forces that obey the laws were found"  # why a case ends
 class March(ABC):
     """A case under way; sample 0 is the first recorded one, the transient lies before it."""
 
-    def __init__(self, check: Callable[[], None] | None, first_stride: int) -> None:
-        """Take what is called between kernel calls, and the samples of the first call."""
+    def __init__(self, check: Callable[[], None] | None, first_stride: int, n_place: int) -> None:
+        """Take what is called between kernel calls, the samples of the first call, and `Model.n_place`."""
+        self.n_place = n_place
         self.n_step = 0
         self.n_left = 0  # times that closed-form motion was left for short steps
         self.sample = 0

@@ -42,15 +42,19 @@ if TYPE_CHECKING:
 LEAST_EXCHANGE = 1e-6  # of the mechanical energy: a motion that exchanges less is balanced against that
 
 
-def empty_samples(n_stator: int, n_sample: int) -> Samples:
-    """Room for the samples of a record: one array, so that their spectra are taken together."""
-    whole = np.zeros((4 + 3 * n_stator, n_sample))
-    axial, lateral, force = whole[4:].reshape(3, n_stator, n_sample)
+def empty_samples(n_place: int, n_sample: int) -> Samples:
+    """Room for the samples of a record: one array, so that their spectra are taken together.
+
+    Places (`Model.n_place`) are the stators, then the carriers, whose vertical motion stands for the axial
+    one, and whose horizontal motion for the lateral one.
+    """
+    whole = np.zeros((4 + 3 * n_place, n_sample))
+    axial, lateral, force = whole[4:].reshape(3, n_place, n_sample)
     return Samples(rotor=whole[:4], axial=axial, lateral=lateral, force=force, whole=whole)
 
 
-def new_accumulator(n_stator: int) -> Accumulator:
-    """Sums at zero, extrema at their neutral ends."""
+def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
+    """Sums at zero, extrema at their neutral ends; places as in `empty_samples`, by default the stators."""
     return Accumulator(
         highest=np.full(3, -np.inf),
         lowest=np.full(3, np.inf),
@@ -65,7 +69,7 @@ def new_accumulator(n_stator: int) -> Accumulator:
         friction_work=np.zeros(n_stator),
         least_slip=np.full(n_stator, np.inf),
         peak_force=np.zeros(n_stator),
-        peak_lateral=np.zeros(n_stator),
+        peak_lateral=np.zeros(n_stator if n_place is None else n_place),
         energy=np.zeros(5),
         pivots=np.zeros(1, dtype=np.int64),
         residual=np.zeros((3, 2)),
@@ -83,10 +87,17 @@ def add_sag(samples: Samples, accumulator: Accumulator, model: Model) -> None:
         accumulator.lowest[k] += sag
 
 
-def by_name(whole: Floats) -> dict[str, Floats]:
+def carrier_displacement(samples: Samples, model: Model) -> Floats:
+    """Largest displacement at a sample, m, of what each stator stands on: a carrier, or the ground (0)."""
+    peak, q = np.zeros(len(model.stators)), len(model.stators)
+    for i, carrier in enumerate(model.carriers, start=q):
+        peak[np.array(carrier.stators) - 1] = np.hypot(samples.axial[i], samples.lateral[i]).max()
+    return peak
+
+
+def by_name(whole: Floats, n_stator: int) -> dict[str, Floats]:
     """Rows of `Samples.whole`, or their spectra, by their names in the schema: (n,) or (n_stator, n)."""
-    n_stator = (len(whole) - 4) // 3
-    axial, lateral, force = whole[4:].reshape(3, n_stator, -1)
+    axial, lateral, force = whole[4:].reshape(3, -1, whole.shape[1])[:, :n_stator]
     return {
         "vertical": whole[VERTICAL],
         "horizontal": whole[HORIZONTAL],
@@ -163,7 +174,8 @@ def measures_of(
         "friction_work": accumulator.friction_work / n_revolution,
         "minimum_slip_speed": np.where(np.isfinite(accumulator.least_slip), accumulator.least_slip, np.nan),
         "force_over_euler_load": accumulator.peak_force / [stator.euler_load for stator in stators],
-        "tip_deflection_ratio": accumulator.peak_lateral / [stator.length for stator in stators],
+        "tip_deflection_ratio": accumulator.peak_lateral[: len(stators)]
+        / [stator.length for stator in stators],
         "peak_torsion": float(max(accumulator.highest[TWIST], -accumulator.lowest[TWIST])),
         "peak_to_peak_vertical": float(accumulator.highest[VERTICAL] - accumulator.lowest[VERTICAL]),
         "peak_to_peak_horizontal": float(accumulator.highest[HORIZONTAL] - accumulator.lowest[HORIZONTAL]),

@@ -54,7 +54,7 @@ class ModalMarch(March):
         check: Callable[[], None] | None,
     ) -> None:
         """Take the case and its reduced initial motion; it is put into a contact mode by `_start`."""
-        super().__init__(check, ALL_SAMPLES)
+        super().__init__(check, ALL_SAMPLES, setup.model.n_place)
         self._setup = setup
         offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
         self._clearance = clearance + offsets - sag_at_stators(setup.model)[0]
@@ -72,7 +72,7 @@ class ModalMarch(March):
             setup.reduced, setup.model, friction, self._clearance, setup.law, setup.displacement_limit
         )
         self._motion = self._reduce(initial)
-        self._recorder = recorder(self._clearance.size)
+        self._recorder = recorder(setup.model.n_place)
         self.progress: Progress = new_progress(1)[0]
 
     @abstractmethod

@@ -159,6 +159,8 @@ def _outputs(reduced: ReducedModel, exponent: Complexes, motion: Complexes, inte
     rows = [displacement, rate, rate[2:] * exponent]
     for degree in reduced.degree:
         rows += [degree[[AXIAL, LATERAL]] @ motion[:n], degree[[LATERAL]] @ motion[n:]]
+    for carrier in reduced.carrier:  # as axial and lateral
+        rows += [carrier @ motion[:n], carrier[[1]] @ motion[n:]]
     later = interval * np.arange(kernel.SAMPLES_AT_ONCE)
     ahead = np.concatenate(rows) * np.exp(exponent * later[:, None])[:, None]  # (sample, o, m)
     table = ahead.reshape(-1, exponent.size).T

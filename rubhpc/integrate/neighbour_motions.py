@@ -39,7 +39,7 @@ class NeighbourMotions:
         self.most_spans = N_ALIGNING + N_MOST
         self._march = march
         n_coordinate, n_motion = march.tables.switch_re.shape[2], march.tables.motion_re.shape[1]
-        q = march.touching().size
+        n, q = march.n_place, march.touching().size
         self._pair = Pair(
             progress=new_progress(2),
             z=np.zeros((2, 2, n_coordinate)),
@@ -52,7 +52,7 @@ class NeighbourMotions:
         self._n_read = N_SPAN
         progress, self._pair.z[0] = march.place()
         begin_in(self._pair.progress[0], progress.mode)
-        self._unrecorded = event_work(q), recorder(q), empty_samples(q, 0), new_accumulator(q)
+        self._unrecorded = event_work(q), recorder(n), empty_samples(n, 0), new_accumulator(q)
 
     def part(self, n_revolution: int) -> float | None:
         """Go on with both; see `lyapunov.Neighbours`. Several spans are passed ahead, all of one length.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.sparse import csr_array, dia_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from rubhpc.fem.statics import sag_at_stators
@@ -45,6 +45,7 @@ class Packed:
     stiffness: Floats
     force: Floats  # (2, n_dof), cosine and sine part of the unbalance force, N
     degree_row: Ints  # (q, 5), rows of each pair's degrees
+    recorded_row: Ints  # (q or more, 5), the same, then each carrier's motion as axial and lateral
     degree_block: Ints  # (q, 5)
     compliance: Floats  # (q, 5, q, 5), m/N
     output_row: Ints  # (3,), vertical, horizontal, torsion
@@ -78,6 +79,8 @@ def pack(model: Model, spin: float, step: float) -> Packed:
     mass, stiffness, damping, force = mass[pick], stiffness[pick], damping[pick], force[:, order]
     inverse = _inverses(mass + 0.5 * step * damping, start)
     degree_row = np.where(degree >= 0, row[degree], -1)
+    carriers = np.full((len(model.carriers), N_DEGREE), -1)
+    carriers[:, [AXIAL, LATERAL]] = np.where((at := carrier_degrees(model)) >= 0, row[at], -1)
     degree_block = np.where(degree >= 0, block[component[degree]], -1)
     return Packed(
         linear=_linear(inverse, stiffness, damping, force, start),
@@ -87,6 +90,7 @@ def pack(model: Model, spin: float, step: float) -> Packed:
         stiffness=stiffness,
         force=force,
         degree_row=degree_row,
+        recorded_row=np.concatenate([degree_row, carriers]),
         degree_block=degree_block,
         compliance=_compliance(inverse, start, degree_row, degree_block, step),
         output_row=np.where(output >= 0, row[output], -1),
@@ -110,7 +114,7 @@ def whole_system(model: Model, spin: float) -> tuple[Floats, Floats, Floats, Flo
 
 def degrees_of(model: Model) -> Ints:
     """Rows of each pair's degrees (q, 5) among all degrees, rotor first, then stators; -1 where held."""
-    first = model.body_start[1:]
+    first = model.stator_start
     degree = np.full((len(model.stators), N_DEGREE), -1)
     for i, stator in enumerate(model.stators):
         degree[i, V], degree[i, W] = model.rotor.index(stator.node, "v"), model.rotor.index(stator.node, "w")
@@ -118,6 +122,17 @@ def degrees_of(model: Model) -> Ints:
         degree[i, AXIAL] = first[i] + stator.axial if stator.axial >= 0 else -1
         degree[i, LATERAL] = first[i] + stator.lateral if stator.lateral >= 0 else -1
     return degree
+
+
+def carrier_degrees(model: Model) -> Ints:
+    """Rows of the vertical and horizontal displacement of each carrier (n_carrier, 2); -1 where held."""
+    start = model.stator_start
+    rows = [
+        [start[carrier.stators[0] - 1] + row if row >= 0 else -1 for row in at]
+        for carrier in model.carriers
+        for at in [[carrier.body.index(1, name) for name in ("v", "w")]]
+    ]
+    return np.array(rows, dtype=np.int64).reshape(-1, 2)
 
 
 def output_degrees(model: Model) -> Ints:
@@ -186,11 +201,12 @@ def _inverses(effective: Floats, start: Ints) -> Floats:
 
 def _diagonals(matrix: Floats) -> tuple[Floats, Ints]:
     """Diagonals that are not zero, (n_diagonal, n_dof), and the offset and column span of each."""
-    banded = dia_array(matrix)
-    values = np.zeros((banded.offsets.size, matrix.shape[0]))
-    values[:, : banded.data.shape[1]] = banded.data
-    span = np.empty((banded.offsets.size, 3), dtype=np.int64)
-    for k, offset in enumerate(banded.offsets):
+    row, column = np.nonzero(matrix)
+    offsets = np.unique(column - row)
+    values = np.zeros((offsets.size, matrix.shape[0]))
+    values[np.searchsorted(offsets, column - row), column] = matrix[row, column]
+    span = np.empty((offsets.size, 3), dtype=np.int64)
+    for k, offset in enumerate(offsets):
         used = np.flatnonzero(values[k])
         span[k] = offset, used[0], used[-1] + 1
     return values, span

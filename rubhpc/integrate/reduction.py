@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from rubhpc.errors import InputError
-from rubhpc.integrate.packing import degrees_of, output_degrees, whole_system
+from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, N_DEGREE, V, W, rim_sense
 
@@ -55,6 +55,8 @@ class ReducedModel:
         Each pair's degrees (v, w, torsion, axial, lateral); zero where held.
     output : (3, n)
         Vertical, horizontal and torsional displacement of the output node.
+    carrier : (n_carrier, 2, n)
+        Vertical and horizontal displacement of each carrier.
     """
 
     spin: float
@@ -65,6 +67,7 @@ class ReducedModel:
     force: Floats
     degree: Floats
     output: Floats
+    carrier: Floats
 
     @cached_property
     def translations(self) -> Floats:
@@ -99,7 +102,7 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
         does not exist.
     """
     mass, damping, stiffness, force = whole_system(model, spin)
-    degree, output = degrees_of(model), output_degrees(model)
+    degree, output, carrier = degrees_of(model), output_degrees(model), carrier_degrees(model)
     standstill = _at_standstill(model)
     fastest = max(standstill.contact_frequency, abs(spin))
     cutoff = CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * fastest
@@ -122,6 +125,7 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
         force=force @ basis,
         degree=np.where((degree >= 0)[:, :, None], basis[np.maximum(degree, 0)], 0.0),
         output=np.where((output >= 0)[:, None], basis[np.maximum(output, 0)], 0.0),
+        carrier=np.where((carrier >= 0)[:, :, None], basis[np.maximum(carrier, 0)], 0.0),
     )
 
 
@@ -170,8 +174,8 @@ def _at_standstill(model: Model) -> _Standstill:
 
 def _seen(model: Model) -> Ints:
     """Degrees that contact or outputs see."""
-    degree, output = degrees_of(model), output_degrees(model)
-    return np.unique(np.concatenate([degree[degree >= 0], output[output >= 0]]))
+    places = (degrees_of(model), output_degrees(model), carrier_degrees(model))
+    return np.unique(np.concatenate([degree[degree >= 0] for degree in places]))
 
 
 def _contact_frequency(parts: list[_Part], degree: Ints, model: Model) -> float:
@@ -190,6 +194,9 @@ def _contact_frequency(parts: list[_Part], degree: Ints, model: Model) -> float:
         response = along / square  # to a unit force, mode by mode
         inertia = (response @ response) / (along @ response) ** 2  # of that shape, as that of the first mode
         compliance = mode[axial] @ (mode[axial] / square)
+        if stator.alone is not None:  # an impact meets the stator before the carrier moves
+            tip = stator.alone.axial
+            compliance = np.linalg.inv(stator.alone.body.stiffness)[tip, tip]
         highest = max(highest, 1.0 / np.sqrt(inertia * compliance))
     return float(highest)
 

@@ -26,7 +26,7 @@ PAUSES = (7, 3)
 def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]:
     """March through the transient, until the motion has settled where `recording` says "auto".
 
-    It has settled when no displacement of output node or stator tips differs from that one cycle of 8 or 12
+    It has settled when no displacement of output node, tips or carriers differs from one cycle of 8 or 12
     revolutions before by more than `settled_within` of the signal's largest value. At the latest it ends with
     `longest_transient` revolutions.
 
@@ -40,10 +40,10 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
     if not recording.is_transient_auto:
         return pass_revolutions(march, recording, recording.longest_transient), recording.longest_transient
 
-    n_stator, done, limit = march.touching().size, 0, recording.longest_transient
+    n_place, done, limit = march.n_place, 0, recording.longest_transient
     samples, accumulator = (
-        empty_samples(n_stator, recording.samples_per_revolution),
-        new_accumulator(n_stator),
+        empty_samples(n_place, recording.samples_per_revolution),
+        new_accumulator(march.touching().size, n_place),
     )
     reference: Floats | None = None
     for i, pause in enumerate(chain([0], cycle(PAUSES))):
@@ -58,7 +58,7 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
         if reason is not None:
             return reason, done
         done += 1
-        latest = samples.whole[[VERTICAL, HORIZONTAL, TWIST, *range(4, 4 + 2 * n_stator)]]
+        latest = samples.whole[[VERTICAL, HORIZONTAL, TWIST, *range(4, 4 + 2 * n_place)]]
         if reference is not None and has_settled(latest, reference, recording.settled_within):
             return None, done
         if i % len(PAUSES) == 0:
@@ -74,6 +74,6 @@ def has_settled(cycle: Floats, earlier: Floats, tolerance: float) -> bool:
 
 def pass_revolutions(march: March, recording: Recording, n_revolution: int) -> str | None:
     """March some revolutions without a record; returns why the case cannot go on."""
-    samples, accumulator = empty_samples(march.touching().size, 0), new_accumulator(march.touching().size)
+    samples, accumulator = empty_samples(march.n_place, 0), new_accumulator(march.touching().size)
     first = -n_revolution * recording.samples_per_revolution
     return march.advance(first, 0, samples, accumulator, is_recorded=False)

@@ -8,10 +8,15 @@ from rubhpc.kernels.contact_forces import fill_compliances
 from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_directions, fill_friction_direction
 
 
-def workspace(pairs: Pairs, step: float) -> Workspace:
-    """Arrays for q pairs and a step (s), with directions and compliance along the stators' axes filled in."""
+def workspace(pairs: Pairs, step: float, n_place: int = 0) -> Workspace:
+    """Arrays for q pairs and a step (s), with directions and compliance along the stators' axes filled in.
+
+    The motion of `n_place` places may be looked at, more than there are pairs.
+    """
     q = pairs.radius.size
     work = empty_workspace(q)
+    if n_place > q:
+        work = work._replace(now=np.zeros((n_place, N_DEGREE)), rate=np.zeros((n_place, N_DEGREE)))
     for i in range(q):
         fill_directions(
             pairs, i, pairs.axis_y[i], pairs.axis_z[i], work.force_direction[i], work.gap_jacobian[i]

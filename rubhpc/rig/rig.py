@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 from rubhpc.input.fields import FieldError, check_fields, parse_field, table, text
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import plain
+from rubhpc.rig.carriers import AnyCarrier  # noqa: TC001 - annotations are read when a rig is built
+from rubhpc.rig.carrying import check_carriers
 from rubhpc.rig.parts import FIXED_AT_NODE_1, Torsion
 from rubhpc.rig.ross import rotor_from_ross
 from rubhpc.rig.rotors import AnyRotor, MatrixRotor
@@ -29,6 +31,9 @@ class Rig:
     name: str = text(doc="Name of the rig.", example='"mokhtar2017"')
     rotor: AnyRotor = table(doc="The rotor: a shaft with discs and bearings, or matrices.")
     stator: tuple[AnyStator, ...] = table(doc="Stators around the rotor.", default=())
+    carrier: tuple[AnyCarrier, ...] = table(
+        doc="Bodies on springs on which stators stand.", default=(), added=True
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -41,6 +46,7 @@ class Rig:
             if self.contact_radius(stator) is None:
                 fix = f"add it, or add the diameter of a disc at node {stator.node}"
                 raise FieldError(f"stator.{i}.radius", f"missing, and no disc there has a diameter; {fix}")
+        check_carriers(self.carrier, self.stator)
 
     @classmethod
     def from_matrices(
@@ -52,6 +58,7 @@ class Rig:
         *,
         degrees: Sequence[tuple[int, str]],
         stators: Sequence[AnyStator] = (),
+        carriers: Sequence[AnyCarrier] = (),
         unbalance: Sequence[Unbalance] = (),
         load: Sequence[Load] = (),
         gravity: float | str = 0.0,
@@ -72,6 +79,8 @@ class Rig:
             stator, friction also on its thx. Coordinates of other kinds have names that begin with "q".
         stators : sequence of Stator, LumpedStator or MatrixStator, or one
             Each with its node and, since matrices have no disc, its contact radius, m.
+        carriers : sequence of Carrier or MatrixCarrier, or one
+            On which stators stand.
         unbalance : sequence of Unbalance
         load : sequence of Load
             Constant forces.
@@ -107,7 +116,7 @@ class Rig:
             output_node=output_node,
             displacement_limit=displacement_limit,
         )
-        return cls(name=name, rotor=rotor, stator=_tuple(stators))
+        return cls(name=name, rotor=rotor, stator=_tuple(stators), carrier=_tuple(carriers))
 
     @classmethod
     def from_ross(
@@ -115,6 +124,7 @@ class Rig:
         rotor: Any,
         *,
         stators: Sequence[AnyStator] = (),
+        carriers: Sequence[AnyCarrier] = (),
         unbalance: Sequence[Unbalance] = (),
         load: Sequence[Load] = (),
         gravity: float | str = 0.0,
@@ -135,6 +145,8 @@ class Rig:
             With six degrees of freedom per node. Its matrices are copied.
         stators : sequence of Stator, LumpedStator or MatrixStator, or one
             Each with its node (from 1) and its contact radius.
+        carriers : sequence of Carrier or MatrixCarrier, or one
+            On which stators stand.
         unbalance : sequence of Unbalance
             At nodes from 1; a ROSS rotor has none.
         load : sequence of Load
@@ -163,7 +175,7 @@ class Rig:
             gravity=parse_quantity(gravity, "m/s^2", "from_ross: gravity"),
             output_node=output_node,
         )
-        return cls(name=name, rotor=found, stator=_tuple(stators))
+        return cls(name=name, rotor=found, stator=_tuple(stators), carrier=_tuple(carriers))
 
     def contact_radius(self, stator: AnyStator) -> float | None:
         """Contact radius of a stator, m: its own, or that of the largest disc at its node."""

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np  # noqa: TC002 - annotations are read when a rig is built
 from numpy.typing import NDArray  # noqa: TC002
 
-from rubhpc.input.fields import FieldError, check_fields, count, flag, matrix, quantity, table, words
+from rubhpc.input.fields import FieldError, check_fields, count, flag, matrix, quantity, table, text, words
 from rubhpc.rig.matrix_body import check_body, checked_matrices
 from rubhpc.rig.parts import MOST_ELEMENTS, UNDAMPED, Damping
 
@@ -33,6 +33,11 @@ class Seat:
     )
     clearance_offset: float = quantity(
         "m", doc="Added to the clearance of the case for this stator.", example='"10 um"', default=0.0
+    )
+    carrier: str | None = text(
+        doc="Name of the carrier on which the stator stands; by default the ground.",
+        example='"casing"',
+        default=None,
     )
     count: int | None = count(
         doc="Number of equal stators in a ring, evenly spaced from `angle`.",

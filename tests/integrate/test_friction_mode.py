@@ -28,6 +28,7 @@ def bodies():
         force=rng.normal(size=(2, N)),
         degree=rng.normal(size=(Q, 5, N)),
         output=rng.normal(size=(3, N)),
+        carrier=np.zeros((0, 2, N)),
     )
     pairs = FrictionPairs(
         gap_jacobian=rng.normal(size=(Q, N)),

@@ -1,0 +1,52 @@
+"""Which stators stand on which carrier, and whether they can."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rubhpc.input.fields import FieldError, nearest
+from rubhpc.rig.stators import LumpedStator, Stator
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rubhpc.rig.carriers import AnyCarrier
+    from rubhpc.rig.stators import AnyStator
+
+
+def check_carriers(carriers: Sequence[AnyCarrier], stators: Sequence[AnyStator]) -> None:
+    """Refuse carriers without stators, stators on carriers that are not there, and those that cannot follow.
+
+    Raises
+    ------
+    FieldError
+        Names the carrier or stator.
+    """
+    names = [carrier.name for carrier in carriers]
+    for i, name in enumerate(names, 1):
+        if names.count(name) > 1:
+            raise FieldError(f"carrier.{i}.name", f"{name} is duplicated; give every carrier its own name")
+        if all(stator.carrier != name for stator in stators):
+            problem = "no stator stands on it"
+            raise FieldError(f"carrier.{i}.name", f'{problem}; give one carrier = "{name}", or remove it')
+    for i, stator in enumerate(stators, 1):
+        if stator.carrier is None:
+            continue
+        if stator.carrier not in names:
+            fix = nearest(stator.carrier, names) if names else "add [[carrier]] with this name"
+            raise FieldError(f"stator.{i}.carrier", f"no carrier is named {stator.carrier}; {fix}")
+        if problem := _why_not(stator):
+            raise FieldError(f"stator.{i}.carrier", problem)
+
+
+def _why_not(stator: AnyStator) -> str:
+    """Why a stator cannot stand on a carrier, and what to do; "" where it can."""
+    if isinstance(stator, Stator):
+        held = "" if stator.lateral else "lateral = false, so its tip would not follow; set lateral = true"
+    elif isinstance(stator, LumpedStator):
+        is_held = stator.rigid or stator.lateral_stiffness is None
+        held = "it is held laterally and would not follow; give it mass, stiffness and lateral_stiffness"
+        held = held if is_held else ""
+    else:
+        held = "matrices hold it to the ground; put it and the carrier into one model, or give it springs"
+    return held

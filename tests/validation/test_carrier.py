@@ -1,0 +1,225 @@
+"""Stators on a carrier: conservation laws, limits with a known result, and a model derived another way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from rubhpc import LumpedStator, MatrixStator, Rig, Unbalance, assemble, read_rig, simulate
+from rubhpc.errors import InputError
+from rubhpc.fem.modes import modes
+from rubhpc.rig.carriers import Carrier, MatrixCarrier
+from rubhpc.rig.reading import rig_from_dict
+
+BASE = read_rig("mokhtar2017")
+MASS, STIFFNESS, INERTIA, TORSIONAL = 2.0, 5e5, 0.02, 2e4
+CASE = {"speed_ratio": 0.75, "clearance": "90 um", "friction": 0.2, "transient": 0, "revolutions": 2}
+
+
+def ring(count: int = 8, **changes: float) -> Rig:
+    """The packaged rig with a ring of its stators on one carrier."""
+    told = {"mass": MASS, "stiffness": STIFFNESS, "inertia": INERTIA, "torsional_stiffness": TORSIONAL}
+    stator = replace(BASE.stator[0], count=count, carrier="casing")
+    return replace(BASE, stator=(stator,), carrier=(Carrier(name="casing", **(told | changes)),))
+
+
+def test_stators_moved_with_their_carrier_are_not_strained_and_have_all_their_mass():
+    rig = ring()
+    (carrier,) = assemble(rig).carriers
+    body, n = carrier.body, 3
+    stator = rig.stator[0]
+    mass = stator.density * stator.length * stator.width * stator.height
+    for motion in np.eye(n):
+        v, w, turn = motion
+        moved = [*motion]
+        for each in rig.stator:
+            c, s = math.cos(each.angle), math.sin(each.angle)
+            for node in range(1, each.elements + 1):
+                distance = 0.06 + each.length * (1 - node / each.elements)
+                moved += [c * v + s * w, c * w - s * v + distance * turn, -turn]
+        moved = np.array(moved)
+        own = np.diag([STIFFNESS, STIFFNESS, TORSIONAL]) @ motion
+        pressed = body.stiffness @ moved
+        np.testing.assert_allclose(pressed[:n], own, atol=1e-4)
+        assert abs(pressed[n:]).max() < 1e-12 * abs(body.stiffness).max()
+        if turn == 0.0:
+            assert moved @ body.mass @ moved == pytest.approx(MASS + 8 * mass, rel=1e-12)
+        else:  # of rods that lie along the radius, and of their slices about the axis of the shaft
+            rods = 8 * mass * ((0.06 + 0.02) ** 2 + (stator.length**2 + stator.height**2) / 12)
+            assert moved @ body.mass @ moved == pytest.approx(INERTIA + rods, rel=1e-12)
+
+
+def test_a_soft_carrier_is_a_mass_on_springs():
+    (carrier,) = assemble(ring(stiffness=5e3, torsional_stiffness=2e2)).carriers
+    first, second, third = modes(carrier.body)[:3]
+    total = MASS + 8 * 1157.0 * 25e-6 * 0.04
+    assert first.frequency == pytest.approx(math.sqrt(5e3 / total) / (2 * math.pi), rel=1e-4)
+    assert second.frequency == pytest.approx(first.frequency, rel=1e-9)
+    assert third.kind == "torsional"
+    assert {mode.whirl for mode in modes(carrier.body)} == {"none"}
+
+
+def test_a_stiff_carrier_is_the_ground():
+    ground = simulate(replace(BASE, stator=(replace(BASE.stator[0], count=8),)), **CASE)
+    held = simulate(ring(stiffness=1e14, torsional_stiffness=1e12), **CASE)
+    assert ground.contact_force.max() > 1.0
+    scale = abs(ground.vertical).max()
+    np.testing.assert_allclose(held.vertical, ground.vertical, atol=1e-6 * scale)
+    np.testing.assert_allclose(held.horizontal, ground.horizontal, atol=1e-6 * scale)
+    expected = 1e-14 * ground.peak_contact_force.max()  # N over N/m; two neighbours at most
+    assert held.carrier_displacement.max() < 2 * expected
+    assert not ground.carrier_displacement.any()
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        {},
+        {"friction_law": "coulomb"},
+        {"restitution": 0.5},
+        {"law": "penalty", "stiffness": 1e7},
+        {"normal": "updated"},
+    ],
+    ids=str,
+)
+def test_the_modal_scheme_agrees_with_the_central_difference(law):
+    """Eight pairs on one soft body; both schemes go their own way to the forces of contact."""
+    rig = ring(count=8, damping=50.0)
+    short = CASE | {"revolutions": 1} | law
+    modal = simulate(rig, **short, accuracy=1e-5)
+    stepped = simulate(rig, **short, method="central-difference", step="1 us")
+    scale = abs(modal.vertical).max()
+    assert modal.peak_contact_force.max() > 1.0
+    assert modal.energy_residual < 2e-6
+    np.testing.assert_allclose(stepped.vertical, modal.vertical, atol=5e-5 * scale)
+    np.testing.assert_allclose(stepped.horizontal, modal.horizontal, atol=5e-5 * scale)
+    np.testing.assert_allclose(stepped.carrier_displacement, modal.carrier_displacement, rtol=1e-4)
+
+
+def test_a_ring_of_masses_agrees_with_equations_written_in_the_plane():
+    """Springs between points of the plane, and a right-hand side of its own, with a penalty for contact."""
+    k, c, m, radius, gap, penalty, mu, spin = 1e5, 5.0, 0.02, 0.1, 1e-4, 1e6, 0.2, 60.0
+    k_side, turning, inertia, body = 4e4, 3e3, 0.01, 1.0
+    angles = 2 * np.pi * np.arange(3) / 3
+    e = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    t = np.stack([-np.sin(angles), np.cos(angles)], axis=1)
+
+    def rate(time, state):
+        x, v = state.reshape(2, -1)
+        force = np.zeros_like(x)
+        disc, casing, points = x[:2], x[2:5], x[5:].reshape(3, 2)
+        force[:2] = -4e4 * disc - 20.0 * v[:2]
+        force[:2] += 0.02 * spin**2 * np.array([math.cos(spin * time), math.sin(spin * time)]) * 0.1
+        force[2:5] = -np.array([2e5, 2e5, turning]) * casing - np.array([30.0, 30.0, 0.0]) * v[2:5]
+        for i in range(3):
+            foot = casing[:2] + radius * casing[2] * t[i]
+            foot_rate = v[2:4] + radius * v[4] * t[i]
+            stretch, speed = points[i] - foot, v[5 + 2 * i : 7 + 2 * i] - foot_rate
+            spring = -(k * (stretch @ e[i]) + c * (speed @ e[i])) * e[i]
+            spring -= (k_side * (stretch @ t[i]) + 1.0 * (speed @ t[i])) * t[i]
+            force[5 + 2 * i : 7 + 2 * i] += spring
+            force[2:4] -= spring
+            force[4] -= radius * (spring @ t[i])
+            normal = penalty * max(disc @ e[i] - points[i] @ e[i] - gap, 0.0)
+            contact = normal * e[i] + mu * normal * t[i]
+            force[5 + 2 * i : 7 + 2 * i] += contact
+            force[:2] -= contact
+        mass = np.array([10.0, 10.0, body, body, inertia, *[m] * 6])
+        return np.concatenate([v, force / mass])
+
+    revolutions, per_revolution = 3, 64
+    times = np.arange(revolutions * per_revolution) * 2 * np.pi / spin / per_revolution
+    exact = solve_ivp(
+        rate, (0.0, times[-1]), np.zeros(22), "DOP853", times, rtol=1e-10, atol=1e-14, max_step=2e-4
+    ).y
+    rig = Rig.from_matrices(
+        np.diag([10.0, 10.0]),
+        np.diag([20.0, 20.0]),
+        np.diag([4e4, 4e4]),
+        degrees=[(1, "v"), (1, "w")],
+        unbalance=[Unbalance(node=1, mass=0.02, radius=0.1)],
+        stators=[
+            LumpedStator(
+                node=1,
+                radius=radius,
+                count=3,
+                carrier="casing",
+                mass=m,
+                stiffness=k,
+                damping=c,
+                lateral_stiffness=k_side,
+                lateral_damping=1.0,
+            )
+        ],
+        carriers=[
+            MatrixCarrier(
+                name="casing",
+                mass=np.diag([body, body, inertia]),
+                damping=np.diag([30.0, 30.0, 0.0]),
+                stiffness=np.diag([2e5, 2e5, turning]),
+                degrees=("v", "w", "thx"),
+            )
+        ],
+    )
+    found = simulate(
+        rig,
+        speed=spin,
+        clearance=gap,
+        friction=mu,
+        law="penalty",
+        stiffness=penalty,
+        transient=0,
+        revolutions=revolutions,
+        samples_per_revolution=per_revolution,
+        accuracy=1e-6,
+    )
+    assert found.peak_contact_force.max() > 1.0
+    scale = abs(exact[:2]).max()
+    np.testing.assert_allclose(found.vertical, exact[0], atol=2e-4 * scale)
+    np.testing.assert_allclose(found.horizontal, exact[1], atol=2e-4 * scale)
+    np.testing.assert_allclose(found.carrier_displacement, np.hypot(*exact[2:4]).max(), rtol=1e-3)
+
+
+def test_a_rig_with_a_carrier_is_read_back_from_its_description():
+    rig = ring()
+    assert assemble(rig_from_dict(rig.as_dict())).carriers[0].stators == tuple(range(1, 9))
+    assert "carrier" not in BASE.as_dict()
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({"carrier": "cassing"}, "no carrier is named cassing; did you mean casing"),
+        ({"lateral": False}, "lateral = false"),
+        (None, "no stator stands on it"),
+    ],
+)
+def test_what_cannot_stand_on_a_carrier_is_refused(change, problem):
+    rig = ring()
+    stator = BASE.stator[0] if change is None else replace(rig.stator[0], **change)
+    others = () if change is None else (replace(rig.stator[0], angle=3.0),)
+    with pytest.raises(InputError, match=problem):
+        replace(rig, stator=(stator, *others))
+
+
+@pytest.mark.parametrize(
+    "stator",
+    [
+        LumpedStator(node=8, rigid=True, carrier="casing"),
+        LumpedStator(node=8, mass=1e-3, stiffness=1e6, carrier="casing"),
+        MatrixStator(node=8, mass=np.eye(1), stiffness=np.eye(1), carrier="casing"),
+    ],
+    ids=["wall", "radial", "matrices"],
+)
+def test_kinds_that_cannot_follow_are_refused(stator):
+    with pytest.raises(InputError, match=r"stator.1.carrier"):
+        replace(ring(), stator=(stator,))
+
+
+def test_a_carrier_that_turns_needs_both_values():
+    with pytest.raises(InputError, match="torsional_stiffness: missing"):
+        Carrier(name="casing", mass=1.0, stiffness=1e6, inertia=0.1)
