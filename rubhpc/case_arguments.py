@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
@@ -20,6 +20,7 @@ from rubhpc.study.initial import Initial, check_initials
 from rubhpc.study.study import Contact, Integrator
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from os import PathLike
 
     from rubhpc.integrate.setup import Setup
@@ -40,6 +41,9 @@ class CaseArguments(TypedDict, total=False):
     restitution: float | None
     friction_law: str
     static_friction_ratio: float | None
+    stribeck_speed: float | str | None
+    slip_speed: Sequence[float | str] | None
+    friction_ratio: Sequence[float] | None
     normal: str
     method: str
     step: float | str | None
@@ -76,6 +80,9 @@ def case_of(
     restitution: float | None = None,
     friction_law: str = "sliding",
     static_friction_ratio: float | None = None,
+    stribeck_speed: float | str | None = None,
+    slip_speed: Sequence[float | str] | None = None,
+    friction_ratio: Sequence[float] | None = None,
     normal: str = "fixed",
     method: str = "modal",
     step: float | str | None = None,
@@ -119,16 +126,21 @@ def case_of(
     mu = parse_quantity(friction, "", f"{caller}: friction")
     if mu < 0:
         raise InputError(f"{caller}: friction: {mu:g} is out of range; it must be at least 0")
-    numbers = {
+    numbers: dict[str, Any] = {
         name: None if value is None else parse_quantity(value, unit, f"{caller}: {name}")
         for name, value, unit in (
             ("stiffness", stiffness, "N/m"),
             ("damping", damping, "N*s/m"),
             ("restitution", restitution, ""),
             ("static_friction_ratio", static_friction_ratio, ""),
+            ("stribeck_speed", stribeck_speed, "m/s"),
         )
     }
-    contact = Contact(law=law, friction_law=friction_law, normal=normal, **numbers)
+    table: dict[str, Any] = {
+        name: None if values is None else tuple(parse_quantity(v, unit, f"{caller}: {name}") for v in values)
+        for name, values, unit in (("slip_speed", slip_speed, "m/s"), ("friction_ratio", friction_ratio, ""))
+    }
+    contact = Contact(law=law, friction_law=friction_law, normal=normal, **numbers, **table)
     setup = prepare(
         rig,
         spin,

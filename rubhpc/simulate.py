@@ -11,7 +11,7 @@ from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from os import PathLike
 
     from rubhpc.integrate.record import Record, State
@@ -34,6 +34,9 @@ def simulate(
     restitution: float | None = None,
     friction_law: str = "sliding",
     static_friction_ratio: float | None = None,
+    stribeck_speed: float | str | None = None,
+    slip_speed: Sequence[float | str] | None = None,
+    friction_ratio: Sequence[float] | None = None,
     normal: str = "fixed",
     method: str = "modal",
     step: float | str | None = None,
@@ -72,10 +75,16 @@ def simulate(
         Of the penalty's damper; default none.
     restitution : float, optional
         Normal velocity after an impact over that before it, 0 to 1; default none.
-    friction_law : {"sliding", "coulomb"}
-        Steady sliding; or set-valued, with stick.
+    friction_law : {"sliding", "coulomb", "stribeck", "table"}
+        Steady sliding; or set-valued with stick: Coulomb's law, Stribeck's, or a table over the slip speed.
     static_friction_ratio : float, optional
-        Coefficient of friction at rest over that in sliding, 1 or more, of Coulomb's law; default 1.
+        Coefficient of friction at rest over that in sliding, 1 or more; of Coulomb's law by default 1.
+    stribeck_speed : float (m/s) or str with a unit, optional
+        Slip speed at which the excess of friction at rest has decayed to 1/e, of Stribeck's law.
+    slip_speed : sequence of float (m/s) or str with a unit, optional
+        Of a friction table, rising from 0.
+    friction_ratio : sequence of float, optional
+        Coefficient at these slip speeds over `friction`; linear between them, constant beyond.
     normal : {"fixed", "updated"}
         Contact normal along the stator's axis, or along the line of centres.
     method : {"modal", "central-difference"}
@@ -136,6 +145,9 @@ def simulate(
         restitution=restitution,
         friction_law=friction_law,
         static_friction_ratio=static_friction_ratio,
+        stribeck_speed=stribeck_speed,
+        slip_speed=slip_speed,
+        friction_ratio=friction_ratio,
         normal=normal,
         method=method,
         step=step,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -143,10 +143,12 @@ def output_degrees(model: Model) -> Ints:
 def law_of(contact: Contact) -> Law:
     """Laws of a study as the kernels take them: what it leaves out keeps its default."""
     given = {key: getattr(contact, key) for key in Law._fields if key != "friction_law"}
-    return Law(
-        friction_law=FRICTION_LAWS.index(contact.friction_law),
-        **{key: float(value) for key, value in given.items() if value is not None},
-    )
+    values: dict[str, Any] = {
+        key: np.array(value) if isinstance(value, tuple) else float(value)
+        for key, value in given.items()
+        if value is not None
+    }
+    return Law(friction_law=FRICTION_LAWS.index(contact.friction_law), **values)
 
 
 def pairs_of(

@@ -5,14 +5,21 @@ To add one, give it a place here and a name in `study.tables`; CONTRIBUTING.md h
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rubhpc.kernels._jit import jit_inline
 
-FRICTION_LAWS = ("sliding", "coulomb")  # names in a study; their places are the numbers below
-SLIDING, COULOMB = range(2)
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+FRICTION_LAWS = ("sliding", "coulomb", "stribeck", "table")  # in a study; their places are the numbers below
+SLIDING, COULOMB, STRIBECK, TABLE = range(4)
+
+
+_NO_TABLE = np.zeros(0)
 
 
 class Law(NamedTuple):
@@ -23,6 +30,9 @@ class Law(NamedTuple):
     damping: float = 0.0  # of the penalty, N s/m
     restitution: float = 0.0  # normal velocity after an impact over that before; 0: the gap is closed at once
     static_friction_ratio: float = 1.0  # coefficient of friction at rest over that in sliding
+    stribeck_speed: float = 1.0  # m/s, at which the excess of friction at rest has decayed to 1/e
+    slip_speed: NDArray[np.float64] = _NO_TABLE  # (n,), m/s, rising from 0, of a table
+    friction_ratio: NDArray[np.float64] = _NO_TABLE  # (n,), coefficient there over that of the case
 
 
 MULTIPLIER = Law()
@@ -47,7 +57,22 @@ def friction_coefficient(law: Law, friction: float, slip_speed: float, is_sticki
     is_sticking : bool
         Whether the pair stuck in the step before.
     """
+    if law.friction_law == STRIBECK:
+        excess = law.static_friction_ratio - 1.0
+        return friction * (1.0 + excess * math.exp(-abs(slip_speed) / law.stribeck_speed))
+    if law.friction_law == TABLE:
+        return friction * interpolated(law.slip_speed, law.friction_ratio, abs(slip_speed))
     return friction * (law.static_friction_ratio if is_sticking else 1.0)
+
+
+@jit_inline
+def interpolated(at: NDArray[np.float64], values: NDArray[np.float64], x: float) -> float:
+    """Value at x between rising places, linear; beyond the last one, its own."""
+    for i in range(1, at.size):
+        if x < at[i]:
+            share = (x - at[i - 1]) / (at[i] - at[i - 1])
+            return float(values[i - 1] + share * (values[i] - values[i - 1]))
+    return float(values[-1])
 
 
 @jit_inline

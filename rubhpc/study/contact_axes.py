@@ -11,20 +11,15 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from rubhpc.errors import InputError
 from rubhpc.input.fields import nearest
-from rubhpc.study.tables import Contact, ContactKeys
+from rubhpc.study.tables import NEEDS_LAW, Contact, ContactKeys
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from dataclasses import Field
 
 PREFIX = "contact."
-_FIELDS: dict[str, Field[Any]] = {PREFIX + declared.name: declared for declared in fields(Contact)}
-# A key that [contact] gives holds for the cases of this law only; those of other laws have none.
-_HOLDS_FOR = {
-    "stiffness": ("law", "penalty"),
-    "damping": ("law", "penalty"),
-    "restitution": ("law", "lagrange"),
-    "static_friction_ratio": ("friction_law", "coulomb"),
+_FIELDS: dict[str, Field[Any]] = {
+    PREFIX + declared.name: declared for declared in fields(Contact) if declared.metadata["kind"] != "series"
 }
 
 
@@ -82,8 +77,8 @@ def contact_at(stated: ContactKeys, values: Mapping[str, float]) -> Contact:
         words = choices_of(name)
         set_here[name.removeprefix(PREFIX)] = words[int(value)] if words else value
     keys = asdict(stated) | set_here
-    for key, (other, needed) in _HOLDS_FOR.items():
-        if key not in set_here and keys[other] != needed:
+    for key, (other, laws, _) in NEEDS_LAW.items():  # a key of [contact] holds for the cases of its laws only
+        if key not in set_here and keys[other] not in laws:
             keys[key] = None
     return Contact(**keys)
 
@@ -107,8 +102,9 @@ def check_contacts(stated: ContactKeys, axes: Sequence[Tried]) -> None:
             raise InputError(f"[grid] {where}: [contact] {error}" if at else f"[contact] {error}") from None
     for key, value in asdict(stated).items():
         if value is not None and all(getattr(contact, key) is None for contact in found):
-            law, needed = _HOLDS_FOR[key]
-            raise InputError(f'[contact] {key}: no case has {law} = "{needed}"; leave it out')
+            kind, laws, _ = NEEDS_LAW[key]
+            listed = " or ".join(f'"{law}"' for law in laws)
+            raise InputError(f"[contact] {key}: no case has {kind} = {listed}; leave it out")
 
 
 def _word(name: str, value: float) -> str:

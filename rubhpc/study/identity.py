@@ -17,6 +17,8 @@ PHYSICS = 4  # version of the physics: raised whenever a study gives other resul
 RING_PHYSICS = 6  # that of several stators in the modal scheme
 CLOSED_FORM_PHYSICS = 7  # that of motion from event to event; the next version of all is 8
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
+# Keys of [contact] that are stated even where they are not given, as older stores do.
+_ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
 _AXIS = "axis"  # in place of a value that every case sets
 
 
@@ -44,7 +46,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
     for key in keys:
         _blank(rig, key.split("."))
     del rig["name"]
-    contact = asdict(study.contact)
+    contact = {k: v for k, v in asdict(study.contact).items() if v is not None or k in _ALWAYS}
     contact |= {
         axis.name.removeprefix(contact_axes.PREFIX): _AXIS for axis in study.axes if axis.is_contact_key
     }

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Literal
 
-from rubhpc.input.fields import FieldError, check_fields, choice, choices, count, quantity
+from rubhpc.input.fields import FieldError, check_fields, choice, choices, count, quantity, series
 from rubhpc.schema import KEEPABLE
 
 AUTO = "auto"  # transient until the motion has settled
@@ -17,7 +18,27 @@ SALTELLI, FEWEST_POINTS = "sobol", 8  # the design that Sobol' indices need
 TURNING_STEP = 0.25e-6  # s, with the updated one, set-valued friction or a penalty
 
 ClosedForm = Literal["always", "never"]
-CLOSED_FORM: dict[str, ClosedForm] = {"sliding": "always", "coulomb": "always"}  # of friction laws
+CLOSED_FORM: dict[str, ClosedForm] = {  # of friction laws
+    "sliding": "always",
+    "coulomb": "always",
+    "stribeck": "never",
+    "table": "never",
+}
+# Keys of [contact] that belong to some laws only, and what their absence means there: None needs them.
+NEEDS_LAW: dict[str, tuple[str, tuple[str, ...], str]] = {
+    "stiffness": ("law", ("penalty",), "a multiplier has none"),
+    "damping": ("law", ("penalty",), "a multiplier has none"),
+    "restitution": ("law", ("lagrange",), "a penalty's rebound comes from its spring and damper"),
+    "static_friction_ratio": ("friction_law", ("coulomb", "stribeck"), "this law has no such ratio"),
+    "stribeck_speed": ("friction_law", ("stribeck",), "other laws have no such speed"),
+    "slip_speed": ("friction_law", ("table",), "other laws have no table"),
+    "friction_ratio": ("friction_law", ("table",), "other laws have no table"),
+}
+_EXAMPLES = {
+    ("law", "penalty"): {"stiffness": "1e8"},
+    ("friction_law", "stribeck"): {"static_friction_ratio": "1.3", "stribeck_speed": '"0.1 m/s"'},
+    ("friction_law", "table"): {"slip_speed": "[0, 0.1, 1.0]", "friction_ratio": "[1.3, 1.1, 1.0]"},
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,17 +65,39 @@ class ContactKeys:
         at_least=0,
     )
     friction_law: str = choice(
-        doc="Friction law: steady sliding in the sense of the spin, or set-valued Coulomb with stick.",
+        doc="Friction law: steady sliding in the sense of the spin; or, with stick, Coulomb's law, "
+        "Stribeck's, whose coefficient decays with the slip speed, or a table over the slip speed.",
         example='"coulomb"',
         of=tuple(CLOSED_FORM),
         default="sliding",
     )
     static_friction_ratio: float | None = quantity(
         "",
-        doc="Static over sliding coefficient of friction; by default 1.",
+        doc="Coefficient of friction at rest over that in sliding; by default 1 (Coulomb's law).",
         example="1.2",
         default=None,
         at_least=1,
+    )
+    stribeck_speed: float | None = quantity(
+        "m/s",
+        doc="Slip speed at which the excess of Stribeck's friction at rest has decayed to 1/e.",
+        example='"0.1 m/s"',
+        default=None,
+        above=0,
+    )
+    slip_speed: tuple[float, ...] | None = series(
+        "m/s",
+        doc="Slip speeds of a friction table, rising from 0.",
+        example="[0, 0.1, 1.0]",
+        default=None,
+        at_least=0,
+    )
+    friction_ratio: tuple[float, ...] | None = series(
+        "",
+        doc="Coefficients there over the friction of the case; linear between, constant beyond.",
+        example="[1.3, 1.1, 1.0]",
+        default=None,
+        at_least=0,
     )
     normal: str = choice(
         doc="Contact normal: along the axis of the stator, or along the line of centres.",
@@ -80,20 +123,26 @@ class Contact(ContactKeys):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.law == "penalty":
-            if self.stiffness is None:
-                raise FieldError("stiffness", "missing; a penalty needs one, such as stiffness = 1e8")
-            if self.restitution is not None:
-                problem = "a penalty's rebound comes from its spring and damper; leave it out"
-                raise FieldError("restitution", problem)
-        for key in ("stiffness", "damping"):
-            if self.law == "lagrange" and getattr(self, key) is not None:
-                raise FieldError(key, 'a multiplier has none; take law = "penalty", or leave it out')
+        for key, (kind, laws, reason) in NEEDS_LAW.items():
+            if getattr(self, key) is not None and getattr(self, kind) not in laws:
+                raise FieldError(key, f'{reason}; take {kind} = "{laws[0]}", or leave it out')
+        for (kind, law), needed in _EXAMPLES.items():
+            for key, example in needed.items():
+                if getattr(self, kind) == law and getattr(self, key) is None:
+                    raise FieldError(key, f'missing; {kind} = "{law}" needs one, such as {key} = {example}')
         if self.restitution is not None and self.restitution > 1:
             raise FieldError("restitution", f"{self.restitution:g} is out of range; it must be at most 1")
-        if self.static_friction_ratio is not None and self.friction_law != "coulomb":
-            problem = 'steady sliding never sticks; take friction_law = "coulomb", or leave it out'
-            raise FieldError("static_friction_ratio", problem)
+        if self.slip_speed is not None and self.friction_ratio is not None:
+            _check_table(self.slip_speed, self.friction_ratio)
+
+
+def _check_table(speed: tuple[float, ...], ratio: tuple[float, ...]) -> None:
+    """Refuse a friction table that is none."""
+    if speed[0] != 0.0 or any(a >= b for a, b in itertools.pairwise(speed)):
+        raise FieldError("slip_speed", "does not rise from 0; write [0, 0.1, 1.0]")
+    if len(ratio) != len(speed):
+        problem = f"{len(ratio)} values for {len(speed)} slip speeds; give one for each"
+        raise FieldError("friction_ratio", problem)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,14 +23,18 @@ PRESSED = 10.0  # N, by which the rotor's vertical spring presses it onto a stat
 
 
 def pressed_onto_a_rim(
-    contact, friction, rim_speed, scheme, *, horizontal, velocity, duration, per_revolution=2000
+    contact, friction, rim_speed, scheme, *, horizontal, velocity, duration, per_revolution=2000, step=2e-6
 ):
     """Record and stiffness of 1 kg on 100 N/m that rubs, horizontally, on a stator that is held above it."""
     mass, stiffness = np.diag([1.0, 1.0]), np.diag([1e4, 100.0])
     rotor = body(mass, stiffness, ((1, "v"), (1, "w")))
     spin = 2 * math.pi / duration
     held = tip(body(1.0, 1.0, ((1, "axial"),)), 0.0, radius=rim_speed / spin, axial=-1)
-    make = partial(set_up, steps_per_sample=5) if scheme == "central-difference" else set_up_modal
+    make = (
+        partial(set_up, steps_per_sample=5)
+        if scheme == "central-difference"
+        else partial(set_up_modal, step=step)
+    )
     setup = make(rotor, [held], spin, per_revolution, contact)
     start = replace(
         State.at_rest(setup.model),
