@@ -69,8 +69,13 @@ def annular_rub(model: Model, spin: float, clearance: float, friction: float) ->
     Raises
     ------
     InputError
-        When the contact-free orbit does not reach the ring, or no circular orbit balances the forces.
+        When the contact-free orbit does not reach the ring, no circular orbit balances the forces, or a
+        carrier couples the stators.
     """
+    if model.carriers:
+        raise InputError(
+            "the stators of a full annular rub in closed form stand on the ground; remove the carrier"
+        )
     rotor, stator = model.rotor.at(spin), model.stators[0]
     rows = [rotor.index(stator.node, name) for name in ("v", "w")]
     sense = math.copysign(1.0, spin)

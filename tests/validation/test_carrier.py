@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from rubhpc import LumpedStator, MatrixStator, Rig, Unbalance, assemble, read_rig, simulate
 from rubhpc.errors import InputError
+from rubhpc.fem.annular import annular_rub
 from rubhpc.fem.modes import modes
 from rubhpc.rig.carriers import Carrier, MatrixCarrier
 from rubhpc.rig.reading import rig_from_dict
@@ -223,3 +224,8 @@ def test_kinds_that_cannot_follow_are_refused(stator):
 def test_a_carrier_that_turns_needs_both_values():
     with pytest.raises(InputError, match="torsional_stiffness: missing"):
         Carrier(name="casing", mass=1.0, stiffness=1e6, inertia=0.1)
+
+
+def test_the_closed_form_of_annular_rub_refuses_a_carrier():
+    with pytest.raises(InputError, match="remove the carrier"):
+        annular_rub(assemble(ring()), 100.0, 1e-4, 0.1)
