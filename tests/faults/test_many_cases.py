@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from running import environment
 
-N_FEW, N_MANY = 2_000, 52_000
+N_FEW, N_MANY = 20_000, 120_000
 MILLION = 1_000_000
 
 
