@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.friction_march import FrictionMarch
 from rubhpc.kernels.case_progress import closed_pairs
-from rubhpc.kernels.event_loop import GAP_TOLERANCE
+from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.flow import next_event
 from rubhpc.kernels.friction_states import STUCK, state_of
 from rubhpc.kernels.laws import is_set_valued

@@ -152,6 +152,16 @@ def floor_log2(count: int) -> int:
 
 
 @jit_inline_sum
+def positive_interval(s: float, rate: float, bound: float) -> float:
+    """Time, s, in which a switch function stays positive: `s + s' t - b t^2 / 2 > 0`."""
+    if not s > 0.0:
+        return 0.0
+    if bound > 0.0:
+        return float((rate + np.sqrt(rate * rate + 2.0 * bound * s)) / bound)
+    return -s / rate if rate < 0.0 else np.inf
+
+
+@jit_inline_sum
 def event_free_interval(
     switch_re: Floats,
     switch_im: Floats,
@@ -167,22 +177,19 @@ def event_free_interval(
     for i in range(switch_re.shape[1]):
         s = dot(switch_re[mode, i], switch_im[mode, i], z_re, z_im)
         rate = dot(rate_re[mode, i], rate_im[mode, i], z_re, z_im)
-        b = bounded(bound[mode, i], z_re, z_im)
-        if not s > 0.0:
-            proved = 0.0
-        elif b > 0.0:
-            proved = min(proved, (rate + np.sqrt(rate * rate + 2.0 * b * s)) / b)
-        elif rate < 0.0:
-            proved = min(proved, -s / rate)
+        proved = min(proved, positive_interval(s, rate, bounded(bound[mode, i], z_re, z_im)))
     return proved
 
 
 @jit_inline_sum
-def resolved_time(re: Floats, im: Floats, pace: Floats, z_re: Floats, z_im: Floats) -> float:
-    """Time, s, over which Hermite's cubic follows a signal with these rows (m,) to 1e-4 of its size."""
+def resolved_time(re: Floats, im: Floats, pace: Floats, least: float, z_re: Floats, z_im: Floats) -> float:
+    """Time, s, over which Hermite's cubic follows a signal with these rows (m,) to 1e-4 of its size.
+
+    Coordinates whose pace is not above `least` are left out.
+    """
     size, bend = 0.0, 0.0
     for k in range(z_re.size):
-        if pace[k] != DYING:
+        if pace[k] > least:
             share = np.sqrt((re[k] * re[k] + im[k] * im[k]) * (z_re[k] * z_re[k] + z_im[k] * z_im[k]))
             size += share
             square = pace[k] * pace[k]

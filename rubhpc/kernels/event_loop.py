@@ -33,25 +33,31 @@ from rubhpc.kernels.case_progress import (
 )
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
-    SAMPLES_AT_ONCE,
     ModeTables,
     Reduced,
     dot,
-    enter,
     event_free_interval,
-    find_mode,
-    floor_log2,
-    is_beyond,
     propagate,
+)
+from rubhpc.kernels.event_steps import (
+    GAP_TOLERANCE,
+    choose_step,
+    contact_age,
+    end_record,
+    enter_wanted,
+    leave_mode,
+    longest_step,
+    note_resolved,
+    record_event,
+    record_touch,
+    sample_step,
 )
 from rubhpc.kernels.measuring import (
     Recorder,
     begin_contact,
     begin_span,
-    end_span,
     observe_step,
     resolved_contact,
-    take_samples,
 )
 from rubhpc.kernels.mode_change import change_contacts
 
@@ -61,7 +67,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 MOST_EVENTS = 200_000  # of one call; more is chatter without end
-GAP_TOLERANCE = 1e-13  # m
 
 
 @jit_lean_sum
@@ -118,32 +123,16 @@ def advance(
             is_begun = True
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
         if progress.tick >= last_tick:
-            if is_recorded and progress.tick == clock.n_sample << clock.sample_level:
-                if is_sample:  # it closes the last interval
-                    take_samples(
-                        tables,
-                        progress.mode,
-                        z_re,
-                        z_im,
-                        clock.n_sample,
-                        clock.n_sample + 1 - progress.next_sample,
-                        interval,
-                        recorder,
-                        samples,
-                        accumulator,
-                    )
-                end_span(tables, clock, z, progress, recorder, accumulator)
+            if is_recorded:
+                end_record(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
             return FINISHED
         is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
         if progress.n_step > last_step and not is_at_event:
             return PAUSED
         mode = progress.mode
         is_free = mask[mode] == 0
-        reach = last_tick
-        if is_recorded:
-            n_ahead = SAMPLES_AT_ONCE if is_sample and is_free else 1
-            reach = min(reach, ((progress.tick >> clock.sample_level) + n_ahead) << clock.sample_level)
-        longest = min(highest_level, floor_log2(reach - progress.tick))
+        is_ahead = is_sample and is_free
+        longest = longest_step(clock, last_tick, highest_level, is_recorded, is_ahead, progress.tick)
         if is_recorded and not is_free:
             age = contact_age(progress)
             if age != progress.contact_age:
@@ -164,10 +153,7 @@ def advance(
             progress.halving_level = level - 1
             continue
         if is_sample:
-            count = max(1, (1 << level) >> clock.sample_level)
-            first = progress.next_sample
-            take_samples(tables, mode, z_re, z_im, first, count, interval, recorder, samples, accumulator)
-            progress.next_sample = first + count
+            sample_step(tables, clock, level, z_re, z_im, progress, recorder, samples, accumulator)
         if crossing != 0:  # an event within the next tick is taken here
             outcome = take_event(
                 tables,
@@ -238,28 +224,12 @@ def begin_mode(
 
     Returns False where the mode is not tabulated.
     """
-    if progress.wanted >= 0:
-        found = find_mode(tables.mask, progress.wanted)
-        if found < 0:
-            return False
-        angle = shaft_angle(clock, progress.tick)
-        enter(tables, found, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
-        progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
-        progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
-    if is_recorded:
+    is_entered = progress.wanted < 0 or enter_wanted(tables, reduced.clearance, clock, progress, motion, z)
+    if is_entered and is_recorded:
         if progress.energy_from < 0:
             begin_span(tables, z, progress, recorder)
         begin_contact(tables, reduced, progress.mode, z, z_next, recorder)
-    return True
-
-
-@jit_inline_sum
-def contact_age(progress: Progress) -> int:
-    """Level of the time for which the contacts have been what they are.
-
-    What an impact sets off is fast at first: no recorded step is longer than the contact has lasted.
-    """
-    return floor_log2(max(1, progress.tick - progress.entered))
+    return is_entered
 
 
 @jit_lean_sum
@@ -267,30 +237,8 @@ def note_resolution(
     tables: ModeTables, clock: Clock, highest_level: int, age: int, progress: Progress, z: Floats
 ) -> None:
     """Note which steps resolve the contacts now, at the level `age` of the time that they have lasted."""
-    resolved = resolved_contact(tables, progress.mode, z[0], z[1]) / clock.tick
-    resolved = min(resolved, 1.0 * (1 << highest_level))
-    progress.contact_age, progress.resolved_level = age, floor_log2(int(max(1.0, resolved)))
-
-
-@jit_inline_sum
-def choose_step(clock: Clock, progress: Progress, longest: int, interval: float) -> tuple[int, bool]:
-    """Level of the next step, `longest` at most, and whether it is known to be free of events.
-
-    While a gap is open or a force compressive, the switch function s obeys `s + s' t - b t^2 / 2 > 0` for an
-    `interval` (s) that the bound b on its second derivative gives: steps within it miss no event.
-    Event-search steps, not longer than `2^search_level` ticks, need none; they are checked at their end.
-    """
-    level, is_event_free = longest, False
-    if progress.is_after_event == 1:
-        progress.is_after_event = 0
-        level, is_event_free = min(longest, FORCED_LEVEL), True
-    elif progress.halving_level >= 0:
-        level = min(longest, progress.halving_level)
-    else:
-        while level > clock.search_level and (1 << level) * clock.tick > interval:
-            level -= 1
-        is_event_free = (1 << level) * clock.tick <= interval
-    return level, is_event_free
+    resolved = resolved_contact(tables, progress.mode, z[0], z[1])
+    note_resolved(resolved, clock, highest_level, age, progress)
 
 
 @jit_inline_sum
@@ -328,18 +276,11 @@ def take_event(
     int
         UNDER_WAY, DIVERGED or CONTACT_UNSOLVED.
     """
-    q, n = reduced.gap_jacobian.shape
-    mode, spin = progress.mode, clock.spin
-    closed = tables.mask[mode]
-    progress.n_event += 1
-    for k in range(2 * n):
-        motion[k] = dot(tables.motion_re[mode, k], tables.motion_im[mode, k], z[0], z[1])
-    if is_beyond(reduced, motion):
+    spin, closed = clock.spin, tables.mask[progress.mode]
+    if not leave_mode(
+        tables, reduced, clock, is_recorded, progress, z, motion, work.impulse, recorder, accumulator
+    ):
         return DIVERGED
-    if is_recorded:
-        end_span(tables, clock, z, progress, recorder, accumulator)
-        for i in range(q):
-            work.impulse[i] = accumulator.impulse[i]
     angle = shaft_angle(clock, progress.tick)
     moment = (1 << FORCED_LEVEL) * clock.tick
     progress.wanted = change_contacts(
@@ -361,11 +302,7 @@ def take_event(
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
         return CONTACT_UNSOLVED
     if is_recorded:
-        interval = clock.tick * (1 << clock.sample_level)
-        for i in range(q):
-            gained = accumulator.impulse[i] - work.impulse[i]
-            samples.force[i, progress.tick >> clock.sample_level] += gained / interval
-            is_closed = (progress.wanted >> i) & 1 == 1
-            accumulator.n_contact[i] += 1 if is_closed and not accumulator.is_touching[i] else 0
-            accumulator.is_touching[i] = is_closed
+        for i in range(reduced.radius.size):
+            record_event(clock, progress, work.impulse, i, samples, accumulator)
+            record_touch(i, (progress.wanted >> i) & 1 == 1, accumulator)
     return UNDER_WAY

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_sum
-from rubhpc.kernels.accumulators import DRIVE_WORK, FRICTION_LOSS
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -29,46 +28,38 @@ from rubhpc.kernels.case_progress import (
     shaft_angle,
 )
 from rubhpc.kernels.contact_modes import (
-    DYING,
     FORCED_LEVEL,
-    RESOLVED,
-    SAMPLES_AT_ONCE,
     ModeTables,
     Reduced,
     bounded,
     dot,
-    enter,
-    find_mode,
-    floor_log2,
-    is_beyond,
+    positive_interval,
     propagate,
-    resolved_time,
 )
-from rubhpc.kernels.event_loop import GAP_TOLERANCE
+from rubhpc.kernels.event_steps import (
+    GAP_TOLERANCE,
+    choose_step,
+    contact_age,
+    end_record,
+    enter_wanted,
+    leave_mode,
+    longest_step,
+    note_resolved,
+    record_event,
+    record_touch,
+    sample_step,
+)
 from rubhpc.kernels.friction_events import FrictionWork, change_states, observe_states
-from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
-from rubhpc.kernels.measuring import (
-    FORCE,
-    FORCE_RATE,
-    SLIP,
-    SLIP_RATE,
-    Recorder,
-    begin_span,
-    end_span,
-    take_samples,
-    turning_value,
-)
+from rubhpc.kernels.friction_measuring import begin_friction, observe_friction, resolved_friction
+from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
+from rubhpc.kernels.measuring import Recorder, begin_span
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST_EVENTS = 4096  # in a revolution; more are left to short steps
-# Steps in contact over those of steady sliding: what the rim drives through a pair that sticks is not small
-# against what the vibration feels of it.
-FINER = 0.25
 
 
 @jit_sum
@@ -116,67 +107,36 @@ def advance_with_friction(
         observe_states(mask[progress.mode], accumulator)
     while True:
         if progress.wanted >= 0:
-            found = find_mode(mask, progress.wanted)
-            if found < 0:
+            if not enter_wanted(tables, reduced.clearance, clock, progress, motion, z):
                 return MODE_WANTED
-            angle = shaft_angle(clock, progress.tick)
-            enter(tables, found, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
-            progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
-            progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
             if is_recorded:
                 begin_span(tables, z, progress, recorder)
-                begin_friction(tables, bodies, found, z, z_next, recorder)
-                observe_states(mask[found], accumulator)
+                begin_friction(tables, bodies, progress.mode, z, z_next, recorder)
+                observe_states(mask[progress.mode], accumulator)
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
         if progress.tick >= last_tick:
-            if is_recorded and progress.tick == clock.n_sample << clock.sample_level:
-                if is_sample:  # it closes the last interval
-                    take_samples(
-                        tables,
-                        progress.mode,
-                        z_re,
-                        z_im,
-                        clock.n_sample,
-                        clock.n_sample + 1 - progress.next_sample,
-                        interval,
-                        recorder,
-                        samples,
-                        accumulator,
-                    )
-                end_span(tables, clock, z, progress, recorder, accumulator)
+            if is_recorded:
+                end_record(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
             return FINISHED
         is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
         if progress.n_step > last_step and not is_at_event:
             return PAUSED
         mode = progress.mode
         states = mask[mode]
-        # The longest step up to the next sample that resolves a recorded contact.
-        limit = last_tick
-        if is_recorded:
-            reach = SAMPLES_AT_ONCE if is_sample and states == 0 else 1
-            limit = min(limit, ((progress.tick >> clock.sample_level) + reach) << clock.sample_level)
-        level = min(highest_level, floor_log2(limit - progress.tick))
+        is_ahead = is_sample and states == 0
+        longest = longest_step(clock, last_tick, highest_level, is_recorded, is_ahead, progress.tick)
         if is_recorded and states != 0:
-            # What an event sets off is fast at first: no step is longer than its states have lasted.
-            age = floor_log2(max(1, progress.tick - progress.entered))
+            age = contact_age(progress)
             if age != progress.contact_age:
-                resolved = resolved_friction(tables, mode, z_re, z_im) / clock.tick
-                resolved = min(resolved, 1.0 * (1 << highest_level))
-                progress.contact_age, progress.resolved_level = age, floor_log2(int(max(1.0, resolved)))
-            level = min(level, clock.contact_level, max(age, FORCED_LEVEL), progress.resolved_level)
-        is_event_free = False
-        if progress.is_after_event == 1:
-            progress.is_after_event = 0
-            level, is_event_free = min(level, FORCED_LEVEL), True
-        elif progress.halving_level >= 0:
-            level = min(level, progress.halving_level)
-        else:
-            free = change_free_interval(
+                resolved = resolved_friction(tables, mode, z_re, z_im)
+                note_resolved(resolved, clock, highest_level, age, progress)
+            longest = min(longest, clock.contact_level, max(age, FORCED_LEVEL), progress.resolved_level)
+        interval_free = 0.0
+        if not is_at_event:
+            interval_free = change_free_interval(
                 states, mode, switch_re, switch_im, rate_re, rate_im, bound, z_re, z_im
             )
-            while level > clock.search_level and (1 << level) * clock.tick > free:
-                level -= 1
-            is_event_free = (1 << level) * clock.tick <= free
+        level, is_event_free = choose_step(clock, progress, longest, interval_free)
         step = (1 << level) * clock.tick
         propagate(power_re[mode, level], power_im[mode, level], z_re, z_im, next_re, next_im)
         if stuck_pairs(states) != 0:
@@ -192,10 +152,7 @@ def advance_with_friction(
             progress.halving_level = level - 1
             continue
         if is_sample:
-            count = max(1, (1 << level) >> clock.sample_level)
-            taken = progress.next_sample
-            take_samples(tables, mode, z_re, z_im, taken, count, interval, recorder, samples, accumulator)
-            progress.next_sample = taken + count
+            sample_step(tables, clock, level, z_re, z_im, progress, recorder, samples, accumulator)
         if crossing != 0:  # an event within the next tick is taken here
             outcome = take_change(
                 tables,
@@ -254,13 +211,7 @@ def change_free_interval(
             continue
         s = dot(switch_re[mode, j], switch_im[mode, j], z_re, z_im)
         rate = dot(rate_re[mode, j], rate_im[mode, j], z_re, z_im)
-        b = bounded(bound[mode, j], z_re, z_im)
-        if not s > 0.0:
-            proved = 0.0
-        elif b > 0.0:
-            proved = min(proved, (rate + np.sqrt(rate * rate + 2.0 * b * s)) / b)
-        elif rate < 0.0:
-            proved = min(proved, -s / rate)
+        proved = min(proved, positive_interval(s, rate, bounded(bound[mode, j], z_re, z_im)))
     return proved
 
 
@@ -302,23 +253,18 @@ def take_change(
     int
         UNDER_WAY, DIVERGED or CONTACT_UNSOLVED.
     """
-    q, n = reduced.gap_jacobian.shape
-    mode = progress.mode
     if progress.tick - progress.counted_from > clock.samples_per_revolution << clock.sample_level:
         progress.counted_from, progress.n_event = progress.tick, 0
-    progress.n_event += 1
-    for k in range(2 * n):
-        motion[k] = dot(tables.motion_re[mode, k], tables.motion_im[mode, k], z[0], z[1])
-    if is_beyond(reduced, motion):
+    states = tables.mask[progress.mode]
+    if not leave_mode(
+        tables, reduced, clock, is_recorded, progress, z, motion, work.impulse, recorder, accumulator
+    ):
         return DIVERGED
-    if is_recorded:
-        end_span(tables, clock, z, progress, recorder, accumulator)
-        work.impulse[:] = accumulator.impulse
     angle = shaft_angle(clock, progress.tick)
     wanted = change_states(
         reduced,
         bodies,
-        tables.mask[mode],
+        states,
         crossing,
         (1 << FORCED_LEVEL) * clock.tick,
         np.cos(angle),
@@ -329,135 +275,11 @@ def take_change(
         accumulator,
     )
     if is_recorded:
-        interval = clock.tick * (1 << clock.sample_level)
-        for i in range(q):
-            gained = accumulator.impulse[i] - work.impulse[i]
-            samples.force[i, progress.tick >> clock.sample_level] += gained / interval
+        for i in range(work.impulse.size):
+            record_event(clock, progress, work.impulse, i, samples, accumulator)
             if wanted >= 0:
-                is_closed = state_of(wanted, i) != OPEN
-                accumulator.n_contact[i] += 1 if is_closed and not accumulator.is_touching[i] else 0
-                accumulator.is_touching[i] = is_closed
+                record_touch(i, state_of(wanted, i) != OPEN, accumulator)
     if wanted < 0 or progress.n_event > MOST_EVENTS:
         return CONTACT_UNSOLVED
     progress.wanted = wanted
     return UNDER_WAY
-
-
-@jit_inline_sum
-def read_friction(
-    tables: ModeTables, bodies: FrictionBodies, mode: int, i: int, z_re: Floats, z_im: Floats
-) -> tuple[float, float, float, float]:
-    """Normal force (N) of closed pair i, its rate, slip speed (m/s) and its rate.
-
-    Where the pair sticks, the last two are its friction (N) and its rate.
-    """
-    a = dot(tables.switch_re[mode, 2 * i], tables.switch_im[mode, 2 * i], z_re, z_im)
-    b = dot(tables.switch_re[mode, 2 * i + 1], tables.switch_im[mode, 2 * i + 1], z_re, z_im)
-    a_rate = dot(tables.rate_re[mode, 2 * i], tables.rate_im[mode, 2 * i], z_re, z_im)
-    b_rate = dot(tables.rate_re[mode, 2 * i + 1], tables.rate_im[mode, 2 * i + 1], z_re, z_im)
-    state = state_of(tables.mask[mode], i)
-    if state == STUCK:
-        share = 0.5 / bodies.static[i]
-        return share * (a + b), share * (a_rate + b_rate), 0.5 * (b - a), 0.5 * (b_rate - a_rate)
-    sense = -1.0 if state == BACKWARD else 1.0
-    return a, a_rate, sense * b, sense * b_rate
-
-
-@jit_sum
-def resolved_friction(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
-    """Time, s, over which cubics follow the switch functions of the pairs closed in contact mode `mode`."""
-    time = np.inf
-    for i in range(tables.switch_re.shape[1] // 2):
-        state = state_of(tables.mask[mode], i)
-        if state == OPEN:
-            continue
-        pace = tables.pace[mode]
-        for j in range(2 * i, 2 * i + 2):
-            re, im = tables.switch_re[mode, j], tables.switch_im[mode, j]
-            if state == STUCK or j == 2 * i:
-                time = min(time, resolved_time(re, im, pace, z_re, z_im))
-                continue
-            size, bend = 0.0, 0.0  # of the slip, but for that of the steady spin
-            for k in range(z_re.size):
-                if pace[k] > 0.0:
-                    share = np.sqrt((re[k] * re[k] + im[k] * im[k]) * (z_re[k] * z_re[k] + z_im[k] * z_im[k]))
-                    size += share
-                    square = pace[k] * pace[k]
-                    bend += share * square * square
-            if bend > 0.0:
-                time = min(time, (RESOLVED * size / bend) ** 0.25)
-    return time * FINER
-
-
-@jit_sum
-def begin_friction(
-    tables: ModeTables, bodies: FrictionBodies, mode: int, z: Floats, calm: Floats, recorder: Recorder
-) -> None:
-    """Read the closed pairs in contact mode `mode`, at its beginning or where a record begins.
-
-    What dies before the first step ends is left out: no cubic follows it. `calm` (2, m) is work space.
-    """
-    for k in range(z.shape[1]):
-        dies = tables.pace[mode, k] == DYING
-        calm[0, k], calm[1, k] = (0.0, 0.0) if dies else (z[0, k], z[1, k])
-    for i in range(bodies.rim_speed.size):
-        if state_of(tables.mask[mode], i) != OPEN:
-            force, rate, across, across_rate = read_friction(tables, bodies, mode, i, calm[0], calm[1])
-            recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = force, rate
-            recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = across, across_rate
-
-
-@jit_inline_sum
-def observe_friction(
-    tables: ModeTables,
-    bodies: FrictionBodies,
-    mode: int,
-    step: float,
-    z_re: Floats,
-    z_im: Floats,
-    i_sample: int,
-    share: float,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
-) -> None:
-    """Add a step (s) of the closed pairs: forces and slip as cubics, Simpson's rule for friction.
-
-    `z` are the coordinates at its end; `share` (1/s) takes an impulse to the mean force of sample `i_sample`.
-    """
-    for i in range(bodies.rim_speed.size):
-        state = state_of(tables.mask[mode], i)
-        if state == OPEN:
-            continue
-        before, rate_before = recorder.node[FORCE, i], recorder.node[FORCE_RATE, i]
-        across_before, across_rate_before = recorder.node[SLIP, i], recorder.node[SLIP_RATE, i]
-        after, rate_after, across_after, across_rate_after = read_friction(
-            tables, bodies, mode, i, z_re, z_im
-        )
-        recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = after, rate_after
-        recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = across_after, across_rate_after
-        bend = step * (rate_before - rate_after)
-        impulse = step * (0.5 * (before + after) + bend / 12.0)
-        peak = max(before, after)
-        if rate_before * rate_after < 0.0:
-            peak = max(peak, turning_value(before, rate_before, after, rate_after, step))
-        samples.force[i, i_sample] += impulse * share
-        accumulator.contact_time[i] += step
-        accumulator.impulse[i] += impulse
-        accumulator.peak_force[i] = max(accumulator.peak_force[i], peak)
-        across_bend = step * (across_rate_before - across_rate_after)
-        if state == STUCK:
-            rubbed = step * (0.5 * (across_before + across_after) + across_bend / 12.0)
-            accumulator.stick_time[i] += step
-            accumulator.least_slip[i] = min(accumulator.least_slip[i], 0.0)
-        else:
-            sense = -1.0 if state == BACKWARD else 1.0
-            rubbed = sense * bodies.sliding[i] * impulse
-            middle = 0.5 * (before + after) + 0.125 * bend
-            across_middle = 0.5 * (across_before + across_after) + 0.125 * across_bend
-            work = before * across_before + 4.0 * middle * across_middle + after * across_after
-            friction_work = sense * bodies.sliding[i] * work * step / 6.0
-            accumulator.friction_work[i] += friction_work
-            accumulator.energy[FRICTION_LOSS] += friction_work
-            accumulator.least_slip[i] = min(accumulator.least_slip[i], across_before, across_after)
-        accumulator.energy[DRIVE_WORK] += bodies.rim_speed[i] * rubbed

@@ -219,10 +219,31 @@ def resolved_contact(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) 
             pace = tables.pace[mode]
             time = min(
                 time,
-                resolved_time(tables.switch_re[mode, i], tables.switch_im[mode, i], pace, z_re, z_im),
-                resolved_time(tables.slip_re[mode, i], tables.slip_im[mode, i], pace, z_re, z_im),
+                resolved_time(tables.switch_re[mode, i], tables.switch_im[mode, i], pace, DYING, z_re, z_im),
+                resolved_time(tables.slip_re[mode, i], tables.slip_im[mode, i], pace, DYING, z_re, z_im),
             )
     return time
+
+
+@jit_inline_sum
+def leave_out_dying(pace: Floats, z: Floats, calm: Floats) -> None:
+    """Fill `calm` (2, m) with the coordinates that outlive the first step: no cubic follows the others."""
+    for k in range(z.shape[1]):
+        dies = pace[k] == DYING
+        calm[0, k], calm[1, k] = (0.0, 0.0) if dies else (z[0, k], z[1, k])
+
+
+@jit_inline_sum
+def force_in_step(
+    before: float, rate_before: float, after: float, rate_after: float, step: float
+) -> tuple[float, float, float]:
+    """Impulse (N s), value in the middle (N) and peak (N) of a force over a step (s), as Hermite's cubic."""
+    bend = step * (rate_before - rate_after)
+    impulse = step * (0.5 * (before + after) + bend / 12.0)
+    peak = max(before, after)
+    if rate_before * rate_after < 0.0:
+        peak = max(peak, turning_value(before, rate_before, after, rate_after, step))
+    return impulse, 0.5 * (before + after) + 0.125 * bend, peak
 
 
 @jit_inline_sum
@@ -231,11 +252,9 @@ def begin_contact(
 ) -> None:
     """Read the pairs closed in contact mode `mode`, at its beginning or where a record begins.
 
-    What dies before the first step ends is left out: no cubic follows it. `calm` (2, m) is work space.
+    `calm` (2, m) is work space.
     """
-    for k in range(z.shape[1]):
-        dies = tables.pace[mode, k] == DYING
-        calm[0, k], calm[1, k] = (0.0, 0.0) if dies else (z[0, k], z[1, k])
+    leave_out_dying(tables.pace[mode], z, calm)
     for i in range(reduced.radius.size):
         if (tables.mask[mode] >> i) & 1:
             force, rate, slip, slip_rate = read_contact(tables, reduced, mode, i, calm[0], calm[1])
@@ -270,15 +289,10 @@ def observe_step(
         after, rate_after, slip_after, slip_rate_after = read_contact(tables, reduced, mode, i, z_re, z_im)
         recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = after, rate_after
         recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip_after, slip_rate_after
-        bend = step * (rate_before - rate_after)
-        impulse = step * (0.5 * (before + after) + bend / 12.0)
-        middle = 0.5 * (before + after) + 0.125 * bend
+        impulse, middle, peak = force_in_step(before, rate_before, after, rate_after, step)
         slip_middle = 0.5 * (slip_before + slip_after) + 0.125 * step * (slip_rate_before - slip_rate_after)
         work = before * slip_before + 4.0 * middle * slip_middle + after * slip_after
         friction_work = reduced.friction[i] * work * step / 6.0
-        peak = max(before, after)
-        if rate_before * rate_after < 0.0:
-            peak = max(peak, turning_value(before, rate_before, after, rate_after, step))
         samples.force[i, i_sample] += impulse * share
         accumulator.contact_time[i] += step
         accumulator.impulse[i] += impulse

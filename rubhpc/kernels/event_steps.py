@@ -1,0 +1,195 @@
+"""What the loops from event to event share: entering a contact mode, choosing a step, recording it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_angle
+from rubhpc.kernels.contact_modes import (
+    FORCED_LEVEL,
+    SAMPLES_AT_ONCE,
+    ModeTables,
+    Reduced,
+    dot,
+    enter,
+    find_mode,
+    floor_log2,
+    is_beyond,
+)
+from rubhpc.kernels.measuring import Recorder, end_span, take_samples
+
+if TYPE_CHECKING:
+    from rubhpc.kernels.accumulators import Accumulator, Samples
+
+Floats = NDArray[np.float64]
+
+GAP_TOLERANCE = 1e-13  # m
+
+
+@jit_lean_sum
+def enter_wanted(
+    tables: ModeTables, clearance: Floats, clock: Clock, progress: Progress, motion: Floats, z: Floats
+) -> bool:
+    """Enter the contact mode wanted with the reduced motion (2 n,); False where the mode is not tabulated."""
+    found = find_mode(tables.mask, progress.wanted)
+    if found < 0:
+        return False
+    angle = shaft_angle(clock, progress.tick)
+    enter(tables, found, clearance, np.cos(angle), np.sin(angle), motion, z)
+    progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
+    progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
+    return True
+
+
+@jit_inline_sum
+def longest_step(
+    clock: Clock, last_tick: int, highest_level: int, is_recorded: bool, is_ahead: bool, tick: int
+) -> int:
+    """Level of the longest step from a tick: up to the end, and to the next sample of a record.
+
+    With `is_ahead`, samples are read from the beginning of the step: it may pass several of them.
+    """
+    reach = last_tick
+    if is_recorded:
+        n_ahead = SAMPLES_AT_ONCE if is_ahead else 1
+        reach = min(reach, ((tick >> clock.sample_level) + n_ahead) << clock.sample_level)
+    return min(highest_level, floor_log2(reach - tick))
+
+
+@jit_inline_sum
+def contact_age(progress: Progress) -> int:
+    """Level of the time for which the contacts have been what they are.
+
+    What an event sets off is fast at first: no recorded step is longer than the contact has lasted.
+    """
+    return floor_log2(max(1, progress.tick - progress.entered))
+
+
+@jit_inline_sum
+def note_resolved(resolved: float, clock: Clock, highest_level: int, age: int, progress: Progress) -> None:
+    """Note the time (s) that resolves the contacts, at the level `age` of the time that they have lasted."""
+    ticks = min(resolved / clock.tick, 1.0 * (1 << highest_level))
+    progress.contact_age, progress.resolved_level = age, floor_log2(int(max(1.0, ticks)))
+
+
+@jit_inline_sum
+def choose_step(clock: Clock, progress: Progress, longest: int, interval: float) -> tuple[int, bool]:
+    """Level of the next step, `longest` at most, and whether it is known to be free of events.
+
+    While a gap is open or a force compressive, the switch function s obeys `s + s' t - b t^2 / 2 > 0` for an
+    `interval` (s) that the bound b on its second derivative gives: steps within it miss no event.
+    Event-search steps, not longer than `2^search_level` ticks, need none; they are checked at their end.
+    """
+    level, is_event_free = longest, False
+    if progress.is_after_event == 1:
+        progress.is_after_event = 0
+        level, is_event_free = min(longest, FORCED_LEVEL), True
+    elif progress.halving_level >= 0:
+        level = min(longest, progress.halving_level)
+    else:
+        while level > clock.search_level and (1 << level) * clock.tick > interval:
+            level -= 1
+        is_event_free = (1 << level) * clock.tick <= interval
+    return level, is_event_free
+
+
+@jit_inline_sum
+def sample_step(
+    tables: ModeTables,
+    clock: Clock,
+    level: int,
+    z_re: Floats,
+    z_im: Floats,
+    progress: Progress,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> None:
+    """Record the samples within a step, from the coordinates at its beginning, which is the first of them."""
+    count = max(1, (1 << level) >> clock.sample_level)
+    interval = clock.tick * (1 << clock.sample_level)
+    first = progress.next_sample
+    take_samples(tables, progress.mode, z_re, z_im, first, count, interval, recorder, samples, accumulator)
+    progress.next_sample = first + count
+
+
+@jit_inline_sum
+def end_record(
+    tables: ModeTables,
+    clock: Clock,
+    is_sample: bool,
+    z: Floats,
+    progress: Progress,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> None:
+    """Close the record where it ends: its last interval between samples, and the energies."""
+    if progress.tick == clock.n_sample << clock.sample_level:
+        if is_sample:
+            count = clock.n_sample + 1 - progress.next_sample
+            interval = clock.tick * (1 << clock.sample_level)
+            take_samples(
+                tables,
+                progress.mode,
+                z[0],
+                z[1],
+                clock.n_sample,
+                count,
+                interval,
+                recorder,
+                samples,
+                accumulator,
+            )
+        end_span(tables, clock, z, progress, recorder, accumulator)
+
+
+@jit_inline_sum
+def leave_mode(
+    tables: ModeTables,
+    reduced: Reduced,
+    clock: Clock,
+    is_recorded: bool,
+    progress: Progress,
+    z: Floats,
+    motion: Floats,
+    impulse: Floats,
+    recorder: Recorder,
+    accumulator: Accumulator,
+) -> bool:
+    """Leave the contact mode at an event: fill the reduced motion (2 n,) and the `impulse` (q,), N s, so far.
+
+    Returns False where the motion diverges.
+    """
+    mode = progress.mode
+    progress.n_event += 1
+    for k in range(motion.size):
+        motion[k] = dot(tables.motion_re[mode, k], tables.motion_im[mode, k], z[0], z[1])
+    if is_beyond(reduced, motion):
+        return False
+    if is_recorded:
+        end_span(tables, clock, z, progress, recorder, accumulator)
+        for i in range(impulse.size):
+            impulse[i] = accumulator.impulse[i]
+    return True
+
+
+@jit_inline_sum
+def record_event(
+    clock: Clock, progress: Progress, before: Floats, i: int, samples: Samples, accumulator: Accumulator
+) -> None:
+    """Add what pair i got by an event to the mean force of its sample; `before` (q,) are impulses, N s."""
+    interval = clock.tick * (1 << clock.sample_level)
+    gained = accumulator.impulse[i] - before[i]
+    samples.force[i, progress.tick >> clock.sample_level] += gained / interval
+
+
+@jit_inline_sum
+def record_touch(i: int, is_closed: bool, accumulator: Accumulator) -> None:
+    """Count a contact of pair i where an event closes it."""
+    accumulator.n_contact[i] += 1 if is_closed and not accumulator.is_touching[i] else 0
+    accumulator.is_touching[i] = is_closed

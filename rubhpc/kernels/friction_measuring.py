@@ -1,0 +1,135 @@
+"""What is measured of pairs under set-valued friction as a case goes from event to event."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels.accumulators import DRIVE_WORK, FRICTION_LOSS
+from rubhpc.kernels.contact_modes import DYING, ModeTables, dot, resolved_time
+from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, FrictionBodies, state_of
+from rubhpc.kernels.measuring import (
+    FORCE,
+    FORCE_RATE,
+    SLIP,
+    SLIP_RATE,
+    Recorder,
+    force_in_step,
+    leave_out_dying,
+)
+
+if TYPE_CHECKING:
+    from rubhpc.kernels.accumulators import Accumulator, Samples
+
+Floats = NDArray[np.float64]
+
+# Steps in contact over those of steady sliding: what the rim drives through a pair that sticks is not small
+# against what the vibration feels of it.
+FINER = 0.25
+
+
+@jit_inline_sum
+def read_friction(
+    tables: ModeTables, bodies: FrictionBodies, mode: int, i: int, z_re: Floats, z_im: Floats
+) -> tuple[float, float, float, float]:
+    """Normal force (N) of closed pair i, its rate, slip speed (m/s) and its rate.
+
+    Where the pair sticks, the last two are its friction (N) and its rate.
+    """
+    a = dot(tables.switch_re[mode, 2 * i], tables.switch_im[mode, 2 * i], z_re, z_im)
+    b = dot(tables.switch_re[mode, 2 * i + 1], tables.switch_im[mode, 2 * i + 1], z_re, z_im)
+    a_rate = dot(tables.rate_re[mode, 2 * i], tables.rate_im[mode, 2 * i], z_re, z_im)
+    b_rate = dot(tables.rate_re[mode, 2 * i + 1], tables.rate_im[mode, 2 * i + 1], z_re, z_im)
+    state = state_of(tables.mask[mode], i)
+    if state == STUCK:
+        share = 0.5 / bodies.static[i]
+        return share * (a + b), share * (a_rate + b_rate), 0.5 * (b - a), 0.5 * (b_rate - a_rate)
+    sense = -1.0 if state == BACKWARD else 1.0
+    return a, a_rate, sense * b, sense * b_rate
+
+
+@jit_sum
+def resolved_friction(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
+    """Time, s, over which cubics follow the switch functions of the pairs closed in contact mode `mode`."""
+    time = np.inf
+    for i in range(tables.switch_re.shape[1] // 2):
+        state = state_of(tables.mask[mode], i)
+        if state == OPEN:
+            continue
+        pace = tables.pace[mode]
+        for j in range(2 * i, 2 * i + 2):
+            # Of the slip, but for that of the steady spin.
+            least = DYING if state == STUCK or j == 2 * i else 0.0
+            re, im = tables.switch_re[mode, j], tables.switch_im[mode, j]
+            time = min(time, resolved_time(re, im, pace, least, z_re, z_im))
+    return time * FINER
+
+
+@jit_sum
+def begin_friction(
+    tables: ModeTables, bodies: FrictionBodies, mode: int, z: Floats, calm: Floats, recorder: Recorder
+) -> None:
+    """Read the closed pairs in contact mode `mode`, at its beginning or where a record begins.
+
+    `calm` (2, m) is work space.
+    """
+    leave_out_dying(tables.pace[mode], z, calm)
+    for i in range(bodies.rim_speed.size):
+        if state_of(tables.mask[mode], i) != OPEN:
+            force, rate, across, across_rate = read_friction(tables, bodies, mode, i, calm[0], calm[1])
+            recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = force, rate
+            recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = across, across_rate
+
+
+@jit_inline_sum
+def observe_friction(
+    tables: ModeTables,
+    bodies: FrictionBodies,
+    mode: int,
+    step: float,
+    z_re: Floats,
+    z_im: Floats,
+    i_sample: int,
+    share: float,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> None:
+    """Add a step (s) of the closed pairs: forces and slip as cubics, Simpson's rule for friction.
+
+    `z` are the coordinates at its end; `share` (1/s) takes an impulse to the mean force of sample `i_sample`.
+    """
+    for i in range(bodies.rim_speed.size):
+        state = state_of(tables.mask[mode], i)
+        if state == OPEN:
+            continue
+        before, rate_before = recorder.node[FORCE, i], recorder.node[FORCE_RATE, i]
+        across_before, across_rate_before = recorder.node[SLIP, i], recorder.node[SLIP_RATE, i]
+        after, rate_after, across_after, across_rate_after = read_friction(
+            tables, bodies, mode, i, z_re, z_im
+        )
+        recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = after, rate_after
+        recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = across_after, across_rate_after
+        impulse, middle, peak = force_in_step(before, rate_before, after, rate_after, step)
+        samples.force[i, i_sample] += impulse * share
+        accumulator.contact_time[i] += step
+        accumulator.impulse[i] += impulse
+        accumulator.peak_force[i] = max(accumulator.peak_force[i], peak)
+        across_bend = step * (across_rate_before - across_rate_after)
+        if state == STUCK:
+            rubbed = step * (0.5 * (across_before + across_after) + across_bend / 12.0)
+            accumulator.stick_time[i] += step
+            accumulator.least_slip[i] = min(accumulator.least_slip[i], 0.0)
+        else:
+            sense = -1.0 if state == BACKWARD else 1.0
+            rubbed = sense * bodies.sliding[i] * impulse
+            across_middle = 0.5 * (across_before + across_after) + 0.125 * across_bend
+            work = before * across_before + 4.0 * middle * across_middle + after * across_after
+            friction_work = sense * bodies.sliding[i] * work * step / 6.0
+            accumulator.friction_work[i] += friction_work
+            accumulator.energy[FRICTION_LOSS] += friction_work
+            accumulator.least_slip[i] = min(accumulator.least_slip[i], across_before, across_after)
+        accumulator.energy[DRIVE_WORK] += bodies.rim_speed[i] * rubbed
