@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -22,13 +21,14 @@ from rubhpc.integrate.measures import (
     empty_samples,
     measures_of,
     new_accumulator,
+    samples_within,
 )
 from rubhpc.integrate.neighbour_motions import NeighbourMotions
 from rubhpc.integrate.proof import Solver
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.setup import ModalSetup, Scheme
 from rubhpc.integrate.start import start_of
-from rubhpc.integrate.transient import pass_transient
+from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.kernels.accumulators import IMPACT_STEPS
 from rubhpc.kernels.laws import is_set_valued
 from rubhpc.schema import DONE, SECTION_NAMES
@@ -143,16 +143,29 @@ def _integrate(
     settings = {"spin_speed": setup.spin, "clearance": clearance}
 
     reason, n_transient = pass_transient(march, recording)
-    if reason is None:
+    n_step = n_left = 0
+    if reason is not None:  # what led to it is the record
+        n_step, n_left = march.n_step, march.n_left
+        ended = n_transient + march.sample // per_revolution + 1
+        march, n_transient = start(initial), max(0, ended - recording.revolutions)
+        if pass_revolutions(march, recording, n_transient) is None:
+            march.advance(0, n_sample, samples, accumulator, is_recorded=True)
+    else:
         energy_before = march.energy()
         accumulator.is_touching[:] = march.touching()  # a contact under way did not begin in the record
         accumulator.age[accumulator.is_touching] = IMPACT_STEPS
         reason = march.advance(0, n_sample, samples, accumulator, is_recorded=True)
     if reason is not None:
-        seen = math.floor(n_transient + march.sample / per_revolution) + 1
-        revolution = min(seen, n_transient + recording.revolutions)  # what ends the record was in it
+        n_kept = samples_within(samples, march.sample, setup.displacement_limit)
+        revolution = n_transient + min(n_kept // per_revolution + 1, recording.revolutions)
+        add_sag(samples, accumulator, setup.model)
         record = diverged_record(
-            f"{reason} in revolution {revolution}", n_stator, recording, settings, march.final()
+            f"{reason} in revolution {revolution}",
+            n_stator,
+            recording,
+            settings,
+            march.final(),
+            by_name(samples.whole[:, :n_kept], n_stator),
         )
     else:
         add_sag(samples, accumulator, setup.model)
@@ -183,7 +196,9 @@ def _integrate(
         if "waveform" not in recording.keep:
             record.signals.clear()
     record.measures.update(
-        transient_revolutions=n_transient, steps=march.n_step, left_closed_form=march.n_left
+        transient_revolutions=n_transient,
+        steps=n_step + march.n_step,
+        left_closed_form=n_left + march.n_left,
     )
     return record
 

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.integrate.divergence import displacement_reason, energy_reason
 from rubhpc.integrate.march import NO_FORCES, March
 from rubhpc.integrate.measures import empty_samples, new_accumulator
 from rubhpc.integrate.packing import pairs_of
 from rubhpc.integrate.record import State
 from rubhpc.integrate.workspace import workspace
 from rubhpc.kernels import central_difference as kernel
-from rubhpc.kernels.contact_pairs import fill_directions, pair_normal_and_gap
+from rubhpc.kernels.contact_pairs import V, W, fill_directions, pair_normal_and_gap
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -94,11 +95,19 @@ class CentralDifferenceMarch(March):
             self.n_step += (int(self._reached[0]) - self.sample) * setup.steps_per_sample
             self.sample = int(self._reached[0])
         if outcome == kernel.DIVERGED:
-            return f"a displacement passed {setup.displacement_limit:.3g} m"
+            return displacement_reason(setup.model, self._judged(), setup.displacement_limit)
         if outcome == kernel.CONTACT_UNSOLVED:
             return NO_FORCES
         self.n_step += (stop - self.sample) * setup.steps_per_sample
+        if not self.energy() <= setup.energy_limit:
+            return energy_reason(setup.energy_limit)
         return None
+
+    def _judged(self) -> Floats:
+        """Displacements of the nodes that `divergence.judged_nodes` names, v and w of each, m."""
+        rims = self._pairs.row[: self._pairs.radius.size, [V, W]]
+        rows = np.concatenate([self._setup.packed.output_row[:2], rims.ravel()])
+        return np.where(rows >= 0, self._state[0][rows], 0.0)
 
     def _kernel(
         self,

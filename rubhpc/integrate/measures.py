@@ -87,6 +87,13 @@ def add_sag(samples: Samples, accumulator: Accumulator, model: Model) -> None:
         accumulator.lowest[k] += sag
 
 
+def samples_within(samples: Samples, n_taken: int, limit: float) -> int:
+    """Count the samples up to the first whose lateral displacement passes a limit, m, of those taken."""
+    lateral = samples.rotor[[VERTICAL, HORIZONTAL], : max(n_taken, 0)]
+    beyond = np.flatnonzero(~np.all(np.abs(lateral) <= limit, axis=0))
+    return int(beyond[0]) if beyond.size else lateral.shape[1]
+
+
 def carrier_displacement(samples: Samples, model: Model) -> Floats:
     """Largest displacement at a sample, m, of what each stator stands on: a carrier, or the ground (0)."""
     peak, q = np.zeros(len(model.stators)), len(model.stators)
@@ -97,7 +104,8 @@ def carrier_displacement(samples: Samples, model: Model) -> Floats:
 
 def by_name(whole: Floats, n_stator: int) -> dict[str, Floats]:
     """Rows of `Samples.whole`, or their spectra, by their names in the schema: (n,) or (n_stator, n)."""
-    axial, lateral, force = whole[4:].reshape(3, -1, whole.shape[1])[:, :n_stator]
+    n_row, n = whole.shape
+    axial, lateral, force = whole[4:].reshape(3, (n_row - 4) // 3, n)[:, :n_stator]
     return {
         "vertical": whole[VERTICAL],
         "horizontal": whole[HORIZONTAL],
@@ -195,9 +203,18 @@ def measures_of(
 
 
 def diverged_record(
-    reason: str, n_stator: int, recording: Recording, settings: dict[str, float], final: State
+    reason: str,
+    n_stator: int,
+    recording: Recording,
+    settings: dict[str, float],
+    final: State,
+    reached: dict[str, Floats] | None = None,
 ) -> Record:
-    """Record of a case that ran away: not-a-number wherever a result would stand."""
+    """Record of a case that ran away: its signals as far as it got, and not-a-number elsewhere.
+
+    `reached` holds the samples (..., n) until then; sections are read from them. Spectra and measures are
+    those of whole records: a diverged case has none.
+    """
     per_revolution = recording.samples_per_revolution
     n_sample = recording.revolutions * per_revolution
     length = {
@@ -213,6 +230,12 @@ def diverged_record(
         elif variable.role == "measure" or variable.role in recording.keep:
             groups[variable.role][name] = np.full([length[dim] for dim in variable.dims], np.nan)
     groups["measure"]["regime"] = -1
+    for name, values in (reached or {}).items():
+        if name in groups["waveform"]:
+            groups["waveform"][name][..., : values.shape[-1]] = values
+        if f"section_{name}" in groups["section"]:
+            once = values[..., ::per_revolution]
+            groups["section"][f"section_{name}"][: once.size] = once
     return Record(
         status=DIVERGED,
         reason=reason,

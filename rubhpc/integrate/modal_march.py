@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.fem.statics import sag_at_stators
+from rubhpc.integrate.divergence import displacement_reason, energy_reason
 from rubhpc.integrate.march import March
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduction import kernel_bodies
@@ -112,7 +113,7 @@ class ModalMarch(March):
         return motion
 
     def is_beyond(self, motion: Floats) -> bool:
-        """Whether a motion (2 n,) takes the output node or a contact degree beyond the limit."""
+        """Whether a motion (2 n,) takes the rotor beyond the limit."""
         seen = self._setup.reduced.translations @ motion[: self.bodies.stiffness.shape[0]]
         return not np.all(np.abs(seen) <= self._setup.displacement_limit)
 
@@ -139,19 +140,29 @@ class ModalMarch(March):
             self.sample = int(self.progress.tick) >> sample_level
             if outcome == CONTACT_UNSOLVED:
                 return self._unsolved()
-            if outcome == DIVERGED or self._has_diverged(accumulator):
-                return f"a displacement passed {self._setup.displacement_limit:.3g} m"
+            reason = self._why_diverged(outcome == DIVERGED, accumulator)
+            if reason is not None:
+                return reason
             if outcome == FINISHED:
                 return None
             if self.check is not None:
                 self.check()
 
-    def _has_diverged(self, accumulator: Accumulator) -> bool:
-        """Whether the output node or a contact degree is, or at a sample was, beyond the limit."""
-        lowest, highest = accumulator.lowest[:2], accumulator.highest[:2]
-        reached = np.concatenate([highest, -lowest, accumulator.peak_lateral])
-        is_within = np.all(reached <= self._setup.displacement_limit)
-        return not is_within or self.is_beyond(self.motion_of(self.progress, self._z))
+    def _why_diverged(self, is_at_event: bool, accumulator: Accumulator) -> str | None:
+        """What of the motion is beyond its limit; of the output node also what was so at a sample."""
+        setup = self._setup
+        limit, motion = setup.displacement_limit, self._motion
+        if not is_at_event:
+            motion = self.motion_of(self.progress, self._z)
+        seen = setup.reduced.translations @ motion[: self.bodies.stiffness.shape[0]]
+        if np.any(accumulator.highest >= accumulator.lowest):  # a sample was taken
+            reached = np.maximum(accumulator.highest[:2], -accumulator.lowest[:2])
+            seen[:2] = np.maximum(np.abs(seen[:2]), reached)
+        if not np.all(np.abs(seen) <= limit):
+            return displacement_reason(setup.model, seen, limit)
+        if not is_at_event and not self.energy() <= setup.energy_limit:
+            return energy_reason(setup.energy_limit)
+        return None
 
     def _reduce(self, state: State) -> Floats:
         """Reduced coordinates and velocities of a state."""

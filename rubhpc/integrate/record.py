@@ -104,7 +104,8 @@ class Record(RecordVariables):
     Attributes
     ----------
     status : int
-        `schema.DONE` or `schema.DIVERGED`; a diverged case holds NaN and says why in `reason`.
+        `schema.DONE` or `schema.DIVERGED`; a diverged case says why in `reason` and holds its signals and
+        sections up to there, then NaN.
     note : str
         What is wrong with the rig at this speed: an unstable rotor.
     signals : dict of (n_sample,) or (n_stator, n_sample)

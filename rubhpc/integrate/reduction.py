@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from rubhpc.errors import InputError
 from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
 from rubhpc.kernels.contact_modes import Reduced
-from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, N_DEGREE, V, W, rim_sense
+from rubhpc.kernels.contact_pairs import N_DEGREE, V, W, rim_sense
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,9 +71,8 @@ class ReducedModel:
 
     @cached_property
     def translations(self) -> Floats:
-        """Lateral motion of the output node, then motion of rims and tips, (2 + 4 q, n)."""
-        pairs = self.degree[:, [V, W, AXIAL, LATERAL]].reshape(-1, self.degree.shape[2])
-        return np.concatenate([self.output[:2], pairs])
+        """Lateral motion of the output node, then of the rims (`divergence.judged_nodes`), (2 + 2 q, n)."""
+        return np.concatenate([self.output[:2], self.degree[:, [V, W]].reshape(-1, self.degree.shape[2])])
 
     @cached_property
     def project(self) -> Floats:

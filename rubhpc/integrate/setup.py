@@ -14,6 +14,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.response import step_limit
 from rubhpc.integrate.contact_mode import ContactMode, confine, solve_contact_mode, solve_parts
+from rubhpc.integrate.divergence import energy_limit
 from rubhpc.integrate.friction_mode import FrictionPairs, solve_friction_mode
 from rubhpc.integrate.mode_library import FrictionLibrary, ModeLibrary, width_without_modes
 from rubhpc.integrate.mode_tables import tabulate
@@ -65,6 +66,11 @@ class CentralDifferenceSetup:
     displacement_limit: float  # m
     law: Law = MULTIPLIER
 
+    @cached_property
+    def energy_limit(self) -> float:
+        """Mechanical energy, J, beyond which a motion has diverged."""
+        return energy_limit(self.model, self.spin, self.displacement_limit)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ModalSetup:
@@ -83,6 +89,11 @@ class ModalSetup:
     _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
     _friction_libraries: dict[float, FrictionLibrary] = field(default_factory=dict)
     _open_tables: dict[float, ModeTables] = field(default_factory=dict)
+
+    @cached_property
+    def energy_limit(self) -> float:
+        """Mechanical energy, J, beyond which a motion has diverged."""
+        return energy_limit(self.model, self.spin, self.displacement_limit)
 
     @cached_property
     def interval(self) -> float:

@@ -23,8 +23,9 @@ from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_forces import solve_contact
 from rubhpc.kernels.contact_pairs import (
     N_DEGREE,
-    TORSION,
     Pairs,
+    V,
+    W,
     Workspace,
     fill_start,
     is_any_closed,
@@ -101,7 +102,7 @@ def advance(
     is_recorded : bool
         Whether to fill `samples` (at index i - first recorded sample = i) and `accumulator`.
     displacement_limit : float, m
-        Displacement of a contact degree or of the output node beyond which the case has diverged.
+        Displacement of the output node or of a rim beyond which the case has diverged.
     output_row : (3,)
         Rows of vertical, horizontal and torsional displacement of the output node; -1 where held.
     state : (2, n_dof), m and m/s (rad and rad/s)
@@ -237,12 +238,12 @@ def flush_decayed(state: Floats) -> None:
 
 @jit_inline
 def has_diverged(displacement: Floats, output_row: Ints, pair_row: Ints, limit: float) -> bool:
-    """Whether a translation of the output node or of a contact pair is not finite or beyond the limit, m."""
+    """Whether a displacement of the output node or of a rim is not finite or beyond the limit, m."""
     for k in range(2):
         if output_row[k] >= 0 and not abs(displacement[output_row[k]]) <= limit:
             return True
     for i in range(pair_row.shape[0]):
-        for a in range(N_DEGREE):
-            if a != TORSION and pair_row[i, a] >= 0 and not abs(displacement[pair_row[i, a]]) <= limit:
+        for a in (V, W):
+            if pair_row[i, a] >= 0 and not abs(displacement[pair_row[i, a]]) <= limit:
                 return True
     return False

@@ -241,10 +241,10 @@ def test_motion_that_has_died_away_is_zero():
 
 
 @pytest.mark.parametrize("value", [0.2, math.nan, math.inf])
-@pytest.mark.parametrize("degree", ["output", "tip"])
+@pytest.mark.parametrize("degree", ["output", "rim"])
 def test_runaway_motion_is_noticed(value, degree):
     case = KernelCase.of(PACKAGED, 300.0, 42_000, clearance=10.0)
-    row = case.packed.output_row[1] if degree == "output" else case.pairs.row[0, LATERAL]
+    row = case.packed.output_row[1] if degree == "output" else case.pairs.row[0, V]
     case.state[0, row] = value
     assert case.advance(0, 1, limit=0.1) == DIVERGED
 

@@ -95,6 +95,20 @@ def test_dataset_of_scalars_alone_has_no_samples(record):
     assert repr(bare) == "<Record: done; measures only>"
 
 
+def test_diverged_record_holds_what_was_reached(record):
+    recording = Recording(transient=1, revolutions=REVOLUTIONS, samples_per_revolution=PER_REVOLUTION * 2)
+    reached = {"vertical": np.arange(2.0 * PER_REVOLUTION + 3), "contact_force": np.ones((N_STATOR, 5))}
+    diverged = diverged_record("it left", N_STATOR, recording, {}, record.final, reached)
+    n_reached = 2 * PER_REVOLUTION + 3
+    assert diverged.vertical[:n_reached].tolist() == reached["vertical"].tolist()
+    assert np.isnan(diverged.vertical[n_reached:]).all()
+    assert diverged.section_vertical[:2].tolist() == [0.0, 2.0 * PER_REVOLUTION]
+    assert np.isnan(diverged.section_vertical[2:]).all()
+    assert np.isfinite(diverged.contact_force).sum() == 5 * N_STATOR
+    assert np.isnan(diverged.horizontal).all()
+    assert np.isnan(diverged.spectrum_vertical).all()
+
+
 @pytest.mark.parametrize("keep", [(), ("waveform",), ("spectrum", "section")])
 def test_diverged_record_is_not_a_number_of_the_usual_shape(record, keep):
     recording = Recording(
