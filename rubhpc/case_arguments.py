@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypedDict
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, cast
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.fem.stability import instability_message
+from rubhpc.input.fields import nearest, parse_field
 from rubhpc.input.quantity import brief, parse_quantity
 from rubhpc.input.reading import build
 from rubhpc.integrate.record import State
@@ -20,14 +21,21 @@ from rubhpc.study.initial import Initial, check_initials
 from rubhpc.study.study import Contact, Integrator
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from os import PathLike
 
     from rubhpc.integrate.setup import Setup
 
+T = TypeVar("T")
+
+FRICTION = 0.3  # coefficient, where none is given
+
 
 class CaseArguments(TypedDict, total=False):
-    """What `simulate` takes to describe a case, but for its rig."""
+    """What `simulate` takes to describe a case, but for its rig.
+
+    Keys of the tables [contact] and [integrator] are read and checked as those tables declare them.
+    """
 
     speed: float | str | None
     speed_ratio: float | None
@@ -62,31 +70,18 @@ class Case:
     note: str  # what is wrong with the rig at this speed, or ""
 
 
+def pick(arguments: Mapping[str, object]) -> CaseArguments:
+    """Those arguments of a function that describe its case."""
+    return cast("CaseArguments", {name: arguments[name] for name in CaseArguments.__annotations__})
+
+
 def case_of(
     caller: str,
     rig: Rig | str | PathLike[str],
+    given: CaseArguments,
     *,
     samples_per_revolution: int,
     initial: object,
-    speed: float | str | None = None,
-    speed_ratio: float | None = None,
-    clearance: float | str | None = None,
-    clearance_ratio: float | None = None,
-    friction: float = 0.3,
-    overrides: dict[str, float | str] | None = None,
-    law: str = "lagrange",
-    stiffness: float | str | None = None,
-    damping: float | str | None = None,
-    restitution: float | None = None,
-    friction_law: str = "sliding",
-    static_friction_ratio: float | None = None,
-    stribeck_speed: float | str | None = None,
-    slip_speed: Sequence[float | str] | None = None,
-    friction_ratio: Sequence[float] | None = None,
-    normal: str = "fixed",
-    method: str = "modal",
-    step: float | str | None = None,
-    accuracy: float = 1e-3,
 ) -> Case:
     """Check the arguments of `caller` and assemble its case.
 
@@ -95,10 +90,16 @@ def case_of(
     InputError
         If an argument cannot be used; its text says which one and how to fix it.
     """
+    known = CaseArguments.__annotations__
+    for name in given:
+        if name not in known:
+            raise InputError(f"{caller}: {name}: unknown argument; {nearest(name, known)}")
     start = _read_initial(caller, initial)
     if not isinstance(rig, Rig):
         rig = read_rig(rig)
-    rig = with_keys(rig, overrides or {})
+    rig = with_keys(rig, given.get("overrides") or {})
+    speed, speed_ratio = given.get("speed"), given.get("speed_ratio")
+    clearance, clearance_ratio = given.get("clearance"), given.get("clearance_ratio")
     if (speed is None) == (speed_ratio is None):
         raise InputError(f"{caller}: give speed or speed_ratio, one of the two")
     if (clearance is None) == (clearance_ratio is None):
@@ -123,33 +124,14 @@ def case_of(
             offset = stator.clearance_offset
             problem = f"{gap:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
             raise InputError(f"{caller}: clearance: {problem}; take a larger one")
-    mu = parse_quantity(friction, "", f"{caller}: friction")
+    mu = parse_quantity(given.get("friction", FRICTION), "", f"{caller}: friction")
     if mu < 0:
         raise InputError(f"{caller}: friction: {mu:g} is out of range; it must be at least 0")
-    numbers: dict[str, Any] = {
-        name: None if value is None else parse_quantity(value, unit, f"{caller}: {name}")
-        for name, value, unit in (
-            ("stiffness", stiffness, "N/m"),
-            ("damping", damping, "N*s/m"),
-            ("restitution", restitution, ""),
-            ("static_friction_ratio", static_friction_ratio, ""),
-            ("stribeck_speed", stribeck_speed, "m/s"),
-        )
-    }
-    table: dict[str, Any] = {
-        name: None if values is None else tuple(parse_quantity(v, unit, f"{caller}: {name}") for v in values)
-        for name, values, unit in (("slip_speed", slip_speed, "m/s"), ("friction_ratio", friction_ratio, ""))
-    }
-    contact = Contact(law=law, friction_law=friction_law, normal=normal, **numbers, **table)
     setup = prepare(
         rig,
         spin,
-        contact=contact,
-        integrator=Integrator(
-            method=method,
-            step=None if step is None else parse_quantity(step, "s", f"{caller}: step"),
-            accuracy=accuracy,
-        ),
+        contact=_declared(Contact, given, caller),
+        integrator=_declared(Integrator, given, caller),
         samples_per_revolution=samples_per_revolution,
         model=model,
     )
@@ -160,6 +142,18 @@ def case_of(
         contact_free_amplitude=amplitude,
         initial=start,
         note=unstable,
+    )
+
+
+def _declared(kind: type[T], given: CaseArguments, caller: str) -> T:
+    """A table of the study file from the arguments that are named as its keys; absent ones have defaults."""
+    declared = {field.name: field for field in fields(cast("Any", kind))}
+    return kind(
+        **{
+            name: parse_field(declared[name], value, f"{caller}: {name}")
+            for name, value in given.items()
+            if name in declared and value is not None
+        }
     )
 
 

@@ -87,7 +87,7 @@ def periodic(
         raise InputError(f"periodic: repeat: {repeat} is out of range; it must be at least 1")
     if isinstance(keep, str):
         keep = (keep,)
-    one = case_of("periodic", rig, samples_per_revolution=samples_per_revolution, initial=initial, **case)
+    one = case_of("periodic", rig, case, samples_per_revolution=samples_per_revolution, initial=initial)
     motion = find_periodic_motion(
         one.setup,
         clearance=one.clearance,

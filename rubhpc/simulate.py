@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rubhpc.case_arguments import case_of
+from rubhpc.case_arguments import FRICTION, case_of, pick
 from rubhpc.integrate.case import run_case
 from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
@@ -26,7 +26,7 @@ def simulate(
     speed_ratio: float | None = None,
     clearance: float | str | None = None,
     clearance_ratio: float | None = None,
-    friction: float = 0.3,
+    friction: float = FRICTION,
     overrides: dict[str, float | str] | None = None,
     law: str = "lagrange",
     stiffness: float | str | None = None,
@@ -126,33 +126,10 @@ def simulate(
     >>> record.period
     2
     """
+    given = pick(locals())
     if isinstance(keep, str):
         keep = (keep,)
-    case = case_of(
-        "simulate",
-        rig,
-        samples_per_revolution=samples_per_revolution,
-        initial=initial,
-        speed=speed,
-        speed_ratio=speed_ratio,
-        clearance=clearance,
-        clearance_ratio=clearance_ratio,
-        friction=friction,
-        overrides=overrides,
-        law=law,
-        stiffness=stiffness,
-        damping=damping,
-        restitution=restitution,
-        friction_law=friction_law,
-        static_friction_ratio=static_friction_ratio,
-        stribeck_speed=stribeck_speed,
-        slip_speed=slip_speed,
-        friction_ratio=friction_ratio,
-        normal=normal,
-        method=method,
-        step=step,
-        accuracy=accuracy,
-    )
+    case = case_of("simulate", rig, given, samples_per_revolution=samples_per_revolution, initial=initial)
     recording = Recording(
         transient=transient,
         transient_limit=transient_limit,

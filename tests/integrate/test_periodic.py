@@ -100,6 +100,9 @@ def test_motion_without_contact_is_the_steady_response():
         ({"method": "central-difference"}, "it needs motion in closed form"),
         ({"initial": 1.0}, "periodic: initial: 1.0 is neither a State nor a dict"),
         ({"friction": -1.0}, "periodic: friction: -1 is out of range"),
+        ({"frction": 0.2}, "periodic: frction: unknown argument; did you mean friction"),
+        ({"law": 3}, "periodic: law: 3 is not text"),
+        ({"slip_speed": ["0 m"]}, "periodic: slip_speed: value 1: "),
     ],
 )
 def test_bad_arguments_are_refused(arguments, text):
