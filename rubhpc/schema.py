@@ -35,6 +35,7 @@ STATUS = ("missing", "done", "failed", "diverged")
 MISSING, DONE, FAILED, DIVERGED = range(4)
 REGIME = ("no_contact", "periodic", "quasi_periodic", "chaotic", "undecided")
 SETTLED = ("not_settled", "settled")
+SCHEMES = ("event_driven", "contact_stepping", "central_difference")
 
 # The recorded signals: name, extra dimensions, unit, long name; in single precision, as are their spectra.
 _SIGNALS = (
@@ -152,6 +153,7 @@ _MEASURES = (
     _measure("contact_residual", "1", "largest residual of the contact problems, relative"),
     _measure("transient_revolutions", "1", "revolutions thrown away", dtype="int64"),
     _measure("steps", "1", "integration steps", dtype="int64"),
+    _measure("scheme", "1", "time integration scheme of the case", dtype="int8", flags=SCHEMES),
     _measure("left_closed_form", "1", "times that short steps took over from closed form", dtype="int64"),
     _measure("wall_time", "s", "wall time of the case"),
 )

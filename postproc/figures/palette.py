@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.store.units import scale_of, short_name
 from rubhpc.errors import InputError
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, REGIME, SETTLED, STATUS, VARIABLES
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, REGIME, SCHEMES, SETTLED, STATUS, VARIABLES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,6 +27,7 @@ REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
 PERIOD_COLORS = ("#D55E00", "#88CCEE", "#332288", "#999933", "#CC79A7")  # none, P1 to P4
 SETTLED_COLORS = ("#D55E00", "#56B4E9")
 NOT_SETTLED = SETTLED[0].replace("_", " ")
+SCHEME_COLORS = ("#56B4E9", "#E69F00", "#009E73")
 STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
 # Motions that starts reach, by number; the contact-free one has the colour of its regime.
 MOTION_COLORS = (
@@ -41,11 +42,12 @@ MOTION_COLORS = (
     "#882255",
 )
 WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
-CATEGORIES = ("status", "regime", "period", "settled")
+CATEGORIES = ("status", "regime", "period", "settled", "scheme")
 _FLAGS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "status": (STATUS, STATUS_COLORS),
     "regime": (tuple(name.replace("quasi_", "quasi-").replace("_", " ") for name in REGIME), REGIME_COLORS),
     "settled": (tuple(name.replace("_", " ") for name in SETTLED), SETTLED_COLORS),
+    "scheme": (tuple(name.replace("_", " ") for name in SCHEMES), SCHEME_COLORS),
 }
 
 

@@ -96,12 +96,15 @@ def run_case(
     def starter(scheme: Scheme) -> Callable[[State], March]:
         return lambda state: march_of(scheme, setup)(setup, clearance, friction, state, check)
 
+    scheme = setup.scheme
     try:
-        record = _integrate(starter(setup.scheme), state, setup, clearance, friction, recording)
+        record = _integrate(starter(scheme), state, setup, clearance, friction, recording)
     except NoClosedForm:
         # Contacts that chatter, or too many sets of them: short steps need no events.
-        record = _integrate(starter(Scheme.CONTACT_STEPPING), state, setup, clearance, friction, recording)
+        scheme = Scheme.CONTACT_STEPPING
+        record = _integrate(starter(scheme), state, setup, clearance, friction, recording)
         record.measures["left_closed_form"] = 1
+    record.measures["scheme"] = scheme.flag
     record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - seconds_compiling() - began
     return record

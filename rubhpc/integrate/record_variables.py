@@ -62,5 +62,6 @@ class RecordVariables:
         contact_residual: float
         transient_revolutions: int
         steps: int
+        scheme: int
         left_closed_form: int
         wall_time: float  # s

@@ -22,6 +22,7 @@ from rubhpc.integrate.packing import Packed, law_of, pack
 from rubhpc.integrate.reduction import ReducedModel, directions, reduce_model
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.laws import MULTIPLIER
+from rubhpc.schema import SCHEMES
 from rubhpc.study.tables import SEARCH_STEP
 
 if TYPE_CHECKING:
@@ -42,6 +43,11 @@ class Scheme(Enum):
     EVENT_DRIVEN = "event-driven"  # closed-form motion from event to event
     CONTACT_STEPPING = "contact-stepping"  # closed-form motion between short steps of contact
     CENTRAL_DIFFERENCE = "central-difference"  # the paper's
+
+    @property
+    def flag(self) -> int:
+        """The scheme's number in a store."""
+        return SCHEMES.index(self.value.replace("-", "_"))
 
 
 def scheme_of(contact: Contact, integrator: Integrator) -> Scheme:

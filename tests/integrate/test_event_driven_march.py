@@ -24,7 +24,7 @@ from rubhpc.rig.parts import Torsion
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.stators import LumpedStator
-from rubhpc.schema import DIVERGED, DONE
+from rubhpc.schema import DIVERGED, DONE, SCHEMES
 from rubhpc.study.study import Contact, Integrator, Recording
 
 SPEED = 170.0
@@ -112,6 +112,8 @@ def test_endless_events_are_left_to_short_steps(monkeypatch, too_many):
         monkeypatch.setattr(event_driven_march, "advance", lambda *_: CONTACT_UNSOLVED)
     stepped = simulate(trial_rig(3), step="0.25 us", **CLOSE)
     assert stepped.status == DONE
+    assert (SCHEMES[exact.scheme], exact.left_closed_form) == ("event_driven", 0)
+    assert (SCHEMES[stepped.scheme], stepped.left_closed_form) == ("contact_stepping", 1)
     assert stepped.steps > 10 * exact.steps
     check_close(stepped, exact, 1e-3)  # first order in the step
     assert stepped.contact_impulse == pytest.approx(exact.contact_impulse, rel=2e-3)
@@ -265,6 +267,7 @@ def test_both_integrators_name_what_diverged_and_keep_the_record_until_then(tran
     modal, stepped = (simulate(rig, **case, **method) for method in METHODS)
     for record in (modal, stepped):
         assert record.reason == "the displacement of the rotor at node 8 passed 0.08 m in revolution 5"
+        assert SCHEMES[record.scheme] == ("event_driven" if record is modal else "central_difference")
         assert record.transient_revolutions == 0
         is_kept = np.isfinite(record.vertical)
         n_kept = int(np.argmin(is_kept))
