@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit, jit_inline, jit_sum
+from rubhpc.kernels._jit import jit, jit_inline, jit_lean_sum
 from rubhpc.kernels.accumulators import (
     DRIVE_WORK,
     FRICTION_LOSS,
@@ -106,7 +106,7 @@ def observe_event(problem: int, pivots: int, solver: Workspace, accumulator: Acc
     observe_solution(problem, pivots, distance, moved, accumulator)
 
 
-@jit_sum
+@jit_lean_sum
 def change_states(
     reduced: Reduced,
     bodies: FrictionBodies,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -62,7 +62,7 @@ Floats = NDArray[np.float64]
 MOST_EVENTS = 4096  # in a revolution; more are left to short steps
 
 
-@jit_sum
+@jit_lean_sum
 def advance_with_friction(
     tables: ModeTables,
     reduced: Reduced,
@@ -230,7 +230,7 @@ def find_change(
     return crossing
 
 
-@jit_sum
+@jit_lean_sum
 def take_change(
     tables: ModeTables,
     reduced: Reduced,

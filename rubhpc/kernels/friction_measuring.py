@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import DRIVE_WORK, FRICTION_LOSS
 from rubhpc.kernels.contact_modes import DYING, ModeTables, dot, resolved_time
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, FrictionBodies, state_of
@@ -51,7 +51,7 @@ def read_friction(
     return a, a_rate, sense * b, sense * b_rate
 
 
-@jit_sum
+@jit_lean_sum
 def resolved_friction(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
     """Time, s, over which cubics follow the switch functions of the pairs closed in contact mode `mode`."""
     time = np.inf
@@ -68,7 +68,7 @@ def resolved_friction(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats)
     return time * FINER
 
 
-@jit_sum
+@jit_lean_sum
 def begin_friction(
     tables: ModeTables, bodies: FrictionBodies, mode: int, z: Floats, calm: Floats, recorder: Recorder
 ) -> None:
