@@ -12,10 +12,10 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.campbell import campbell, follow_modes
 from rubhpc.fem.critical_speeds import CriticalSpeed, find_critical_speeds
-from rubhpc.fem.response import first_lateral_frequency
+from rubhpc.fem.response import check_response_node, first_lateral_frequency, response_nodes
 from rubhpc.fem.separation_margin import amplitude_over_speed, grid_through, response_peaks
 from rubhpc.fem.stability import logarithmic_decrement, threshold_speed
-from rubhpc.fem.unbalance_response import check_response_node, response_nodes, unbalance_response
+from rubhpc.fem.unbalance_response import unbalance_response
 from rubhpc.rig.rotors import Rotor
 from rubhpc.threads import on_one_thread
 

@@ -121,3 +121,16 @@ def _spectral_radius(body: Body) -> float:
     is_symmetric = np.array_equal(body.stiffness, body.stiffness.T)
     squares = (eigvalsh if is_symmetric else eigvals)(body.stiffness, body.mass)
     return float(np.abs(squares).max())
+
+
+def response_nodes(model: Model) -> list[int]:
+    """Nodes of the rotor that move sideways, rising."""
+    return sorted({node for node, name in model.rotor.degrees if name in ("v", "w")})
+
+
+def check_response_node(model: Model, node: int, where: str = "node") -> None:
+    """Refuse a node of the rotor that does not move sideways."""
+    nodes = response_nodes(model)
+    if node not in nodes:
+        problem = f"{node} does not move sideways; nodes {nodes[0]} to {nodes[-1]} do"
+        raise InputError(f"{where}: {problem if len(nodes) > 1 else f'{node} is not there; give {nodes[0]}'}")

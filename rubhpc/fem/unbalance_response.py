@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from rubhpc.errors import InputError
-from rubhpc.fem.response import steady_response
+from rubhpc.fem.response import check_response_node, response_nodes, steady_response
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,19 +16,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-
-
-def response_nodes(model: Model) -> list[int]:
-    """Nodes of the rotor that move sideways, rising."""
-    return sorted({node for node, name in model.rotor.degrees if name in ("v", "w")})
-
-
-def check_response_node(model: Model, node: int, where: str = "node") -> None:
-    """Refuse a node of the rotor that does not move sideways."""
-    nodes = response_nodes(model)
-    if node not in nodes:
-        problem = f"{node} does not move sideways; nodes {nodes[0]} to {nodes[-1]} do"
-        raise InputError(f"{where}: {problem if len(nodes) > 1 else f'{node} is not there; give {nodes[0]}'}")
 
 
 def unbalance_response(

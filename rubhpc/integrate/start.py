@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fem.response import steady_response
+from rubhpc.fem.response import check_response_node, steady_response
 from rubhpc.fem.stability import instability_message
-from rubhpc.fem.unbalance_response import check_response_node
 from rubhpc.integrate.initial_state import at_rest, fit_to_gaps, static_shapes
 from rubhpc.integrate.record import State
 from rubhpc.study.initial import CONTACT_FREE

@@ -12,10 +12,14 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.constraints import find_rigid_body_mode
-from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
+from rubhpc.fem.response import (
+    check_response_node,
+    contact_free_amplitude,
+    first_lateral_frequency,
+    step_limit,
+)
 from rubhpc.fem.stability import instability_message, is_passive
 from rubhpc.fem.statics import sag_at_stators
-from rubhpc.fem.unbalance_response import check_response_node
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.axes import CLEARANCE_AXES, SPEED_AXES
 from rubhpc.study.contact_axes import choices_of, contact_at

@@ -69,6 +69,12 @@ def test_help_and_import_load_nothing_heavy():
     )
 
 
+def test_a_run_loads_nothing_that_reading_needs():
+    loaded = loaded_by("import rubhpc.running.driver, rubhpc.running.worker, rubhpc.simulate")
+    assert "numba" in loaded
+    assert not {"xarray", "pandas", "dask", "matplotlib", "pint", "rich"} & loaded
+
+
 def test_help_takes_no_time():
     def seconds() -> float:
         began = time.perf_counter()
