@@ -37,8 +37,8 @@ class Option:
     ----------
     kind : {bool, int, float, str}
         Of one value, as a command line gives it.
-    form : {"one", "many", "pairs"}
-        One value, a sequence of them, or a mapping of names to them.
+    form : {"one", "two", "many", "pairs"}
+        One value, two of them, a sequence, or a mapping of names to them.
     choices : tuple of str
         All values there are; empty where any is allowed.
     """
@@ -47,7 +47,7 @@ class Option:
     default: Any
     help: str
     kind: type
-    form: Literal["one", "many", "pairs"] = "one"
+    form: Literal["one", "two", "many", "pairs"] = "one"
     choices: tuple[str, ...] = ()
     bounds: Bounds | None = None
     metavar: str | None = None
@@ -143,11 +143,13 @@ def _entries(sections: str) -> list[tuple[str, str]]:
 
 def _option(parameter: inspect.Parameter, text: str) -> Option:
     kinds = _members(parameter.annotation)
-    form: Literal["one", "many", "pairs"] = "one"
+    form: Literal["one", "two", "many", "pairs"] = "one"
     item = kinds[0]
     for kind in kinds:
         if get_origin(kind) is Sequence:
             form, item = "many", get_args(kind)[0]
+        elif get_origin(kind) is tuple:
+            form, item = "two", get_args(kind)[0]
         elif get_origin(kind) is Mapping:
             form, item = "pairs", get_args(kind)[1]
     item, *notes = get_args(item) if get_origin(item) is Annotated else (item,)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import Record, State
     from rubhpc.periodic import periodic
     from rubhpc.rig.forces import Load, Unbalance
+    from rubhpc.rig.probes import Probe
     from rubhpc.rig.reading import read_rig
     from rubhpc.rig.rig import Rig
     from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
@@ -37,6 +38,7 @@ __all__ = [
     "MatrixStator",
     "NoPeriodicMotion",
     "PeriodicMotion",
+    "Probe",
     "Record",
     "Rig",
     "RubError",
@@ -65,6 +67,7 @@ _HOMES = {
     "MatrixStator": "rubhpc.rig.stators:MatrixStator",
     "NoPeriodicMotion": "rubhpc.errors:NoPeriodicMotion",
     "PeriodicMotion": "rubhpc.integrate.periodic_motion:PeriodicMotion",
+    "Probe": "rubhpc.rig.probes:Probe",
     "Record": "rubhpc.integrate.record:Record",
     "Rig": "rubhpc.rig.rig:Rig",
     "RubError": "rubhpc.errors:RubError",

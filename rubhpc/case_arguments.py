@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, cast
 
@@ -15,13 +16,14 @@ from rubhpc.input.quantity import brief, parse_quantity
 from rubhpc.input.reading import build
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
+from rubhpc.rig.probes import Probe
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.study.initial import Initial, check_initials
 from rubhpc.study.study import Contact, Integrator
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
     from os import PathLike
 
     from rubhpc.integrate.setup import Setup
@@ -82,6 +84,7 @@ def case_of(
     *,
     samples_per_revolution: int,
     initial: object,
+    probes: Sequence[Probe] = (),
 ) -> Case:
     """Check the arguments of `caller` and assemble its case.
 
@@ -134,6 +137,7 @@ def case_of(
         integrator=_declared(Integrator, given, caller),
         samples_per_revolution=samples_per_revolution,
         model=model,
+        probes=probes,
     )
     return Case(
         setup=setup,
@@ -142,6 +146,16 @@ def case_of(
         contact_free_amplitude=amplitude,
         initial=start,
         note=unstable,
+    )
+
+
+def read_probes(caller: str, probes: Sequence[Probe | Mapping[str, object]]) -> tuple[Probe, ...]:
+    """Return probes, of which some may be given by their keys."""
+    if isinstance(probes, Probe | Mapping):
+        probes = [probes]
+    return tuple(
+        probe if isinstance(probe, Probe) else build(Probe, probe, caller, f"probes.{i}")
+        for i, probe in enumerate(probes, 1)
     )
 
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rubhpc.case_arguments import CaseArguments, case_of
+from rubhpc.case_arguments import CaseArguments, case_of, read_probes
 from rubhpc.errors import InputError
 from rubhpc.integrate.periodic_motion import find_periodic_motion
 from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from os import PathLike
     from typing import Unpack
 
     from rubhpc.integrate.periodic_motion import PeriodicMotion
     from rubhpc.integrate.record import State
+    from rubhpc.rig.probes import Probe
     from rubhpc.rig.rig import Rig
 
 LONGEST = 64  # revolutions
@@ -32,6 +33,7 @@ def periodic(
     repeat: int = 1,
     samples_per_revolution: int = 256,
     keep: str | tuple[str, ...] = ("waveform", "spectrum", "section"),
+    probes: Sequence[Probe | Mapping[str, object]] = (),
     **case: Unpack[CaseArguments],
 ) -> PeriodicMotion:
     """Solve for a periodic motion by shooting, and find its stability.
@@ -59,6 +61,9 @@ def periodic(
         Samples in each revolution of the record, an even number.
     keep : tuple of {"waveform", "spectrum", "section"}
         What the record holds besides its measures.
+    probes : sequence of Probe or dict
+        What is measured besides, by the keys of [[record.probe]], such as `{"name": "left", "node": 1,
+        "angle": "-45 deg"}`: the record holds `probe_left` and `spectrum_probe_left`.
     **case
         Speed, clearance, friction, laws and accuracy as of `simulate`: one of `speed` and `speed_ratio` and
         one of `clearance` and `clearance_ratio` are needed.
@@ -87,7 +92,10 @@ def periodic(
         raise InputError(f"periodic: repeat: {repeat} is out of range; it must be at least 1")
     if isinstance(keep, str):
         keep = (keep,)
-    one = case_of("periodic", rig, case, samples_per_revolution=samples_per_revolution, initial=initial)
+    measured = read_probes("periodic", probes)
+    one = case_of(
+        "periodic", rig, case, samples_per_revolution=samples_per_revolution, initial=initial, probes=measured
+    )
     motion = find_periodic_motion(
         one.setup,
         clearance=one.clearance,
@@ -95,7 +103,10 @@ def periodic(
         period=period,
         repeat=repeat,
         recording=Recording(
-            transient=transient, samples_per_revolution=samples_per_revolution, keep=tuple(keep)
+            transient=transient,
+            samples_per_revolution=samples_per_revolution,
+            keep=tuple(keep),
+            probe=measured,
         ),
         initial=one.initial,
     )

@@ -1,13 +1,17 @@
 """Every array of a store: dimensions after the axes, type, unit and name.
 
-This is the only declaration of a stored variable: storage, docs and tests read it.
+This is the only declaration of a stored variable: storage, docs and tests read it. Those of probes are made
+of the names that a study gives them.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,6 +165,59 @@ _MEASURES = (
 VARIABLES: dict[str, Variable] = {
     v.name: v for v in (*_WAVEFORMS, *_SPECTRA, *_SECTIONS, _STATE, *_SETTINGS, *_FLAGS, *_MEASURES)
 }
+
+
+# What a probe measures: unit, long name.
+PROBE_QUANTITIES = {
+    "displacement": ("m", "displacement"),
+    "velocity": ("m s-1", "velocity"),
+    "acceleration": ("m s-2", "acceleration"),
+    "twist": ("rad", "torsional displacement"),
+    "twist_rate": ("rad s-1", "torsional velocity"),
+    "twist_acceleration": ("rad s-2", "torsional acceleration"),
+    "bearing_force": ("N", "force on the bearings"),
+    "foundation_force": ("N", "force on the foundation"),
+}
+PROBE = "probe_"
+_OF_PROBES: dict[str, tuple[str, tuple[str, ...], str, str]] = {  # prefix: role, dimensions, type, long name
+    PROBE: ("waveform", ("sample",), "float32", "{quantity} at the probe {name}"),
+    f"spectrum_{PROBE}": (
+        "spectrum",
+        ("order",),
+        "float32",
+        "amplitude (zero to peak) of the {quantity} at the probe {name}",
+    ),
+    f"peak_to_peak_{PROBE}": ("measure", (), "float64", "peak-to-peak {quantity} at the probe {name}"),
+}
+
+
+def probe_variables(probes: Iterable[tuple[str, str]]) -> dict[str, Variable]:
+    """Return the variables of probes, each a name and a quantity: waveforms, spectra, then measures."""
+    known = list(probes)
+    return {
+        f"{prefix}{name}": Variable(
+            name=f"{prefix}{name}",
+            role=role,
+            dims=dims,
+            dtype=dtype,
+            unit=PROBE_QUANTITIES[quantity][0],
+            long_name=text.format(quantity=PROBE_QUANTITIES[quantity][1], name=name),
+        )
+        for prefix, (role, dims, dtype, text) in _OF_PROBES.items()
+        for name, quantity in known
+    }
+
+
+def role_of(name: str) -> str:
+    """Return the role of a variable, be it of a probe; "" where it is none of a store."""
+    if name in VARIABLES:
+        return VARIABLES[name].role
+    return next((role for prefix, (role, *_) in _OF_PROBES.items() if name.startswith(prefix)), "")
+
+
+def is_signal(name: str) -> bool:
+    """Whether a name is that of a recorded signal, be it of a probe."""
+    return name in SIGNAL_NAMES or name.startswith(PROBE)
 
 
 def case_measures() -> tuple[Variable, ...]:

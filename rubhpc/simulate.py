@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rubhpc.case_arguments import FRICTION, case_of, pick
+from rubhpc.case_arguments import FRICTION, case_of, pick, read_probes
 from rubhpc.integrate.case import run_case
 from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from rubhpc.integrate.record import Record, State
+    from rubhpc.rig.probes import Probe
     from rubhpc.rig.rig import Rig
 
 
@@ -47,6 +48,7 @@ def simulate(
     revolutions: int = 64,
     samples_per_revolution: int = 256,
     keep: str | tuple[str, ...] = ("waveform", "spectrum", "section"),
+    probes: Sequence[Probe | Mapping[str, object]] = (),
     initial: State | Mapping[str, float | str] | None = None,
 ) -> Record:
     """Simulate one case.
@@ -107,6 +109,9 @@ def simulate(
         Samples in each, an even number.
     keep : tuple of {"waveform", "spectrum", "section"}
         What the record holds besides its measures.
+    probes : sequence of Probe or dict
+        What is measured besides, by the keys of [[record.probe]], such as `{"name": "left", "node": 1,
+        "angle": "-45 deg"}`: the record holds `probe_left` and `spectrum_probe_left`.
     initial : State or dict, optional
         Where to start, by default at rest: a record's `final`, or keys of [initial] such as
         `{"from": "contact_free", "impulse": "0.1 N*s"}`.
@@ -129,7 +134,15 @@ def simulate(
     given = pick(locals())
     if isinstance(keep, str):
         keep = (keep,)
-    case = case_of("simulate", rig, given, samples_per_revolution=samples_per_revolution, initial=initial)
+    measured = read_probes("simulate", probes)
+    case = case_of(
+        "simulate",
+        rig,
+        given,
+        samples_per_revolution=samples_per_revolution,
+        initial=initial,
+        probes=measured,
+    )
     recording = Recording(
         transient=transient,
         transient_limit=transient_limit,
@@ -137,6 +150,7 @@ def simulate(
         revolutions=revolutions,
         samples_per_revolution=samples_per_revolution,
         keep=tuple(keep),
+        probe=measured,
     )
     record = run_case(
         case.setup,

@@ -19,6 +19,7 @@ import postproc
 import rubhpc
 from rubhpc.cli import commands
 from rubhpc.input.fields import key_of
+from rubhpc.rig.probes import Probe
 from rubhpc.rig.rig import Rig
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import OwnAxes
@@ -34,6 +35,7 @@ STUDY_TABLES = {
     "[initial]": Initial,
     "[integrator]": Integrator,
     "[record]": Recording,
+    "[[record.probe]]": Probe,
     "[sample]": Sample,
     "[run]": Run,
 }

@@ -12,13 +12,14 @@ from postproc.store.select import narrow
 from postproc.store.units import meanings
 from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
-from rubhpc.schema import DONE, VARIABLES
+from rubhpc.schema import DONE, VARIABLES, role_of
 from rubhpc.study.axes import SPEED_AXES, coordinate_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in ("measure", "flag", "setting"))
+_ROLES = ("measure", "flag", "setting")
+MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in _ROLES)
 _FRICTION_LAW = "contact_friction_law"  # where it is an axis: under Coulomb's law slip may reverse
 MOST_FACETS, MOST_PANELS = 2, 6
 # Where the model leaves its range, by variable: the flag, what is out of range, and the test.
@@ -27,6 +28,11 @@ VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
     "force_over_euler_load": (2, "Euler load", lambda ratio: ratio > 1),
     "tip_deflection_ratio": (4, "bending", lambda ratio: ratio > 0.1),
 }
+
+
+def is_mappable(name: str) -> bool:
+    """Whether a variable of this name, be it of a probe, has a value for every case."""
+    return role_of(name) in _ROLES
 
 
 def default_axes(
@@ -112,7 +118,7 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
         that steady sliding is wrong), 2 (force over the stator's Euler load) and 4 (tip over a tenth of its
         length).
     """
-    if value not in MAPPABLE:
+    if not is_mappable(value):
         require_variables(store, [value])
         raise InputError(f"{source(store)}: {value}: no measure of a case; choose {', '.join(MAPPABLE)}")
     store = store.assign(validity=validity(store))

@@ -26,7 +26,7 @@ from postproc.store.select import select
 from postproc.store.variables import LONG_ROLES, require_measure
 from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
-from rubhpc.schema import DONE, VARIABLES
+from rubhpc.schema import DONE, role_of
 from rubhpc.storage.regular_files import CHECKED, RegularFiles
 
 if TYPE_CHECKING:
@@ -57,8 +57,8 @@ def open_in_pieces(path: str | Path, n_byte: float | None = None) -> xr.Dataset:
             path if is_fast else files, chunks=None, decode_times=False, decode_timedelta=False
         )
     pieces: dict[str, xr.DataArray] = {}
-    for name, variable in VARIABLES.items():
-        if variable.role in LONG_ROLES and name in store:
+    for name in map(str, store.data_vars):
+        if role_of(name) in LONG_ROLES:
             pieces[name] = bare[name].chunk(_piece(store[name], axes_of(store), n_byte))
     found: xr.Dataset = store.assign(pieces)
     found.encoding = store.encoding

@@ -13,7 +13,7 @@ from postproc.figures.small_multiples import legend_below
 from postproc.signals.spectra import samples_per_revolution
 from postproc.signals.waveforms import orbit_data
 from postproc.store.rig_of_case import stator_places
-from postproc.store.units import scale_for
+from postproc.store.units import scale_for, short_name
 from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
@@ -23,10 +23,17 @@ if TYPE_CHECKING:
     from postproc.figures.options import Axis, Count
 
 
-def orbit(cases: xr.Dataset, *, revolutions: Count | None = None, over: Axis | None = None) -> Drawing:
-    """Orbit of the disc.
+def orbit(
+    cases: xr.Dataset,
+    *,
+    revolutions: Count | None = None,
+    over: Axis | None = None,
+    probes: tuple[str, str] | None = None,
+) -> Drawing:
+    """Orbit of the disc, or of the place that two probes look at.
 
-    The clearance, the stators and a point a revolution are drawn with it.
+    The clearance, the stators and a point a revolution are drawn with that of the disc, the directions of
+    the probes with the other.
 
     Parameters
     ----------
@@ -36,8 +43,10 @@ def orbit(cases: xr.Dataset, *, revolutions: Count | None = None, over: Axis | N
         Only the last ones [default: all].
     over
         Draw the cases along AXIS over one another.
+    probes
+        Names of two probes at one place, whose motion is drawn in place of the disc's.
     """
-    shown = orbit_data(cases, revolutions, over)
+    shown = orbit_data(cases, revolutions, over, probes)
 
     def draw(axes: list[Axes]) -> None:
         draw_orbit(shown, axes[0])
@@ -56,9 +65,12 @@ def draw_orbit(data: xr.Dataset, ax: Axes) -> Axes:
     vertical, horizontal = data["vertical"].load(), data["horizontal"].load()
     require_results(vertical, data)
     size = float(np.nanmax(np.abs([vertical.values, horizontal.values])))
-    scale = scale_for("m", size)
+    scale = scale_for(str(vertical.attrs.get("units", "m")), size)
+    if "probes" in data.attrs:
+        _draw_probes(data.attrs["probes"], ax, 1.25 * size * scale.factor)
     if vertical.ndim == 1:
-        _draw_stators(data, ax, scale.factor, 1.15 * size * scale.factor)
+        if "probes" not in data.attrs:
+            _draw_stators(data, ax, scale.factor, 1.15 * size * scale.factor)
         _draw_one(vertical, horizontal, ax, scale.factor)
     else:
         curves = zip(overlaid(vertical, "sample"), overlaid(horizontal, "sample"), strict=True)
@@ -67,8 +79,27 @@ def draw_orbit(data: xr.Dataset, ax: Axes) -> Axes:
         ax.legend(loc="upper right")
     ax.set_aspect("equal", adjustable="datalim")
     ax.locator_params(nbins=6)
-    ax.set(xlabel=scale.label("Horizontal displacement"), ylabel=scale.label("Vertical displacement"))
+    ax.set(xlabel=scale.label(_name(horizontal)), ylabel=scale.label(_name(vertical)))
     return ax
+
+
+def _name(motion: xr.DataArray) -> str:
+    """Name of a motion of the disc, or of the place that probes look at."""
+    return short_name(motion.rename(None) if "of_probes" in motion.attrs else motion)
+
+
+def _draw_probes(probes: list[tuple[str, float]], ax: Axes, reach: float) -> None:
+    """Draw a triangle with its name where each probe looks at the shaft; `reach` is beyond the orbit."""
+    for name, angle in probes:
+        at = (reach * math.sin(angle), reach * math.cos(angle))
+        marker = (3, 0, math.degrees(-angle) + 180.0)  # its tip points at the shaft
+        ax.plot(*at, marker=marker, color="0.35", markersize=6, linestyle="none", zorder=4)
+        ax.plot([0.0, at[0]], [0.0, at[1]], color="0.85", linewidth=0.6, zorder=0)
+        side = "left" if at[0] < 0.0 else "right"  # towards the middle
+        text = name.replace("_", " ")
+        above: dict[str, Any] = {"textcoords": "offset points", "xytext": (0, 7), "ha": side, "va": "bottom"}
+        ax.annotate(text, at, fontsize=7, color="0.35", **above)
+        ax.update_datalim([(at[0], at[1] + 0.25 * reach)])
 
 
 def _draw_one(vertical: xr.DataArray, horizontal: xr.DataArray, ax: Axes, factor: float) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.store.units import scale_of, short_name
 from rubhpc.errors import InputError
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, REGIME, SCHEMES, SETTLED, STATUS, VARIABLES
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, REGIME, SCHEMES, SETTLED, STATUS, role_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -82,7 +82,7 @@ class Paint(NamedTuple):
 
 def coloured(data: xr.Dataset, value: str) -> tuple[xr.DataArray, bool]:
     """Return the values that have a colour, and whether all have, being known before any case is done."""
-    is_known = value == "status" or VARIABLES[value].role == "setting"
+    is_known = value == "status" or role_of(value) == "setting"
     return (data[value] if is_known else data[value].where(data["status"] == DONE)), is_known
 
 

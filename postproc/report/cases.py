@@ -12,7 +12,7 @@ from postproc.report.detail import pack_case
 from postproc.store.axes import axes_of
 from postproc.store.rig_of_case import stator_places
 from postproc.store.variables import LONG_ROLES
-from rubhpc.schema import DONE, VARIABLES
+from rubhpc.schema import DONE, role_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -31,10 +31,10 @@ class Cases:
     def __init__(self, store: xr.Dataset) -> None:
         self._axes = axes_of(store)
         self._shape = tuple(store.sizes[a] for a in self._axes)
-        kept = [n for n, v in VARIABLES.items() if v.role in LONG_ROLES and n in store]
-        self.kept = tuple(sorted({VARIABLES[n].role for n in kept}))
+        kept = [n for n in map(str, store.data_vars) if role_of(n) in LONG_ROLES]
+        self.kept = tuple(sorted({role_of(n) for n in kept}))
         if "waveform" in self.kept:  # of which spectra over whole periods are taken
-            kept = [n for n in kept if VARIABLES[n].role != "spectrum"]
+            kept = [n for n in kept if role_of(n) != "spectrum"]
         self._arrays = store[[*kept, *(n for n in ("period",) if n in store)]]
         self.status = store["status"].values.ravel()
         self.done = np.flatnonzero(self.status == DONE)

@@ -16,7 +16,7 @@ from postproc.signals.spectra import (
     samples_per_revolution,
     whole_periods,
 )
-from rubhpc.schema import SECTION_NAMES, SIGNAL_NAMES
+from rubhpc.schema import PROBE, SECTION_NAMES, SIGNAL_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -94,14 +94,18 @@ def pack_case(case: xr.Dataset, detail: Detail, places: list[tuple[float, float]
     if places is not None:
         header["places"] = places
     arrays: Arrays = []
-    waves = _stacked(case, [s for s in detail.signals if s in case], "sample")
+    probes = [
+        str(n).removeprefix("spectrum_")
+        for n in case.data_vars
+        if str(n).removeprefix("spectrum_")[:6] == PROBE
+    ]
+    signals = (*detail.signals, *dict.fromkeys(probes))
+    waves = _stacked(case, [s for s in signals if s in case], "sample")
     if waves is not None:
         _add_waves(waves, case, detail, header, arrays)
         spectra: xr.DataArray | None = amplitude_spectrum(whole_periods(waves, case.get("period")))
     else:
-        spectra = _stacked(
-            case, [f"spectrum_{s}" for s in detail.signals if f"spectrum_{s}" in case], "order"
-        )
+        spectra = _stacked(case, [f"spectrum_{s}" for s in signals if f"spectrum_{s}" in case], "order")
     if spectra is not None:
         _add_spectra(spectra, detail, header, arrays)
     sections = _stacked(case, [f"section_{s}" for s in SECTION_NAMES if f"section_{s}" in case], "section")

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.cases.maps import MAPPABLE, VALIDITY, validity
+from postproc.cases.maps import MAPPABLE, VALIDITY, is_mappable, validity
 from postproc.figures.cells import cell_edges, is_geometric
 from postproc.figures.palette import categories
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.units import Scale, displayed, meanings, scale_for, short_name
 from postproc.store.worst import worst_word
-from rubhpc.schema import DIVERGED, DONE, SIGNAL_NAMES, VARIABLES
+from rubhpc.schema import DIVERGED, DONE, PROBE, SIGNAL_NAMES, VARIABLES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,7 +56,8 @@ class Measures:
     def __init__(self, store: xr.Dataset) -> None:
         self._drawn = drawn_axes(store)
         store = store.assign(validity=validity(store)).reset_coords(self._drawn)
-        names = [n for n in (*MAPPABLE, "validity", *self._drawn) if n in store.data_vars]
+        of_probes = [n for n in map(str, store.data_vars) if n not in MAPPABLE and is_mappable(n)]
+        names = [n for n in (*MAPPABLE, "validity", *of_probes, *self._drawn) if n in store.data_vars]
         names.sort(key=lambda n: _FIRST.index(n) if n in _FIRST else len(_FIRST))
         self._data = store[names].load()
         self._dims = axes_of(store)
@@ -86,8 +87,8 @@ class Measures:
         """
         if name == "spin_speed":
             return Scale(30 / np.pi, "rpm")
-        unit = VARIABLES[name].unit if name in SIGNAL_NAMES else self._unit(name)
-        described = next((group for group, names in _SHARED if name in names), (name,))
+        unit = VARIABLES[name].unit if name in SIGNAL_NAMES else self._unit(_measured(name))
+        described = next((group for group, names in _SHARED if name in names), (_measured(name),))
         sizes = np.abs(
             np.concatenate([np.zeros(1), *(self.values(n).ravel() for n in described if n in self.names)])
         )
@@ -98,7 +99,7 @@ class Measures:
         """Return name, unit and factor from SI of each signal that the store keeps anything of."""
         kept = {str(n).removeprefix("spectrum_").removeprefix("section_"): n for n in store.data_vars}
         described = {}
-        for name in SIGNAL_NAMES:
+        for name in (*SIGNAL_NAMES, *(n for n in kept if n.startswith(PROBE))):
             if name in kept:
                 scale = self.scale(name)
                 label = plain(short_name(store[kept[name]].rename(name)))
@@ -156,6 +157,11 @@ class Measures:
             {"code": c, "name": text, "color": to_hex(color)}
             for c, (text, color) in categories(name, np.array(codes)).items()
         ]
+
+
+def _measured(name: str) -> str:
+    """Name of the measure by whose size a signal of a probe is displayed; other names are their own."""
+    return f"peak_to_peak_{name}" if name.startswith(PROBE) else name
 
 
 def validity_text(code: int) -> str:

@@ -16,7 +16,7 @@ from postproc.store.axes import find_axis, source
 from postproc.store.select import narrow
 from rubhpc import spectra
 from rubhpc.errors import InputError
-from rubhpc.schema import SIGNAL_NAMES
+from rubhpc.schema import SIGNAL_NAMES, is_signal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -151,9 +151,11 @@ def with_frequency(spectrum: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataA
 
 def check_signal(signal: str) -> None:
     """Refuse a name that is no recorded signal."""
-    if signal not in SIGNAL_NAMES:
+    if not is_signal(signal):
         velocity = " (a velocity has a section alone)" if signal.endswith("_velocity") else ""
-        raise InputError(f"{signal}: no such signal{velocity}; there are {', '.join(SIGNAL_NAMES)}")
+        raise InputError(
+            f"{signal}: no such signal{velocity}; there are {', '.join(SIGNAL_NAMES)}, and probe_NAME"
+        )
 
 
 def _over_orders(function: Any, orders: NDArray[np.floating[Any]], *waveforms: xr.DataArray) -> xr.DataArray:

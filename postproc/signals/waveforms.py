@@ -8,14 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.signals.spectra import check_signal, last_revolutions
-from postproc.store.axes import find_axis
+from postproc.store.axes import find_axis, source
 from postproc.store.select import narrow
+from postproc.store.variables import probe_of
+from rubhpc.errors import InputError
+from rubhpc.schema import PROBE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import xarray as xr
 
+_LEAST_SINE = 0.05  # of the angle between two probes: 3 degrees
 DEFAULT_SIGNALS = ("vertical", "horizontal", "torsion", "contact_force")
 
 
@@ -53,7 +57,12 @@ def waveform_data(
     return data
 
 
-def orbit_data(store: xr.Dataset, revolutions: int | None = None, over: str | None = None) -> xr.Dataset:
+def orbit_data(
+    store: xr.Dataset,
+    revolutions: int | None = None,
+    over: str | None = None,
+    probes: tuple[str, str] | None = None,
+) -> xr.Dataset:
     """Return the last revolutions of vertical and horizontal motion, with the clearance; lazy.
 
     Parameters
@@ -62,10 +71,52 @@ def orbit_data(store: xr.Dataset, revolutions: int | None = None, over: str | No
         One case, or cases along the axis `over`.
     revolutions : int, optional
         How many; all that were recorded by default.
+    probes : (name, name), optional
+        Two probes at one place whose signals, which need not be at right angles, give the motion there in
+        place of that of the disc; the clearance is left out.
     """
-    names = ["vertical", "horizontal", "clearance"]
-    data = narrow(store, names, [find_axis(store, over)] if over else [])
+    spread = [find_axis(store, over)] if over else []
+    if probes is None:
+        data = narrow(store, ["vertical", "horizontal", "clearance"], spread)
+    else:
+        data = _seen_by_two(store, probes, spread)
     if revolutions is not None:
         kept = last_revolutions(data["vertical"], revolutions)
         data = data.isel(sample=slice(-kept.sizes["sample"], None))
+    return data
+
+
+def _seen_by_two(store: xr.Dataset, probes: tuple[str, str], spread: Sequence[str]) -> xr.Dataset:
+    """Return vertical and horizontal motion from two displacements along other directions."""
+    first, second = (probe_of(store, name) for name in probes)
+    for probe in (first, second):
+        if probe["quantity"] not in ("displacement", "velocity", "acceleration"):
+            problem = f"measures {probe['quantity'].replace('_', ' ')}, which has no orbit"
+            raise InputError(
+                f"{source(store)}: probe {probe['name']}: {problem}; choose one of a displacement"
+            )
+    for key in ("quantity", "node", "stator"):
+        if first.get(key) != second.get(key):
+            pair = f"{first['name']} and {second['name']}"
+            raise InputError(
+                f"{source(store)}: probes {pair}: differ in their {key}; choose two at one place"
+            )
+    a, b = first["angle"], second["angle"]
+    sine = math.sin(b - a)
+    if abs(sine) < _LEAST_SINE:
+        pair = f"{first['name']} and {second['name']}"
+        raise InputError(f"{source(store)}: probes {pair}: look in one direction; choose two that do not")
+    names = [f"{PROBE}{probe['name']}" for probe in (first, second)]
+    data = narrow(store, names, spread)
+    x, y = (data[name].astype(float) for name in names)
+    where = f"node {first['node']}" if "node" in first else f"the tip of stator {first['stator']}"
+    for name, value in (
+        ("vertical", (x * math.sin(b) - y * math.sin(a)) / sine),
+        ("horizontal", (y * math.cos(a) - x * math.cos(b)) / sine),
+    ):
+        about = {"units": data[names[0]].attrs.get("units", "m"), "of_probes": where}
+        about["long_name"] = f"{name} {first['quantity']} of {where}"
+        data = data.assign({name: value.assign_attrs(about)})
+    data = data.drop_vars(names)
+    data.attrs["probes"] = [(probe["name"], probe["angle"]) for probe in (first, second)]
     return data

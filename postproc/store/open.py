@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 from postproc.store.axes import drawn_axes
 from postproc.store.variables import LONG_ROLES
 from rubhpc.errors import StoreError
-from rubhpc.schema import VARIABLES
+from rubhpc.schema import VARIABLES, role_of
 from rubhpc.storage.regular_files import CHECKED, RegularFiles
 from rubhpc.storage.store import is_damaged
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
 
 
@@ -31,11 +33,11 @@ def open_store(path: str | Path) -> xr.Dataset:
     path = Path(path)
     if not path.exists():
         raise StoreError(f"{path}: no such store; give the directory that a study was run into")
-    long = [n for n, v in VARIABLES.items() if v.role in LONG_ROLES]
-    short = [n for n in VARIABLES if n not in long]
     try:
+        arrays = _open(path, chunks={})
+        long = [str(n) for n in arrays.data_vars if role_of(str(n)) in LONG_ROLES]
         measures = _open(path, chunks="auto", without=long)
-        arrays = _open(path, chunks={}, without=short)
+        arrays = arrays[long]
     except StoreError:
         raise
     except Exception as error:  # zarr and xarray raise a dozen kinds for a directory that is not a store
@@ -60,7 +62,7 @@ def _check_attributes(store: xr.Dataset, path: Path) -> None:
         raise StoreError(f"{path}: its metadata are damaged; run its study again to repair them")
 
 
-def _open(path: Path, chunks: Any, without: list[str]) -> xr.Dataset:
+def _open(path: Path, chunks: Any, without: Sequence[str] = ()) -> xr.Dataset:
     import xarray as xr
     import zarr
 
@@ -71,7 +73,7 @@ def _open(path: Path, chunks: Any, without: list[str]) -> xr.Dataset:
         store = xr.open_zarr(
             RegularFiles(path),
             chunks=chunks,
-            drop_variables=without,
+            drop_variables=list(without),
             decode_times=False,
             decode_timedelta=False,
         )

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.schema import PROBE
+
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
@@ -31,6 +33,7 @@ _WRITTEN = {
     "rad s-1": ("rad s⁻¹", ""),
     "rad/s": ("rad s⁻¹", ""),
     "rad s-2": ("rad s⁻²", ""),
+    "m s-2": ("m s⁻²", ""),
     "N m-1": ("N m⁻¹", "MGk"),
     "N/m": ("N m⁻¹", "MGk"),
 }
@@ -91,6 +94,7 @@ _SHORT = {
     "contact_iterations": "Contact iterations",
     "contact_residual": "Contact residual",
 }
+_OF_SPECTRA = "amplitude (zero to peak) of the "
 _SYMBOLS = {
     "speed_ratio": "r",
     "speed": r"\omega",
@@ -176,6 +180,9 @@ def short_name(data: xr.DataArray) -> str:
     """Return a name of the quantity that fits an axis at column width."""
     name = str(data.name).removeprefix("spectrum_").removeprefix("section_")
     text = _SHORT.get(name, "")
+    if name.startswith(PROBE):
+        text = str(data.attrs.get("long_name", name)).removeprefix(_OF_SPECTRA)
+        text = text.replace(" the probe ", " ").replace("_", " ")
     if text and (of_stators := data.attrs.get("of_stators")):
         text = f"{text}, {of_stators}"
     text = text or str(data.attrs.get("long_name", name.replace("_", " ")))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import difflib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from postproc.store.axes import source
 from rubhpc.errors import InputError
-from rubhpc.schema import VARIABLES
+from rubhpc.schema import PROBE, VARIABLES, role_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -33,9 +33,9 @@ def require_variables(store: xr.Dataset, names: Iterable[str]) -> None:
     for name in names:
         if name in store:
             continue
-        variable = VARIABLES.get(name)
-        if variable is not None and variable.role in LONG_ROLES:
-            fix = f'run the study with "{variable.role}" in [record] keep'
+        role = role_of(name) if name in VARIABLES else ""  # no probe needs to be there
+        if role in LONG_ROLES:
+            fix = f'run the study with "{role}" in [record] keep'
             raise InputError(f"{source(store)}: does not contain {name}; {fix}")
         known = [str(n) for n in store.data_vars]
         near = difflib.get_close_matches(name, known, n=1)
@@ -45,7 +45,7 @@ def require_variables(store: xr.Dataset, names: Iterable[str]) -> None:
 
 def require_measure(store: xr.Dataset, name: str) -> None:
     """Check that a name is that of a measure, and that the store has it; InputError where not."""
-    if name not in MEASURES:
+    if role_of(name) not in ("measure", "setting"):
         require_variables(store, [name])
         raise InputError(f"{source(store)}: {name}: is not a measure; choose one of {', '.join(MEASURES)}")
     require_variables(store, [name])
@@ -56,3 +56,20 @@ def require_results(values: ArrayLike, store: xr.Dataset) -> None:
     if not np.isfinite(np.asarray(values, dtype=float)).any():
         fix = "run the study to its end, or select other cases"
         raise InputError(f"{source(store)}: no selected case is done; {fix}")
+
+
+def probes_of(store: xr.Dataset) -> dict[str, dict[str, Any]]:
+    """Return the probes of a store by name, each with the keys of its table of the study, in SI."""
+    study = store.attrs.get("study")
+    record = study.get("record", {}) if isinstance(study, dict) else {}
+    return {probe["name"]: probe for probe in record.get("probe", [])}
+
+
+def probe_of(store: xr.Dataset, name: str) -> dict[str, Any]:
+    """Return one probe of a store; InputError where it has no such."""
+    known = probes_of(store)
+    name = name.removeprefix(PROBE)
+    if name not in known:
+        fix = f"choose one of {', '.join(known)}" if known else "run the study with a [[record.probe]]"
+        raise InputError(f"{source(store)}: no probe {name}; {fix}")
+    return known[name]

@@ -93,7 +93,7 @@ def assemble_carrier(
     stators : sequence of (number, stator, model)
         Those that stand on it; the model is that of the stator on a carrier that is held.
     """
-    own, names = _matrices(carrier)
+    own, names = own_matrices(carrier)
     n = len(names)
     n_all = n + sum(model.body.n_dof for _, _, model in stators)
     mass, damping, stiffness = np.zeros((3, n_all, n_all))
@@ -135,7 +135,7 @@ def assemble_carrier(
     return CarrierModel(name=carrier.name, body=body, stators=numbers), placed
 
 
-def _matrices(carrier: AnyCarrier) -> tuple[tuple[Floats, Floats, Floats], tuple[str, ...]]:
+def own_matrices(carrier: AnyCarrier) -> tuple[tuple[Floats, Floats, Floats], tuple[str, ...]]:
     """M, C and K of a carrier without stators, and the names of their rows."""
     if not isinstance(carrier, Carrier):
         assert carrier.damping is not None

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.rig.bearing_table import BearingTable
+    from rubhpc.rig.probes import Probe
 
 NOTHING = 1e-14  # of a matrix's greatest entry: a coupling that is rounding
 
@@ -177,6 +178,32 @@ class CarrierModel:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class ProbeRows:
+    """What each probe sees of a model at one speed.
+
+    Attributes
+    ----------
+    probes : tuple of Probe
+    rows : (3, n_probe, n_all)
+        Factors of displacements, velocities and accelerations of all bodies (`Model.bodies`), measured from
+        the sagged shaft.
+    constant : (n_probe,)
+        What is seen of the sag.
+    """
+
+    probes: tuple[Probe, ...]
+    rows: NDArray[np.float64]
+    constant: NDArray[np.float64]
+
+    @property
+    def patterns(self) -> NDArray[np.float64]:
+        """Degrees that probes see together, (n_all, n_pattern), each of length 1."""
+        seen = self.rows.reshape(-1, self.rows.shape[2])
+        seen = seen[np.any(seen != 0.0, axis=1)]
+        return np.unique(seen / np.linalg.norm(seen, axis=1, keepdims=True), axis=0).T
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Model:
     """Rotor and stators, assembled.
 
@@ -191,6 +218,7 @@ class Model:
     sag: NDArray[np.float64]  # (n_dof,), of the rotor under its constant loads, no stator touching, m or rad
     load: NDArray[np.float64]  # (n_dof,), constant loads on the rotor, N or N m
     carriers: tuple[CarrierModel, ...] = ()
+    probe: ProbeRows | None = None
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -224,6 +252,21 @@ class Model:
     def n_place(self) -> int:
         """Places whose motion is recorded besides the output node's: tips of stators, then carriers."""
         return len(self.stators) + len(self.carriers)
+
+    @property
+    def n_probe(self) -> int:
+        """Number of probes."""
+        return 0 if self.probe is None else len(self.probe.probes)
+
+    @property
+    def probe_rows(self) -> NDArray[np.float64]:
+        """What probes see of displacements, velocities and accelerations, (3, n_probe, n_all)."""
+        return np.zeros((3, 0, self.body_start[-1])) if self.probe is None else self.probe.rows
+
+    @property
+    def probe_patterns(self) -> NDArray[np.float64]:
+        """Degrees that probes see together, (n_all, n_pattern), each of length 1."""
+        return np.zeros((self.body_start[-1], 0)) if self.probe is None else self.probe.patterns
 
     def split(self, values: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Views of a vector over all bodies, (n_all,), one for each body."""

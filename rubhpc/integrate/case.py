@@ -21,6 +21,7 @@ from rubhpc.integrate.measures import (
     empty_samples,
     measures_of,
     new_accumulator,
+    probe_extents,
     samples_within,
 )
 from rubhpc.integrate.neighbour_motions import NeighbourMotions
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rubhpc.fem.model import Model
     from rubhpc.integrate.lyapunov import Neighbours
     from rubhpc.integrate.march import March
     from rubhpc.integrate.setup import Setup
@@ -142,7 +144,8 @@ def _integrate(
     per_revolution = setup.samples_per_revolution
     n_stator = len(setup.model.stators)
     n_sample = recording.revolutions * per_revolution
-    samples, accumulator = empty_samples(march.n_place, n_sample), new_accumulator(n_stator, march.n_place)
+    samples = empty_samples(march.n_place, n_sample, setup.model.n_probe)
+    accumulator = new_accumulator(n_stator, march.n_place)
     settings = {"spin_speed": setup.spin, "clearance": clearance}
 
     reason, n_transient = pass_transient(march, recording)
@@ -168,17 +171,17 @@ def _integrate(
             recording,
             settings,
             march.final(),
-            by_name(samples.whole[:, :n_kept], n_stator),
+            by_name(samples.whole[:, :n_kept], setup.model),
         )
     else:
         add_sag(samples, accumulator, setup.model)
-        signals, final = by_name(samples.whole, n_stator), march.final()
+        signals, final = by_name(samples.whole, setup.model), march.final()
         solver = _solver(march, setup, clearance, friction, final)
         record = Record(
             status=DONE,
             samples_per_revolution=per_revolution,
             signals=signals,
-            spectra=_spectra(samples, n_stator) if "spectrum" in recording.keep else {},
+            spectra=_spectra(samples, setup.model) if "spectrum" in recording.keep else {},
             sections={f"section_{name}": signals[name][::per_revolution].copy() for name in SECTION_NAMES}
             if "section" in recording.keep
             else {},
@@ -192,9 +195,11 @@ def _integrate(
                 growth=growth(lambda: _neighbours(march, solver, start, final, setup, recording)),
                 solve=solver,
             )
-            | {"carrier_displacement": carrier_displacement(samples, setup.model)},
+            | {"carrier_displacement": carrier_displacement(samples, setup.model)}
+            | probe_extents(signals),
             settings=settings,
             final=final,
+            probed=recording.probed,
         )
         if "waveform" not in recording.keep:
             record.signals.clear()
@@ -229,7 +234,7 @@ def _neighbours(
     return Marches(start, final, setup, recording)
 
 
-def _spectra(samples: Samples, n_stator: int) -> dict[str, Floats]:
+def _spectra(samples: Samples, model: Model) -> dict[str, Floats]:
     """Spectra of all signals, by their names in the schema."""
-    spectra = by_name(amplitude_spectrum(samples.whole), n_stator)
+    spectra = by_name(amplitude_spectrum(samples.whole), model)
     return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items()}

@@ -132,6 +132,7 @@ class CentralDifferenceMarch(March):
             is_recorded,
             setup.displacement_limit,
             setup.packed.output_row,
+            setup.packed.probe,
             state,
             self._work,
             self._scratch,

@@ -140,6 +140,7 @@ class ContactSteppingMarch(ModalMarch):
             shifted_re=np.ascontiguousarray(shifted.real),
             shifted_im=np.ascontiguousarray(shifted.imag),
             twist_response=degree @ setup.reduced.output[2],
+            probe_response=setup.reduced.probe[2] @ degree.T,
         )
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:

@@ -25,7 +25,7 @@ from rubhpc.kernels.accumulators import (
     Accumulator,
     Samples,
 )
-from rubhpc.schema import DIVERGED, VARIABLES
+from rubhpc.schema import DIVERGED, PROBE, VARIABLES, probe_variables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -42,15 +42,23 @@ if TYPE_CHECKING:
 LEAST_EXCHANGE = 1e-6  # of the mechanical energy: a motion that exchanges less is balanced against that
 
 
-def empty_samples(n_place: int, n_sample: int) -> Samples:
+def empty_samples(n_place: int, n_sample: int, n_probe: int = 0) -> Samples:
     """Room for the samples of a record: one array, so that their spectra are taken together.
 
     Places (`Model.n_place`) are the stators, then the carriers, whose vertical motion stands for the axial
     one, and whose horizontal motion for the lateral one.
     """
-    whole = np.zeros((4 + 3 * n_place, n_sample))
-    axial, lateral, force = whole[4:].reshape(3, n_place, n_sample)
-    return Samples(rotor=whole[:4], axial=axial, lateral=lateral, force=force, whole=whole)
+    first_probe = 4 + 3 * n_place
+    whole = np.zeros((first_probe + n_probe, n_sample))
+    axial, lateral, force = whole[4:first_probe].reshape(3, n_place, n_sample)
+    return Samples(
+        rotor=whole[:4],
+        axial=axial,
+        lateral=lateral,
+        force=force,
+        probe=whole[first_probe:],
+        whole=whole,
+    )
 
 
 def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
@@ -77,9 +85,11 @@ def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
 
 
 def add_sag(samples: Samples, accumulator: Accumulator, model: Model) -> None:
-    """Count the motion of the output node from the shaft without loads, not from where it sags to."""
+    """Count what output node and probes see from the shaft without loads, not from where it sags to."""
     if not model.sag.any():
         return
+    if model.probe is not None:
+        samples.probe[:] += model.probe.constant[:, np.newaxis]
     for k, row in enumerate(output_degrees(model)):
         sag = model.sag[row] if row >= 0 else 0.0
         samples.rotor[k] += sag
@@ -102,10 +112,11 @@ def carrier_displacement(samples: Samples, model: Model) -> Floats:
     return peak
 
 
-def by_name(whole: Floats, n_stator: int) -> dict[str, Floats]:
+def by_name(whole: Floats, model: Model) -> dict[str, Floats]:
     """Rows of `Samples.whole`, or their spectra, by their names in the schema: (n,) or (n_stator, n)."""
-    n_row, n = whole.shape
-    axial, lateral, force = whole[4:].reshape(3, (n_row - 4) // 3, n)[:, :n_stator]
+    first_probe, n = 4 + 3 * model.n_place, whole.shape[1]
+    axial, lateral, force = whole[4:first_probe].reshape(3, model.n_place, n)[:, : len(model.stators)]
+    probes = () if model.probe is None else model.probe.probes
     return {
         "vertical": whole[VERTICAL],
         "horizontal": whole[HORIZONTAL],
@@ -114,6 +125,15 @@ def by_name(whole: Floats, n_stator: int) -> dict[str, Floats]:
         "stator_axial": axial,
         "stator_lateral": lateral,
         "contact_force": force,
+    } | {f"{PROBE}{probe.name}": whole[first_probe + i] for i, probe in enumerate(probes)}
+
+
+def probe_extents(signals: dict[str, Floats]) -> dict[str, float]:
+    """Peak to peak of what each probe has sampled."""
+    return {
+        f"peak_to_peak_{name}": float(np.ptp(signal))
+        for name, signal in signals.items()
+        if name.startswith(PROBE)
     }
 
 
@@ -224,7 +244,7 @@ def diverged_record(
         "section": recording.revolutions,
     }
     groups: dict[str, dict[str, Any]] = {"waveform": {}, "spectrum": {}, "section": {}, "measure": {}}
-    for name, variable in VARIABLES.items():
+    for name, variable in (VARIABLES | probe_variables(recording.probed)).items():
         if variable.role == "measure" and not variable.dims:
             groups["measure"][name] = -1 if variable.dtype.startswith("int") else np.nan
         elif variable.role == "measure" or variable.role in recording.keep:
@@ -246,4 +266,5 @@ def diverged_record(
         measures=groups["measure"],
         settings=settings,
         final=final,
+        probed=recording.probed,
     )

@@ -73,7 +73,7 @@ class ModalMarch(March):
             setup.reduced, setup.model, friction, self._clearance, setup.law, setup.displacement_limit
         )
         self._motion = self._reduce(initial)
-        self._recorder = recorder(setup.model.n_place)
+        self._recorder = recorder(setup.model.n_place, setup.model.n_probe)
         self.progress: Progress = new_progress(1)[0]
 
     @abstractmethod

@@ -161,6 +161,8 @@ def _outputs(reduced: ReducedModel, exponent: Complexes, motion: Complexes, inte
         rows += [degree[[AXIAL, LATERAL]] @ motion[:n], degree[[LATERAL]] @ motion[n:]]
     for carrier in reduced.carrier:  # as axial and lateral
         rows += [carrier @ motion[:n], carrier[[1]] @ motion[n:]]
+    positions, rates, accelerations = reduced.probe
+    rows.append(positions @ motion[:n] + rates @ motion[n:] + (accelerations @ motion[n:]) * exponent)
     later = interval * np.arange(kernel.SAMPLES_AT_ONCE)
     ahead = np.concatenate(rows) * np.exp(exponent * later[:, None])[:, None]  # (sample, o, m)
     table = ahead.reshape(-1, exponent.size).T

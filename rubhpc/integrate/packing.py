@@ -49,6 +49,7 @@ class Packed:
     degree_block: Ints  # (q, 5)
     compliance: Floats  # (q, 5, q, 5), m/N
     output_row: Ints  # (3,), vertical, horizontal, torsion
+    probe: Floats  # (3, n_probe, n_dof), what each sees of displacements, velocities and accelerations
 
 
 def pack(model: Model, spin: float, step: float) -> Packed:
@@ -60,11 +61,12 @@ def pack(model: Model, spin: float, step: float) -> Packed:
         Rotation speed, rad/s, and time step, s.
     """
     mass, damping, stiffness, force = whole_system(model, spin)
-    degree, output = degrees_of(model), output_degrees(model)
+    degree, output, probe = degrees_of(model), output_degrees(model), model.probe_rows
+    looked_at = np.flatnonzero(np.any(probe != 0.0, axis=(0, 1)))
 
     coupled = csr_array((mass != 0) | (stiffness != 0) | (damping != 0))
     n_component, component = connected_components(coupled, directed=False)
-    seen = np.unique(component[np.concatenate([degree[degree >= 0], output[output >= 0]])])
+    seen = np.unique(component[np.concatenate([degree[degree >= 0], output[output >= 0], looked_at])])
     # Within a block, degrees coupled by K and M stand together (the planes of bending): fewer diagonals.
     _, plane = connected_components(csr_array((mass != 0) | (stiffness != 0)), directed=False)
     order = np.concatenate([np.flatnonzero(component == c) for c in seen])
@@ -94,6 +96,7 @@ def pack(model: Model, spin: float, step: float) -> Packed:
         degree_block=degree_block,
         compliance=_compliance(inverse, start, degree_row, degree_block, step),
         output_row=np.where(output >= 0, row[output], -1),
+        probe=np.ascontiguousarray(probe[:, :, order]),
     )
 
 

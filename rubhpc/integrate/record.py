@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.integrate.record_variables import RecordVariables
-from rubhpc.schema import DONE, STATUS, VARIABLES
+from rubhpc.schema import DONE, STATUS, VARIABLES, probe_variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -120,6 +120,8 @@ class Record(RecordVariables):
         `spin_speed` (rad/s) and `clearance` (m).
     final : State
         Where the case ended: `initial=` of a run that goes on.
+    probed : tuple of (name, quantity)
+        Its probes.
     """
 
     status: int = DONE
@@ -132,6 +134,7 @@ class Record(RecordVariables):
     measures: dict[str, Any] = field(default_factory=dict)
     settings: dict[str, float] = field(default_factory=dict)
     final: State
+    probed: tuple[tuple[str, str], ...] = ()
 
     def _groups(self) -> tuple[dict[str, Any], ...]:
         return self.signals, self.spectra, self.sections, self.measures, self.settings
@@ -168,12 +171,13 @@ class Record(RecordVariables):
         import xarray as xr
 
         arrays = {**self.signals, **self.spectra, **self.sections, **self.measures, **self.settings}
+        variables = VARIABLES | probe_variables(self.probed)
         dataset = xr.Dataset(
             {
                 name: (
-                    VARIABLES[name].dims,
+                    variables[name].dims,
                     np.asarray(value),
-                    {"units": VARIABLES[name].unit, "long_name": VARIABLES[name].long_name},
+                    {"units": variables[name].unit, "long_name": variables[name].long_name},
                 )
                 for name, value in arrays.items()
             }

@@ -57,6 +57,8 @@ class ReducedModel:
         Vertical, horizontal and torsional displacement of the output node.
     carrier : (n_carrier, 2, n)
         Vertical and horizontal displacement of each carrier.
+    probe : (3, n_probe, n)
+        What each probe sees of displacements, velocities and accelerations.
     """
 
     spin: float
@@ -68,6 +70,7 @@ class ReducedModel:
     degree: Floats
     output: Floats
     carrier: Floats
+    probe: Floats
 
     @cached_property
     def translations(self) -> Floats:
@@ -85,8 +88,9 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
 
     The basis of each uncoupled part holds its undamped modes at standstill up to a cutoff, and residual
     attachment modes: the static responses of what lies above to a unit force on each degree that contact or
-    outputs see, and to what dampers and cross-coupled springs draw from the modes kept. Gyroscopic and
-    damping terms are then projected. Modes that nothing sees are left out.
+    outputs see, or on those together that a probe sees, and to what dampers and cross-coupled springs draw
+    from the modes kept. Gyroscopic and damping terms are then projected. Modes that nothing sees are left
+    out.
 
     Parameters
     ----------
@@ -103,17 +107,17 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     mass, damping, stiffness, force = whole_system(model, spin)
     degree, output, carrier = degrees_of(model), output_degrees(model), carrier_degrees(model)
     standstill = _at_standstill(model)
-    fastest = max(standstill.contact_frequency, abs(spin))
-    cutoff = CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * fastest
+    cutoff = cutoff_frequency(model, spin, accuracy)
     modes = [_parted(part, cutoff) for part in standstill.parts]
     symmetric, seen = standstill.stiffness, _seen(model)
     kept = np.hstack([those.low for those in modes])
     frequency = np.concatenate([those.low_frequency for those in modes])
     drawn = np.hstack([0.5 * (damping + damping.T) @ kept, (stiffness - symmetric) @ (kept / frequency)])
     least = LEAST_RESPONSE * np.sqrt(accuracy)
-    basis = np.hstack([kept, *(_attachment_modes(those, seen, drawn, least) for those in modes)])
+    patterns = model.probe_patterns
+    basis = np.hstack([kept, *(_attachment_modes(those, seen, patterns, drawn, least) for those in modes)])
     stiffness, damping = basis.T @ stiffness @ basis, basis.T @ damping @ basis
-    keep = np.flatnonzero(_visible(basis[seen], stiffness, damping))
+    keep = np.flatnonzero(_visible(np.vstack([basis[seen], patterns.T @ basis]), stiffness, damping))
     basis, pick = basis[:, keep], np.ix_(keep, keep)
     return ReducedModel(
         spin=spin,
@@ -125,13 +129,24 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
         degree=np.where((degree >= 0)[:, :, None], basis[np.maximum(degree, 0)], 0.0),
         output=np.where((output >= 0)[:, None], basis[np.maximum(output, 0)], 0.0),
         carrier=np.where((carrier >= 0)[:, :, None], basis[np.maximum(carrier, 0)], 0.0),
+        probe=model.probe_rows @ basis,
     )
+
+
+def cutoff_frequency(model: Model, spin: float, accuracy: float) -> float:
+    """Frequency, rad/s, up to which modes are kept, and up to which probes see what the full model shows.
+
+    Ten times the contact frequency (the rotor's inertia on the stator's static stiffness), or the spin where
+    that is higher, times `(1e-3 / accuracy)^(1/4)`; infinite for rigid walls.
+    """
+    fastest = max(_at_standstill(model).contact_frequency, abs(spin))
+    return float(CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * fastest)
 
 
 class _Part(NamedTuple):
     """Undamped modes of what mass and stiffness couple, orthonormal in the mass."""
 
-    n_seen: int  # of its degrees are seen by contact or outputs
+    n_seen: int  # of its degrees, and of their combinations, are seen by contact, outputs or probes
     mode: Floats  # (n_all, n)
     frequency: Floats  # (n,), rad/s
 
@@ -153,7 +168,9 @@ def _at_standstill(model: Model) -> _Standstill:
     n_part, number = connected_components(csr_array(coupled), directed=False)
     _, whole = connected_components(csr_array(coupled | (damping != 0)), directed=False)
     is_seen, is_felt = np.zeros((2, len(mass)), dtype=bool)
+    looked_at = model.probe_patterns != 0.0
     is_seen[seen], is_felt[whole[seen]] = True, True
+    is_felt[whole[looked_at.any(axis=1)]] = True
     parts = []
     for i_part in range(n_part):
         rows = np.flatnonzero(number == i_part)
@@ -167,7 +184,8 @@ def _at_standstill(model: Model) -> _Standstill:
             )
         mode = np.zeros((mass.shape[0], rows.size))
         mode[rows] = shape
-        parts.append(_Part(int(is_seen[rows].sum()), mode, np.sqrt(square)))
+        n_seen = is_seen[rows].sum() + looked_at[rows].any(axis=0).sum()
+        parts.append(_Part(int(n_seen), mode, np.sqrt(square)))
     return _Standstill(symmetric, parts, _contact_frequency(parts, degrees_of(model), model))
 
 
@@ -218,18 +236,22 @@ def _parted(part: _Part, cutoff: float) -> _Modes:
     return _Modes(mode[:, :n_low], frequency[:n_low], mode[:, n_low:], frequency[n_low:])
 
 
-def _attachment_modes(modes: _Modes, seen: Ints, drawn: Floats, least: float) -> Floats:
+def _attachment_modes(modes: _Modes, seen: Ints, patterns: Floats, drawn: Floats, least: float) -> Floats:
     """Residual attachment modes: static responses of the modes above the cutoff, (n_all, n_shape).
 
-    They are orthonormal in the mass, and respond to a unit force on each degree seen and to those
-    combinations of the forces `drawn` (n_all, n_force) from modes at unit velocity whose strain energy is
-    over `least`^2 of that mode's. Proportional damping draws none: it does not couple modes.
+    They are orthonormal in the mass, and respond to a unit force on each degree seen, to the `patterns`
+    (n_all, n_pattern) of forces and to those combinations of the forces `drawn` (n_all, n_force) from modes
+    at unit velocity whose strain energy is over `least`^2 of that mode's. Proportional damping draws none: it
+    does not couple modes.
     """
     if not modes.high_frequency.size:
         return modes.high
     response = modes.high.T / modes.high_frequency[:, np.newaxis]  # its square is twice the strain energy
     turn, size, _ = np.linalg.svd(response @ drawn, full_matrices=False)
-    shape = np.hstack([response[:, seen], turn[:, size > least]]) / modes.high_frequency[:, np.newaxis]
+    shape = (
+        np.hstack([response[:, seen], response @ patterns, turn[:, size > least]])
+        / modes.high_frequency[:, np.newaxis]
+    )
     length = np.linalg.norm(shape, axis=0)
     shape = shape[:, length > 0.0] / length[length > 0.0]
     size, mix = np.linalg.eigh(shape.T @ shape)

@@ -12,6 +12,7 @@ import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
+from rubhpc.fem.probes import with_probes
 from rubhpc.fem.response import step_limit
 from rubhpc.integrate.contact_mode import ContactMode, confine, solve_contact_mode, solve_parts
 from rubhpc.integrate.divergence import energy_limit
@@ -26,10 +27,13 @@ from rubhpc.schema import SCHEMES
 from rubhpc.study.tables import SEARCH_STEP
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rubhpc.fem.model import Model
     from rubhpc.integrate.contact_mode import Solved
     from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.laws import Law
+    from rubhpc.rig.probes import Probe
     from rubhpc.rig.rig import Rig
     from rubhpc.study.study import Contact, Integrator
 
@@ -215,23 +219,25 @@ def prepare(
     integrator: Integrator,
     samples_per_revolution: int,
     model: Model | None = None,
+    probes: Sequence[Probe] = (),
 ) -> Setup:
     """Assemble, check the step and factorise: once per rig and speed.
 
-    `model` is that of the rig, where it has been assembled already. The step is shortened so that a whole
+    `model` is that of the rig, where it has been assembled already, `probes` what is measured of it. The step
+    is shortened so that a whole
     number of steps fills a sample's interval.
 
     Raises
     ------
     InputError
         If the step asked for is above the stability limit of the assembled matrices, the rig has no stator,
-        or the speed is zero.
+        the speed is zero, or a probe has nothing to measure.
     """
     if not rig.stator:
         raise InputError(f"rig {rig.name}: [[stator]]: none; a rub case needs at least one")
     if speed == 0.0 or not math.isfinite(speed):
         raise InputError(f"speed: {speed} rad/s; sampling is locked to the shaft, so it has to turn")
-    model = model_at(model or assemble(rig), speed)
+    model = with_probes(model_at(model or assemble(rig), speed), rig, probes, speed)
     if integrator.method == "modal":
         return ModalSetup(
             scheme=scheme_of(contact, integrator),

@@ -24,7 +24,8 @@ class Samples(NamedTuple):
     axial: Floats  # (q, n_sample), m
     lateral: Floats  # (q, n_sample), m
     force: Floats  # (q, n_sample), N
-    whole: Floats  # (4 + 3 q, n_sample), of which the others are rows, in this order
+    probe: Floats  # (n_probe, n_sample), each in its own unit
+    whole: Floats  # (4 + 3 q + n_probe, n_sample), of which the others are rows, in this order
 
 
 class Accumulator(NamedTuple):

@@ -83,6 +83,7 @@ def advance(
     is_recorded: bool,
     displacement_limit: float,
     output_row: Ints,
+    probe: Floats,
     state: Floats,
     work: Workspace,
     scratch: Floats,
@@ -105,6 +106,8 @@ def advance(
         Displacement of the output node or of a rim beyond which the case has diverged.
     output_row : (3,)
         Rows of vertical, horizontal and torsional displacement of the output node; -1 where held.
+    probe : (3, n_probe, n_dof)
+        What each probe sees of displacements, velocities and accelerations.
     state : (2, n_dof), m and m/s (rad and rad/s)
         Displacement, and velocity half a step earlier; advanced in place.
     scratch : (3, n_dof)
@@ -207,6 +210,8 @@ def advance(
                     samples.rotor[TWIST_ACCELERATION, i_sample] = (
                         velocity_next[twist] - velocity[twist]
                     ) / step
+                if i_step == 0:
+                    read_probes(probe, step, displacement, velocity, velocity_next, i_sample, samples.probe)
             if is_touching and bounces:  # what a force has moved before its impact was due
                 late[:] = -delay
                 apply_contact(
@@ -225,6 +230,28 @@ def advance(
             reached[0] = i_sample
             return DIVERGED
     return FINISHED
+
+
+@jit_inline
+def read_probes(
+    probe: Floats,
+    step: float,
+    displacement: Floats,
+    velocity: Floats,
+    velocity_next: Floats,
+    i_sample: int,
+    seen: Floats,
+) -> None:
+    """Record what probes see, (n_probe, n_sample), between the velocities half a step before and after."""
+    for i in range(seen.shape[0]):
+        value = 0.0
+        for k in range(displacement.size):
+            value += (
+                probe[0, i, k] * displacement[k]
+                + probe[1, i, k] * 0.5 * (velocity[k] + velocity_next[k])
+                + probe[2, i, k] * (velocity_next[k] - velocity[k]) / step
+            )
+        seen[i, i_sample] = value
 
 
 @jit_inline

@@ -12,8 +12,8 @@ from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Rows of `ModeTables.output_*`: displacements and rates of the output node, its torsional acceleration, then
-# three rows a stator tip: axial and lateral displacement, lateral rate.
+# Rows of `ModeTables.output`: displacements and rates of the output node, its torsional acceleration, then
+# three rows a stator tip: axial and lateral displacement, lateral rate; then one row a probe.
 N_ROTOR_ROW = 7
 TWIST_ACCELERATION_ROW = 6
 LATERAL_ROW, LATERAL_RATE = 1, 2

@@ -51,9 +51,9 @@ class Recorder(NamedTuple):
     entry: Floats  # (2,), J, forms of damping loss and unbalance work where the span began
 
 
-def recorder(q: int) -> Recorder:
-    """Work space for q pairs, before the first sample."""
-    n_row = N_ROTOR_ROW + 3 * q
+def recorder(q: int, n_probe: int = 0) -> Recorder:
+    """Work space for q pairs and the probes, before the first sample."""
+    n_row = N_ROTOR_ROW + 3 * q + n_probe
     return Recorder(
         value=np.zeros(SAMPLES_AT_ONCE * n_row),
         last=np.full((2, 3 + q), np.nan),
@@ -122,6 +122,7 @@ def take_samples(
         samples.rotor,
         samples.axial,
         samples.lateral,
+        samples.probe,
     )
     widen_extrema(
         recorder.value,
@@ -146,10 +147,12 @@ def read_samples(
     rotor: Floats,
     axial: Floats,
     lateral: Floats,
+    probe: Floats,
 ) -> None:
     """Fill `value` with the outputs of `count` samples, and those of the record with the samples."""
     q = axial.shape[0]
-    n_row, n_sample = N_ROTOR_ROW + 3 * q, rotor.shape[1]
+    n_row, n_sample = value.size // SAMPLES_AT_ONCE, rotor.shape[1]
+    first_probe = N_ROTOR_ROW + 3 * q
     read_outputs(output, mode, z_re, z_im, -(-count * n_row // LANES) * LANES, value)
     for j in range(min(count, n_sample - first)):
         start = j * n_row
@@ -161,6 +164,8 @@ def read_samples(
             tip = start + N_ROTOR_ROW + 3 * i
             axial[i, first + j] = value[tip]
             lateral[i, first + j] = value[tip + LATERAL_ROW]
+        for i in range(probe.shape[0]):
+            probe[i, first + j] = value[start + first_probe + i]
 
 
 @jit_lean_sum
@@ -175,7 +180,7 @@ def widen_extrema(
 ) -> None:
     """Widen the extrema of the watched signals by `count` samples, an `interval` (s) apart."""
     q = peak_lateral.size
-    n_row = N_ROTOR_ROW + 3 * q
+    n_row = value.size // SAMPLES_AT_ONCE
     for k in range(3 + q):
         tip = N_ROTOR_ROW + 3 * (k - 3)
         row, rate_row = (k, 3 + k) if k < 3 else (tip + LATERAL_ROW, tip + LATERAL_RATE)

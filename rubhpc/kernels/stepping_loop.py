@@ -50,6 +50,7 @@ class ContactImpulses(NamedTuple):
     shifted_re: Floats  # (5 q, m), those of the displacement that a unit impulse makes in a second
     shifted_im: Floats
     twist_response: Floats  # (5 q,), torsional acceleration of the output node for a unit force
+    probe_response: Floats  # (n_probe, 5 q), what a probe of acceleration sees of a unit force, at once
 
 
 @jit_sum
@@ -228,6 +229,10 @@ def advance_by_steps(
                             samples.rotor[TWIST_ACCELERATION, t >> clock.sample_level] += (
                                 impulses.twist_response[b] * impulse / step
                             )
+                            for p in range(samples.probe.shape[0]):
+                                samples.probe[p, t >> clock.sample_level] += (
+                                    impulses.probe_response[p, b] * impulse / step
+                                )
                         for k in range(z_re.size):
                             next_re[k] += impulses.drifted_re[b, k] * impulse
                             next_im[k] += impulses.drifted_im[b, k] * impulse

@@ -57,6 +57,7 @@ def set_up(study: Study, case: Case, model: Model | None = None) -> Setup:
         integrator=study.integrator,
         samples_per_revolution=study.recording.samples_per_revolution,
         model=model,
+        probes=study.recording.probe,
     )
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
 from rubhpc.errors import StoreError
-from rubhpc.schema import STATE, VARIABLES, case_measures
+from rubhpc.schema import STATE, VARIABLES, case_measures, probe_variables
 from rubhpc.storage.disk import read_regular, write_whole
 from rubhpc.storage.journal import Header
 from rubhpc.storage.measures import from_json, to_json, unlisted_measures
@@ -140,7 +140,8 @@ class Manifest:
     @property
     def variables(self) -> tuple[Variable, ...]:
         """The arrays stored for every case and written block by block, in the order of their checksum."""
-        return tuple(v for v in VARIABLES.values() if v.role in self.keep)
+        known = VARIABLES | probe_variables(_probed(self.parts))
+        return tuple(v for v in known.values() if v.role in self.keep)
 
     @property
     def packed(self) -> tuple[Variable, ...]:
@@ -191,7 +192,10 @@ class Manifest:
             },
             keep=tuple(sorted([*recording.keep, *([STATE] if grid.continuation else [])])),
             files={},
-            measures=case_measures(),
+            measures=(
+                *case_measures(),
+                *(v for v in probe_variables(recording.probed).values() if v.role == "measure"),
+            ),
         )
 
     def write(self, store: Path) -> None:
@@ -296,6 +300,11 @@ class Manifest:
         return self.parts != same and not replace(self, parts=same, identity=other.identity).differences(
             other
         )
+
+
+def _probed(parts: dict[str, Any]) -> list[tuple[str, str]]:
+    """Name and quantity of the probes of a study, from the parts of its identity."""
+    return [(probe["name"], probe["quantity"]) for probe in parts["record"].get("probe", [])]
 
 
 def shard_of(shape: tuple[int, ...], chunk: tuple[int, ...]) -> tuple[int, ...]:

@@ -7,6 +7,8 @@ import math
 from typing import TYPE_CHECKING
 
 from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.probes import with_probes
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import CLEARANCE_AXES, FROM_REST, NO_NEIGHBOURS, SPEED_AXES, Axis
@@ -14,6 +16,7 @@ from rubhpc.study.axes import CLEARANCE_AXES, FROM_REST, NO_NEIGHBOURS, SPEED_AX
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from rubhpc.rig.probes import Probe
     from rubhpc.rig.rig import Rig
 
 # Names that a store takes for itself; an axis `clearance` is the very setting of that name.
@@ -57,8 +60,8 @@ def check_axes(axes: tuple[Axis, ...]) -> None:
                 raise InputError(f"[grid] {axis.name}: is set by the axis {other.name} too; leave one out")
 
 
-def check_rigs(rig: Rig, axes: tuple[Axis, ...]) -> None:
-    """Refuse a grid some of whose rigs cannot be, or cannot be studied."""
+def check_rigs(rig: Rig, axes: tuple[Axis, ...], probes: tuple[Probe, ...] = ()) -> None:
+    """Refuse a grid some of whose rigs cannot be, or cannot be studied, or whose probes see nothing."""
     rig_axes = [axis for axis in axes if axis.is_rig_key]
     names = [axis.name for axis in rig_axes]
     grid: Iterable[tuple[float, ...]]
@@ -78,6 +81,10 @@ def check_rigs(rig: Rig, axes: tuple[Axis, ...]) -> None:
                 raise
             values_text = ", ".join(f"{name} = {value:g}" for name, value in case.items())
             raise InputError(f"[grid] {values_text}: invalid rig: {error}") from None
+    if probes:  # of the first rig, since each is assembled for it
+        chosen = with_keys(rig, {axis.name: axis.tried[0] for axis in rig_axes})
+        model = assemble(chosen)
+        with_probes(model, chosen, probes, next(iter(model.rotor.tabulated_speeds), 0.0))
 
 
 def _check_rig(rig: Rig, axes: tuple[Axis, ...]) -> None:

@@ -58,7 +58,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
         "rig": rig,
         "contact": contact,
         "integrator": asdict(study.integrator),
-        "record": asdict(study.recording) | {"keep": sorted(study.recording.keep)},
+        "record": study.recording.as_dict() | {"keep": sorted(study.recording.keep)},
     }
     starts = {axis.name.removeprefix(initial.PREFIX): _AXIS for axis in study.axes if axis.is_initial_key}
     if starts or study.initial != initial.Initial():  # absent in older stores

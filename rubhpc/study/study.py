@@ -114,7 +114,7 @@ class Study:
         check_axes(self.axes)
         check_contacts(self.contact, [axis for axis in self.axes if axis.is_contact_key])
         check_initials(self.initial, [axis for axis in self.axes if axis.is_initial_key])
-        check_rigs(self.rig, self.axes)
+        check_rigs(self.rig, self.axes, self.recording.probe)
 
     def axis(self, *names: str) -> Axis:
         """Return the first axis that has one of these names."""
@@ -143,7 +143,7 @@ class Study:
             },
             **({"initial": plain(self.initial)} if self.initial != DEFAULT_INITIAL else {}),
             "integrator": asdict(self.integrator),
-            "record": asdict(self.recording) | {"keep": list(self.recording.keep)},
+            "record": self.recording.as_dict() | {"keep": list(self.recording.keep)},
         }
 
 

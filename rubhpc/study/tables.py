@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
 
-from rubhpc.input.fields import FieldError, check_fields, choice, choices, count, quantity, series
+from rubhpc.input.fields import FieldError, check_fields, choice, choices, count, quantity, series, table
+from rubhpc.input.reading import plain
+from rubhpc.rig.probes import Probe  # noqa: TC001 - annotations are read when a table is built
 from rubhpc.schema import KEEPABLE
 
 AUTO = "auto"  # transient until the motion has settled
@@ -224,6 +226,7 @@ class Recording:
     keep: tuple[str, ...] = choices(
         doc="Signals kept for each case.", example='["spectrum", "section"]', of=KEEPABLE, default=KEEPABLE
     )
+    probe: tuple[Probe, ...] = table(doc="What is measured besides, and where.", default=(), added=True)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -233,6 +236,21 @@ class Recording:
         for key in ("transient_limit", "transient_tolerance"):
             if self.transient != AUTO and getattr(self, key) is not None:
                 raise FieldError(key, f'it goes with transient = "{AUTO}"; leave it out, or set that')
+        names = [probe.name for probe in self.probe]
+        for i, name in enumerate(names, 1):
+            if name in names[: i - 1]:
+                raise FieldError(f"probe.{i}.name", f'"{name}" is another probe already; choose another name')
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the keys for JSON; probes only where there are any, as older stores have none."""
+        keys = asdict(self)
+        del keys["probe"]
+        return keys | ({"probe": [plain(probe) for probe in self.probe]} if self.probe else {})
+
+    @property
+    def probed(self) -> tuple[tuple[str, str], ...]:
+        """Name and quantity of each probe, of which those of its variables are made."""
+        return tuple((probe.name, probe.quantity) for probe in self.probe)
 
     @property
     def is_transient_auto(self) -> bool:

@@ -29,6 +29,7 @@ def bodies():
         degree=rng.normal(size=(Q, 5, N)),
         output=rng.normal(size=(3, N)),
         carrier=np.zeros((0, 2, N)),
+        probe=np.zeros((3, 0, N)),
     )
     pairs = FrictionPairs(
         gap_jacobian=rng.normal(size=(Q, N)),

@@ -91,6 +91,7 @@ class KernelCase:
             is_recorded,
             limit,
             self.packed.output_row,
+            self.packed.probe,
             self.state,
             self.work,
             np.zeros((3, self.state.shape[1])),

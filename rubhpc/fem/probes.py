@@ -1,0 +1,154 @@
+"""What probes see: linear functions of the displacements, velocities and accelerations of all bodies."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.fem.carrier import own_matrices
+from rubhpc.fem.damping import rayleigh_coefficients
+from rubhpc.fem.model import ProbeRows
+from rubhpc.rig.bearing_table import BearingTable
+from rubhpc.rig.probes import MOTIONS, TWISTS
+from rubhpc.rig.rotors import Rotor
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+    from rubhpc.rig.probes import Probe
+    from rubhpc.rig.rig import Rig
+
+    Floats = NDArray[np.float64]
+
+NOTHING = 1e-9  # of a direction, below which a part of it is rounding
+DISPLACEMENT, VELOCITY, ACCELERATION = range(3)
+
+
+def with_probes(model: Model, rig: Rig, probes: Sequence[Probe], spin: float) -> Model:
+    """Return a model with probes, at the spin (rad/s) at which its bearings are.
+
+    Raises
+    ------
+    InputError
+        Where there is nothing to be measured: no such node, stator or bearing, or one that is held.
+    """
+    probes = tuple(probes)
+    known = () if model.probe is None else model.probe.probes
+    if known == probes and model.rotor.by_speed is None:  # as it is, with what has been derived from it
+        return model
+    if not probes:
+        return replace(model, probe=None)
+    rows = np.zeros((3, len(probes), model.body_start[-1]))
+    for i, probe in enumerate(probes):
+        try:
+            _fill(rows[:, i], probe, model, rig, spin)
+        except InputError as error:
+            raise InputError(f"[record] probe {probe.name}: {error}") from None
+    constant = rows[DISPLACEMENT][:, : model.rotor.n_dof] @ model.sag
+    return replace(model, probe=ProbeRows(probes=probes, rows=rows, constant=constant))
+
+
+def _fill(rows: Floats, probe: Probe, model: Model, rig: Rig, spin: float) -> None:
+    """Fill the factors (3, n_all) of a probe."""
+    if probe.quantity == "bearing_force":
+        _fill_bearing_force(rows, probe, model, rig, spin)
+    elif probe.quantity == "foundation_force":
+        _fill_foundation_force(rows, probe, model, rig)
+    elif probe.quantity in TWISTS:
+        row = _at_node(probe, model, rig, "thx")
+        if row < 0:
+            raise InputError(f"node: node {probe.node} does not twist; choose another one")
+        rows[TWISTS.index(probe.quantity), row] = 1.0
+    else:
+        looked_at = rows[MOTIONS.index(probe.quantity)]
+        for row, share in _along(probe, model, rig):
+            looked_at[row] = share
+        if not looked_at.any():
+            place = f"node {probe.node}" if probe.stator is None else f"the tip of stator {probe.stator}"
+            raise InputError(f"angle: {place} does not move in this direction; choose another one")
+
+
+def _along(probe: Probe, model: Model, rig: Rig) -> list[tuple[int, float]]:
+    """Rows that move in the direction of a probe, and their shares of it."""
+    if probe.stator is None:
+        held = [_at_node(probe, model, rig, name) for name in ("v", "w")]
+        angle = probe.angle
+    else:
+        number = _number(probe, model)
+        stator, first = model.stators[number], model.stator_start[number]
+        held = [first + row if row >= 0 else -1 for row in (stator.axial, stator.lateral)]
+        angle = probe.angle - stator.angle
+    shares = zip(held, (math.cos(angle), math.sin(angle)), strict=True)
+    return [(row, share) for row, share in shares if row >= 0 and abs(share) > NOTHING]
+
+
+def _at_node(probe: Probe, model: Model, rig: Rig, name: str) -> int:
+    """Row of a degree of a probe's node; -1 where it is held."""
+    assert probe.node is not None
+    rig.rotor.check_node("node", probe.node)
+    return model.rotor.index(probe.node, name)
+
+
+def _number(probe: Probe, model: Model) -> int:
+    """Position of the stator of a probe."""
+    assert probe.stator is not None
+    if probe.stator > len(model.stators):
+        raise InputError(f"stator: {probe.stator} is not there; the rig has {len(model.stators)}")
+    return probe.stator - 1
+
+
+def _fill_bearing_force(rows: Floats, probe: Probe, model: Model, rig: Rig, spin: float) -> None:
+    """Force of the shaft on the bearings of a node, `e . (K u + (C + beta K) u')`, beta being Rayleigh's."""
+    at = [_at_node(probe, model, rig, name) for name in ("v", "w")]
+    supports = [(i, b) for i, b in enumerate(rig.rotor.bearing, 1) if b.node == probe.node]
+    if not supports:
+        nodes = ", ".join(str(n) for n in sorted({b.node for b in rig.rotor.bearing})) or "none"
+        raise InputError(f"node: {probe.node} has no bearing; nodes with one: {nodes}")
+    beta = rayleigh_coefficients(rig.rotor.damping)[1] if isinstance(rig.rotor, Rotor) else 0.0
+    direction = np.array([math.cos(probe.angle), math.sin(probe.angle)])
+    for number, support in supports:
+        if isinstance(support, BearingTable):
+            stiffness, damping = support.at(spin, f"rotor.bearing.{number}")
+        else:
+            stiffness, damping = np.array(support.stiffness_matrix), np.array(support.damping_matrix)
+        for k, row in enumerate(at):
+            if row >= 0:
+                rows[DISPLACEMENT, row] += (direction @ stiffness)[k]
+                rows[VELOCITY, row] += (direction @ (damping + beta * stiffness))[k]
+
+
+def _fill_foundation_force(rows: Floats, probe: Probe, model: Model, rig: Rig) -> None:
+    """Force on the ground under a stator's root, or under the carrier that it stands on.
+
+    It is `r . (K u + D u')` with r the motion of the whole body by a unit along the direction: what springs
+    and dampers do not pass on inside the body they pass on to the ground.
+    """
+    number = _number(probe, model)
+    stator, first = model.stators[number], model.stator_start[number]
+    carrier = next((c for c in model.carriers if number + 1 in c.stators), None)
+    if carrier is not None:
+        part = next(part for part in rig.carrier if part.name == carrier.name)
+        (_, damping, stiffness), names = own_matrices(part)
+        whole = {"v": math.cos(probe.angle), "w": math.sin(probe.angle), "thx": 0.0}
+    else:
+        damping, stiffness = stator.body.damping, stator.body.stiffness
+        names = tuple(name for _, name in stator.body.degrees)
+        angle = probe.angle - stator.angle
+        whole = {"axial": math.cos(angle), "lateral": math.sin(angle), "rotation": 0.0}
+    if unknown := [name for name in names if name not in whole]:
+        problem = f'its degree "{unknown[0]}" leaves open how it moves as a whole'
+        raise InputError(f"stator: {probe.stator}: {problem}; the force on its foundation is unknown")
+    moved = np.array([whole[name] for name in names])
+    rows[DISPLACEMENT, first : first + moved.size] = moved @ stiffness
+    rows[VELOCITY, first : first + moved.size] = moved @ damping
+    if not rows.any():
+        raise InputError(
+            f"stator: {probe.stator} is rigid; it has no degrees of freedom to find its force by"
+        )
