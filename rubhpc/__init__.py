@@ -1,7 +1,7 @@
 """Parallel parameter studies of rotor-stator rub.
 
-`rubhpc.simulate` computes one case, `rubhpc.periodic` solves for a periodic motion, `rubhpc.run` computes a
-study, `rubhpc.open` opens a store as a lazy dataset.
+`rubhpc.simulate` computes one case, `rubhpc.periodic` solves for a periodic motion, `rubhpc.branch` follows
+it along a parameter, `rubhpc.run` computes a study, `rubhpc.open` opens a store as a lazy dataset.
 """
 
 from __future__ import annotations
@@ -15,9 +15,11 @@ from rubhpc.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from postproc.accessor import open  # noqa: A004 - the public name
+    from rubhpc.branch import branch
     from rubhpc.errors import InputError, NoPeriodicMotion, RubError, StoppedEarly, StoreError
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.linear_design import linear_design
+    from rubhpc.integrate.branches import Branch
     from rubhpc.integrate.periodic_motion import PeriodicMotion
     from rubhpc.integrate.record import Record, State
     from rubhpc.periodic import periodic
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study, read_study
 
 __all__ = [
+    "Branch",
     "InputError",
     "Load",
     "LumpedStator",
@@ -50,6 +53,7 @@ __all__ = [
     "Summary",
     "Unbalance",
     "assemble",
+    "branch",
     "linear_design",
     "open",
     "periodic",
@@ -61,6 +65,7 @@ __all__ = [
 
 # Module of each name; imported at first use, so that `import rubhpc` is fast.
 _HOMES = {
+    "Branch": "rubhpc.integrate.branches:Branch",
     "InputError": "rubhpc.errors:InputError",
     "Load": "rubhpc.rig.forces:Load",
     "LumpedStator": "rubhpc.rig.stators:LumpedStator",
@@ -79,6 +84,7 @@ _HOMES = {
     "Summary": "rubhpc.storage.summary:Summary",
     "Unbalance": "rubhpc.rig.forces:Unbalance",
     "assemble": "rubhpc.fem.assemble:assemble",
+    "branch": "rubhpc.branch:branch",
     "linear_design": "rubhpc.fem.linear_design:linear_design",
     "open": "postproc.accessor:open",
     "periodic": "rubhpc.periodic:periodic",
@@ -93,7 +99,7 @@ class _Package(ModuleType):
     """The package; a module, once imported, does not hide the function of its name."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        is_hiding = isinstance(value, ModuleType) and name in ("periodic", "simulate")
+        is_hiding = isinstance(value, ModuleType) and name in ("branch", "periodic", "simulate")
         super().__setattr__(name, getattr(value, name) if is_hiding else value)
 
 

@@ -64,6 +64,9 @@ class CaseArguments(TypedDict, total=False):
 class Case:
     """One case, ready to be integrated."""
 
+    rig: Rig
+    contact: Contact
+    integrator: Integrator
     setup: Setup
     clearance: float  # m
     friction: float
@@ -130,16 +133,21 @@ def case_of(
     mu = parse_quantity(given.get("friction", FRICTION), "", f"{caller}: friction")
     if mu < 0:
         raise InputError(f"{caller}: friction: {mu:g} is out of range; it must be at least 0")
+    contact = _declared(Contact, given, caller)
+    integrator = _declared(Integrator, given, caller)
     setup = prepare(
         rig,
         spin,
-        contact=_declared(Contact, given, caller),
-        integrator=_declared(Integrator, given, caller),
+        contact=contact,
+        integrator=integrator,
         samples_per_revolution=samples_per_revolution,
         model=model,
         probes=probes,
     )
     return Case(
+        rig=rig,
+        contact=contact,
+        integrator=integrator,
         setup=setup,
         clearance=gap,
         friction=mu,

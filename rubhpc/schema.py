@@ -38,6 +38,7 @@ class Variable:
 STATUS = ("missing", "done", "failed", "diverged")
 MISSING, DONE, FAILED, DIVERGED = range(4)
 REGIME = ("no_contact", "periodic", "quasi_periodic", "chaotic", "undecided")
+BRANCH_EVENT = ("none", "fold", "period_doubling", "neimark_sacker", "grazing", "end", "branch_point")
 SETTLED = ("not_settled", "settled")
 SCHEMES = ("event_driven", "contact_stepping", "central_difference")
 

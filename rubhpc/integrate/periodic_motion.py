@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -150,11 +151,12 @@ def find_periodic_motion(
         raise NoPeriodicMotion(f"periodic: {problem}; take another case") from None
     multipliers = orbit.multipliers
     state = piecewise.march.state_of(orbit.motion, piecewise.contact_force(orbit.states, orbit.motion))
-    growth = math.log(abs(multipliers[0])) / orbit.period if multipliers[0] else -math.inf
     return PeriodicMotion(
         period=orbit.period,
         state=state,
-        record=_record(setup, clearance, friction, state, orbit.period, growth, repeat, recording),
+        record=record_of_period(
+            setup, clearance, friction, state, orbit.period, multipliers[0], repeat, recording
+        ),
         multipliers=multipliers,
         is_stable=bool(abs(multipliers[0]) < 1.0),
         monodromy=orbit.monodromy,
@@ -204,13 +206,13 @@ def _search(
     raise NoPeriodicMotion(f"periodic: {text}; give another period, or a state near one as initial")
 
 
-def _record(
+def record_of_period(
     setup: ModalSetup,
     clearance: float,
     friction: float,
     state: State,
     period: int,
-    growth: float,
+    multiplier: complex,
     repeat: int,
     recording: Recording,
 ) -> Record:
@@ -231,7 +233,9 @@ def _record(
     measures = record.measures | {
         "period": period,
         "regime": REGIME.index("periodic" if has_touched else "no_contact"),
-        "lyapunov_exponent": growth,
+        "lyapunov_exponent": math.log(abs(multiplier)) / period if multiplier else -math.inf,
+        "largest_multiplier": abs(multiplier),
+        "multiplier_angle": abs(cmath.phase(multiplier)),
         "settled": 1,
         "transient_revolutions": 0,
     }

@@ -92,7 +92,7 @@ class Mode(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Revolution:
-    """One revolution of the shaft, from angle 0 to angle 0.
+    """One revolution of the shaft, from angle 0 to angle 0 unless another was asked for.
 
     Attributes
     ----------
@@ -182,8 +182,23 @@ class PiecewiseMotion:
         z[1] += motion @ mode.enter_im
         return z
 
-    def revolve(self, motion: Floats, states: int, most_events: int = MOST_EVENTS) -> Revolution:
+    def revolve(
+        self,
+        motion: Floats,
+        states: int,
+        most_events: int = MOST_EVENTS,
+        *,
+        phase: float = 0.0,
+        share: float = 1.0,
+    ) -> Revolution:
         """Follow a motion (2 n,) with the pairs in these states through one revolution.
+
+        Parameters
+        ----------
+        phase : float
+            Angle of the shaft where it begins, in revolutions.
+        share : float
+            Of a revolution that is followed.
 
         Raises
         ------
@@ -191,7 +206,8 @@ class PiecewiseMotion:
             A displacement passes its limit, no contact forces obey the laws, or events follow without end.
         """
         pieces: list[Piece] = []
-        time, clock = 0.0, self.march.clock
+        time, clock = phase * self.turn, self.march.clock
+        stop = (phase + share) * self.turn
         least_gap, least_force = np.full((2, self.q), np.inf)
         while True:
             mode = self.mode(states)
@@ -213,7 +229,7 @@ class PiecewiseMotion:
                 clock.tick,
                 clock.search_level,
                 self._longest,
-                self.turn - time,
+                stop - time,
                 begun,
                 z,
                 turned,
@@ -267,6 +283,19 @@ class PiecewiseMotion:
         j = first_of(crossing)
         re, im = self._tables.switch_re[mode.place, j], self._tables.switch_im[mode.place, j]
         return np.asarray(mode.enter_re @ re - mode.enter_im @ im)
+
+    def switch(self, mode: Mode, crossing: int, re: Floats, im: Floats) -> float:
+        """First switch function that vanishes, of coordinates (m,), real and imaginary."""
+        j = first_of(crossing)
+        return float(self._tables.switch_re[mode.place, j] @ re - self._tables.switch_im[mode.place, j] @ im)
+
+    def unit_clearance(self, mode: Mode) -> tuple[Floats, Floats]:
+        """What a clearance greater by 1 m at every pair adds to coordinates (m,), real and imaginary."""
+        first = self._tables.n_eigenmode[mode.place]
+        re, im = -self._tables.enter_constant[mode.place].sum(axis=0)
+        re[first], im[first] = 0.0, 0.0
+        re[first + 1 : first + 1 + self.q] = 1.0
+        return re, im
 
     def what_changes(self, piece: Piece) -> list[tuple[int, Change]]:
         """Pairs that an event at the end of a piece concerns, and what becomes of them."""

@@ -37,6 +37,32 @@ def monodromy(motion: PiecewiseMotion, revolutions: Iterable[Revolution]) -> Flo
     return tangent
 
 
+def by_clearance(motion: PiecewiseMotion, revolutions: Iterable[Revolution]) -> Floats:
+    """Derivative (2 n,) of a motion's end by the clearance of all pairs, its beginning held.
+
+    A clearance is a coordinate of the contact modes: it enters each piece, and moves each event.
+    """
+    moved = np.zeros(2 * motion.n)
+    for revolution in revolutions:
+        for piece, following in pairwise([*revolution.pieces, None]):
+            assert piece is not None
+            mode = motion.mode(piece.states)
+            clearance_re, clearance_im = motion.unit_clearance(mode)
+            begun_re = moved @ mode.enter_re + clearance_re
+            begun_im = moved @ mode.enter_im + clearance_im
+            size, turn = np.exp(mode.exponent[0] * piece.duration), mode.exponent[1] * piece.duration
+            re, im = size * np.cos(turn), size * np.sin(turn)
+            z_re, z_im = re * begun_re - im * begun_im, re * begun_im + im * begun_re
+            moved = mode.shape_re @ z_re - mode.shape_im @ z_im
+            if following is None or (not motion.has_states and not piece.touching.size):
+                continue
+            impact = Impact(motion, piece)
+            switched = motion.switch(mode, piece.crossing, z_re, z_im)
+            jump = following.rate_begun - impact.apply(piece.rate_before)
+            moved = impact.apply(moved) + jump * (switched / piece.switch_rate)
+    return moved
+
+
 def propagator(mode: Mode, duration: float) -> Floats:
     """Derivative (2 n, 2 n) of the motion by that a time (s) before; it keeps closed gaps closed."""
     size, turn = np.exp(mode.exponent[0] * duration), mode.exponent[1] * duration

@@ -190,6 +190,11 @@ class ModalSetup:
             )
         return self._friction_libraries[friction]
 
+    def forget(self, friction: float) -> None:
+        """Free the contact modes of a friction."""
+        for held in (self._libraries, self._friction_libraries, self._open_tables):
+            held.pop(friction, None)
+
     def open_tables(self, friction: float) -> ModeTables:
         """Tables of the mode with every pair open alone, as wide as those of the friction's library."""
         if friction not in self._open_tables:

@@ -157,6 +157,20 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     return replace(_axis(name, declared, _read(declared, values, where), where), sweep=sweep)
 
 
+def unit_of(name: str, rig: Rig) -> str:
+    """Return the unit of an axis as quantities are written: "kg/m^3"; "" without dimension.
+
+    Raises
+    ------
+    InputError
+        When the name is unknown, or its values are no quantities.
+    """
+    declared = _declared(name, rig, name)
+    if declared.metadata["kind"] != "quantity":
+        raise InputError(f"{name}: is no quantity; take one, such as friction")
+    return str(declared.metadata["unit"])
+
+
 def direction_axis() -> Axis:
     """Return the axis that separates the two directions of a sweep."""
     return Axis(

@@ -1,0 +1,120 @@
+"""Branches of periodic motions against answers in closed form.
+
+The impact oscillator x'' + x = cos w t with a wall at s and restitution e (Shaw and Holmes 1983): a motion
+with one impact of speed V a period T satisfies
+
+    (s + k V)^2 + (h V)^2 = 1 / (1 - w^2)^2,    k = (1 + e) / (2 tan(T / 2)),    h = (1 - e) / (2 w),
+
+so that over s two motions meet at a fold at s^2 = (1 + (k / h)^2) / (1 - w^2)^2.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lone_bodies import body, set_up_modal, tip
+
+import rubhpc
+from rubhpc import LumpedStator, read_rig
+from rubhpc.integrate.arclength import follow
+from rubhpc.integrate.branch_events import Event
+from rubhpc.integrate.branch_point import Branching
+from rubhpc.integrate.branch_search import search
+from rubhpc.integrate.family import Family
+from rubhpc.integrate.periodic_motion import find_periodic_motion
+from rubhpc.integrate.piecewise_motion import PiecewiseMotion
+from rubhpc.study.initial import Initial
+from rubhpc.study.study import Contact, Recording
+
+WALL = tip(body(1.0, 1.0, ((1, "axial"),)), 0.0, axial=-1)  # it is held
+
+
+class Oscillators(Family):
+    """Of one frequency or one wall, and a restitution."""
+
+    def __init__(self, along, span, frequency, restitution):
+        super().__init__(None, along, span)
+        self._frequency, self._restitution, self._known = frequency, restitution, {}
+
+    def settings(self, value):
+        frequency = value if self.along == "speed" else self._frequency
+        if frequency not in self._known:
+            self._known[frequency] = set_up_modal(
+                body(1.0, 1.0, ((1, "v"),)), [WALL], frequency, 64, Contact(restitution=self._restitution),
+                force=[1.0], step=1e-4,
+            )  # fmt: skip
+        return self._known[frequency], value if self.along == "clearance" else 0.0, 0.0
+
+    def first(self, branching, value):
+        """The motion that a simulation from rest leads to."""
+        setup, clearance, friction = self.settings(value)
+        recording = Recording(transient=30, samples_per_revolution=64, keep=())
+        found = find_periodic_motion(
+            setup, clearance=clearance, friction=friction, period=1, repeat=1, recording=recording,
+            initial=Initial(),
+        )  # fmt: skip
+        piecewise = PiecewiseMotion(setup, clearance, friction, found.state)
+        return branching.begin(value, piecewise.start, piecewise.states, 1)
+
+
+def events(track):
+    return [(Event(e).name, p) for p, e in zip(track.points, track.events, strict=True) if e]
+
+
+def impacts(point):
+    return [speed for r in point.revolutions for piece in r.pieces for speed in piece.approach]
+
+
+def test_period_doubles_where_the_closed_form_has_it_and_the_branch_is_switched():
+    """At w = 2.65334773 for e = 0.8 the multipliers are -1 and -e^2; two impacts a period lead on."""
+    family = Oscillators("speed", 0.7, None, 0.8)
+    branching = Branching(family, 0.05)
+    once, twice = search(branching, [family.first(branching, 2.2)], low=2.1, high=2.7, most=100, doublings=1)
+    (name, point) = next(one for one in events(once) if one[0] != "END")
+    assert name == "PERIOD_DOUBLING"
+    assert point.value == pytest.approx(2.65334773, abs=1e-8)
+    assert point.multipliers == pytest.approx(np.array([-1.0, -0.64]), abs=1e-8)
+    assert next(p.n_unstable for p in once.points if p.value > 2.66) == 1
+    assert twice.points[0].value == pytest.approx(point.value, abs=1e-12)
+    assert {p.period for p in twice.points} == {2}
+    assert twice.points[3].n_unstable == 0
+    approach = [
+        piece.approach[0] for r in twice.points[3].revolutions for piece in r.pieces if piece.crossing
+    ]
+    assert len(approach) == 2
+    assert abs(approach[0] - approach[1]) > 1e-3
+
+
+def test_two_motions_meet_at_the_fold_of_the_closed_form():
+    w, e = 1.7, 0.7
+    family = Oscillators("clearance", 2.0, w, e)
+    branching = Branching(family, 0.1)
+    track = follow(branching, [family.first(branching, 0.0)], 1.0, low=-0.1, high=2.0, most=100)
+    k, h = (1 + e) / (2 * math.tan(math.pi / w)), (1 - e) / (2 * w)
+    name, point = events(track)[0]
+    assert name == "FOLD"
+    assert point.value == pytest.approx(math.hypot(1, k / h) / (w**2 - 1), rel=1e-9)
+    with_one = [found for found in track.points if len(impacts(found)) == 1]
+    for found in with_one:
+        (speed,) = impacts(found)
+        assert (found.value + k * speed) ** 2 + (h * speed) ** 2 == pytest.approx((1 - w**2) ** -2, rel=1e-9)
+        assert np.linalg.det(found.monodromy) == pytest.approx(e**2, rel=1e-8)
+    assert [with_one[0].n_unstable, with_one[-1].n_unstable] == [0, 1]
+
+
+def test_ring_of_springs_over_its_clearance():
+    """A rub, an unstable rub and the motion without contact, which grazes at the contact-free amplitude."""
+    springs = LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)
+    ring = replace(read_rig("mokhtar2017"), stator=(springs,))
+    case = {"speed_ratio": 1.25, "friction": 0.0}
+    (found,) = rubhpc.branch(
+        ring, along="clearance", start="240 um", stop="420 um", largest_step="40 um", transient=40, **case
+    )
+    kinds = [name for name, _ in found.events() if name != "grazing"]
+    free = rubhpc.periodic(ring, clearance=1e-3, keep=(), **case).record.contact_free_amplitude
+    assert kinds == ["fold", "fold"]
+    assert found.events()[-1][1] == pytest.approx(free, rel=3e-6)  # that of the full model
+    assert [point.touches for point in (found.points[0], found.points[-1])] == [8, 0]
+    lowest, highest = (found.values[[p.event == "fold" for p in found.points]][k] for k in (1, 0))
+    assert lowest < free < highest
