@@ -35,8 +35,9 @@ class Variable:
         return math.nan if self.dtype.startswith("float") else -1
 
 
-STATUS = ("missing", "done", "failed", "diverged")
-MISSING, DONE, FAILED, DIVERGED = range(4)
+STATUS = ("missing", "done", "failed", "diverged", "inferred")
+MISSING, DONE, FAILED, DIVERGED, INFERRED = range(5)  # inferred: not computed, readers fill it
+HAS_VALUES = (DONE, INFERRED)  # measures and regime, as a reader of the store sees them
 REGIME = ("no_contact", "periodic", "quasi_periodic", "chaotic", "undecided")
 BRANCH_EVENT = ("none", "fold", "period_doubling", "neimark_sacker", "grazing", "end", "branch_point")
 SETTLED = ("not_settled", "settled")

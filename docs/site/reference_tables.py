@@ -24,6 +24,7 @@ from rubhpc.rig.rig import Rig
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import OwnAxes
 from rubhpc.study.initial import Initial
+from rubhpc.study.refine import Refine
 from rubhpc.study.tables import Contact, Integrator, Recording, Run, Sample
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ STUDY_TABLES = {
     "[record]": Recording,
     "[[record.probe]]": Probe,
     "[sample]": Sample,
+    "[refine]": Refine,
     "[run]": Run,
 }
 ROOMS = ("store", "signals", "cases", "figures")  # of postproc, whose functions the reference shows
@@ -124,6 +126,7 @@ def _kind(meta: Any) -> str:
         "matrix": "matrix",
         "degrees": "list of node and name",
         "series": "list of numbers",
+        "criteria": "list of flags and `{ measure = share }`",
     }
     kind = meta["kind"]
     if kind in ("choice", "choices"):
@@ -154,7 +157,8 @@ def _default(field: dataclasses.Field[Any]) -> str:
     if isinstance(value, str):
         return f'`"{value}"`'
     if isinstance(value, tuple):
-        return "`[" + ", ".join(f'"{word}"' for word in value) + "]`"
+        words = (word if isinstance(word, str) else word[0] for word in value)
+        return "`[" + ", ".join(f'"{word}"' for word in words) + "]`"
     return f"`{value:g}`"
 
 

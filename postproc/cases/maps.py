@@ -12,7 +12,7 @@ from postproc.store.select import narrow
 from postproc.store.units import meanings
 from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
-from rubhpc.schema import DONE, VARIABLES, role_of
+from rubhpc.schema import HAS_VALUES, VARIABLES, role_of
 from rubhpc.study.axes import SPEED_AXES, coordinate_of
 
 if TYPE_CHECKING:
@@ -153,6 +153,6 @@ def validity(store: xr.Dataset) -> xr.DataArray:
 
 
 def reasons_of(data: xr.Dataset) -> str:
-    """Return what leaves the model's range in any case of `map_data` that is done, as a list in words."""
-    validity = np.where(data["status"].values == DONE, data["validity"].values, 0)
+    """Return what leaves the model's range in any case of `map_data` that has values, as a list in words."""
+    validity = np.where(np.isin(data["status"].values, HAS_VALUES), data["validity"].values, 0)
     return ", ".join(text for bit, text, _ in VALIDITY.values() if (validity & bit).any())

@@ -26,7 +26,7 @@ from postproc.store.select import select
 from postproc.store.variables import LONG_ROLES, require_measure
 from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
-from rubhpc.schema import DONE, role_of
+from rubhpc.schema import DONE, HAS_VALUES, role_of
 from rubhpc.storage.regular_files import CHECKED, RegularFiles
 
 if TYPE_CHECKING:
@@ -225,12 +225,17 @@ def _axes(store: xr.Dataset, values: xr.DataArray, over: Iterable[str]) -> list[
 
 
 def _done(store: xr.Dataset, measure: str, over: Iterable[str]) -> tuple[xr.DataArray, list[str]]:
-    """Return a measure of the cases that are done, loaded, NaN for others, and the dimensions to reduce."""
+    """Return a measure of the cases that have it, loaded, NaN for others, and the dimensions to reduce."""
     require_measure(store, measure)
     over = list(over)
     if "stator" not in over:
         store = worst_of_stators(store, [measure])
-    values = store[measure].astype(float).where(store["status"] == DONE).assign_attrs(store[measure].attrs)
+    values = (
+        store[measure]
+        .astype(float)
+        .where(store["status"].isin(HAS_VALUES))
+        .assign_attrs(store[measure].attrs)
+    )
     return values.rename(measure).compute(), _axes(store, values.rename(measure), over)
 
 

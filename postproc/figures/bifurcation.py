@@ -17,7 +17,7 @@ from postproc.store.units import displayed, meanings, scale_of, short_name
 from postproc.store.variables import require_results
 from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
-from rubhpc.schema import DONE
+from rubhpc.schema import HAS_VALUES
 from rubhpc.study.axes import DIRECTION
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ def _groups(
     if color is None:
         yield {**style, "color": "C0"}, np.ones(len(section), bool), section.values
         return
-    codes = np.where(data["status"].values == DONE, data[color].values, -1)
+    codes = np.where(np.isin(data["status"].values, HAS_VALUES), data[color].values, -1)
     for code, (name, shade) in categories(color, codes).items():
         chosen = codes == code
         yield {**style, "color": shade, "label": name}, chosen, section.values[chosen]

@@ -19,7 +19,7 @@ from postproc.store.units import displayed
 from postproc.store.variables import require_variables
 from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
-from rubhpc.schema import DONE
+from rubhpc.schema import HAS_VALUES, INFERRED, MISSING
 from rubhpc.study.sampling import CASE
 
 if TYPE_CHECKING:
@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     Edges = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
+_PANEL = 200.0  # points: the shorter side of a panel, about
+
+
 def map(  # noqa: A001 - the name of the command
     cases: xr.Dataset,
     value: str = "peak_contact_force",
@@ -45,6 +48,7 @@ def map(  # noqa: A001 - the name of the command
     facet: Axis | Sequence[Axis] = (),
     contours: Annotated[int, Bounds(least=1), Metavar("N")] | None = None,
     log: bool = False,
+    computed: bool = False,
 ) -> Drawing:
     """Map of a measure, the regime or the status over two axes.
 
@@ -67,11 +71,15 @@ def map(  # noqa: A001 - the name of the command
         Lines at N levels.
     log
         Colours on a logarithmic scale.
+    computed
+        Dots on the cases of a refined map that were computed; the others are inferred from them.
     """
     named = [facet] if isinstance(facet, str) else list(facet)
     is_sample = bool(drawn_axes(cases))
     if is_sample and contours:
         raise InputError(f"{source(cases)}: map: points of a sample have no contours; leave --contours out")
+    if is_sample and computed:
+        raise InputError(f"{source(cases)}: map: all cases of a sample are computed; leave --computed out")
     across, up = scatter_axes(cases, x, y) if is_sample else default_axes(cases, x, y, named)
     spread = [CASE] if is_sample else [across, up]
     facets = facet_axes(cases, named, spread)
@@ -85,7 +93,7 @@ def map(  # noqa: A001 - the name of the command
         if is_sample:
             scatter_maps(shown, value, across, up, axes, log)
         else:
-            value_maps(shown, value, axes, log, contours or 0)
+            value_maps(shown, value, axes, log, contours or 0, computed)
 
     if not facets:
         return Drawing(shown=shown, draw=draw, height=75.0, lines=tuple(notes))
@@ -101,7 +109,12 @@ def map(  # noqa: A001 - the name of the command
 
 
 def value_maps(
-    data: xr.Dataset, value: str, axes: Sequence[Axes], log: bool = False, n_contour: int = 0
+    data: xr.Dataset,
+    value: str,
+    axes: Sequence[Axes],
+    log: bool = False,
+    n_contour: int = 0,
+    computed: bool = False,
 ) -> Sequence[Axes]:
     """Draw maps from `map_data`, one for each value of its facets, in one scale of colours.
 
@@ -116,6 +129,8 @@ def value_maps(
         As many as there are facets, row by row.
     n_contour : int
         Contour lines at about so many levels.
+    computed : bool
+        Whether dots mark the cases that were computed.
     """
     *facets, y_name, x_name = [str(name) for name in data[value].dims]
     data = data.sortby([*facets, y_name, x_name])
@@ -138,6 +153,8 @@ def value_maps(
         if not is_known:
             for patch in _hatch(ax, edges, data.isel(here), value, reasons_of(data)):
                 handles[str(patch.get_label())] = patch
+        if computed:
+            handles |= _dots(ax, x, y, data["status"].isel(here).values)
         for values, name in ((x, "x"), (y, "y")):
             if is_geometric(values):
                 getattr(ax, f"set_{name}scale")("log")
@@ -154,20 +171,41 @@ def value_maps(
     return axes
 
 
+def _dots(
+    ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], status: NDArray[np.int8]
+) -> dict[str, Artist]:
+    """Mark the cases that were computed, and return what names them."""
+    rows, columns = np.nonzero((status != MISSING) & (status != INFERRED))
+    spacing = min(_PANEL / len(x), _PANEL / len(y))  # points of a page between two cases, about
+    (dots,) = ax.plot(
+        x[columns],
+        y[rows],
+        linestyle="",
+        marker="o",
+        color="black",
+        markersize=min(max(0.35 * spacing, 0.3), 2.0),
+        markeredgewidth=0.0,
+        rasterized=True,
+        label="computed",
+    )
+    return {"computed": dots}
+
+
 def _hatch(ax: Axes, edges: Edges, data: xr.Dataset, value: str, reasons: str) -> list[Artist]:
     """Hatch what has no result, no value, or is out of the model's range, and return what names them."""
     status = data["status"].values
+    has_values = np.isin(status, HAS_VALUES)
     handles: list[Artist] = []
     for code, (name, color, hatch) in NOT_DONE.items():
         handles += hatch_cells(ax, edges, status == code, name, hatch, facecolor=color)
     # Such as durations without contact.
-    empty = (status == DONE) & np.isnan(np.asarray(data[value].values, dtype=float))
+    empty = has_values & np.isnan(np.asarray(data[value].values, dtype=float))
     handles += hatch_cells(ax, edges, empty, "no value", "", facecolor="white")
     color = "k" if value in CATEGORIES else WARNING
     if "settled" in data and value != "settled":
-        moving = (status == DONE) & (data["settled"].values == 0)
+        moving = has_values & (data["settled"].values == 0)
         handles += hatch_cells(ax, edges, moving, NOT_SETTLED, "||||", color=color)
-    invalid = (status == DONE) & (data["validity"].values > 0)
+    invalid = has_values & (data["validity"].values > 0)
     return handles + hatch_cells(ax, edges, invalid, f"out of range: {reasons}", "\\\\\\\\", color=color)
 
 

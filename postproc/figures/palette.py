@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.store.units import scale_of, short_name
 from rubhpc.errors import InputError
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, REGIME, SCHEMES, SETTLED, STATUS, role_of
+from rubhpc.schema import DIVERGED, FAILED, HAS_VALUES, MISSING, REGIME, SCHEMES, SETTLED, STATUS, role_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,7 +28,7 @@ PERIOD_COLORS = ("#D55E00", "#88CCEE", "#332288", "#999933", "#CC79A7")  # none,
 SETTLED_COLORS = ("#D55E00", "#56B4E9")
 NOT_SETTLED = SETTLED[0].replace("_", " ")
 SCHEME_COLORS = ("#56B4E9", "#E69F00", "#009E73")
-STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00")
+STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00", "#B8DFD2")
 # Motions that starts reach, by number; the contact-free one has the colour of its regime.
 MOTION_COLORS = (
     "#E69F00",
@@ -83,7 +83,7 @@ class Paint(NamedTuple):
 def coloured(data: xr.Dataset, value: str) -> tuple[xr.DataArray, bool]:
     """Return the values that have a colour, and whether all have, being known before any case is done."""
     is_known = value == "status" or role_of(value) == "setting"
-    return (data[value] if is_known else data[value].where(data["status"] == DONE)), is_known
+    return (data[value] if is_known else data[value].where(data["status"].isin(HAS_VALUES))), is_known
 
 
 def paint_of(shown: xr.DataArray, log: bool) -> Paint:

@@ -13,7 +13,7 @@ from postproc.cases.saltelli import drawn_ranges
 from postproc.report.grid import plain
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.units import Scale, scale_for, short_name
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS, VARIABLES
+from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS, VARIABLES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,7 +37,8 @@ def counts(status: NDArray[np.float64]) -> list[dict[str, Any]]:
     """Return state and number of cases, the done ones first."""
     return [
         {"state": STATUS[code], "n": int((status == code).sum())}
-        for code in (DONE, FAILED, DIVERGED, MISSING)
+        for code in (DONE, FAILED, DIVERGED, INFERRED, MISSING)
+        if code != INFERRED or (status == code).any()
     ]
 
 

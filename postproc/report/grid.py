@@ -13,7 +13,7 @@ from postproc.figures.palette import categories
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.units import Scale, displayed, meanings, scale_for, short_name
 from postproc.store.worst import worst_word
-from rubhpc.schema import DIVERGED, DONE, PROBE, SIGNAL_NAMES, VARIABLES
+from rubhpc.schema import DIVERGED, HAS_VALUES, PROBE, SIGNAL_NAMES, VARIABLES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +62,7 @@ class Measures:
         self._data = store[names].load()
         self._dims = axes_of(store)
         self.names = tuple(names)
-        self._has_result = np.isin(self._data["status"].values, (DONE, DIVERGED))
+        self._has_result = np.isin(self._data["status"].values, (*HAS_VALUES, DIVERGED))
 
     def values(self, name: str) -> NDArray[np.float64]:
         """Return a variable in SI units over the axes, and the stators where it depends on them."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from postproc.store.inferred import fill_inferred
 from postproc.store.open import open_store
 from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.lock import is_alive, read_holder
@@ -48,5 +49,6 @@ def open_live(path: Path) -> xr.Dataset:
         dataset = dataset.assign(
             {name: (dataset[name].dims, values, dataset[name].attrs) for name, values in packed.items()}
         )
+        dataset = fill_inferred(dataset, path)
     about_runs = {"reasons": dict(ledger.reasons), "runs": runs, "running": running}
     return dataset.assign_attrs(about_runs)

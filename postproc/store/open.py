@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from postproc.store.axes import drawn_axes
+from postproc.store.inferred import fill_inferred
 from postproc.store.variables import LONG_ROLES
 from rubhpc.errors import StoreError
 from rubhpc.schema import VARIABLES, role_of
@@ -51,7 +52,7 @@ def open_store(path: str | Path) -> xr.Dataset:
         raise StoreError(f"{path}: is not a rubhpc store; give the directory that a study was run into")
     store.encoding["source"] = str(path)
     _check_attributes(store, path)
-    return store
+    return fill_inferred(store, path)
 
 
 def _check_attributes(store: xr.Dataset, path: Path) -> None:

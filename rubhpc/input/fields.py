@@ -100,6 +100,13 @@ def words(*, doc: str, example: str, default: tuple[str, ...]) -> Any:
     return _declare("words", doc, example, default)
 
 
+def criteria(
+    *, flags: tuple[str, ...], measures: tuple[str, ...], doc: str, example: str, default: Any = MISSING
+) -> Any:
+    """Declare a field that holds flags, and measures with a tolerance: pairs, with 0 for a flag."""
+    return _declare("criteria", doc, example, default, flags=flags, measures=measures)
+
+
 def pairs(units: tuple[str, str], *, doc: str, example: str) -> Any:
     """Declare a field that holds pairs of numbers, written as a table `{ 31.56 = 0.09 }`; none by default."""
     return _declare("pairs", doc, example, (), units=units)
@@ -151,6 +158,8 @@ def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> 
         if not isinstance(value, list | tuple) or not all(isinstance(word, str) for word in value):
             raise InputError(f'{where}: {brief(value)} is not a list of words; write ["axial", "lateral"]')
         return tuple(value)
+    if kind == "criteria":
+        return _parse_criteria(value, declared, where)
     if kind == "flag":
         if isinstance(value, float) and value in (0.0, 1.0):
             return bool(value)  # an axis holds floats
@@ -240,6 +249,37 @@ def _parse_degrees(value: object, where: str) -> tuple[tuple[int, str], ...]:
     return tuple(degrees)
 
 
+def _parse_criteria(value: object, declared: Any, where: str) -> tuple[tuple[str, float], ...]:
+    """Flags by name, measures as tables `{ name = tolerance }`; one of them needs no list."""
+    pairs: list[tuple[str, float]] = []
+    for entry in value if isinstance(value, list | tuple) else [value]:
+        if isinstance(entry, str):
+            pairs.append((entry, 0.0))
+        elif isinstance(entry, dict):
+            pairs += [(name, parse_quantity(share, "", f"{where}: {name}")) for name, share in entry.items()]
+        else:
+            example = declared.metadata["example"]
+            raise InputError(f"{where}: {brief(entry)} is no flag and no measure; write {example}")
+    return tuple(pairs)
+
+
+def _check_criteria(value: Any, bounds: Any) -> str:
+    if not value:
+        return "empty; give at least one flag or measure"
+    flags, measures = bounds["flags"], bounds["measures"]
+    names = [name for name, _ in value]
+    for name, share in value:
+        if names.count(name) > 1:
+            return f"{name} is duplicated; remove one"
+        if name in measures and not 0.0 < share < 1.0:
+            return f"{name} needs a relative difference between 0 and 1; write {{ {name} = 0.1 }}"
+        if name in flags and share:
+            return f'{name} is a flag, which has no difference; write "{name}"'
+        if name not in flags and name not in measures:
+            return f"{brief(name)} is no flag or measure; {nearest(name, [*flags, *measures])}"
+    return ""
+
+
 def _check_quantity(value: object, bounds: Any) -> str:
     unit = f" {bounds['unit']}" if bounds["unit"] else ""
     try:
@@ -315,4 +355,5 @@ _CHECKS = {
     "text": _check_text,
     "choice": _check_choice,
     "choices": _check_choices,
+    "criteria": _check_criteria,
 }

@@ -4,44 +4,34 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from rubhpc.errors import RubError, StoppedEarly
 from rubhpc.integrate.compilation import announced_by, seconds_compiling
+from rubhpc.running.computing import Computing
 from rubhpc.running.crash import crash
 from rubhpc.running.finish import finish_part, finish_run
 from rubhpc.running.job import RunRequest, prepare_job
 from rubhpc.running.pool import Pool, RankLost, Totals, connect
-from rubhpc.running.progress import Progress
 from rubhpc.running.stopping import Stopping
-from rubhpc.running.watchdog import Watchdog
-from rubhpc.running.worker import Worker
 from rubhpc.running.workers import start_workers
 from rubhpc.schema import MISSING
 from rubhpc.storage.disk import disk_errors
-from rubhpc.storage.in_progress import InProgress
 from rubhpc.storage.manifest import PRIVATE
-from rubhpc.storage.resume import missing_share
 from rubhpc.storage.store import Store
-from rubhpc.study.cases import CaseGrid
 from rubhpc.study.parts import Part
 from rubhpc.study.study import Study, read_study
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from rubhpc.running.job import Job
     from rubhpc.storage.summary import Summary
-    from rubhpc.study.cases import Block
-
-_PACKING_GAP = 600.0  # s between packings while a run is on; one takes 5 s for a million cases
 
 
 @on_one_thread
@@ -210,9 +200,14 @@ def _round(request: RunRequest, pool: Pool, began: float) -> Summary:
     request.token = job.token
     if job.part is None:
         _together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=False))
-    _together(pool, lambda: _compute(job, pool, request))
-    if job.suspect and not request.stopping.look():
-        _together(pool, lambda: _try_suspects(job, pool, request.stopping))
+    computing = Computing(job, pool, request)
+    while True:
+        _together(pool, computing.compute)
+        if job.suspect and not request.stopping.look():
+            _together(pool, computing.try_suspects)
+        if not computing.advance():
+            break
+    _together(pool, computing.sync)
     reason = next((reason for reason in pool.gather(request.stopping.verdict) if reason), "")
     if not reason and job.part is None:
         _together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=True))
@@ -242,113 +237,9 @@ def _together(pool: Pool, work: Callable[[], None]) -> None:
             raise other
 
 
-def _compute(job: Job, pool: Pool, request: RunRequest) -> None:
-    """Compute blocks until there are none left."""
-    stopping = request.stopping
-    grid = CaseGrid(job.study, chunk=job.chunk)
-    store = Store(job.study.output)
-    every = grid.sequences()
-    sequences = [every[i] for i in job.pending]
-    quiet = request.quiet or pool.rank > 0
-    with (
-        _progress(job, grid, sequences, quiet=quiet, has_bar=not pool.is_launched) as progress,
-        _open_worker(job, pool, grid, store, stopping, "rank", progress) as worker,
-    ):
-        next_packing = time.monotonic() + _PACKING_GAP
-        for block in _claimed(job, grid, sequences, pool, stopping):
-            worker.work(block)
-            worker.attend()
-            if pool.rank == 0 and job.part is None and time.monotonic() > next_packing:
-                store.pack(store.replay())  # for readers who look on
-                next_packing = time.monotonic() + _PACKING_GAP
-    if stopping.reason:
-        pool.add(Totals(stop=1))
-
-
 def _pack_blocks(job: Job, pool: Pool, stopping: Stopping, *, is_end: bool) -> None:
     """Pack this rank's part of the shards; at the beginning of a run, only those that are mostly unpacked."""
     files = Store(job.study.output).block_files
     least = 1 if is_end else files.n_inner // 2 + 1
     with disk_errors(job.study.output):
         files.pack(pool.rank, pool.size, least=least, is_over=stopping.look)
-
-
-def _try_suspects(job: Job, pool: Pool, stopping: Stopping) -> None:
-    """Compute the cases during which ranks died: last, and each stored before the next begins.
-
-    Those with the fewest deaths come first, so that a case that kills its rank ends up alone.
-    """
-    grid = CaseGrid(job.study, chunk=job.chunk)
-    store = Store(job.study.output)
-    job = replace(job, ledger=store.replay(with_measures=False))
-    blocks = {block.start: (n, block) for n, sequence in enumerate(grid.sequences()) for block in sequence}
-    with _open_worker(job, pool, grid, store, stopping, "tail") as worker:
-        for flat in sorted(job.suspect, key=lambda i: job.suspect[i]):
-            n_sequence, block = blocks[store.start_of(flat)]
-            if n_sequence % pool.size == pool.rank and not stopping.look():  # a block has one writer
-                worker.missing = np.arange(grid.n_case) == flat
-                worker.work(block)
-
-
-@contextmanager
-def _open_worker(
-    job: Job,
-    pool: Pool,
-    grid: CaseGrid,
-    store: Store,
-    stopping: Stopping,
-    kind: str,
-    progress: Progress | None = None,
-) -> Iterator[Worker]:
-    """A worker with its journal and its in-progress record; all is on the disk at the end."""
-
-    def attend() -> None:
-        if pool.rank == 0 and progress is not None:
-            progress.update(pool.totals())
-
-    writer = f"{kind}{pool.rank:05d}"
-    with disk_errors(store.path):
-        current = InProgress(store.in_progress_directory, job.run, writer)
-    with (
-        current,
-        Watchdog(job.study.run.case_time_limit, current) as watch,
-        store.journal(job.run, writer) as journal,
-    ):
-        worker = Worker(grid, store, job.ledger, job.missing, journal, watch, stopping, pool.add, attend)
-        yield worker
-        worker.sync()
-
-
-def _claimed(
-    job: Job, grid: CaseGrid, sequences: list[list[Block]], pool: Pool, stopping: Stopping
-) -> Iterator[Block]:
-    """The blocks this rank is to compute, one sequence after another, until none is left or the run stops."""
-    most_failures = job.study.run.max_failures
-    missing = job.missing.reshape(grid.shape)
-
-    def is_over(sums: Totals) -> bool:
-        has_failed = most_failures is not None and sums.failed > most_failures
-        return bool(stopping.look() or sums.stop or has_failed)
-
-    while not stopping.look():
-        sums = pool.claim()
-        if sums.claimed >= len(sequences) or is_over(sums):
-            return
-        for i, block in enumerate(sequences[sums.claimed]):
-            if i and is_over(pool.totals()):
-                return
-            if missing_share(block, missing):
-                yield block
-
-
-def _progress(
-    job: Job, grid: CaseGrid, sequences: list[list[Block]], *, quiet: bool, has_bar: bool
-) -> Progress:
-    is_missing = job.missing.reshape(grid.shape)
-    return Progress(
-        n_case := int(job.share.sum()),
-        sum(block.cost * missing_share(block, is_missing) for sequence in sequences for block in sequence),
-        n_done=n_case - int(job.missing.sum()),
-        quiet=quiet,
-        has_bar=has_bar,
-    )

@@ -11,6 +11,7 @@ from rubhpc.storage.disk import disk_errors, remove
 from rubhpc.storage.in_progress import forget
 from rubhpc.storage.ledger import count
 from rubhpc.storage.lock import InUse
+from rubhpc.storage.refined import status_of
 from rubhpc.storage.store import Store
 from rubhpc.storage.summary import Summary
 
@@ -26,6 +27,7 @@ def finish_run(job: Job, request: RunRequest, computed: int, seconds: float) -> 
     store = Store(job.study.output)
     ledger = store.replay()
     store.pack(ledger)
+    ledger.status = status_of(store.manifest, ledger.status, ledger.measures)
     _clean_up(store, ledger)
     return _summary(job, store, ledger, computed, seconds)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.errors import StoppedEarly, StoreError
+from rubhpc.errors import InputError, StoppedEarly, StoreError
 from rubhpc.integrate.case import compile_kernels
 from rubhpc.running.stopping import Stopped, Stopping
 from rubhpc.running.worker import set_up
@@ -18,11 +18,11 @@ from rubhpc.storage.in_progress import forget, read_deaths
 from rubhpc.storage.journal import Entry, next_run
 from rubhpc.storage.lock import InUse
 from rubhpc.storage.parts import Shares
+from rubhpc.storage.refined import Refinement
 from rubhpc.storage.resume import (
     bring_up_to_date,
     cases_without_files,
     grid_for,
-    missing_share,
     must_be_grown,
     open_store,
 )
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from rubhpc.study.cases import Block
     from rubhpc.study.parts import Part
     from rubhpc.study.study import Study
+
+    Sequences = list[list[Block]]
 
 
 @dataclass(kw_only=True)
@@ -77,7 +79,7 @@ class Job:
     share : (n_case,) bool
         Cases of the part; all without one.
     missing : (n_case,) bool
-        Cases of it to be computed, but for the suspect ones.
+        Cases of it to be computed, but for the suspect ones; of a refined map those of one level.
     pending : (n,) int
         Positions in `CaseGrid.sequences()` of those that hold one.
     suspect : dict
@@ -85,6 +87,12 @@ class Job:
         itself, those of a sweep in order.
     token : str
         Of the lock on the store.
+    refinement : Refinement, optional
+        Of a refined map, what its next level depends on.
+    level : int
+        How many levels have been computed in this run.
+    n_claimed : int
+        Sequences that were claimed on the levels before.
     """
 
     study: Study
@@ -97,6 +105,9 @@ class Job:
     pending: NDArray[np.int64]
     suspect: dict[int, int]
     token: str
+    refinement: Refinement | None = None
+    level: int = 0
+    n_claimed: int = 0
 
 
 def prepare_job(request: RunRequest, n_rank: int) -> Job:
@@ -108,10 +119,11 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
         grid = CaseGrid(study, chunk=store.manifest.chunk)
     with disk_errors(study.output):
         run, share = (_begin if request.part is None else _begin_part)(request, store, grid, n_rank)
-        ledger = store.replay(with_measures=request.part is None and not store.is_packed())
+        is_refined = store.manifest.refine is not None
+        needs_measures = request.part is None and (is_refined or not store.is_packed())
+        ledger = store.replay(with_measures=needs_measures)
         if request.part is None:
             store.pack(ledger)  # readers see what a killed run has left, from now on
-        ledger.measures = None  # the other ranks need none
         own = replace(ledger, status=np.where(share, ledger.status, MISSING))
         store.mark_missing(ledger, cases_without_files(store, own), run, "gone")
         missing = share & (ledger.status == MISSING)
@@ -121,21 +133,23 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
                 ledger, _with_dependants(grid, failed), run, "anew"
             )  # a name that comes before those of ranks
             missing = share & ((ledger.status == MISSING) | (ledger.status == FAILED))
+        refinement = None
+        if is_refined and ledger.measures is not None:
+            refinement = Refinement(
+                store.manifest, ledger.status, ledger.measures, again=request.retry_failed
+            )
+            missing &= refinement.missing()
+        ledger.measures = None  # the other ranks need none
         among = None if request.part is None else share
         deaths = _fail_killers(store, ledger, missing, run, among)
         suspect = _with_followers(grid, deaths, missing)
     missing[list(suspect)] = False
     sequences = grid.sequences()
-    is_missing = missing.reshape(grid.shape)
-    pending = [
-        i
-        for i, sequence in enumerate(sequences)
-        if any(missing_share(block, is_missing) for block in sequence)
-    ]
-    if pending and not request.quiet:
+    pending = find_pending(grid, sequences, missing)
+    if len(pending) and not request.quiet:
         for line in grid.warnings():
             print(f"warning: {line}", flush=True)
-    if pending:
+    if len(pending):
         _warm_up(grid, sequences[pending[-1]][0], stopping)
     return Job(
         study=study,
@@ -145,10 +159,54 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
         ledger=ledger,
         share=share,
         missing=missing,
-        pending=np.array(pending, dtype=np.int64),
+        pending=pending,
         suspect=suspect,
         token=request.token,
+        refinement=refinement,
     )
+
+
+def next_level(
+    job: Job, grid: CaseGrid, sequences: Sequences, entries: list[Entry], n_claimed: int
+) -> Job | None:
+    """The next level of a refined map, from what all ranks have entered; None where there is none."""
+    refinement = job.refinement
+    assert refinement is not None
+    refinement.enter(entries)
+    for entry in entries:
+        job.ledger.status[entry.flat], job.ledger.checksum[entry.flat] = entry.status, entry.checksum
+    missing = refinement.missing()
+    if not missing.any() or (missing & job.missing).any():  # or some of this level have not been computed
+        return None
+    return replace(
+        job,
+        missing=missing,
+        pending=find_pending(grid, sequences, missing),
+        suspect={},
+        level=job.level + 1,
+        n_claimed=job.n_claimed + n_claimed,
+    )
+
+
+def find_pending(grid: CaseGrid, sequences: Sequences, missing: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Positions of the sequences that hold a missing case; of a refined map those with most cases first."""
+    starts = [np.arange(0, n, c) for n, c in zip(grid.shape, grid.chunk, strict=True)]
+    counts = missing.reshape(grid.shape).astype(np.int32)
+    for axis, at in enumerate(starts):
+        counts = np.add.reduceat(counts, at, axis=axis)
+    n_missing = np.array(
+        [
+            sum(
+                int(counts[tuple(s // c for s, c in zip(b.start, grid.chunk, strict=True))]) for b in sequence
+            )
+            for sequence in sequences
+        ],
+        dtype=np.int64,
+    )
+    pending = np.flatnonzero(n_missing)
+    if grid.study.refine is not None:
+        pending = pending[np.argsort(-n_missing[pending], kind="stable")]
+    return pending
 
 
 def _begin(request: RunRequest, store: Store, grid: CaseGrid, n_rank: int) -> tuple[int, NDArray[np.bool_]]:
@@ -172,6 +230,9 @@ def _begin_part(
     """Begin a part: lock it, bring the store up to date if no other part is at work; also its cases."""
     part, stopping, parts = request.part, request.stopping, store.parts
     assert part is not None
+    if request.study.refine is not None:
+        why = "the levels of a refined map need the results of all parts"
+        raise InputError(f"part {part}: {why}; use --workers or mpirun, or remove [refine]")
     with ExitStack() as alone:
         try:
             alone.enter_context(parts.alone(part, stopping.look))

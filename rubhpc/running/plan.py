@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.running.pilots import count_preparations, seconds_of, time_pilots
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
+from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
 from rubhpc.storage.duration import duration
 from rubhpc.storage.growth import origins
 from rubhpc.storage.ledger import count
 from rubhpc.storage.manifest import Manifest
+from rubhpc.storage.measures import blank_records, converted
 from rubhpc.storage.parts import Shares
+from rubhpc.storage.refined import Refinement, status_of
 from rubhpc.storage.resume import cases_without_files, grid_for, is_store, missing_share
 from rubhpc.storage.store import Store
 from rubhpc.study.parts import Part, share_out
@@ -23,6 +25,8 @@ from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from rubhpc.study.study import Study
 
@@ -38,7 +42,7 @@ class Plan:
     Attributes
     ----------
     counts : tuple of int
-        Cases that are missing, done, failed and diverged, in this order.
+        Cases that are missing, done, failed, diverged and inferred, in this order.
     n_sequence, n_block, n_per_block : int
         Sequences and blocks of the whole grid, and cases in a block.
     n_file, n_file_running : int
@@ -55,6 +59,8 @@ class Plan:
         Coordinates of the pilot cases that failed, and why.
     warnings : tuple of str
         Unstable speeds, and a sag beyond the clearance.
+    n_expected : int or None
+        Cases that a refined map computes in all, about; `steps` and `core_hours` are for the rest of them.
     part : str
         The part of the study to which counts, steps and core-hours refer, as "3/64"; "" for all of it.
     """
@@ -75,6 +81,7 @@ class Plan:
     failures: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     part: str = ""
+    n_expected: int | None = None
 
     @property
     def _files(self) -> str:
@@ -109,9 +116,18 @@ class Plan:
                 f"cases       {n_case} = {sizes}",
                 f"blocks      {self.n_block}, at most {self.n_per_block} cases each; {self._idle}",
                 f"store       {_size(self.n_byte)} before compression, {self._files}",
+                *(
+                    [f"refined     computes at most all {n_case} cases, about {self.n_expected}"]
+                    if self.n_expected is not None
+                    else []
+                ),
                 *([f"part        {self.part}: {sum(self.counts)} cases"] if self.part else []),
                 "so far      "
-                + ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING)),
+                + ", ".join(
+                    f"{self.counts[i]} {STATUS[i]}"
+                    for i in (DONE, FAILED, DIVERGED, INFERRED, MISSING)
+                    if i != INFERRED or self.counts[i]
+                ),
                 f"to compute  {self.steps:.3g} steps, {cost}",
                 *(f"failed      a pilot case: {text}" for text in self.failures),
                 *(f"warning     {text}" for text in self.warnings),
@@ -139,14 +155,21 @@ def make_plan(study: Study, part: str | None = None, *, start_up: float = 0.0) -
     blocks = grid.blocks()
     shares = None
     status = np.zeros(grid.n_case, np.int8)
+    kind = manifest.header.record_type
+    records = blank_records(grid.n_case if manifest.refine else 0, kind)
     if is_store(study.output):
         store = Store(study.output)
         manifest = replace(manifest, shard=store.manifest.shard)
-        ledger = store.replay(with_measures=False)
+        ledger = store.replay(with_measures=manifest.refine is not None)
         ledger.status[cases_without_files(store, ledger)] = MISSING
         origin = origins(store.manifest, manifest)
         status = np.where(origin < 0, MISSING, ledger.status[origin])
+        if manifest.refine is not None and ledger.measures is not None:
+            records[origin >= 0] = converted(ledger.measures, kind)[origin[origin >= 0]]
         shares = store.parts.read_shares(manifest)
+    n_expected, left_of_all = None, 1.0
+    if manifest.refine is not None:
+        n_expected, left_of_all, status = _refined(manifest, status, records)
     is_in_part = np.ones(grid.n_case, bool)
     if chosen is not None:
         if shares is None or shares.count != chosen.total:
@@ -154,7 +177,7 @@ def make_plan(study: Study, part: str | None = None, *, start_up: float = 0.0) -
         is_in_part = shares.cases(chosen.number, manifest)
     missing = (is_in_part & (status == MISSING)).reshape(grid.shape)
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
-    steps = sum(block.cost * share for block, share in left)
+    steps = left_of_all * sum(block.cost * share for block, share in left)
     pace, failures = time_pilots(grid, manifest, [block for block, _ in left])
     seconds = seconds_of(pace, steps, count_preparations(grid, missing)) if left else 0.0
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
@@ -184,7 +207,19 @@ def make_plan(study: Study, part: str | None = None, *, start_up: float = 0.0) -
         failures=tuple(failures),
         warnings=grid.warnings(),
         part="" if chosen is None else str(chosen),
+        n_expected=n_expected,
     )
+
+
+def _refined(
+    manifest: Manifest, status: NDArray[np.int8], records: NDArray[np.void]
+) -> tuple[int, float, NDArray[np.int8]]:
+    """Cases that a refined map computes, the share of the missing ones that it still needs, and statuses."""
+    asked = Refinement(manifest, status, records).asked()
+    n_expected = asked.n_expected
+    n_known = int((asked.cases.ravel() & (status != MISSING)).sum())
+    n_missing = int((status == MISSING).sum())
+    return n_expected, (n_expected - n_known) / max(n_missing, 1), status_of(manifest, status, records)
 
 
 def _size(n_byte: float) -> str:

@@ -77,6 +77,8 @@ class Worker:
         Called with every case that has ended.
     attend : callable
         Called several times a second while a case is computed.
+    entered : list of Entry
+        Of a refined map, what this rank has journalled.
     """
 
     grid: CaseGrid
@@ -93,6 +95,7 @@ class Worker:
         self._record_type = self.store.manifest.header.record_type
         self._setups: OrderedDict[tuple[int, float, Contact], tuple[Rig, Setup]] = OrderedDict()
         self._initial_states = InitialStates(self.grid, self.store, self.ledger, self._repair)
+        self.entered: list[Entry] = []
         self._unsynced: list[Path] = []
         self._next_sync = time.monotonic() + _SYNC_GAP
         self._seconds, self._cost = 0.0, 0.0
@@ -150,6 +153,8 @@ class Worker:
             self.store.write_block(block.start, data)
             with disk_errors(self.store.path):
                 self.journal.write(entries)
+            if self.grid.study.refine is not None:
+                self.entered += entries
             for entry in entries:
                 self.ledger.status[entry.flat] = entry.status
                 self.ledger.checksum[entry.flat] = entry.checksum
@@ -171,6 +176,12 @@ class Worker:
         self._unsynced.clear()
         ended = time.monotonic()
         self._next_sync = ended + max(_SYNC_GAP, _SYNC_SHARE * (ended - began))
+
+    def take_unsynced(self) -> list[Path]:
+        """Return the files that `sync` would write to the disk, arrays before the journal, once."""
+        unsynced = [*self._unsynced, *([self.journal.path] if self.journal.is_begun else [])]
+        self._unsynced.clear()
+        return unsynced
 
     @property
     def _pace(self) -> float:

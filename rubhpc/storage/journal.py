@@ -138,6 +138,11 @@ class Journal:
         while view:
             view = view[os.write(self._handle, view) :]
 
+    @property
+    def is_begun(self) -> bool:
+        """Whether there is a file yet."""
+        return self._handle is not None
+
     def sync(self) -> None:
         """Return once all entries are on the disk."""
         if self._handle is not None:

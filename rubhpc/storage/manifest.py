@@ -19,6 +19,7 @@ from rubhpc.study.axes import FROM_REST, coordinate_of, meanings_of, written
 from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.identity import WHOLE
 from rubhpc.study.points import Points
+from rubhpc.study.refine import table_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -81,6 +82,8 @@ class Manifest:
         Measures that the store was made without, so that its older cases lack them.
     accepted : tuple of int
         Earlier versions of the physics whose cases were kept.
+    refine : dict or None
+        Of a map of which not all cases are computed: criteria, step of the first level, refined dimensions.
     """
 
     title: str
@@ -95,6 +98,7 @@ class Manifest:
     added: tuple[str, ...] = ()
     accepted: tuple[int, ...] = ()
     shard: tuple[int, ...] = ()
+    refine: dict[str, Any] | None = None
 
     @cached_property
     def points(self) -> Points:
@@ -196,6 +200,7 @@ class Manifest:
                 *case_measures(),
                 *(v for v in probe_variables(recording.probed).values() if v.role == "measure"),
             ),
+            refine=None if study.refine is None else table_of(study.refine, study.axes),
         )
 
     def write(self, store: Path) -> None:
@@ -205,6 +210,8 @@ class Manifest:
         content |= {"axes": axes, "measures": to_json(self.measures)}
         if not self.shard:
             del content["shard"]
+        if self.refine is None:
+            del content["refine"]
         text = json.dumps(content).encode()
         number = _SHARDED if self.shard else _FORMAT
         for name in _NAMES:

@@ -92,6 +92,7 @@ def bring_up_to_date(store: Store, grid: CaseGrid, *, accept_version: bool = Fal
     note = _note_on(added, store) if added else ""
     if must_grow:
         grow(store, grid)
+    store.refine(Manifest.of(grid).refine)
     store.repair_files(grid)
     return note
 

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
+from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
 from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.duration import duration
 from rubhpc.storage.ledger import count, replay
 from rubhpc.storage.lock import is_alive, read_holder
 from rubhpc.storage.manifest import PRIVATE, Manifest
 from rubhpc.storage.parts import Parts
+from rubhpc.storage.refined import status_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -63,7 +64,7 @@ class StoreStatus:
     Attributes
     ----------
     counts : tuple of int
-        Cases that are missing, done, failed and diverged, in this order.
+        Cases that are missing, done, failed, diverged and inferred, in this order.
     holder : Holder or None
         Who computes now.
     parts : tuple of PartStatus
@@ -95,7 +96,10 @@ class StoreStatus:
         lines = [
             self.title,
             f"{n_case} cases: "
-            + ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in (DONE, FAILED, DIVERGED, MISSING)),
+            + ", ".join(
+                f"{self.counts[i]} {STATUS[i]}"
+                for i in (DONE, FAILED, DIVERGED, *((INFERRED,) if self.counts[INFERRED] else ()), MISSING)
+            ),
         ]
         if self.holder is not None:
             left = self.seconds_left
@@ -129,7 +133,10 @@ def read_status(path: Path) -> StoreStatus:
         holder = read_holder(lock)
         if holder is not None and not is_alive(holder, lock):
             holder = None
-        ledger = replay(path / PRIVATE / "journal", manifest.header, with_measures=False)
+        ledger = replay(
+            path / PRIVATE / "journal", manifest.header, with_measures=manifest.refine is not None
+        )
+        ledger.status = status_of(manifest, ledger.status, ledger.measures)
         parts = _read_parts(path, manifest, ledger)
     troubled = {*np.flatnonzero((ledger.status == FAILED) | (ledger.status == DIVERGED)).tolist()}
     return StoreStatus(

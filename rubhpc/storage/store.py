@@ -31,6 +31,7 @@ from rubhpc.storage.ledger import Ledger, replay
 from rubhpc.storage.lock import Lock, process_state
 from rubhpc.storage.manifest import GROWTH, PRIVATE, Manifest
 from rubhpc.storage.parts import Parts
+from rubhpc.storage.refined import status_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -266,7 +267,8 @@ class Store:
             raise ValueError("a ledger replayed without measures has none to pack")
         void = ~np.isin(ledger.status, (DONE, DIVERGED))
         shape = self.manifest.shape
-        packed: dict[str, NDArray[Any]] = {"status": ledger.status.reshape(shape)}
+        status = status_of(self.manifest, ledger.status, ledger.measures)
+        packed: dict[str, NDArray[Any]] = {"status": status.reshape(shape)}
         for variable in self.manifest.measures:
             values = ledger.measures[variable.name].copy()
             values[void] = variable.fill_value
@@ -283,6 +285,14 @@ class Store:
             return read_regular(self.private / "packed.json")
         except OSError:
             return None
+
+    def refine(self, table: dict[str, Any] | None) -> None:
+        """Have the map refined in this way, or (None) computed whole; needs the store's lock."""
+        if self.manifest.refine != table:
+            with disk_errors(self.path):
+                self.forget_packing()
+                self.manifest = replace(self.manifest, refine=table)
+                self.manifest.write(self.path)
 
     def forget_packing(self) -> None:
         """Have the next run pack again."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING, STATUS
+from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
 from rubhpc.storage.duration import duration
 
 if TYPE_CHECKING:
@@ -22,7 +22,8 @@ class Summary:
     Attributes
     ----------
     counts : tuple of int
-        Cases of the study, or of its part, that are missing, done, failed and diverged, in this order.
+        Cases of the study, or of its part, that are missing, done, failed, diverged and inferred, in this
+        order.
     computed : int
         Cases this run computed.
     seconds : float
@@ -61,7 +62,7 @@ class Summary:
 
     def text(self) -> str:
         """The summary in a line."""
-        states = [i for i in (DONE, FAILED, DIVERGED, MISSING) if self.counts[i]]
+        states = [i for i in (DONE, FAILED, DIVERGED, INFERRED, MISSING) if self.counts[i]]
         counts = ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in states)
         flaw = f"; {self.flawed} done with a remark, rubhpc status names them" if self.flawed else ""
         rest = ""

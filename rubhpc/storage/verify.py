@@ -10,7 +10,7 @@ import numpy as np
 import zarr
 
 from rubhpc.errors import StoreError
-from rubhpc.schema import DIVERGED, DONE, MISSING
+from rubhpc.schema import DIVERGED, DONE, INFERRED, MISSING
 from rubhpc.storage.disk import is_filled
 from rubhpc.storage.growth import finish_growth
 from rubhpc.storage.journal import next_run
@@ -144,7 +144,7 @@ def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:
     packed = _read(store, "status")
     lost = set(ledger.damaged_cases)
     if packed is not None:
-        lost |= set(np.flatnonzero((packed.ravel() != MISSING) & never).tolist())
+        lost |= set(np.flatnonzero(~np.isin(packed.ravel(), (MISSING, INFERRED)) & never).tolist())
     return {flat: "its line in the journal is damaged or gone" for flat in lost if never[flat]}
 
 

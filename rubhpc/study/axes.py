@@ -74,6 +74,8 @@ class Axis:
         Where the values are a sample's. Such axes share a dimension.
     sweep : {"from_rest", "up", "down", "both"}
         Whether each case starts at rest, or where its neighbour on this axis has ended.
+    is_range : bool
+        Whether the values were given as a range.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Axis:
     long_name: str
     drawn_from: Range | None = None
     sweep: str = FROM_REST
+    is_range: bool = False
 
     def __post_init__(self) -> None:
         if self.sweep not in SWEEPS:
@@ -149,12 +152,15 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     """
     where = place(file, "grid", name)
     declared = _declared(name, rig, where)
-    sweep = FROM_REST
+    sweep, is_range = FROM_REST, False
     if isinstance(values, dict):
         values, sweep = _read_table(values, where)
+        is_range = isinstance(values, dict)
     if sweep != FROM_REST and (problem := _why_not_swept(name)):
         raise InputError(f"{where}: sweep: {problem}")
-    return replace(_axis(name, declared, _read(declared, values, where), where), sweep=sweep)
+    return replace(
+        _axis(name, declared, _read(declared, values, where), where), sweep=sweep, is_range=is_range
+    )
 
 
 def unit_of(name: str, rig: Rig) -> str:

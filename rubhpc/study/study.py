@@ -25,6 +25,7 @@ from rubhpc.study.axes import (
 from rubhpc.study.checks import check_axes, check_rigs
 from rubhpc.study.contact_axes import check_contacts
 from rubhpc.study.initial import Initial, check_initials
+from rubhpc.study.refine import Refine
 from rubhpc.study.sampling import draw
 from rubhpc.study.tables import Contact, ContactKeys, Integrator, Recording, Run, Sample
 
@@ -38,6 +39,7 @@ __all__ = [
     "Contact",
     "Integrator",
     "Recording",
+    "Refine",
     "Run",
     "Sample",
     "Study",
@@ -48,7 +50,7 @@ __all__ = [
 ]
 
 _TABLES = (
-    *("title", "rig", "output", "grid", "sample", "override"),
+    *("title", "rig", "output", "grid", "sample", "refine", "override"),
     *("contact", "initial", "integrator", "record", "run"),
 )
 _MOST_AXES = 32  # arrays have 64 dimensions at most
@@ -78,6 +80,8 @@ class Study:
         swept in both directions adds a last one, `direction`.
     sample : Sample or None
         How some of the axes have been drawn (`rubhpc.study.sampling.draw`).
+    refine : Refine or None
+        Which cases are computed, where the others are inferred; it changes the result of no case.
     contact : ContactKeys
         A `Contact`; of a grid with contact axes what they leave open, as far as it applies to a case's law.
     initial : Initial
@@ -97,6 +101,7 @@ class Study:
     rig: Rig
     axes: tuple[Axis, ...]
     sample: Sample | None = None
+    refine: Refine | None = None
     contact: ContactKeys = DEFAULT_CONTACT
     initial: Initial = DEFAULT_INITIAL
     integrator: Integrator = DEFAULT_INTEGRATOR
@@ -112,6 +117,8 @@ class Study:
         if any(axis.sweep == BOTH for axis in self.axes) and self.axes[-1].name != DIRECTION:
             object.__setattr__(self, "axes", (*self.axes, direction_axis()))
         check_axes(self.axes)
+        if self.refine is not None:
+            self.refine.refined(self.axes)
         check_contacts(self.contact, [axis for axis in self.axes if axis.is_contact_key])
         check_initials(self.initial, [axis for axis in self.axes if axis.is_initial_key])
         check_rigs(self.rig, self.axes, self.recording.probe)
@@ -183,6 +190,7 @@ def read_study(
     rig = read_rig(_text(table, "rig", "", file), source.parent, place(file, "", "rig"), trust_rig=trust_rig)
     rig = _overridden(rig, _table(table, "override", file), file)
     sample = build(Sample, table["sample"], file, "sample") if "sample" in table else None
+    refine = build(Refine, table["refine"], file, "refine") if "refine" in table else None
     axes = _read_axes(_table(table, "grid", file), rig, sample, file)
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
         raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
@@ -202,6 +210,7 @@ def read_study(
             rig=rig,
             axes=axes,
             sample=sample,
+            refine=refine,
             contact=contact,
             initial=initial,
             integrator=integrator,

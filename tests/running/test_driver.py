@@ -17,7 +17,7 @@ from stub_physics import Physics, record
 
 from rubhpc.errors import InputError, StoppedEarly, StoreError
 from rubhpc.kernels._jit import compilation
-from rubhpc.running import driver, job, stopping, worker
+from rubhpc.running import computing, driver, job, stopping, worker
 from rubhpc.running.driver import run
 from rubhpc.running.pilots import count_preparations
 from rubhpc.schema import (
@@ -359,7 +359,7 @@ def test_what_a_killed_run_left_is_packed_when_the_next_begins(physics, study, m
 
 
 def test_results_are_packed_now_and_then_for_those_who_look_on(physics, study, monkeypatch):
-    monkeypatch.setattr(driver, "_PACKING_GAP", 0.0)
+    monkeypatch.setattr(computing, "_PACKING_GAP", 0.0)
     seen: list[int] = []
     physics.on_case = lambda: seen.append(int((xr.open_zarr(study.output).status == DONE).sum()))
     run(study, quiet=True)

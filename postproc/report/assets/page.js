@@ -161,13 +161,13 @@ async function drawCase(flat) {
   const status = (await valuesOf("status"))[flat], validity = (await valuesOf("validity"))[flat];
   const spin = variable.spin_speed ? (await valuesOf("spin_speed"))[flat] : NaN;
   const words = await caseTable(flat);
-  const meaning = ["not computed yet", "done", "failed", "diverged"][status];
+  const meaning = ["not computed yet", "done", "failed", "diverged", "inferred from the cases around it"][status];
   const reason = facts.reasons[flat] ? `: ${facts.reasons[flat]}` : "";
   const range = status === 1 ? (validity > 0 ? `; out of the model's range: ${facts.validity[validity]}` : "; within the model's range") : "";
   byId("case-text").textContent = `${caseWords() || "The only case"} – ${status === 1 ? words : meaning + reason}${range}`.replace(/^./, (c) => c.toUpperCase());
   const record = status === 1 ? await recordOf(flat) : null;
   if (!record) {
-    const why = status !== 1 ? `This case ${status === 0 ? "is" : "has"} ${meaning}${reason}`
+    const why = status !== 1 ? `This case ${status === 0 || status === 4 ? "is" : "has"} ${meaning}${reason}`
       : `Left out to limit the size of this page; run rubhpc view ${facts.store}`;
     for (const panel of Object.values(panels)) panel.say(why);
     return;

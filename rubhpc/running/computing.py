@@ -1,0 +1,178 @@
+"""One rank's share of a run: it claims blocks and computes them; of a refined map, level by level."""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.running.job import next_level
+from rubhpc.running.pool import Totals
+from rubhpc.running.progress import Progress
+from rubhpc.running.watchdog import Watchdog
+from rubhpc.running.worker import Worker
+from rubhpc.schema import MISSING
+from rubhpc.storage.disk import disk_errors, flush_to_disk
+from rubhpc.storage.in_progress import InProgress
+from rubhpc.storage.resume import missing_share
+from rubhpc.storage.store import Store
+from rubhpc.study.cases import CaseGrid
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from rubhpc.running.job import Job, RunRequest
+    from rubhpc.running.pool import Pool
+    from rubhpc.storage.journal import Entry
+    from rubhpc.study.cases import Block
+
+_PACKING_GAP = 600.0  # s between packings while a run is on; one takes 5 s for a million cases
+
+
+class Computing:
+    """What a rank computes of a job.
+
+    Parameters
+    ----------
+    job : Job
+    pool : Pool
+    request : RunRequest
+    """
+
+    def __init__(self, job: Job, pool: Pool, request: RunRequest) -> None:
+        self._job, self._pool, self._request = job, pool, request
+        self._stopping = request.stopping
+        self._grid = CaseGrid(job.study, chunk=job.chunk)
+        self._sequences = self._grid.sequences()
+        self._store = Store(job.study.output)
+        self._entered: list[Entry] = []  # on this level
+        self._n_claim = 0
+        self._unsynced: list[Path] = []
+
+    def compute(self) -> None:
+        """Compute blocks until there are none left."""
+        pool, job = self._pool, self._job
+        sequences = [self._sequences[i] for i in job.pending]
+        quiet = self._request.quiet or pool.rank > 0
+        # Journals of a later level count after those of an earlier one.
+        kind = f"rank_{job.level:02d}_" if job.level else "rank"
+        with self._progress(sequences, quiet=quiet) as progress, self._worker(kind, progress) as worker:
+            next_packing = time.monotonic() + _PACKING_GAP
+            for block in self._claimed(sequences):
+                worker.work(block)
+                worker.attend()
+                if pool.rank == 0 and job.part is None and time.monotonic() > next_packing:
+                    self._store.pack(self._store.replay())  # for readers who look on
+                    next_packing = time.monotonic() + _PACKING_GAP
+        if self._stopping.reason:
+            pool.add(Totals(stop=1))
+
+    def try_suspects(self) -> None:
+        """Compute the cases during which ranks died: last, and each stored before the next begins.
+
+        Those with the fewest deaths come first, so that a case that kills its rank ends up alone.
+        """
+        job = self._job = replace(self._job, ledger=self._store.replay(with_measures=False))
+        blocks = {block.start: (n, block) for n, sequence in enumerate(self._sequences) for block in sequence}
+        with self._worker("tail") as worker:
+            for flat in sorted(job.suspect, key=lambda i: job.suspect[i]):
+                n_sequence, block = blocks[self._store.start_of(flat)]
+                is_mine = n_sequence % self._pool.size == self._pool.rank  # a block has one writer
+                if is_mine and not self._stopping.look():
+                    worker.missing = np.arange(self._grid.n_case) == flat
+                    worker.work(block)
+
+    def advance(self) -> bool:
+        """Go on to the next level of a refined map, together with all ranks; whether there is one."""
+        if self._job.refinement is None:
+            return False
+        found = self._pool.gather((self._entered, self._n_claim, bool(self._stopping.look())))
+        entries = [entry for entered, _, _ in found for entry in entered]
+        following = next_level(self._job, self._grid, self._sequences, entries, sum(n for _, n, _ in found))
+        if following is None or any(is_over for _, _, is_over in found):
+            return False
+        self._job, self._entered, self._n_claim = following, [], 0
+        return True
+
+    def sync(self) -> None:
+        """Return once all that this rank has stored would survive a power failure."""
+        with disk_errors(self._store.path):
+            for path in dict.fromkeys(self._unsynced):
+                flush_to_disk(path)
+        self._unsynced.clear()
+
+    def _claimed(self, sequences: list[list[Block]]) -> Iterator[Block]:
+        """The blocks this rank is to compute, one sequence after another, until none is left or it stops."""
+        pool, stopping = self._pool, self._stopping
+        most_failures = self._job.study.run.max_failures
+        missing = self._job.missing.reshape(self._grid.shape)
+
+        def is_over(sums: Totals) -> bool:
+            has_failed = most_failures is not None and sums.failed > most_failures
+            return bool(stopping.look() or sums.stop or has_failed)
+
+        while not stopping.look():
+            sums = pool.claim()
+            self._n_claim += 1
+            number = sums.claimed - self._job.n_claimed
+            if number >= len(sequences) or is_over(sums):
+                return
+            for i, block in enumerate(sequences[number]):
+                if i and is_over(pool.totals()):
+                    return
+                if missing_share(block, missing):
+                    yield block
+
+    @contextmanager
+    def _worker(self, kind: str, progress: Progress | None = None) -> Iterator[Worker]:
+        """A worker with its journal and its in-progress record.
+
+        At its end all is on the disk; on a level of a refined map it only survives this process, lest the
+        other ranks wait for the disk (`sync`).
+        """
+        job, pool, store = self._job, self._pool, self._store
+
+        def attend() -> None:
+            if pool.rank == 0 and progress is not None:
+                progress.update(pool.totals())
+
+        writer = f"{kind}{pool.rank:05d}"
+        with disk_errors(store.path):
+            current = InProgress(store.in_progress_directory, job.run, writer)
+        with (
+            current,
+            Watchdog(job.study.run.case_time_limit, current) as watch,
+            store.journal(job.run, writer) as journal,
+        ):
+            worker = Worker(
+                self._grid, store, job.ledger, job.missing, journal, watch, self._stopping, pool.add, attend
+            )
+            worker.entered = self._entered
+            yield worker
+            if job.refinement is None:
+                worker.sync()
+            else:
+                self._unsynced += worker.take_unsynced()
+
+    def _progress(self, sequences: list[list[Block]], *, quiet: bool) -> Progress:
+        job, pool = self._job, self._pool
+        is_missing = job.missing.reshape(self._grid.shape)
+        n_missing = int(job.missing.sum())
+        is_refined = job.refinement is not None
+        n_known = int((job.ledger.status != MISSING).sum())
+        n_case = n_missing + n_known if is_refined else int(job.share.sum())
+        return Progress(
+            n_case,
+            sum(
+                block.cost * missing_share(block, is_missing) for sequence in sequences for block in sequence
+            ),
+            n_done=n_case - n_missing,
+            quiet=quiet,
+            has_bar=not pool.is_launched,
+            level=job.level + 1 if is_refined else None,
+            before=pool.totals(),
+        )

@@ -1,0 +1,97 @@
+"""Refined maps: which cases a level asks for, as the results of a store decide, and which are inferred."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.schema import FAILED, INFERRED, MISSING
+from rubhpc.study.levels import Results
+from rubhpc.study.refine import levels_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from rubhpc.storage.journal import Entry
+    from rubhpc.storage.manifest import Manifest
+    from rubhpc.study.levels import Asked
+
+
+class Refinement:
+    """The cases that a refined map asks for, from the results so far.
+
+    Parameters
+    ----------
+    manifest : Manifest
+        Of a store with a refined map.
+    status : (n_case,) int8
+    records : (n_case,) record
+        Measures of the cases.
+    again : bool
+        Whether failed cases are to be computed again, and so are not known.
+    """
+
+    def __init__(
+        self,
+        manifest: Manifest,
+        status: NDArray[np.int8],
+        records: NDArray[np.void],
+        *,
+        again: bool = False,
+    ) -> None:
+        assert manifest.refine is not None
+        self._levels = levels_of(manifest.refine, manifest.points)
+        self._by: list[tuple[str, float]] = [(name, share) for name, share in manifest.refine["by"]]
+        self._status = status.copy()
+        self._is_known = self._status != MISSING
+        if again:
+            self._is_known &= self._status != FAILED
+        self._kind = records.dtype
+        self._held = {name: records[name].copy() for name, _ in self._by}
+
+    def enter(self, entries: Sequence[Entry]) -> None:
+        """Add what has been computed since."""
+        for entry in entries:
+            self._status[entry.flat] = entry.status
+            self._is_known[entry.flat] = entry.status != MISSING
+            if entry.measures:
+                record = np.frombuffer(entry.measures, self._kind)[0]
+                for name, _ in self._by:
+                    self._held[name][entry.flat] = record[name]
+
+    def asked(self) -> Asked:
+        """Return the cases that are asked for, as far as results decide."""
+        shape = self._levels.shape
+        results = Results(
+            is_known=self._is_known.reshape(shape),
+            is_failed=(self._is_known & (self._status == FAILED)).reshape(shape),
+            classes=[self._status.reshape(shape)],
+        )
+        for name, share in self._by:
+            held = self._held[name]
+            for values in held.T if held.ndim > 1 else [held]:
+                values = values.reshape(shape)
+                if share:
+                    results.values.append((values.astype(np.float64), share))
+                else:
+                    results.classes.append(values)
+        return self._levels.asked(results)
+
+    def missing(self) -> NDArray[np.bool_]:
+        """Return the cases that are asked for and not known, (n_case,)."""
+        missing: NDArray[np.bool_] = self.asked().cases.ravel() & ~self._is_known
+        return missing
+
+
+def status_of(
+    manifest: Manifest, status: NDArray[np.int8], records: NDArray[np.void] | None
+) -> NDArray[np.int8]:
+    """Return the status of each case, (n_case,): of a complete refined map, what it lacks is inferred."""
+    if manifest.refine is None or not (status == MISSING).any():
+        return status
+    assert records is not None
+    is_all = Refinement(manifest, status, records).asked().is_all
+    return np.where(is_all & (status == MISSING), INFERRED, status).astype(np.int8)

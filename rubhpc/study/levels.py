@@ -1,0 +1,232 @@
+"""Which cases of a grid a refined map computes, level by level, and what it infers between them.
+
+Every `coarse`-th value of each refined axis, and its last one, are computed first. Then one axis after
+another is halved until it has all its values: the case in the middle of two neighbours is computed where
+these differ, or where two neighbours before or after them on the same line do (an edge may lie between two
+that agree), and so are the two themselves; elsewhere it is inferred from them. At last, every inferred case
+next to one that differs is computed, until there is none.
+
+Halving one axis at a time makes maps of rub cheap: their regions are bands along some of the axes, and a band
+one case wide is followed along its length by as few cases as a wide one.
+
+Decisions come from the results of the cases that were asked for, level by level, and from nothing else:
+neither ranks nor kills nor what else a store holds change them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+_FIRST, _LATER = 0.5, 0.3  # share of the middles that are computed, as long as no result says it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Results:
+    """What is known of the cases of a grid, as far as it decides what is refined.
+
+    Attributes
+    ----------
+    is_known : (*grid) bool
+        Cases that have an outcome.
+    is_failed : (*grid) bool
+        Those of them that have none to compare: their surroundings are computed.
+    classes : list of (*grid) int
+        Flags.
+    values : list of ((*grid) float, float)
+        Measures, and the share of the larger one by which neighbours may differ.
+    """
+
+    is_known: NDArray[np.bool_]
+    is_failed: NDArray[np.bool_]
+    classes: list[NDArray[Any]] = field(default_factory=list)
+    values: list[tuple[NDArray[np.float64], float]] = field(default_factory=list)
+
+
+class Asked(NamedTuple):
+    """The cases that are asked for, (*grid), whether these are all, and about how many there will be."""
+
+    cases: NDArray[np.bool_]
+    is_all: bool
+    n_expected: int
+
+
+class Levels:
+    """The levels of a refined grid.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Cases along each dimension.
+    refined : sequence of int
+        Dimensions that are refined, in this order; those of one case are not.
+    coarse : int
+        Step of the first level, a power of two.
+    """
+
+    def __init__(self, shape: tuple[int, ...], refined: Sequence[int], coarse: int) -> None:
+        self.shape = shape
+        self.refined = tuple(axis for axis in refined if shape[axis] > 1)
+        self.coarse = coarse
+
+    def asked(self, results: Results) -> Asked:
+        """Return the cases that are to be computed, as results decide: up to a level that lacks any."""
+        asked = np.zeros(self.shape, bool)
+        known = [results.is_failed, *results.classes, *(values for values, _ in results.values)]
+        tolerances = [0.0] * (1 + len(results.classes)) + [share for _, share in results.values]
+        nodes = self._first()
+        here = self._at(nodes)
+        asked[here] = True
+        if not results.is_known[here].all():
+            return Asked(asked, False, self._expected(asked, 0))
+        held = [values[here] for values in known]
+        for number, (axis, fine) in enumerate(self._halvings(), 1):
+            is_open = self._differ(held, tolerances, axis)
+            is_open = _with_neighbours(is_open, axis)
+            touched = _touched(is_open, axis, nodes[axis], fine)
+            held = [_between(values, axis, nodes[axis], fine) for values in held]
+            nodes = {**nodes, axis: fine}
+            here = self._at(nodes)
+            asked[here] |= touched
+            asked_here = asked[here]
+            if not results.is_known[here][asked_here].all():
+                return Asked(asked, False, self._expected(asked, number))
+            held = [np.where(asked_here, v[here], h) for v, h in zip(known, held, strict=True)]
+        while True:
+            beside = np.zeros(self.shape, bool)
+            for axis in self.refined:
+                is_open = self._differ(held, tolerances, axis)
+                beside[_span(axis, None, -1)] |= is_open
+                beside[_span(axis, 1, None)] |= is_open
+            if not (beside & ~asked).any():
+                return Asked(asked, True, int(asked.sum()))
+            asked |= beside
+            if not results.is_known[asked].all():
+                return Asked(asked, False, int(asked.sum()))
+            held = [np.where(asked, v, h) for v, h in zip(known, held, strict=True)]
+
+    def filled(self, values: NDArray[Any], is_computed: NDArray[np.bool_]) -> NDArray[Any]:
+        """Return values, (*grid, ...), with those that are not computed inferred from their neighbours.
+
+        Floats are interpolated linearly over the numbers of an axis; where one side is NaN the other counts.
+        Integers are those of the nearer side.
+        """
+        nodes = self._first()
+        held = values[self._at(nodes)]
+        for axis, fine in self._halvings():
+            held = _between(held, axis, nodes[axis], fine)
+            nodes = {**nodes, axis: fine}
+            here = self._at(nodes)
+            known = is_computed[here]
+            held = np.where(known.reshape(*known.shape, *[1] * (held.ndim - known.ndim)), values[here], held)
+        return held
+
+    def _expected(self, asked: NDArray[np.bool_], n_done: int) -> int:
+        """About how many cases there will be: an edge takes as many more on each level of its axis."""
+        counts, most, axes, nodes = [int(asked[self._at(self._first())].sum())], [], [-1], self._first()
+        before = self._size(nodes)
+        for axis, fine in self._halvings():
+            nodes = {**nodes, axis: fine}
+            counts.append(int(asked[self._at(nodes)].sum()))
+            most.append(self._size(nodes) - before)
+            axes.append(axis)
+            before = self._size(nodes)
+        total, added = float(counts[n_done]), 0.0
+        if n_done:
+            added = float(counts[n_done] - counts[n_done - 1])
+        for i in range(n_done + 1, len(counts)):
+            if axes[i] != axes[i - 1]:
+                added = (_FIRST if i == 1 else _LATER) * most[i - 1]
+            added = min(added, most[i - 1])
+            total += added
+        return round(total)
+
+    def _first(self) -> dict[int, NDArray[np.int64]]:
+        """Indices of the first level along each refined axis."""
+        return {axis: _every(self.shape[axis], self.coarse) for axis in self.refined}
+
+    def _halvings(self) -> Iterator[tuple[int, NDArray[np.int64]]]:
+        """The axis of each further level, and the indices along it from then on."""
+        for axis in self.refined:
+            step, n_before = self.coarse, len(_every(self.shape[axis], self.coarse))
+            while step > 1:
+                step //= 2
+                places = _every(self.shape[axis], step)
+                if len(places) > n_before:
+                    yield axis, places
+                n_before = len(places)
+
+    def _size(self, nodes: dict[int, NDArray[np.int64]]) -> int:
+        lengths = [len(nodes[axis]) if axis in nodes else n for axis, n in enumerate(self.shape)]
+        return int(np.prod(lengths))
+
+    def _at(self, nodes: dict[int, NDArray[np.int64]]) -> tuple[NDArray[np.int64], ...]:
+        """The cases of a level as an index of arrays over the grid."""
+        return np.ix_(*(nodes.get(axis, np.arange(n)) for axis, n in enumerate(self.shape)))
+
+    @staticmethod
+    def _differ(held: list[NDArray[Any]], tolerances: list[float], axis: int) -> NDArray[np.bool_]:
+        """Whether neighbours along an axis differ; first in `held` are failures, which agree with none."""
+        failed, *rest = held
+        one, other = _span(axis, None, -1), _span(axis, 1, None)
+        found: NDArray[np.bool_] = failed[one] | failed[other]
+        for values, tolerance in zip(rest, tolerances[1:], strict=True):
+            a, b = values[one], values[other]
+            if values.dtype.kind != "f":
+                found |= a != b
+                continue
+            is_same = np.abs(a - b) <= tolerance * np.maximum(np.abs(a), np.abs(b))  # of NaN, false
+            found |= ~is_same & ~(np.isnan(a) & np.isnan(b))
+        return found
+
+
+def _every(n: int, step: int) -> NDArray[np.int64]:
+    return np.unique(np.append(np.arange(0, n, step), n - 1))
+
+
+def _span(axis: int, start: int | None, stop: int | None) -> tuple[slice, ...]:
+    """All along the axes before one, and a part of it."""
+    return (*[slice(None)] * axis, slice(start, stop))
+
+
+def _with_neighbours(marked: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
+    """What is marked, and what comes before or after it along an axis."""
+    wide = marked.copy()
+    wide[_span(axis, 1, None)] |= marked[_span(axis, None, -1)]
+    wide[_span(axis, None, -1)] |= marked[_span(axis, 1, None)]
+    return wide
+
+
+def _touched(
+    is_open: NDArray[np.bool_], axis: int, coarse: NDArray[np.int64], fine: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Whether each place of a level lies in a marked interval of the level before, ends included."""
+    above = np.searchsorted(coarse, fine, side="right") - 1  # the interval that begins at or before it
+    below = np.where(coarse[above] == fine, above - 1, above)
+    last = is_open.shape[axis] - 1
+    touched: NDArray[np.bool_] = is_open.take(below.clip(0, last), axis) | is_open.take(
+        above.clip(0, last), axis
+    )
+    return touched
+
+
+def _between(
+    values: NDArray[Any], axis: int, coarse: NDArray[np.int64], fine: NDArray[np.int64]
+) -> NDArray[Any]:
+    """Values on the places of a level from those on the places of the level before."""
+    low = (np.searchsorted(coarse, fine, side="right") - 1).clip(0, len(coarse) - 2)
+    share = (fine - coarse[low]) / (coarse[low + 1] - coarse[low])
+    if values.dtype.kind != "f":
+        return values.take(np.where(share > 0.5, low + 1, low), axis)
+    share = share.reshape([-1 if i == axis else 1 for i in range(values.ndim)])
+    first, second = values.take(low, axis), values.take(low + 1, axis)
+    between = np.where(share == 1.0, second, first + share * (second - first))
+    between = np.where(share == 0.0, first, between)
+    return np.where(np.isnan(between), np.where(np.isnan(first), second, first), between)
