@@ -69,7 +69,7 @@ def check(finished: Path, strikes: list[tuple[int, str, float, int]]) -> None:
         }
         n_case = len(told.cases)
         summary = run_study(finished / "tiny.toml", output=store, quiet=True)
-        assert summary.counts == (0, 12, 0, 0)
+        assert summary.counts == (0, 12, 0, 0, 0)
         assert summary.computed == n_case, (told.lines(), struck)
         assert not verify(store)
         assert stored_bytes(store) == whole

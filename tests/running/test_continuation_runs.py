@@ -44,7 +44,7 @@ def swept(folder: Path, sweep: str = "both", speeds: tuple[float, ...] = SPEEDS,
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Study:
     study = swept(tmp_path_factory.mktemp("finished"))
     summary = run(study, quiet=True)
-    assert summary.counts == (0, 20, 0, 0)
+    assert summary.counts == (0, 20, 0, 0, 0)
     return study
 
 
@@ -232,7 +232,7 @@ def test_a_case_that_fails_breaks_its_chain_and_a_retry_mends_it(finished, tmp_p
     undo = poisoned(monkeypatch, speed)
     summary = run(study, quiet=True)
     undo()
-    assert summary.counts == (0, 16, 4, 0)
+    assert summary.counts == (0, 16, 4, 0, 0)
     assert "4 done with a remark, rubhpc status names them" in summary.text()
     ledger = Store(study.output).replay()
     told = sorted({text for i, text in ledger.reasons.items() if ledger.status[i] == DONE})

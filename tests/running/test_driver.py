@@ -74,7 +74,7 @@ def diverge(*, recording: Recording, **_: Any) -> Record:
 
 def test_every_case_gets_its_own_numbers(physics, study):
     summary = run(study, quiet=True)
-    assert summary.counts == (0, 12, 0, 0)
+    assert summary.counts == (0, 12, 0, 0, 0)
     assert summary.exit_code == 0
     ds = xr.open_zarr(study.output)
     assert (ds.status == DONE).all()
@@ -109,7 +109,7 @@ def test_a_finished_study_computes_nothing(physics, study):
 def test_a_poisoned_case_fails_with_its_reason_and_the_others_finish(physics, study, poison, reason):
     physics.poison = poison
     summary = run(replace(study, run=replace(study.run, case_time_limit=0.05)), quiet=True)
-    assert summary.counts == (0, 8, 4, 0)
+    assert summary.counts == (0, 8, 4, 0, 0)
     assert summary.exit_code == 1
     assert {told for _, told in summary.reasons} == {reason}
     assert summary.reasons[0][0] == "speed_ratio=0.9, clearance_ratio=0.7, friction=0.3"
@@ -128,7 +128,7 @@ def test_failed_cases_are_computed_anew_on_request_only(physics, study):
     assert run(study, quiet=True).counts[FAILED] == 4
     assert physics.frictions == []
     summary = run(study, quiet=True, retry_failed=True)
-    assert summary.counts == (0, 12, 0, 0)
+    assert summary.counts == (0, 12, 0, 0, 0)
     assert physics.frictions == [0.3] * 4
     assert not verify(study.output)
     ds = xr.open_zarr(study.output)
@@ -138,7 +138,7 @@ def test_failed_cases_are_computed_anew_on_request_only(physics, study):
 def test_a_diverged_case_is_a_result(physics, study):
     physics.poison = diverge
     summary = run(study, quiet=True)
-    assert summary.counts == (0, 8, 0, 4)
+    assert summary.counts == (0, 8, 0, 4, 0)
     assert summary.exit_code == 0
     assert run(study, quiet=True, retry_failed=True).computed == 0
     ledger = Store(study.output).replay()
@@ -158,7 +158,7 @@ def test_a_balance_that_is_off_is_named(physics, study):
     physics.poison = lose_energy
     other = replace(study, output=study.output.with_name("other.zarr"))
     summary = run(other, quiet=True)
-    assert summary.counts == (0, 12, 0, 0)
+    assert summary.counts == (0, 12, 0, 0, 0)
     assert summary.exit_code == 0
     assert "4 done with a remark" in summary.text()
     failures = read_status(other.output).failures
@@ -205,7 +205,7 @@ def test_the_file_stop_stops_one_run(physics, study):
     (study.output / "STOP").touch()
     with pytest.raises(StoppedEarly, match="the file STOP"):
         run(study, quiet=True)
-    assert run(study, quiet=True).counts == (0, 12, 0, 0)
+    assert run(study, quiet=True).counts == (0, 12, 0, 0, 0)
 
 
 class Clock:
@@ -272,7 +272,7 @@ def test_the_end_of_the_slurm_job_stops_a_run(physics, study, monkeypatch):
     with pytest.raises(StoppedEarly, match="the time limit"):
         run(study, quiet=True)
     monkeypatch.setenv("SLURM_JOB_END_TIME", str(int(time.time()) + 3600))
-    assert run(study, quiet=True).counts == (0, 12, 0, 0)
+    assert run(study, quiet=True).counts == (0, 12, 0, 0, 0)
 
 
 def test_a_disk_that_fills_up_keeps_what_is_there(physics, study, monkeypatch):
@@ -313,7 +313,7 @@ def test_a_block_found_damaged_on_the_way_is_computed_whole(physics, study):
     store.arrays["torsion"][0, 0, 0, 5] = 99.0
     physics.frictions.clear()
     summary = run(study, quiet=True, retry_failed=True)
-    assert summary.counts == (0, 12, 0, 0)
+    assert summary.counts == (0, 12, 0, 0, 0)
     assert sorted(physics.frictions) == [0.1, 0.3, 0.3, 0.3, 0.3]
     assert not verify(study.output)
 
