@@ -28,7 +28,8 @@ paper: $(VENV)/.installed ## the studies behind the paper's figures, its figures
 	$(BIN)/rubhpc claims --draw $(PAPER)/figures
 
 # Each worker has a copy of the compiled kernels; all tests of a file have one worker, which makes its fixtures once.
-PARALLEL := -n 2 --dist loadfile --durations=15
+# Files come in the order of tests/conftest.py, the longest first.
+PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder --durations=15
 ORDINARY := not bench and not long
 
 check: $(VENV)/.ready ## the inner loop, under a minute: style, and the fast tests with the layers of imports

@@ -69,6 +69,23 @@ SLOW = (
     "study/test_warnings.py::test_unstable_speeds_are_named_once_and_have_no_amplitude",
     "validation/",
 )
+# Files of more than ten seconds each, begun first: else one of them may be left for the end.
+LONGEST = (
+    "running/test_parts.py",
+    "running/test_workers.py",
+    "validation/test_full_order.py",
+    "report/test_report.py",
+    "browser/test_report_page.py",
+    "validation/test_rub.py",
+    "running/test_driver.py",
+    "commands/test_modes_command.py",
+    "kernels/test_jit.py",
+    "integrate/test_event_driven_march.py",
+    "running/test_continuation_runs.py",
+    "kernels/test_contact_pairs.py",
+    "integrate/test_contact_stepping_march.py",
+    "running/test_added_measure.py",
+)
 # These have deadlines, or start ranks that wait for each other busily: nothing else may run at the same time.
 SERIAL = (
     "commands/test_cli.py::test_help_takes_no_time",
@@ -105,7 +122,9 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what is slow, and what must run alone."""
+    """Mark what is slow, and what must run alone; the longest files come first."""
+    rank = {TESTS / name: i for i, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path, len(rank)))
     for item in items:
         place = f"{item.path.relative_to(TESTS).as_posix()}::{item.name}"
         for name, places in (("slow", SLOW), ("serial", SERIAL)):

@@ -59,7 +59,7 @@ def test_a_script_stores_what_the_command_does_in_as_little_time(tmp_path):
     """A sampled study prepares every case anew, so linear algebra is most of it."""
     study = write_sample(tmp_path)
     stores, times = [], []
-    for name, variables in (("warm", {}), ("free", {}), ("held", dict.fromkeys(VARIABLES, "1"))):
+    for name, variables in (("free", {}), ("held", dict.fromkeys(VARIABLES, "1"))):
         store = tmp_path / f"{name}.zarr"
         text = study.read_text().replace(str(tmp_path / "tiny.zarr"), str(store))
         path = tmp_path / f"{name}.toml"
@@ -67,5 +67,5 @@ def test_a_script_stores_what_the_command_does_in_as_little_time(tmp_path):
         _, taken = script(SCRIPT, path, **variables)
         stores.append(stored_bytes(store))
         times.append(taken)
-    assert stores[1] == stores[2]
-    assert times[1] < 1.3 * times[2]
+    assert stores[0] == stores[1]
+    assert times[0] < 1.3 * times[1]

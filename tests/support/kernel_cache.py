@@ -14,58 +14,29 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 KERNELS = ROOT / "rubhpc" / "kernels"
 CACHES = ROOT / ".pytest_cache" / "kernels"
-# What all schemes share is compiled with the first; then two processes compile some 40 s each.
-FIRST = "events"
-SHARES = (
-    ("neighbours", "short steps", "periodic"),
-    ("stick and slip", "central differences", "periodic stick and slip"),
+SCHEMES = (
+    "events",
+    "neighbours",
+    "short steps",
+    "stick and slip",
+    "central differences",
+    "periodic",
+    "periodic stick and slip",
 )
 
 
 def compile_once() -> None:
-    """Compile the kernels into the cache beside their sources, in two processes, unless it is up to date."""
+    """Compile the kernels into the cache beside their sources, unless it is up to date.
+
+    In one process, which shares what the schemes share: two take half as much processor time again.
+    """
     stamp = CACHES / "compiled"
     if _is_current(stamp):
         return
-    if not _is_begun():
-        assert _start(FIRST).wait() == 0
-        beside, apart = SHARES
-        folder = CACHES / "apart"
-        shutil.rmtree(folder, ignore_errors=True)
-        _copy_to(folder)
-        started = [_start(*beside), _start(*apart, folder=folder)]
-        assert [process.wait() for process in started] == [0, 0]
-        _take_over(folder)
-        shutil.rmtree(folder)
-    assert _start(FIRST, *sum(SHARES, ())).wait() == 0  # loads what there is, compiles what is missing
-    _mark(stamp)
-
-
-def _is_begun() -> bool:
-    """Whether kernels of these sources lie in the cache beside them."""
-    from rubhpc.kernels._jit import _SOURCES
-
-    return any(KERNELS.glob(f"__pycache__/kernels-{_SOURCES[:16]}/*.nbi"))
-
-
-def _start(*schemes: str, folder: Path | None = None) -> subprocess.Popen[bytes]:
-    """Start a process that uses some schemes, with a cache in a folder or else beside the sources."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     environment.pop("NUMBA_CACHE_DIR", None)
-    if folder is not None:
-        environment["NUMBA_CACHE_DIR"] = str(folder)
-    return subprocess.Popen([sys.executable, __file__, *schemes], env=environment, cwd=ROOT)
-
-
-def _take_over(folder: Path) -> None:
-    """Copy the kernels that do not lie beside the sources yet."""
-    for index in folder.rglob("*.nbi"):
-        place = KERNELS / "__pycache__" / index.parent.name
-        place.mkdir(parents=True, exist_ok=True)
-        if not (place / index.name).exists():
-            for file in index.parent.glob(f"{index.stem}.*.nbc"):
-                shutil.copy(file, place)
-            shutil.copy(index, place)
+    subprocess.run([sys.executable, __file__, *SCHEMES], env=environment, cwd=ROOT, check=True)
+    _mark(stamp)
 
 
 def use(scheme: str) -> None:

@@ -109,27 +109,27 @@ def test_a_ring_of_masses_agrees_with_equations_written_in_the_plane():
     e = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     t = np.stack([-np.sin(angles), np.cos(angles)], axis=1)
 
+    mass = np.array([10.0, 10.0, body, body, inertia, *[m] * 6])
+    held, held_rate = np.array([2e5, 2e5, turning]), np.array([30.0, 30.0, 0.0])
+
     def rate(time, state):
         x, v = state.reshape(2, -1)
         force = np.zeros_like(x)
         disc, casing, points = x[:2], x[2:5], x[5:].reshape(3, 2)
         force[:2] = -4e4 * disc - 20.0 * v[:2]
         force[:2] += 0.02 * spin**2 * np.array([math.cos(spin * time), math.sin(spin * time)]) * 0.1
-        force[2:5] = -np.array([2e5, 2e5, turning]) * casing - np.array([30.0, 30.0, 0.0]) * v[2:5]
-        for i in range(3):
-            foot = casing[:2] + radius * casing[2] * t[i]
-            foot_rate = v[2:4] + radius * v[4] * t[i]
-            stretch, speed = points[i] - foot, v[5 + 2 * i : 7 + 2 * i] - foot_rate
-            spring = -(k * (stretch @ e[i]) + c * (speed @ e[i])) * e[i]
-            spring -= (k_side * (stretch @ t[i]) + 1.0 * (speed @ t[i])) * t[i]
-            force[5 + 2 * i : 7 + 2 * i] += spring
-            force[2:4] -= spring
-            force[4] -= radius * (spring @ t[i])
-            normal = penalty * max(disc @ e[i] - points[i] @ e[i] - gap, 0.0)
-            contact = normal * e[i] + mu * normal * t[i]
-            force[5 + 2 * i : 7 + 2 * i] += contact
-            force[:2] -= contact
-        mass = np.array([10.0, 10.0, body, body, inertia, *[m] * 6])
+        force[2:5] = -held * casing - held_rate * v[2:5]
+        stretch = points - (casing[:2] + radius * casing[2] * t)
+        speed = v[5:].reshape(3, 2) - (v[2:4] + radius * v[4] * t)
+        along = k * (stretch * e).sum(axis=1) + c * (speed * e).sum(axis=1)
+        aside = k_side * (stretch * t).sum(axis=1) + 1.0 * (speed * t).sum(axis=1)
+        spring = -along[:, None] * e - aside[:, None] * t
+        normal = penalty * np.maximum(((disc - points) * e).sum(axis=1) - gap, 0.0)
+        contact = normal[:, None] * (e + mu * t)
+        force[5:] = (spring + contact).ravel()
+        force[2:4] -= spring.sum(axis=0)
+        force[4] += radius * aside.sum()
+        force[:2] -= contact.sum(axis=0)
         return np.concatenate([v, force / mass])
 
     revolutions, per_revolution = 3, 64
