@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rubhpc.integrate.central_difference_march import CentralDifferenceMarch
+from rubhpc.integrate.closed_form import closed_form_march
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
 from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
@@ -31,7 +32,6 @@ from rubhpc.integrate.setup import ModalSetup, Scheme
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.kernels.accumulators import IMPACT_STEPS
-from rubhpc.kernels.laws import is_set_valued
 from rubhpc.schema import DONE, SECTION_NAMES
 from rubhpc.spectra import amplitude_spectrum
 from rubhpc.study.initial import Initial
@@ -61,9 +61,8 @@ MARCHES: dict[Scheme, Callable[..., March]] = {
 
 def march_of(scheme: Scheme, setup: Setup) -> Callable[..., March]:
     """Return what integrates a case by a scheme."""
-    if scheme is Scheme.EVENT_DRIVEN and is_set_valued(setup.law):
-        return FrictionMarch
-    return MARCHES[scheme]
+    march = MARCHES[scheme]
+    return closed_form_march(setup.law) if march is EventDrivenMarch else march
 
 
 def run_case(

@@ -64,6 +64,10 @@ class EventDrivenMarch(ModalMarch):
         """Which pairs are closed in a contact mode, (q,)."""
         return np.array([bool(mask >> i & 1) for i in range(self._clearance.size)])
 
+    def opened(self, mask: int) -> NDArray[np.bool_]:
+        """Which pairs are open in a contact mode, and watched for their gap, (q,)."""
+        return ~self.closed(mask)
+
     def forces(self, mode: int, z: Floats) -> Floats:
         """Forces (q,), N, at coordinates (2, m) of a contact mode, given by its index in the tables."""
         force = self.tables.switch_re[mode] @ z[0] - self.tables.switch_im[mode] @ z[1]

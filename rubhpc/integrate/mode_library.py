@@ -9,6 +9,7 @@ import numpy as np
 from rubhpc.integrate.contact_mode import ContactMode, count_coordinates, solve_contact_mode
 from rubhpc.integrate.friction_mode import solve_friction_mode
 from rubhpc.integrate.mode_tables import MOST_MODES, TableStack, tabulate
+from rubhpc.integrate.penalty_mode import Penalty, solve_penalty_mode, stored_energy
 from rubhpc.integrate.reduction import ReducedModel, directions
 from rubhpc.kernels.friction_states import FORWARD
 
@@ -125,17 +126,60 @@ class ModeLibrary:
         n_blank = self.width - mode.exponent.size
         exponent = np.pad(np.stack([mode.exponent.real, mode.exponent.imag]), ((0, 0), (0, n_blank)))
         self._exponents[mode.mask] = exponent, np.pad(mode.drift, (0, n_blank))
-        self._tables.add(
-            tabulate(
-                mode,
-                self.reduced,
-                self._slip_rows(),
-                width=self.width,
-                tick=self._tick,
-                sample_level=self._sample_level,
-                n_level=self._n_level,
-            )
+        self._tables.add(self._tables_of(mode, self.reduced))
+
+    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
+        """Tables of one mode."""
+        return tabulate(
+            mode,
+            reduced,
+            self._slip_rows(),
+            width=self.width,
+            tick=self._tick,
+            sample_level=self._sample_level,
+            n_level=self._n_level,
         )
+
+
+class PenaltyLibrary(ModeLibrary):
+    """Contact modes of pairs that press, by spring and damper, or are lifted; masks hold q bits for each.
+
+    What dampers take and springs hold is counted with the loss by damping.
+    """
+
+    def __init__(
+        self,
+        reduced: ReducedModel,
+        model: Model,
+        friction: float,
+        *,
+        penalty: Penalty,
+        opened: ContactMode,
+        known: Solved,
+        tick: float,
+        sample_level: int,
+        n_level: int,
+    ) -> None:
+        """Start as `ModeLibrary` does."""
+        self._penalty = penalty
+        super().__init__(
+            reduced,
+            model,
+            friction,
+            opened=opened,
+            known=known,
+            tick=tick,
+            sample_level=sample_level,
+            n_level=n_level,
+        )
+
+    def _solved(self, mask: int) -> ContactMode:
+        return solve_penalty_mode(self.reduced, self._penalty, self._opened, mask, self._known)
+
+    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
+        tables = super()._tables_of(mode, self._penalty.damped(reduced, mode.mask))
+        tables.loss[0] += stored_energy(self._penalty, mode, self.width)
+        return tables
 
 
 class FrictionLibrary(ModeLibrary):

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
-from rubhpc.integrate.friction_march import FrictionMarch
+from rubhpc.integrate.closed_form import closed_form_march
+from rubhpc.integrate.event_driven_march import NoClosedForm
 from rubhpc.kernels.case_progress import closed_pairs
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.flow import next_event
@@ -78,6 +78,7 @@ class Mode(NamedTuple):
 
     place: int  # in the tables
     is_closed: NDArray[np.bool_]  # (q,)
+    is_open: NDArray[np.bool_]  # (q,), watched for its gap
     floor: Floats  # (n_switch,), below which a switch function is negative
     exponent: Floats  # (2, m), 1/s, real and imaginary
     drift: Floats  # (m,), 1/s
@@ -132,8 +133,7 @@ class PiecewiseMotion:
     def __init__(self, setup: ModalSetup, clearance: float, friction: float, initial: State) -> None:
         """Take a case in closed form; `NoClosedForm` where it has none."""
         self.has_states = is_set_valued(setup.law)
-        march = FrictionMarch if self.has_states else EventDrivenMarch
-        self.march = march(setup, clearance, friction, initial, None)
+        self.march = closed_form_march(setup.law)(setup, clearance, friction, initial, None)
         self.setup = setup
         self.turn = setup.interval * setup.samples_per_revolution
         self.bodies = self.march.bodies
@@ -235,7 +235,7 @@ class PiecewiseMotion:
                 turned,
             )
             lowest = turned[:: self.n_switch // self.q]
-            least_gap = np.where(mode.is_closed, least_gap, np.minimum(least_gap, lowest))
+            least_gap = np.where(mode.is_open, np.minimum(least_gap, lowest), least_gap)
             least_force = np.where(mode.is_closed, np.minimum(least_force, lowest), least_force)
             before = mode.shape_re @ z[0] - mode.shape_im @ z[1]
             touching, approach, after, states_after = NO_PAIR, np.zeros(0), before, states
@@ -326,6 +326,7 @@ class PiecewiseMotion:
         return Mode(
             place=place,
             is_closed=is_closed,
+            is_open=self.march.opened(states),
             floor=floor,
             exponent=exponent,
             drift=drift,
@@ -350,7 +351,7 @@ class PiecewiseMotion:
         """Pairs whose gaps close at an event, and their speeds of approach, m/s."""
         stride, tables = self.n_switch // self.q, self._tables
         pairs = np.flatnonzero(
-            [crossing >> stride * i & 1 and not closed for i, closed in enumerate(mode.is_closed)]
+            [crossing >> stride * i & 1 and is_open for i, is_open in enumerate(mode.is_open)]
         )
         rows = stride * pairs
         return pairs, tables.rate_im[mode.place, rows] @ z[1] - tables.rate_re[mode.place, rows] @ z[0]

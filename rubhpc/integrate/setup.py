@@ -17,9 +17,15 @@ from rubhpc.fem.response import step_limit
 from rubhpc.integrate.contact_mode import ContactMode, confine, solve_contact_mode, solve_parts
 from rubhpc.integrate.divergence import energy_limit
 from rubhpc.integrate.friction_mode import FrictionPairs, solve_friction_mode
-from rubhpc.integrate.mode_library import FrictionLibrary, ModeLibrary, width_without_modes
+from rubhpc.integrate.mode_library import (
+    FrictionLibrary,
+    ModeLibrary,
+    PenaltyLibrary,
+    width_without_modes,
+)
 from rubhpc.integrate.mode_tables import tabulate
 from rubhpc.integrate.packing import Packed, law_of, pack
+from rubhpc.integrate.penalty_mode import Penalty
 from rubhpc.integrate.reduction import ReducedModel, directions, reduce_model
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.laws import MULTIPLIER
@@ -98,6 +104,7 @@ class ModalSetup:
     law: Law = MULTIPLIER
     _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
     _friction_libraries: dict[float, FrictionLibrary] = field(default_factory=dict)
+    _penalty_libraries: dict[float, PenaltyLibrary] = field(default_factory=dict)
     _open_tables: dict[float, ModeTables] = field(default_factory=dict)
 
     @cached_property
@@ -192,8 +199,26 @@ class ModalSetup:
 
     def forget(self, friction: float) -> None:
         """Free the contact modes of a friction."""
-        for held in (self._libraries, self._friction_libraries, self._open_tables):
+        held_by = self._libraries, self._friction_libraries, self._penalty_libraries, self._open_tables
+        for held in held_by:
             held.pop(friction, None)
+
+    def penalty_library(self, friction: float) -> PenaltyLibrary:
+        """Contact modes of a friction under a penalty, shared by its cases."""
+        if friction not in self._penalty_libraries:
+            gap_jacobian, force_direction, _ = directions(self.reduced, self.model, friction)
+            self._penalty_libraries[friction] = PenaltyLibrary(
+                self.reduced,
+                self.model,
+                friction,
+                penalty=Penalty(self.law.stiffness, self.law.damping, gap_jacobian, force_direction),
+                opened=self._opened,
+                known=self._known_of_ring,
+                tick=self.tick,
+                sample_level=self.sample_level,
+                n_level=self._n_level,
+            )
+        return self._penalty_libraries[friction]
 
     def open_tables(self, friction: float) -> ModeTables:
         """Tables of the mode with every pair open alone, as wide as those of the friction's library."""

@@ -32,7 +32,7 @@ class ModeTables(NamedTuple):
     pair, m.
     """
 
-    mask: Ints  # (p,), bit i set: pair i is closed
+    mask: Ints  # (p,), bit i set: pair i is closed; other states of a pair have bits of their own
     n_eigenmode: Ints  # (p,), how many eigenmodes
     switch_re: Floats  # (p, q, m), gap of an open pair, m; force of a closed one, N
     switch_im: Floats
@@ -75,6 +75,8 @@ class Reduced(NamedTuple):
     radius: Floats  # (q,), m
     rim_speed: Floats  # (q,), of the steady spin, m/s, not negative
     restitution: float  # normal velocity after an impact over that before it
+    spring: float  # of a penalty, N/m; 0: gaps are closed by multipliers
+    damper: float  # N s/m
     clearance: Floats  # (q,), m
     translations: Floats  # (r, n), displacements that none may pass the limit with
     displacement_limit: float  # m

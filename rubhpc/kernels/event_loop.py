@@ -60,6 +60,7 @@ from rubhpc.kernels.measuring import (
     resolved_contact,
 )
 from rubhpc.kernels.mode_change import change_contacts
+from rubhpc.kernels.penalty_events import change_pressed
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -113,6 +114,7 @@ def advance(
     power_re, power_im = tables.power_re, tables.power_im
     interval = clock.tick * (1 << clock.sample_level)
     highest_level = power_re.shape[1] - 1
+    every_pair = (1 << reduced.radius.size) - 1
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
     is_begun = False
@@ -130,7 +132,7 @@ def advance(
         if progress.n_step > last_step and not is_at_event:
             return PAUSED
         mode = progress.mode
-        is_free = mask[mode] == 0
+        is_free = mask[mode] & every_pair == 0
         is_ahead = is_sample and is_free
         longest = longest_step(clock, last_tick, highest_level, is_recorded, is_ahead, progress.tick)
         if is_recorded and not is_free:
@@ -283,22 +285,25 @@ def take_event(
         return DIVERGED
     angle = shaft_angle(clock, progress.tick)
     moment = (1 << FORCED_LEVEL) * clock.tick
-    progress.wanted = change_contacts(
-        reduced,
-        closed,
-        crossing,
-        spin,
-        moment,
-        np.cos(angle),
-        np.sin(angle),
-        motion,
-        is_recorded,
-        work.force,
-        work.speed,
-        work.active,
-        work.elimination,
-        accumulator,
-    )
+    if reduced.spring > 0.0:
+        progress.wanted = change_pressed(reduced, closed, crossing, motion)
+    else:
+        progress.wanted = change_contacts(
+            reduced,
+            closed,
+            crossing,
+            spin,
+            moment,
+            np.cos(angle),
+            np.sin(angle),
+            motion,
+            is_recorded,
+            work.force,
+            work.speed,
+            work.active,
+            work.elimination,
+            accumulator,
+        )
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
         return CONTACT_UNSOLVED
     if is_recorded:

@@ -114,7 +114,7 @@ class ContactKeys:
     @property
     def closed_form(self) -> ClosedForm:
         """When the modal scheme has a closed form of contact; elsewhere it takes short steps."""
-        if self.normal == "updated" or self.law == "penalty":
+        if self.normal == "updated" or (self.law == "penalty" and self.friction_law != "sliding"):
             return "never"
         return CLOSED_FORM[self.friction_law]
 
@@ -185,7 +185,8 @@ class Integrator:
         """Step in contact, s, of the modal scheme."""
         if self.step is not None:
             return self.step
-        is_steady = contact.closed_form == "always" and contact.friction_law == "sliding"
+        laws = contact.closed_form, contact.friction_law, contact.law
+        is_steady = laws == ("always", "sliding", "lagrange")
         return SEARCH_STEP if is_steady else TURNING_STEP
 
     def step_within(self, limit: float) -> float:

@@ -1,0 +1,64 @@
+"""Events under a penalty: which pairs press, are lifted or open. Motion and forces are continuous.
+
+A pair presses from where its gap closes until its force `-k g - c g'` vanishes. With a damper the gap is
+overlapped then: the pair is lifted, until the gap opens or the force would be compressive again. A set of
+states has bit i for pair i that presses and bit q + i for one that is lifted. The switch function of a lifted
+pair is `k g + c g'`, which vanishes before the next touch too: the pair goes over to open then.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.mode_change import product
+
+Floats = NDArray[np.float64]
+
+MOST_PAIRS = 31  # whose states an integer holds
+
+
+@jit_lean_sum
+def gap_of(reduced: Reduced, i: int, motion: Floats) -> float:
+    """Gap of pair i, m, of a reduced motion (2 n,)."""
+    n = reduced.gap_jacobian.shape[1]
+    return float(reduced.clearance[i] + product(reduced.gap_jacobian[i], motion[:n]))
+
+
+@jit_lean_sum
+def pressed_pairs(reduced: Reduced, motion: Floats) -> int:
+    """States of the pairs in a motion (2 n,) of which nothing is known."""
+    q, n = reduced.gap_jacobian.shape
+    found = int(np.int64(0))
+    for i in range(q):
+        gap = gap_of(reduced, i, motion)
+        force = -reduced.spring * gap - reduced.damper * product(reduced.gap_jacobian[i], motion[n:])
+        if gap < 0.0:
+            found |= 1 << (i if force > 0.0 else q + i)
+    return found
+
+
+@jit_lean_sum
+def change_pressed(reduced: Reduced, states: int, crossing: int, motion: Floats) -> int:
+    """States that go on after the switch functions `crossing` (bits) vanish, in a motion (2 n,)."""
+    q = reduced.gap_jacobian.shape[0]
+    found = int(np.int64(0))
+    for i in range(q):
+        is_pressed, is_lifted = (states >> i) & 1 == 1, (states >> (q + i)) & 1 == 1
+        if (crossing >> i) & 1 == 1:
+            if is_pressed:
+                is_pressed, is_lifted = False, reduced.damper > 0.0
+            elif is_lifted:
+                is_pressed = gap_of(reduced, i, motion) < 0.0
+                is_lifted = False
+            else:
+                is_pressed = True
+        elif is_lifted:
+            is_lifted = gap_of(reduced, i, motion) < 0.0
+        if is_pressed:
+            found |= 1 << i
+        elif is_lifted:
+            found |= 1 << (q + i)
+    return found
