@@ -7,7 +7,7 @@ of the names that a study gives them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
@@ -210,10 +210,47 @@ def probe_variables(probes: Iterable[tuple[str, str]]) -> dict[str, Variable]:
     }
 
 
+POINT, BRANCH = "point_", "branch"  # prefix of the variables of a branch study, and their role
+MULTIPLIERS = 8  # stored of every point
+# Name, dimensions after the point, unit, long name.
+_OF_POINTS: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
+    ("value", (), "1", "value on the axis that is followed (its unit)"),
+    ("branch", (), "1", "number of the branch, from 1"),
+    ("stability", (), "1", "0: unstable, 1: stable"),
+    ("event", (), "1", f"what happens there: 0, 1, ... of {', '.join(BRANCH_EVENT)}"),
+    ("multiplier_real", ("multiplier",), "1", "real part of a Floquet multiplier, largest first"),
+    ("multiplier_imag", ("multiplier",), "1", "imaginary part of a Floquet multiplier"),
+)
+# Measures of a simulation that a solved motion does not have.
+_OF_RUNS = {
+    "settled", "contact_iterations", "contact_residual", "transient_revolutions", "steps", "scheme",
+    "left_closed_form", "wall_time",
+}  # fmt: skip
+
+
+def branch_variables() -> dict[str, Variable]:
+    """Return the variables of the points of a branch study; all are floats, NaN beyond the last point."""
+    own = (
+        Variable(name=POINT + name, role=BRANCH, dims=("point", *dims), unit=unit, long_name=text)
+        for name, dims, unit, text in _OF_POINTS
+    )
+    measures = (
+        replace(v, name=POINT + v.name, role=BRANCH, dims=("point", *v.dims), dtype="float64", flags=())
+        for v in case_measures()
+        if v.name not in _OF_RUNS
+    )
+    sections = (
+        replace(v, name=POINT + v.name, role=BRANCH, dims=("point", "point_section")) for v in _SECTIONS
+    )
+    return {v.name: v for v in (*own, *measures, *sections)}
+
+
 def role_of(name: str) -> str:
     """Return the role of a variable, be it of a probe; "" where it is none of a store."""
     if name in VARIABLES:
         return VARIABLES[name].role
+    if name.startswith(POINT):
+        return BRANCH
     return next((role for prefix, (role, *_) in _OF_PROBES.items() if name.startswith(prefix)), "")
 
 

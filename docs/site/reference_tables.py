@@ -23,6 +23,7 @@ from rubhpc.rig.probes import Probe
 from rubhpc.rig.rig import Rig
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import OwnAxes
+from rubhpc.study.branch_keys import BranchKeys
 from rubhpc.study.initial import Initial
 from rubhpc.study.refine import Refine
 from rubhpc.study.tables import Contact, Integrator, Recording, Run, Sample
@@ -39,6 +40,7 @@ STUDY_TABLES = {
     "[[record.probe]]": Probe,
     "[sample]": Sample,
     "[refine]": Refine,
+    "[branch]": BranchKeys,
     "[run]": Run,
 }
 ROOMS = ("store", "signals", "cases", "figures")  # of postproc, whose functions the reference shows
@@ -157,8 +159,8 @@ def _default(field: dataclasses.Field[Any]) -> str:
     if isinstance(value, str):
         return f'`"{value}"`'
     if isinstance(value, tuple):
-        words = (word if isinstance(word, str) else word[0] for word in value)
-        return "`[" + ", ".join(f'"{word}"' for word in words) + "]`"
+        words = (word if isinstance(word, str | float) else word[0] for word in value)
+        return "`[" + ", ".join(f"{w:g}" if isinstance(w, float) else f'"{w}"' for w in words) + "]`"
     return f"`{value:g}`"
 
 

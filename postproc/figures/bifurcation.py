@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from postproc.figures.branch_lines import draw_branches
 from postproc.figures.cells import is_geometric
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import categories
 from postproc.figures.ticks import tick_levels
 from postproc.signals.sections import section_of, sections_along
-from postproc.store.axes import find_axis, ordered_axes, source
-from postproc.store.select import first_of_rest
+from postproc.store.axes import axes_of, find_axis, ordered_axes, source
+from postproc.store.branch_points import is_of_points, one_case
+from postproc.store.open import open_store
+from postproc.store.select import first_of_rest, select
 from postproc.store.units import displayed, meanings, scale_of, short_name
-from postproc.store.variables import require_results
+from postproc.store.variables import require_results, require_variables
 from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
 from rubhpc.schema import HAS_VALUES
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from postproc.figures.options import Axis
+    from postproc.figures.options import Axis, File
 
 _WIDTH = 180  # mm: two columns, since an axis has hundreds of values
 _MOST_DRAWN = 200_000  # points in a pdf or svg; of more, they become a picture in it
@@ -42,10 +45,12 @@ def bifurcation(
     *,
     along: Axis | None = None,
     color: Literal["regime", "period", "direction"] | None = None,
+    over: File | None = None,
 ) -> Drawing:
     """Bifurcation diagram: section points of a signal along an axis.
 
-    There is a point a revolution, coloured by regime, period or direction of the sweep.
+    There is a point a revolution, coloured by regime, period or direction of the sweep. Of a branch study the
+    branches are drawn: stable parts full, unstable ones dashed, with their events.
 
     Parameters
     ----------
@@ -57,7 +62,13 @@ def bifurcation(
         The axis of the diagram [default: the longest].
     color
         [default: direction, where an axis was swept both ways; else regime]
+    over
+        Of a branch study: a store of simulated cases that the branches are drawn over.
     """
+    if is_of_points(cases):
+        return _of_branches(cases, signal, over)
+    if over is not None:
+        raise InputError(f"{source(cases)}: over: is for branches; give the store of a study with [branch]")
     coloring = default_coloring(cases, color)
     axis = default_axis(cases, along)
     over = coloring if coloring == DIRECTION else None
@@ -75,6 +86,36 @@ def bifurcation(
         width=_WIDTH,
         lines=tuple(notes),
     )
+
+
+def _of_branches(cases: xr.Dataset, signal: str, over: str | None) -> Drawing:
+    """The diagram of branches, over simulated cases at the same values of the other axes."""
+    cases, along, notes = one_case(cases)
+    require_variables(cases, [f"section_{signal}"])
+    simulated = None
+    if over is not None:
+        store = open_store(over)
+        axis = find_axis(store, along)
+        held = [name for name in axes_of(store) if name != axis and name in cases.coords]
+        store = select(store, {name: float(cases[name]) for name in held})
+        store, more = first_of_rest(store, [axis], f"section_{signal}")
+        simulated, notes = sections_along(store, signal, axis), [*notes, *more]
+
+    def draw(axes: list[Axes]) -> None:
+        ax = axes[0]
+        if simulated is not None:
+            draw_bifurcation(simulated, signal, ax, None)
+            for line in ax.lines:
+                line.set(color="0.65", zorder=1)
+        draw_branches(cases, f"section_{signal}", along, ax)
+        scale = scale_of(cases[f"section_{signal}"])
+        ax.set(
+            xlabel=displayed(cases[along])[1],
+            ylabel=scale.label(f"{short_name(cases[f'section_{signal}'])},\nonce a revolution"),
+        )
+        ax.figure.legend(loc="outside upper right", ncols=8, handletextpad=0.4, columnspacing=1.0)
+
+    return Drawing(shown=cases, draw=draw, height=90, width=_WIDTH, lines=tuple(notes))
 
 
 def default_axis(store: xr.Dataset, along: str | None = None) -> str:

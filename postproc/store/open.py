@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from postproc.store.axes import drawn_axes
+from postproc.store.branch_points import as_points
 from postproc.store.inferred import fill_inferred
 from postproc.store.variables import LONG_ROLES
 from rubhpc.errors import StoreError
-from rubhpc.schema import VARIABLES, role_of
+from rubhpc.schema import POINT, VARIABLES, role_of
 from rubhpc.storage.regular_files import CHECKED, RegularFiles
 from rubhpc.storage.store import is_damaged
 
@@ -24,7 +25,8 @@ def open_store(path: str | Path) -> xr.Dataset:
     """Return the store as a lazy, dask-backed dataset.
 
     Waveforms, spectra and sections keep the chunks of the disk, so that a selection reads only its own
-    chunks; measures are read in pieces of about 100 MB, since a map needs all of them at once.
+    chunks; measures are read in pieces of about 100 MB, since a map needs all of them at once. A branch study
+    is returned as its points (`postproc.store.branch_points`).
 
     Raises
     ------
@@ -52,7 +54,7 @@ def open_store(path: str | Path) -> xr.Dataset:
         raise StoreError(f"{path}: is not a rubhpc store; give the directory that a study was run into")
     store.encoding["source"] = str(path)
     _check_attributes(store, path)
-    return fill_inferred(store, path)
+    return as_points(store) if f"{POINT}value" in store else fill_inferred(store, path)
 
 
 def _check_attributes(store: xr.Dataset, path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
+from postproc.store.branch_points import is_of_points
 from postproc.store.units import meanings, scale_for, typed
 from postproc.store.variables import require_variables
 from postproc.store.worst import at_most_loaded_stator
@@ -45,6 +46,9 @@ def select(store: xr.Dataset, choice: Mapping[str, Any]) -> xr.Dataset:
         No such axis, or no such value on it; the message names what is near.
     """
     for name, wanted in choice.items():
+        if is_of_points(store) and coordinate_of(name) in store.coords:
+            store = store.isel(point=_points(store, coordinate_of(name), wanted))
+            continue
         if (drawn := coordinate_of(name)) in drawn_axes(store):
             places = _positions(store, drawn, wanted, is_drawn=True)
             store = store.isel({CASE: places})
@@ -52,6 +56,14 @@ def select(store: xr.Dataset, choice: Mapping[str, Any]) -> xr.Dataset:
         axis = find_axis(store, name)
         store = store.isel({axis: _positions(store, axis, wanted)})
     return store
+
+
+def _points(store: xr.Dataset, name: str, wanted: Any) -> NDArray[np.intp]:
+    """Return the points of branches at chosen values of a coordinate."""
+    values, place = np.unique(store[name].values, return_inverse=True)
+    known = store.drop_vars(name).assign_coords({name: (name, values, store[name].attrs)})
+    found = _positions(known, name, wanted)
+    return np.flatnonzero(np.isin(place, found))
 
 
 def narrow(store: xr.Dataset, names: Iterable[str], spread: Iterable[str] = ()) -> xr.Dataset:

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.errors import InputError
 from rubhpc.integrate.branch_events import Event, crossings, grazing, grazing_between, half_change, halving
 from rubhpc.integrate.branch_point import away_from_events
+from rubhpc.integrate.piecewise_motion import Unfollowed
 from rubhpc.integrate.shooting import SAME, NotConverged
 
 if TYPE_CHECKING:
@@ -68,83 +70,87 @@ def follow(
         points.append(point)
         events.append(event)
 
-    while len(points) < most:
-        if ahead := away_from_events(history[-1]):
-            history = [branching.moved(point, ahead) for point in history[-3:]]
-        base = history[-1]
-        if has_turned or len(history) == 1:
-            toward = np.append(np.zeros(base.motion.size), sense)
-            if len(history) > 1:
-                toward = branching.difference(*history[-2:])
-            heading, history, has_turned = branching.tangent(base, toward), [base], False
-        edge, found, guess = 0.0, None, None
-        while length >= LEAST:
-            if heading is not None:
-                guess, along = length * heading, heading
-            else:
-                guess, along = predict(branching, history, length)
-            value = base.value + guess[-1] * branching.step
-            edge = low if value <= low else high if value >= high else 0.0
-            if value <= low or value >= high:
-                guess = guess * (edge - base.value) / (guess[-1] * branching.step)
-                along = np.zeros_like(along)
-                along[-1] = 1.0
-            try:
-                trial = branching.correct(base, guess, along)
-            except NotConverged:
+    try:
+        while len(points) < most:
+            if ahead := away_from_events(history[-1]):
+                history = [branching.moved(point, ahead) for point in history[-3:]]
+            base = history[-1]
+            if has_turned or len(history) == 1:
+                toward = np.append(np.zeros(base.motion.size), sense)
+                if len(history) > 1:
+                    toward = branching.difference(*history[-2:])
+                heading, history, has_turned = branching.tangent(base, toward), [base], False
+            edge, found, guess = 0.0, None, None
+            while length >= LEAST:
+                if heading is not None:
+                    guess, along = length * heading, heading
+                else:
+                    guess, along = predict(branching, history, length)
+                value = base.value + guess[-1] * branching.step
+                edge = low if value <= low else high if value >= high else 0.0
+                if value <= low or value >= high:
+                    guess = guess * (edge - base.value) / (guess[-1] * branching.step)
+                    along = np.zeros_like(along)
+                    along[-1] = 1.0
+                try:
+                    trial = branching.correct(base, guess, along)
+                except NotConverged:
+                    length *= 0.5
+                    continue
+                is_back = trial.sequence == base.sequence and _is_back(trial, base)
+                if _is_near(branching, history, guess, trial) and not (is_back and length > SHORT):
+                    found = trial
+                    break
                 length *= 0.5
+            if found is None:
+                point = grazing(branching, history, predict)
+                if point is None:
+                    end = "no motion is found that goes on from here"
+                    break
+                add(Event.GRAZING, point)
+                follower = _beyond(branching, history[-2], base, point)
+                if follower is None:
+                    end = "a contact grazes"
+                    break
+                add(Event.NONE, follower)
+                history, length, has_turned = [point, follower], FIRST, True
                 continue
-            is_back = trial.sequence == base.sequence and _is_back(trial, base)
-            if _is_near(branching, history, guess, trial) and not (is_back and length > SHORT):
-                found = trial
+            is_same = found.sequence == base.sequence
+            if is_same:
+                for event, point in crossings(branching, base, found):
+                    add(event, point)
+            elif graze := grazing_between(branching, base, found):
+                sides = [graze.point, graze.beyond]
+                if graze.point.sequence != base.sequence:
+                    sides.reverse()
+                for event, point in crossings(branching, base, sides[0]):
+                    add(event, point)
+                add(Event.GRAZING, graze.point)
+                for event, point in crossings(branching, sides[1], found):
+                    add(event, point)
+            if is_same and _is_back(found, base):
+                if point := halving(branching, base, found):
+                    add(Event.PERIOD_DOUBLING, point)
+                    is_halved = True
+                end = "it meets a motion of half the period"
                 break
-            length *= 0.5
-        if found is None:
-            point = grazing(branching, history, predict)
-            if point is None:
-                end = "no motion is found that goes on from here"
+            if _is_half(found):
+                end, is_halved = "it meets a motion of half the period", True
                 break
-            add(Event.GRAZING, point)
-            follower = _beyond(branching, history[-2], base, point)
-            if follower is None:
-                end = "a contact grazes"
+            is_at_edge = found.value in (low, high)
+            add(Event.END if is_at_edge else Event.NONE, found)
+            if is_at_edge:
+                end = "the range ends"
                 break
-            add(Event.NONE, follower)
-            history, length, has_turned = [point, follower], FIRST, True
-            continue
-        is_same = found.sequence == base.sequence
-        if is_same:
-            for event, point in crossings(branching, base, found):
-                add(event, point)
-        elif graze := grazing_between(branching, base, found):
-            pair = (base, graze) if graze.sequence == base.sequence else (graze, found)
-            if pair[0] is graze:
-                add(Event.GRAZING, graze)
-            for event, point in crossings(branching, *pair):
-                add(event, point)
-            if pair[1] is graze:
-                add(Event.GRAZING, graze)
-        if is_same and _is_back(found, base):
-            if point := halving(branching, base, found):
-                add(Event.PERIOD_DOUBLING, point)
-                is_halved = True
-            end = "it meets a motion of half the period"
-            break
-        if _is_half(found):
-            end, is_halved = "it meets a motion of half the period", True
-            break
-        is_at_edge = found.value in (low, high)
-        add(Event.END if is_at_edge else Event.NONE, found)
-        if is_at_edge:
-            end = "the range ends"
-            break
-        if _has_closed(branching, points, history, found):
-            end = "the branch is closed"
-            break
-        assert guess is not None
-        miss = _miss(branching, base, guess, found) / length
-        history, heading, has_turned = [*history[-2:], found], None, not is_same
-        length = min(LONGEST, 1.5 * length) if miss < GOOD else (0.6 * length if miss > POOR else length)
+            if _has_closed(branching, points, history, found):
+                end = "the branch is closed"
+                break
+            assert guess is not None
+            miss = _miss(branching, base, guess, found) / length
+            history, heading, has_turned = [*history[-2:], found], None, not is_same
+            length = min(LONGEST, 1.5 * length) if miss < GOOD else (0.6 * length if miss > POOR else length)
+    except (Unfollowed, InputError, NotConverged, np.linalg.LinAlgError) as problem:
+        end = str(problem)
     if events[-1] is Event.NONE and len(points) < most:
         events[-1] = Event.END
     return Track(points=points, events=events, end=end, is_halved=is_halved)

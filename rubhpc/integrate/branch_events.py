@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -26,6 +26,11 @@ SAME_PLACE = 1e-6  # share of a step within which two multipliers leave together
 APPROACH = 0.1  # of its distance to grazing that a trial leaves
 MOST_TRIALS, MOST_SECANTS = 40, 8
 CLOSE = 1e-4  # steps before a grazing at which its point may lie
+BESIDE = (
+    1e-3,
+    1e-2,
+    0.1,
+)  # shares of a step from a grazing, at which the motion with more contacts is sought
 WITHIN_REACH = 3.0  # steps, in which a distance to grazing would vanish
 
 
@@ -46,6 +51,8 @@ def crossings(branching: Branching, a: Point, b: Point) -> Iterator[tuple[Event,
 
     The m-th largest modulus is a continuous function along the branch; its distance from 1 vanishes there.
     """
+    if a is b or a.sequence != b.sequence:
+        return
     change = branching.difference(a, b)
     length = float(np.linalg.norm(change))
 
@@ -179,10 +186,18 @@ def half_change(point: Point) -> Floats:
     return np.asarray(point.revolutions[point.period // 2 - 1].end - point.motion)
 
 
-def grazing_between(branching: Branching, a: Point, b: Point) -> Point | None:
-    """Locate the grazing between two points with one contact more or less; the motion with fewer there.
+class Grazing(NamedTuple):
+    """Motions on both sides of a grazing."""
 
-    On that side the least gap falls linearly to zero, along which it is sought; else the place is halved.
+    point: Point  # with fewer contacts
+    beyond: Point  # with more, as near as it was found
+
+
+def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
+    """Locate the grazing between two points with one contact more or less.
+
+    On the side with fewer contacts the least gap falls linearly to zero, along which it is sought; else the
+    place is halved.
     """
     change = branching.difference(a, b)
     if len(a.sequence) == len(b.sequence):
@@ -192,17 +207,30 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Point | None:
     ends = {a.sequence: 0.0, b.sequence: 1.0}
     free: list[tuple[float, Point]] = [(0.0, a) if is_first_free else (1.0, b)]
     root = None
+
+    def impacting(at: float) -> Point:
+        """The motion with more contacts that is nearest to the grazing."""
+        end, other = (1.0, b) if is_first_free else (0.0, a)
+        for part in BESIDE:
+            try:
+                found = branching.correct(a, (at + part * (end - at)) * change, direction)
+            except NotConverged:
+                continue
+            if found.sequence == other.sequence:
+                return found
+        return other
+
     for _ in range(MOST_TRIALS):
         near, far = free[-1][0], ends[b.sequence if is_first_free else a.sequence]
         root = _root(free) or root  # a gap of rounding is not seen any more
         if root is None or not min(near, far) < root < max(near, far):
             share = 0.5 * (near + far)
         elif abs(root - near) < tolerance:
-            return free[-1][1]
+            return Grazing(free[-1][1], impacting(near))
         else:
             share = root + APPROACH * (near - root)
         if abs(near - far) < tolerance:
-            return free[-1][1]
+            return Grazing(free[-1][1], impacting(near))
         try:
             trial = branching.correct(a, share * change, direction)
         except NotConverged:

@@ -16,6 +16,8 @@ from rubhpc.integrate.saltation import monodromy
 from rubhpc.integrate.shooting import CONVERGED, NotConverged, shoot
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from rubhpc.integrate.family import Family
@@ -99,11 +101,13 @@ class Branching:
     ----------
     step : float
         Change of the parameter that counts as one step.
+    check : callable, optional
+        Called before every search for a motion; what it raises ends the search for branches.
     """
 
-    def __init__(self, family: Family, step: float) -> None:
+    def __init__(self, family: Family, step: float, check: Callable[[], None] | None = None) -> None:
         """Take the cases."""
-        self.family, self.step = family, step
+        self.family, self.step, self._check = family, step, check
 
     def begin(self, value: float, motion: Floats, states: int, period: int) -> Point:
         """Shoot at a value of the parameter from a motion at the angle 0; the section is then moved.
@@ -196,6 +200,8 @@ class Branching:
         NotConverged
             Newton's method finds none.
         """
+        if self._check is not None:
+            self._check()
         family, phase, states = self.family, base.phase, base.states
         scale, period = self._scale(base), period or base.period
         is_held = abs(along[-1]) > STEEP

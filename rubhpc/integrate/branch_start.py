@@ -32,7 +32,7 @@ SEED = 1  # of the disturbances: the same in every run
 def starts(
     branching: Branching, values: Sequence[float], periods: Sequence[int], recording: Recording
 ) -> Iterator[Point]:
-    """Yield motions at some values of the parameter, each of the first period asked for that is found.
+    """Yield motions at some values of the parameter, of each period asked for that is found.
 
     The case is simulated with the parameter rising, each from where the one before has ended, then falling,
     then from rest with a sideways velocity as random as its direction, up to that of a whirl in the gap.
@@ -46,8 +46,7 @@ def starts(
                 state = Initial()
                 continue
             state, piecewise = ended
-            if (point := shot(branching, value, piecewise, periods)) is not None:
-                yield point
+            yield from _of_each_period(branching, value, piecewise, periods)
     random = np.random.default_rng(SEED)
     for value in rising:
         setup, clearance, _ = branching.family.settings(value)
@@ -56,7 +55,17 @@ def starts(
             vertical_velocity=float(speed * np.cos(angle)), horizontal_velocity=float(speed * np.sin(angle))
         )
         ended = simulated(branching, value, disturbed, recording)
-        if ended and (point := shot(branching, value, ended[1], periods)) is not None:
+        if ended:
+            yield from _of_each_period(branching, value, ended[1], periods)
+
+
+def _of_each_period(
+    branching: Branching, value: float, piecewise: PiecewiseMotion, periods: Sequence[int]
+) -> Iterator[Point]:
+    """Motions of these periods, and of no divisor, that Newton's method finds from where a case begins."""
+    for period in periods:
+        point = shot(branching, value, piecewise, (period,))
+        if point is not None and point.period == period:
             yield point
 
 

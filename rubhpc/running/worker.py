@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rubhpc.integrate.branch_case import BranchRecord, record_branches
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.compilation import seconds_compiling
+from rubhpc.integrate.family import CLEARANCES, SPEEDS, Operation
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
 from rubhpc.running.initial_states import InitialState, InitialStates
@@ -216,7 +218,10 @@ class Worker:
         self.watch.begin(flat, case.id)
         try:
             record = self._compute(case, start)
-            put(record, data, i_case)
+            if isinstance(record, BranchRecord):
+                put_points(record, data, i_case)
+            else:
+                put(record, data, i_case)
             measures = packed_measures(record, self._record_type).tobytes()
         except Stopped:
             raise
@@ -229,8 +234,22 @@ class Worker:
         remark = "; ".join(text for text in (start.note, record.remark) if text)
         return Entry(flat, case.id, record.status, case_checksum(data, i_case), measures, remark)
 
-    def _compute(self, case: Case, start: InitialState) -> Record:
+    def _compute(self, case: Case, start: InitialState) -> Record | BranchRecord:
         study = self.grid.study
+        limit = self.watch.limit
+        end = time.monotonic() + limit if limit else float("inf")
+
+        def check() -> None:
+            self.attend()
+            if self.stopping.look():
+                raise Stopped
+            if time.monotonic() > end:
+                raise _OverTime(f"over its time limit of {limit:g} s")
+
+        if study.branch is not None:
+            span = study.axis(study.branch.along).drawn_from
+            assert span is not None
+            return record_branches(operation_of(self.grid, case), study.branch, span, study.recording, check)
         key = (
             id(case.rig),
             case.speed,
@@ -244,16 +263,6 @@ class Worker:
             self._setups[key] = (case.rig, setup)
             if len(self._setups) > MOST_SETUPS:
                 self._setups.popitem(last=False)
-        limit = self.watch.limit
-        end = time.monotonic() + limit if limit else float("inf")
-
-        def check() -> None:
-            self.attend()
-            if self.stopping.look():
-                raise Stopped
-            if time.monotonic() > end:
-                raise _OverTime(f"over its time limit of {limit:g} s")
-
         return run_case(
             setup,
             clearance=case.clearance,
@@ -283,7 +292,28 @@ def put(record: Record, data: Arrays, i_case: int) -> None:
         values[i_case] = arrays[name]
 
 
-def packed_measures(record: Record, kind: np.dtype[np.void]) -> NDArray[np.void]:
+def put_points(record: BranchRecord, data: Arrays, i_case: int) -> None:
+    """Put the points of the branches of a case into the arrays of a block."""
+    for name, values in data.items():
+        values[i_case] = np.nan
+        values[i_case, : len(record.arrays[name])] = record.arrays[name]
+
+
+def operation_of(grid: CaseGrid, case: Case) -> Operation:
+    """How the rig of a case runs, its speed and clearance as the axes give them."""
+    axes = grid.study.axes
+    given = dict(zip([axis.name for axis in axes], grid.points.at(case.index), strict=True))
+    return Operation(
+        rig=case.rig,
+        **{name: given.get(name) for name in (*SPEEDS, *CLEARANCES)},
+        friction=case.friction,
+        contact=case.contact,
+        integrator=grid.study.integrator,
+        samples_per_revolution=grid.study.recording.samples_per_revolution,
+    )
+
+
+def packed_measures(record: Record | BranchRecord, kind: np.dtype[np.void]) -> NDArray[np.void]:
     """The measures of a record, packed; one that this version does not know is missing."""
     row = np.zeros((), kind)
     for name in kind.names or ():

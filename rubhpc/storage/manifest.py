@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
 from rubhpc.errors import StoreError
-from rubhpc.schema import STATE, VARIABLES, case_measures, probe_variables
+from rubhpc.schema import (
+    BRANCH,
+    MULTIPLIERS,
+    STATE,
+    VARIABLES,
+    branch_variables,
+    case_measures,
+    probe_variables,
+)
 from rubhpc.storage.disk import read_regular, write_whole
 from rubhpc.storage.journal import Header
 from rubhpc.storage.measures import from_json, to_json, unlisted_measures
@@ -144,7 +152,7 @@ class Manifest:
     @property
     def variables(self) -> tuple[Variable, ...]:
         """The arrays stored for every case and written block by block, in the order of their checksum."""
-        known = VARIABLES | probe_variables(_probed(self.parts))
+        known = VARIABLES | probe_variables(_probed(self.parts)) | branch_variables()
         return tuple(v for v in known.values() if v.role in self.keep)
 
     @property
@@ -193,8 +201,19 @@ class Manifest:
                 "order": n_sample // 2 + 1,
                 "section": recording.revolutions,
                 **({"degree": grid.n_degree} if grid.continuation else {}),
+                **(
+                    {
+                        "point": study.branch.points,
+                        "multiplier": MULTIPLIERS,
+                        "point_section": study.branch.longest,
+                    }
+                    if study.branch
+                    else {}
+                ),
             },
-            keep=tuple(sorted([*recording.keep, *([STATE] if grid.continuation else [])])),
+            keep=(BRANCH,)
+            if study.branch
+            else tuple(sorted([*recording.keep, *([STATE] if grid.continuation else [])])),
             files={},
             measures=(
                 *case_measures(),

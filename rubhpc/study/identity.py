@@ -63,6 +63,9 @@ def identity_parts(study: Study) -> dict[str, Any]:
     starts = {axis.name.removeprefix(initial.PREFIX): _AXIS for axis in study.axes if axis.is_initial_key}
     if starts or study.initial != initial.Initial():  # absent in older stores
         parts["initial"] = plain(study.initial) | starts
+    if study.branch is not None:
+        span = study.axis(study.branch.along).drawn_from
+        parts["branch"] = asdict(study.branch) | (asdict(span) if span else {})
     if study.sample is not None:
         ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
         parts["sample"] = {

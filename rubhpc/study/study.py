@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
 from rubhpc.input.fields import place
-from rubhpc.input.quantity import brief
+from rubhpc.input.quantity import brief, parse_quantity
 from rubhpc.input.reading import build, plain, read_toml, refuse_unknown
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.study import contact_axes
@@ -21,7 +21,9 @@ from rubhpc.study.axes import (
     flatten,
     make_axis,
     make_range,
+    unit_of,
 )
+from rubhpc.study.branch_keys import BranchKeys, branch_axis, check_branch
 from rubhpc.study.checks import check_axes, check_rigs
 from rubhpc.study.contact_axes import check_contacts
 from rubhpc.study.initial import Initial, check_initials
@@ -50,7 +52,7 @@ __all__ = [
 ]
 
 _TABLES = (
-    *("title", "rig", "output", "grid", "sample", "refine", "override"),
+    *("title", "rig", "output", "grid", "sample", "refine", "branch", "override"),
     *("contact", "initial", "integrator", "record", "run"),
 )
 _MOST_AXES = 32  # arrays have 64 dimensions at most
@@ -82,6 +84,8 @@ class Study:
         How some of the axes have been drawn (`rubhpc.study.sampling.draw`).
     refine : Refine or None
         Which cases are computed, where the others are inferred; it changes the result of no case.
+    branch : BranchKeys or None
+        Along which axis periodic motions are followed; that axis has one case, and `drawn_from` is its range.
     contact : ContactKeys
         A `Contact`; of a grid with contact axes what they leave open, as far as it applies to a case's law.
     initial : Initial
@@ -102,6 +106,7 @@ class Study:
     axes: tuple[Axis, ...]
     sample: Sample | None = None
     refine: Refine | None = None
+    branch: BranchKeys | None = None
     contact: ContactKeys = DEFAULT_CONTACT
     initial: Initial = DEFAULT_INITIAL
     integrator: Integrator = DEFAULT_INTEGRATOR
@@ -121,6 +126,15 @@ class Study:
             self.refine.refined(self.axes)
         check_contacts(self.contact, [axis for axis in self.axes if axis.is_contact_key])
         check_initials(self.initial, [axis for axis in self.axes if axis.is_initial_key])
+        if self.branch is not None:
+            check_branch(
+                self.branch,
+                self.axes,
+                self.contact,
+                self.integrator,
+                self.recording,
+                is_sampled=self.sample is not None,
+            )
         check_rigs(self.rig, self.axes, self.recording.probe)
 
     def axis(self, *names: str) -> Axis:
@@ -143,6 +157,7 @@ class Study:
                 if axis.name != DIRECTION
             },
             **({"sample": asdict(self.sample)} if self.sample else {}),
+            **({"branch": asdict(self.branch)} if self.branch else {}),
             "contact": {
                 key: value
                 for key, value in asdict(self.contact).items()
@@ -191,7 +206,13 @@ def read_study(
     rig = _overridden(rig, _table(table, "override", file), file)
     sample = build(Sample, table["sample"], file, "sample") if "sample" in table else None
     refine = build(Refine, table["refine"], file, "refine") if "refine" in table else None
-    axes = _read_axes(_table(table, "grid", file), rig, sample, file)
+    grid = _table(table, "grid", file)
+    branch = None
+    if "branch" in table:
+        branch = _read_branch(
+            _table(table, "branch", file), grid, rig, sample, file, is_refined=refine is not None
+        )
+    axes = _read_axes(grid, rig, sample, file, branch.along if branch else "")
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
         raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
     for name in ("contact", "initial"):
@@ -211,6 +232,7 @@ def read_study(
             axes=axes,
             sample=sample,
             refine=refine,
+            branch=branch,
             contact=contact,
             initial=initial,
             integrator=integrator,
@@ -244,7 +266,37 @@ def _overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
         raise InputError(f"{place(file, 'override')} {error}") from None
 
 
-def _read_axes(table: dict[str, Any], rig: Rig, sample: Sample | None, file: str) -> tuple[Axis, ...]:
+def _read_branch(
+    table: dict[str, Any],
+    grid: dict[str, Any],
+    rig: Rig,
+    sample: Sample | None,
+    file: str,
+    *,
+    is_refined: bool,
+) -> BranchKeys:
+    """Return the table [branch], its step in the unit of its axis."""
+    along, step = table.get("along"), table.get("step")
+    if isinstance(along, str) and along not in dict(flatten(grid)):
+        fix = f"{along} is no axis of the grid; add it as {{ start, stop }}"
+        raise InputError(f"{place(file, 'branch', 'along')}: {fix}")
+    if sample is not None:
+        fix = "a sample has no axis to follow; remove [sample] or [branch]"
+        raise InputError(f"{place(file, 'branch')}: {fix}")
+    if is_refined:
+        raise InputError(f"{place(file, 'branch')}: branches are not refined; remove [refine] or [branch]")
+    if isinstance(along, str) and isinstance(step, str):
+        where = place(file, "branch", "step")
+        try:
+            table = {**table, "step": parse_quantity(step, unit_of(along, rig), where)}
+        except InputError as error:
+            raise InputError(str(error) if where in str(error) else f"{where}: {error}") from None
+    return build(BranchKeys, table, file, "branch")
+
+
+def _read_axes(
+    table: dict[str, Any], rig: Rig, sample: Sample | None, file: str, along: str
+) -> tuple[Axis, ...]:
     pairs = flatten(table)
     names = [name for name, _ in pairs]
     if len(names) > _MOST_AXES:
@@ -254,7 +306,9 @@ def _read_axes(table: dict[str, Any], rig: Rig, sample: Sample | None, file: str
         if names.count(name) > 1:
             raise InputError(f"{place(file, 'grid', name)}: is duplicated; remove one")
     if sample is None:
-        return tuple(make_axis(name, values, rig, file) for name, values in pairs)
+        return tuple(
+            (branch_axis if name == along else make_axis)(name, values, rig, file) for name, values in pairs
+        )
     axes = [(make_range if isinstance(v, dict) else make_axis)(name, v, rig, file) for name, v in pairs]
     try:
         return draw(axes, sample)

@@ -1,0 +1,100 @@
+"""Branches of periodic motions in a diagram: stable full, unstable dashed, events marked and named."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postproc.figures.palette import categories
+from postproc.store.branch_points import other_axes
+from postproc.store.units import displayed, scale_of
+from rubhpc.schema import BRANCH_EVENT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+MARKED: dict[str, tuple[str, str, float]] = {  # event: name, marker, size
+    "fold": ("fold", "o", 4.0),
+    "period_doubling": ("period doubling", "D", 3.6),
+    "neimark_sacker": ("Neimark-Sacker", "s", 3.8),
+    "grazing": ("grazing", "^", 4.4),
+    "branch_point": ("branch point", "P", 4.6),
+}
+_STYLES: dict[bool, dict[str, Any]] = {
+    True: {"linestyle": "-", "linewidth": 1.2},
+    False: {"linestyle": "--", "linewidth": 0.9},
+}
+
+
+def draw_branches(data: xr.Dataset, variable: str, along: str, ax: Axes) -> Axes:
+    """Draw a variable of the points of branches over the axis that they follow.
+
+    Of several values a point, such as a section, there is a line each, in their order: a motion of two
+    revolutions has two. Points of a branch are in order, so that lines turn at folds.
+    """
+    scale = scale_of(data[variable])
+    x, _ = displayed(data[along])
+    y = data[variable].values.reshape(x.size, -1) * scale.factor
+    y = np.sort(y, axis=1)  # which revolution comes first may change along a branch; NaN comes last
+    color = categories("period", data["period"].values)
+    named: set[str] = set()
+    for rows in runs(data):
+        stable = bool(data["stability"].values[rows[0 if rows.size < 2 else 1]])
+        name, shade = color[int(data["period"].values[rows[0]])]
+        label = f"{name}, {'stable' if stable else 'unstable'}"
+        for column in range(int(np.isfinite(y[rows]).any(axis=0).sum())):
+            ax.plot(
+                x[rows],
+                y[rows, column],
+                color=shade,
+                label=None if label in named else label,
+                **_STYLES[stable],
+            )
+            named.add(label)
+    events = data["event"].values
+    for code, event in enumerate(BRANCH_EVENT):
+        if event not in MARKED or not (events == code).any():
+            continue
+        text, marker, size = MARKED[event]
+        at = events == code
+        places = np.repeat(x[at], y.shape[1]), y[at].ravel()
+        ax.plot(
+            *places,
+            linestyle="",
+            marker=marker,
+            markersize=size,
+            markeredgecolor="black",
+            markerfacecolor="white",
+            markeredgewidth=0.7,
+            label=text,
+            zorder=4,
+        )
+    return ax
+
+
+def runs(data: xr.Dataset) -> Iterator[NDArray[np.intp]]:
+    """Yield the points of each stretch of one stability; neighbours share the point between."""
+    branch, stable = data["branch"].values, data["stability"].values
+    case = _case(data)
+    start = 0
+    for k in range(1, branch.size + 1):
+        if k == branch.size or branch[k] != branch[start] or case[k] != case[start]:
+            yield np.arange(start, k)
+            start = k
+        elif k - start > 1 and stable[k] != stable[k - 1]:
+            yield np.arange(start, k)
+            start = k - 1
+
+
+def _case(data: xr.Dataset) -> NDArray[np.intp]:
+    """Number of the case of each point."""
+    own = [name for name in other_axes(data) if data[name].ndim]
+    if not own:
+        return np.zeros(data.sizes["point"], dtype=np.intp)
+    columns = np.stack([data[name].values for name in own], axis=1)
+    return np.asarray(np.unique(columns, axis=0, return_inverse=True)[1]).ravel()

@@ -1,0 +1,119 @@
+"""Studies with [branch]: what is stored and opened, resumption, refusals and the diagram."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+import rubhpc
+from postproc.figures.bifurcation import bifurcation
+from postproc.figures.branch_lines import runs
+from rubhpc.errors import InputError
+from rubhpc.study.study import read_study
+
+STUDY = """
+title = "branches"
+rig = "mokhtar2017"
+[grid]
+clearance = { start = "112 um", stop = "124 um" }
+speed_ratio = [0.74, 0.75]
+friction = 0.3
+[branch]
+along = "clearance"
+periods = [1, 2]
+step = "4 um"
+sweeps = 1
+points = 60
+[record]
+transient = 40
+samples_per_revolution = 64
+"""
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("branches")
+    (folder / "study.toml").write_text(STUDY)
+    study = read_study(folder / "study.toml", folder / "branches.zarr")
+    rubhpc.run(study, quiet=True)
+    return folder
+
+
+def test_points_have_a_coordinate_for_every_axis(store):
+    points = rubhpc.open(store / "branches.zarr")
+    assert set(points.peak_torsion.dims) == {"point"}
+    assert set(np.unique(points.speed_ratio)) == {0.74, 0.75}
+    assert {"clearance", "speed_ratio", "friction", "branch", "period"} <= set(points.coords)
+    one = points.rub.select(speed_ratio=0.75)
+    free = one.contact_fraction.max("stator") == 0.0
+    grazing = one.clearance[(one.event == 4) & free]
+    assert float(grazing[-1]) == pytest.approx(122.3228824e-6, rel=1e-7)
+    assert one.clearance[free].min() == pytest.approx(float(grazing[-1]))
+    modulus = np.hypot(one.multiplier_real, one.multiplier_imag)[:, 0]
+    assert np.array_equal(one.stability.values == 1, modulus.values < 1.0)
+    assert np.isfinite(one.section_vertical.values).sum() == int(one.period.sum())
+
+
+def test_stability_changes_at_events_alone(store):
+    points = rubhpc.open(store / "branches.zarr")
+    is_next = np.diff(points.branch) == 0
+    changes = np.flatnonzero(is_next & (np.diff(points.stability) != 0))
+    events = points.event.values
+    assert changes.size
+    assert ((events[changes] != 0) | (events[changes + 1] != 0)).all()
+    assert sum(rows.size for rows in runs(points)) >= points.sizes["point"]
+
+
+def test_what_is_lost_is_computed_anew_to_the_same_bytes(store):
+    path = store / "branches.zarr"
+    files = sorted((path / "point_value" / "c").rglob("*"))
+    kept = {file: file.read_bytes() for file in files if file.is_file()}
+    lost = sorted(kept)[0]
+    lost.unlink()
+    rubhpc.run(read_study(store / "study.toml", path), quiet=True)
+    assert {file: file.read_bytes() for file in kept} == kept
+
+
+def test_branches_are_drawn_over_simulated_cases(store, tmp_path):
+    simulated = STUDY.partition("[branch]")[0] + "[record]\ntransient = 20\nrevolutions = 2\n"
+    simulated = simulated.replace('stop = "124 um" }', 'stop = "124 um", num = 3 }')
+    (tmp_path / "study.toml").write_text(simulated)
+    rubhpc.run(read_study(tmp_path / "study.toml", tmp_path / "simulated.zarr"), quiet=True)
+    points = rubhpc.open(store / "branches.zarr")
+    ax = bifurcation(points, over=str(tmp_path / "simulated.zarr")).show()
+    names = {line.get_label() for line in ax.lines}
+    assert {"P1, stable", "P1, unstable", "grazing", "period doubling"} <= names
+    dashed = [line for line in ax.lines if line.get_linestyle() == "--"]
+    assert dashed
+    assert all("unstable" in str(line.get_label()) or line.get_label().startswith("_") for line in dashed)
+    with pytest.raises(InputError, match="over: is for branches"):
+        bifurcation(rubhpc.open(tmp_path / "simulated.zarr"), over="other.zarr")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ('{ start = "112 um", stop = "124 um" }', '"112 um"', "clearance: .* follows it; write it as"),
+        ('along = "clearance"', 'along = "speed"', "along: speed is no axis of the grid"),
+        ("periods = [1, 2]", "periods = [1.5]", "periods: 1.5 is no number of revolutions"),
+        ("periods = [1, 2]", "periods = []", "periods: "),
+        ('step = "4 um"', 'step = "4 kg"', "step: "),
+        ('step = "4 um"', "step = 0", "step: 0 is out of range"),
+        ("sweeps = 1", "sweep = 1", "unknown key; did you mean sweeps"),
+        ("[record]", '[contact]\nnormal = "updated"\n[record]', "needs motion in closed form"),
+        ("[record]", "[sample]\nn = 8\n[record]", "a sample has no axis to follow"),
+        ("[0.74, 0.75]", '{ values = [0.74, 0.75], sweep = "up" }', "branches need no sweep"),
+    ],
+)
+def test_bad_studies_are_refused(tmp_path, old, new, text):
+    (tmp_path / "study.toml").write_text(STUDY.replace(old, new))
+    with pytest.raises(InputError, match=text) as caught:
+        read_study(tmp_path / "study.toml")
+    assert "\n" not in str(caught.value)
+
+
+def test_another_range_is_another_study(store, tmp_path):
+    shutil.copytree(store / "branches.zarr", tmp_path / "branches.zarr")
+    (tmp_path / "study.toml").write_text(STUDY.replace("124 um", "125 um"))
+    with pytest.raises(rubhpc.StoreError, match=r"branch\.stop was 0\.000124, is 0\.000125"):
+        rubhpc.run(read_study(tmp_path / "study.toml", tmp_path / "branches.zarr"), quiet=True)
