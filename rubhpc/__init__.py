@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.branches import Branch
     from rubhpc.integrate.periodic_motion import PeriodicMotion
     from rubhpc.integrate.record import Record, State
+    from rubhpc.knocks import least_knock
     from rubhpc.periodic import periodic
     from rubhpc.rig.forces import Load, Unbalance
     from rubhpc.rig.probes import Probe
@@ -54,6 +55,7 @@ __all__ = [
     "Unbalance",
     "assemble",
     "branch",
+    "least_knock",
     "linear_design",
     "open",
     "periodic",
@@ -85,6 +87,7 @@ _HOMES = {
     "Unbalance": "rubhpc.rig.forces:Unbalance",
     "assemble": "rubhpc.fem.assemble:assemble",
     "branch": "rubhpc.branch:branch",
+    "least_knock": "rubhpc.knocks:least_knock",
     "linear_design": "rubhpc.fem.linear_design:linear_design",
     "open": "postproc.accessor:open",
     "periodic": "rubhpc.periodic:periodic",

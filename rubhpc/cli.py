@@ -29,6 +29,10 @@ COMMANDS = {
         "rubhpc.commands.modes:modes",
         "Natural frequencies, damping ratios and whirl of a rig; Campbell diagram.",
     ),
+    "knock": (
+        "rubhpc.commands.knock:knock",
+        "The least knock that leads to a rub that stays, over the speed.",
+    ),
     "reduce": ("rubhpc.commands.reduce:reduce", "Mean, envelope, quantiles or histogram over many cases."),
     "report": ("rubhpc.commands.report:report", "One HTML page: maps, and every case behind them."),
     "view": ("rubhpc.commands.report:view", "The same over a big store, served to this machine alone."),

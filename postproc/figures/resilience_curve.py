@@ -1,0 +1,121 @@
+"""The resilience curve: the least knock that leads to rub over the speed, and its direction."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.figures.cells import is_geometric
+from postproc.figures.drawing import Drawing
+from postproc.store.units import displayed, scale_of, written_value
+from rubhpc.errors import InputError
+from rubhpc.study.axes import SPEED_AXES, written
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+_MOST_LINES = 6
+
+
+def resilience(knocks: xr.Dataset) -> Drawing:
+    """Return the curve of `rubhpc.knocks.least_knock`: impulse above, direction below.
+
+    Parameters
+    ----------
+    knocks : Dataset over the axes of a study
+        The curve runs over the speed, or else over the longest axis; a line for each value of the others.
+
+    Raises
+    ------
+    InputError
+        There are more lines than can be told apart.
+    """
+    several = [str(d) for d in knocks.least_impulse.dims if knocks.sizes[d] > 1]
+    speeds = [d for d in several if d in SPEED_AXES]
+    along = (
+        speeds or sorted(several, key=lambda d: -knocks.sizes[d]) or [str(knocks.least_impulse.dims[0])]
+    )[0]
+    others = [d for d in several if d != along]
+    single = {d: 0 for d in knocks.least_impulse.dims if d != along and d not in others}
+    shown = knocks.isel(single).sortby(along)
+    lines = [shown] if not others else [part for _, part in _parts(shown, others)]
+    if len(lines) > _MOST_LINES:
+        raise InputError(
+            f"{len(lines)} curves are more than {_MOST_LINES}; leave some values of {others[0]} out"
+        )
+
+    def draw(axes: list[Axes]) -> list[Axes]:
+        above, below = axes
+        x, x_label = displayed(shown[along])
+        scale = scale_of(shown["least_impulse"])
+        for i, line in enumerate(lines):
+            name = ", ".join(written_value(line[d]) for d in others)
+            impulse = line["least_impulse"].values * scale.factor
+            style = {"color": f"C{i}", "marker": "o", "markersize": 2.5}
+            above.plot(x, impulse, linewidth=1.0, label=name or None, **style)
+            above.fill_between(
+                x, 0.0, line["harmless_impulse"].values * scale.factor, color=f"C{i}", alpha=0.08
+            )
+            below.plot(x, np.degrees(line["worst_angle"].values), linestyle="", **style)
+        _mark(above, x, lines)
+        above.set(ylabel=f"Least impulse ({scale.unit})", ylim=(0.0, None))
+        below.set(xlabel=x_label, ylabel="Direction (\N{DEGREE SIGN})", ylim=(-15.0, 375.0))
+        below.set_yticks(range(0, 361, 90))
+        for ax in axes:
+            ax.set_xlim(x[0], x[-1])
+            if is_geometric(x):
+                ax.set_xscale("log")
+        if others or above.get_legend_handles_labels()[1]:
+            above.legend(loc="best", fontsize=6)
+        return axes
+
+    return Drawing(
+        shown=shown, draw=draw, panels=(2, 1), height=90.0, lines=tuple(_told(lines, along, others))
+    )
+
+
+def _parts(shown: xr.Dataset, others: list[str]) -> list[tuple[object, xr.Dataset]]:
+    """The curves, one for each combination of values on the other axes."""
+    places = list(np.ndindex(*(shown.sizes[d] for d in others)))
+    return [(place, shown.isel(dict(zip(others, place, strict=True)))) for place in places]
+
+
+def _mark(ax: Axes, x: np.ndarray, lines: list[xr.Dataset]) -> None:
+    """Shade where no line has a contact-free motion to start from."""
+    is_rubbing = ~np.any([line["has_contact_free_motion"].values for line in lines], axis=0)
+    if is_rubbing.any() and len(x) > 1:
+        ax.fill_between(
+            x,
+            0,
+            1,
+            where=is_rubbing,
+            transform=ax.get_xaxis_transform(),
+            color="0.85",
+            linewidth=0,
+            label="no contact-free motion",
+        )
+
+
+def _told(lines: list[xr.Dataset], along: str, others: list[str]) -> list[str]:
+    """A line of text for each curve: where the machine is least resilient."""
+    told = []
+    for line in lines:
+        name = ", ".join(_plain(line[d]) for d in others)
+        impulse = line["least_impulse"].values
+        head = f"{name}: " if name else ""
+        if not np.isfinite(impulse).any():
+            told.append(f"{head}no knock that was tried leads to rub")
+            continue
+        i = int(np.nanargmin(impulse))
+        worst = line.isel({along: i})
+        told.append(
+            f"{head}least knock {float(worst.least_impulse):.4g} N s at {_plain(worst[along])}, "
+            f"{np.degrees(float(worst.worst_angle)):.0f} degrees from straight up"
+        )
+    return told
+
+
+def _plain(value: xr.DataArray) -> str:
+    return written(str(value.name), float(value), str(value.attrs["units"]))

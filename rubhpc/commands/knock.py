@@ -1,0 +1,67 @@
+"""`rubhpc knock`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rubhpc.commands.quantity import quantity
+
+
+@click.command()
+@click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
+@click.option("--angles", type=click.IntRange(min=1), default=12, show_default=True, help="Directions tried.")
+@click.option(
+    "--node", "nodes", type=int, multiple=True, help="Node that is knocked [default: the output node]."
+)
+@click.option("--most", metavar="IMPULSE", help='Largest impulse tried: "2 N*s", or a number in N s.')
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+    default=0.02,
+    show_default=True,
+    help="Relative width of the interval of the least impulse.",
+)
+@click.option("--figure", metavar="FILE", help=".png, .pdf or .svg [default: STUDY_knock.png here]")
+@click.option("--data", metavar="FILE", help="Write the data too: .csv, .json, .zarr or .nc.")
+@click.option(
+    "--trust-rig", is_flag=True, help='Run the Python code of a study whose rig is "FILE.py:FUNCTION".'
+)
+def knock(
+    study: Path,
+    angles: int,
+    nodes: tuple[int, ...],
+    most: str | None,
+    tolerance: float,
+    figure: str | None,
+    data: str | None,
+    trust_rig: bool,
+) -> int:
+    """Find the least knock that takes a machine from its contact-free motion to a rub that stays.
+
+    For every case of STUDY.toml: the smallest impulse over all directions and nodes tried. A figure shows it
+    over the speed, the resilience curve of the machine. No store is made.
+    """
+    from postproc.figures.resilience_curve import resilience
+    from postproc.figures.style import check_figure_path
+    from postproc.store.export import check_data_path, write_data
+    from rubhpc.knocks import least_knock
+    from rubhpc.study.study import read_study
+
+    path = check_figure_path(figure or f"{study.stem}_knock.png")
+    data_path = check_data_path(data) if data else None
+    found = least_knock(
+        read_study(study, trust_rig=trust_rig),
+        angles=angles,
+        nodes=nodes,
+        most=None if most is None else quantity(most, "N*s", "--most"),
+        tolerance=tolerance,
+    )
+    drawing = resilience(found)
+    for line in drawing.lines:
+        click.echo(line)
+    click.echo(str(drawing.save(path)))
+    if data_path is not None:
+        click.echo(str(write_data(drawing.shown, data_path)))
+    return 0

@@ -1,0 +1,106 @@
+"""The least knock: the search against known edges, and a machine against every knock of a grid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from postproc.figures.resilience_curve import resilience
+from rubhpc.errors import InputError
+from rubhpc.knocks import Direction, find_least, least_knock
+from rubhpc.simulate import simulate
+from rubhpc.study.study import read_study
+
+STUDY = """
+rig = "mokhtar2017"
+[grid]
+speed_ratio = {speed}
+clearance = "300 um"
+friction = 0.1
+{rest}
+[override]
+"stator.youngs_modulus" = "30 GPa"
+[record]
+transient = "auto"
+revolutions = 16
+samples_per_revolution = 64
+"""
+ALL_ROUND = [Direction(2 * math.pi * i / 12, None) for i in range(12)]
+
+
+def study_of(folder, speed="1.25", rest=""):
+    path = folder / "a.toml"
+    path.write_text(STUDY.format(speed=speed, rest=rest))
+    return read_study(path)
+
+
+@pytest.mark.parametrize("least", [0.013, 0.4, 7.0])
+def test_the_edge_and_the_worst_direction_are_found(least):
+    def leads_to_rub(impulse, direction):
+        return impulse > least * (1.5 + 0.5 * math.cos(direction.angle))
+
+    found = find_least(leads_to_rub, ALL_ROUND, 0.01, 10.0, 0.001)
+    assert found.direction.angle == pytest.approx(math.pi)
+    assert found.impulse == pytest.approx(least, rel=0.001)
+    assert found.harmless < least < found.impulse
+    assert leads_to_rub(found.impulse, found.direction)
+
+
+def test_no_edge_and_an_edge_below_the_first_impulse():
+    none = find_least(lambda *_: False, ALL_ROUND, 0.1, 1.0, 0.01)
+    assert math.isnan(none.impulse)
+    assert none.harmless == 1.0
+    assert none.direction is None
+    below = find_least(lambda impulse, _: impulse > 0.003, ALL_ROUND, 0.1, 1.0, 0.01)
+    assert below.impulse == pytest.approx(0.003, rel=0.01)
+
+
+def test_a_range_that_ends_does_not_hide_the_next_edge():
+    found = find_least(lambda impulse, _: 0.2 < impulse < 0.6 or impulse > 0.9, ALL_ROUND, 0.01, 5.0, 0.01)
+    assert found.impulse == pytest.approx(0.2, rel=0.01)
+
+
+def test_every_smaller_knock_of_a_grid_is_harmless(tmp_path):
+    found = least_knock(study_of(tmp_path), angles=2, tolerance=0.05).squeeze()
+    least, harmless = float(found.least_impulse), float(found.harmless_impulse)
+    assert 0.95 * least < harmless < least
+
+    def rubs(impulse, angle):
+        record = simulate(
+            "mokhtar2017",
+            speed_ratio=1.25,
+            clearance="300 um",
+            friction=0.1,
+            overrides={"stator.youngs_modulus": "30 GPa"},
+            transient="auto",
+            revolutions=16,
+            samples_per_revolution=64,
+            keep=(),
+            initial={"from": "contact_free", "impulse": impulse, "impulse_angle": angle},
+        )
+        return bool(record.measures["contact_fraction"][0])
+
+    assert rubs(least, float(found.worst_angle))
+    grid = [(share * harmless, angle) for share in np.linspace(0.1, 1.0, 6) for angle in (0.0, math.pi)]
+    assert not any(rubs(*at) for at in grid)
+
+
+def test_a_machine_without_a_contact_free_motion_and_its_figure(tmp_path):
+    found = least_knock(study_of(tmp_path, "[1.1, 1.25]"), angles=1, tolerance=0.2)
+    assert found.has_contact_free_motion.values.ravel().tolist() == [False, True]
+    assert np.isnan(found.least_impulse.values.ravel()[0])
+    drawing = resilience(found)
+    assert "at speed_ratio=1.25, 0 degrees" in drawing.lines[0]
+    assert drawing.save(tmp_path / "curve.png").exists()
+
+
+def test_what_cannot_be_is_refused(tmp_path):
+    study = study_of(tmp_path, rest='"initial.impulse" = [0.0, 0.1]')
+    with pytest.raises(InputError, match="initial.impulse: the knock itself is searched for"):
+        least_knock(study)
+    with pytest.raises(InputError, match="99 does not move sideways"):
+        least_knock(study_of(tmp_path), nodes=[99])
+    with pytest.raises(InputError, match="give numbers above 0"):
+        least_knock(study_of(tmp_path), angles=0)
