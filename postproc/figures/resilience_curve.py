@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.figures.cells import is_geometric
+from postproc.figures.cells import cell_edges, is_geometric
 from postproc.figures.drawing import Drawing
 from postproc.store.units import displayed, scale_of, written_value
 from rubhpc.errors import InputError
@@ -15,6 +15,7 @@ from rubhpc.study.axes import SPEED_AXES, written
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
 _MOST_LINES = 6
 
@@ -53,18 +54,22 @@ def resilience(knocks: xr.Dataset) -> Drawing:
         for i, line in enumerate(lines):
             name = ", ".join(written_value(line[d]) for d in others)
             impulse = line["least_impulse"].values * scale.factor
-            style = {"color": f"C{i}", "marker": "o", "markersize": 2.5}
+            style: dict[str, Any] = {"color": f"C{i}", "marker": "o", "markersize": 2.5}
             above.plot(x, impulse, linewidth=1.0, label=name or None, **style)
             above.fill_between(
                 x, 0.0, line["harmless_impulse"].values * scale.factor, color=f"C{i}", alpha=0.08
             )
             below.plot(x, np.degrees(line["worst_angle"].values), linestyle="", **style)
         _mark(above, x, lines)
-        above.set(ylabel=f"Least impulse ({scale.unit})", ylim=(0.0, None))
+        largest = [
+            float(np.nanmax(v)) for line in lines if np.isfinite(v := line["least_impulse"].values).any()
+        ]
+        top = 1.25 * scale.factor * max(largest) if largest else None
+        above.set(ylabel=f"Least impulse ({scale.unit})", ylim=(0.0, top))
         below.set(xlabel=x_label, ylabel="Direction (\N{DEGREE SIGN})", ylim=(-15.0, 375.0))
         below.set_yticks(range(0, 361, 90))
         for ax in axes:
-            ax.set_xlim(x[0], x[-1])
+            ax.set_xlim(*cell_edges(x)[[0, -1]])
             if is_geometric(x):
                 ax.set_xscale("log")
         if others or above.get_legend_handles_labels()[1]:
@@ -72,7 +77,7 @@ def resilience(knocks: xr.Dataset) -> Drawing:
         return axes
 
     return Drawing(
-        shown=shown, draw=draw, panels=(2, 1), height=90.0, lines=tuple(_told(lines, along, others))
+        shown=shown, draw=draw, panels=(2, 1), height=80.0, lines=tuple(_told(lines, along, others))
     )
 
 
@@ -82,20 +87,13 @@ def _parts(shown: xr.Dataset, others: list[str]) -> list[tuple[object, xr.Datase
     return [(place, shown.isel(dict(zip(others, place, strict=True)))) for place in places]
 
 
-def _mark(ax: Axes, x: np.ndarray, lines: list[xr.Dataset]) -> None:
+def _mark(ax: Axes, x: NDArray[np.float64], lines: list[xr.Dataset]) -> None:
     """Shade where no line has a contact-free motion to start from."""
     is_rubbing = ~np.any([line["has_contact_free_motion"].values for line in lines], axis=0)
-    if is_rubbing.any() and len(x) > 1:
-        ax.fill_between(
-            x,
-            0,
-            1,
-            where=is_rubbing,
-            transform=ax.get_xaxis_transform(),
-            color="0.85",
-            linewidth=0,
-            label="no contact-free motion",
-        )
+    edges = cell_edges(x)
+    for i in np.flatnonzero(is_rubbing):
+        label = "no contact-free motion" if i == np.flatnonzero(is_rubbing)[0] else None
+        ax.axvspan(edges[i], edges[i + 1], color="0.85", linewidth=0, zorder=0, label=label)
 
 
 def _told(lines: list[xr.Dataset], along: str, others: list[str]) -> list[str]:

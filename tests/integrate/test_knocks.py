@@ -98,7 +98,7 @@ def test_a_machine_without_a_contact_free_motion_and_its_figure(tmp_path):
 
 def test_what_cannot_be_is_refused(tmp_path):
     study = study_of(tmp_path, rest='"initial.impulse" = [0.0, 0.1]')
-    with pytest.raises(InputError, match="initial.impulse: the knock itself is searched for"):
+    with pytest.raises(InputError, match="the knock itself is searched for"):
         least_knock(study)
     with pytest.raises(InputError, match="99 does not move sideways"):
         least_knock(study_of(tmp_path), nodes=[99])
