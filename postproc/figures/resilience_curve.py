@@ -31,7 +31,7 @@ def resilience(knocks: xr.Dataset) -> Drawing:
     Raises
     ------
     InputError
-        There are more lines than can be told apart.
+        There are too many lines for one figure.
     """
     several = [str(d) for d in knocks.least_impulse.dims if knocks.sizes[d] > 1]
     speeds = [d for d in several if d in SPEED_AXES]
@@ -77,7 +77,7 @@ def resilience(knocks: xr.Dataset) -> Drawing:
         return axes
 
     return Drawing(
-        shown=shown, draw=draw, panels=(2, 1), height=80.0, lines=tuple(_told(lines, along, others))
+        shown=shown, draw=draw, panels=(2, 1), height=80.0, lines=tuple(_in_words(lines, along, others))
     )
 
 
@@ -96,23 +96,23 @@ def _mark(ax: Axes, x: NDArray[np.float64], lines: list[xr.Dataset]) -> None:
         ax.axvspan(edges[i], edges[i + 1], color="0.85", linewidth=0, zorder=0, label=label)
 
 
-def _told(lines: list[xr.Dataset], along: str, others: list[str]) -> list[str]:
+def _in_words(lines: list[xr.Dataset], along: str, others: list[str]) -> list[str]:
     """A line of text for each curve: where the machine is least resilient."""
-    told = []
+    lines_of_text = []
     for line in lines:
         name = ", ".join(_plain(line[d]) for d in others)
         impulse = line["least_impulse"].values
         head = f"{name}: " if name else ""
         if not np.isfinite(impulse).any():
-            told.append(f"{head}no knock that was tried leads to rub")
+            lines_of_text.append(f"{head}no knock that was tried leads to rub")
             continue
         i = int(np.nanargmin(impulse))
         worst = line.isel({along: i})
-        told.append(
+        lines_of_text.append(
             f"{head}least knock {float(worst.least_impulse):.4g} N s at {_plain(worst[along])}, "
             f"{np.degrees(float(worst.worst_angle)):.0f} degrees from straight up"
         )
-    return told
+    return lines_of_text
 
 
 def _plain(value: xr.DataArray) -> str:
