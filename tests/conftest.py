@@ -30,6 +30,7 @@ SLOW = (
     "figures/test_figure_commands.py",
     "figures/test_maps.py::test_command_draws",
     "input/test_reading.py::test_pint_stays_away_until_it_is_needed",
+    "integrate/test_branch.py",
     "integrate/test_contact_stepping_march.py",
     "integrate/test_event_driven_march.py::test_dry_whip_diverges_and_says_so",
     "integrate/test_event_driven_march.py::test_endless_events_are_left_to_short_steps",
@@ -85,6 +86,7 @@ LONGEST = (
     "integrate/test_event_driven_march.py",
     "running/test_continuation_runs.py",
     "kernels/test_contact_pairs.py",
+    "integrate/test_branch.py",
     "integrate/test_contact_stepping_march.py",
     "running/test_added_measure.py",
 )

@@ -56,6 +56,12 @@ def draw_branches(data: xr.Dataset, variable: str, along: str, ax: Axes) -> Axes
                 **_STYLES[stable],
             )
             named.add(label)
+    mark_events(data, x, y, ax)
+    return ax
+
+
+def mark_events(data: xr.Dataset, x: NDArray[Any], y: NDArray[Any], ax: Axes) -> None:
+    """Mark the events at abscissas (n_point,) and ordinates (n_point, n), and name them for a legend."""
     events = data["event"].values
     for code, event in enumerate(BRANCH_EVENT):
         if event not in MARKED or not (events == code).any():
@@ -74,7 +80,6 @@ def draw_branches(data: xr.Dataset, variable: str, along: str, ax: Axes) -> Axes
             label=text,
             zorder=4,
         )
-    return ax
 
 
 def runs(data: xr.Dataset) -> Iterator[NDArray[np.intp]]:

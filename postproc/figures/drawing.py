@@ -30,6 +30,8 @@ class Drawing:
         Draws on a list of axes, row by row.
     panels : (n_row, n_column), optional
         Of a figure of several axes; without, it has one.
+    is_shared : bool
+        Whether its axes have one abscissa, and those of a row one ordinate.
     height, width : float, optional
         mm; by default as in `postproc.figures.style.new_figure`.
     lines : tuple of str
@@ -41,6 +43,7 @@ class Drawing:
     shown: xr.Dataset
     draw: Callable[[list[Axes]], Any]
     panels: tuple[int, int] | None = None
+    is_shared: bool = True
     height: float | None = None
     width: float | None = None
     lines: tuple[str, ...] = ()
@@ -50,7 +53,7 @@ class Drawing:
         """Draw the figure, write it as png, pdf or svg, and return its path; needs no display."""
         n_row, n_column = self.panels or (1, 1)
         with house_style():
-            figure, axes = new_figure(n_row, self.height, self.width, n_column)
+            figure, axes = new_figure(n_row, self.height, self.width, n_column, self.is_shared)
             self.draw(axes)
             figure.suptitle(caption(self.shown), fontsize=7, x=0.02, ha="left")
             return save(figure, path)
@@ -81,6 +84,12 @@ class Drawing:
         size = figure_size(n_row, self.height, self.width)
         figure = pyplot.figure(figsize=size, dpi=150, layout="constrained")
         with house_style():
-            made = figure.subplots(n_row, n_column, sharex=True, sharey=n_column > 1, squeeze=False)
+            made = figure.subplots(
+                n_row,
+                n_column,
+                sharex=self.is_shared,
+                sharey=self.is_shared and n_column > 1,
+                squeeze=False,
+            )
             figure.suptitle(caption(self.shown), fontsize=7, x=0.02, ha="left")
         return list(made.ravel())

@@ -29,9 +29,15 @@ def house_style() -> Iterator[None]:
 
 
 def new_figure(
-    n_panel: int = 1, height: float | None = None, width: float | None = None, n_column: int = 1
+    n_panel: int = 1,
+    height: float | None = None,
+    width: float | None = None,
+    n_column: int = 1,
+    is_shared: bool = True,
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with `n_panel` rows of axes that share their abscissa and, in columns, their ordinate.
+
+    Without `is_shared` they share nothing.
 
     Width and height are in mm; by default it is one journal column wide and each row takes its share of the
     height. The axes come row by row. Call it within `house_style`.
@@ -42,7 +48,9 @@ def new_figure(
 
     figure = Figure(figsize=figure_size(n_panel, height, width))
     FigureCanvasAgg(figure)
-    axes = figure.subplots(n_panel, n_column, sharex=True, sharey=n_column > 1, squeeze=False)
+    axes = figure.subplots(
+        n_panel, n_column, sharex=is_shared, sharey=is_shared and n_column > 1, squeeze=False
+    )
     return figure, list(axes.ravel())
 
 

@@ -188,8 +188,8 @@ class Family:
             )
             if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
                 raise InputError(
-                    "it needs motion in closed form between events; take method modal, normal fixed and "
-                    "law lagrange"
+                    f"{self.along}: branches need motion in closed form between events; take method modal, "
+                    "normal fixed, friction_law sliding or coulomb, and with law penalty sliding"
                 )
             self._setups[key] = setup
             if len(self._setups) > MOST_KEPT:

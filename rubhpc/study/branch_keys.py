@@ -107,8 +107,8 @@ def check_branch(
     varied: dict[str, Any] = {axis.name: axis for axis in axes if axis.is_contact_key}
     if integrator.method != "modal" or contact.closed_form == "never" or "contact.law" in varied:
         raise InputError(
-            "[branch] along: it needs motion in closed form between events; take method modal, normal fixed "
-            "and law lagrange"
+            "[branch] along: branches need motion in closed form between events; take method modal, normal "
+            "fixed, friction_law sliding or coulomb, and with law penalty sliding"
         )
     if recording.probe:
         raise InputError("[branch] along: branches have no probes; remove [[record.probe]]")

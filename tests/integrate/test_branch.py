@@ -112,7 +112,7 @@ def test_derivative_by_the_clearance_is_that_of_two_flows(along):
         ({"largest_step": "-1 um"}, "largest_step: -1 um is out of range"),
         ({"clearance": 1e-4}, "clearance: is what varies"),
         ({"start": "1 kg"}, "branch: start: "),
-        ({"normal": "updated"}, "needs motion in closed form"),
+        ({"normal": "updated"}, "branches need motion in closed form"),
     ],
 )
 def test_bad_arguments_are_refused(arguments, text):

@@ -8,6 +8,7 @@ import pytest
 import rubhpc
 from postproc.figures.bifurcation import bifurcation
 from postproc.figures.branch_lines import runs
+from postproc.figures.multipliers import multipliers
 from rubhpc.errors import InputError
 from rubhpc.study.study import read_study
 
@@ -90,6 +91,17 @@ def test_branches_are_drawn_over_simulated_cases(store, tmp_path):
         bifurcation(rubhpc.open(tmp_path / "simulated.zarr"), over="other.zarr")
 
 
+def test_multipliers_are_drawn(store):
+    points = rubhpc.open(store / "branches.zarr")
+    plane, moduli = multipliers(points).show()
+    assert "multiplier" in plane.get_xlabel()
+    assert moduli.get_ylabel() == "Largest modulus"
+    marked = next(line for line in moduli.lines if line.get_label() == "period doubling")
+    assert marked.get_ydata() == pytest.approx(1.0, abs=1e-6)
+    with pytest.raises(InputError, match="there is no 99"):
+        multipliers(points, branch=99)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
@@ -100,7 +112,7 @@ def test_branches_are_drawn_over_simulated_cases(store, tmp_path):
         ('step = "4 um"', 'step = "4 kg"', "step: "),
         ('step = "4 um"', "step = 0", "step: 0 is out of range"),
         ("sweeps = 1", "sweep = 1", "unknown key; did you mean sweeps"),
-        ("[record]", '[contact]\nnormal = "updated"\n[record]', "needs motion in closed form"),
+        ("[record]", '[contact]\nnormal = "updated"\n[record]', "branches need motion in closed form"),
         ("[record]", "[sample]\nn = 8\n[record]", "a sample has no axis to follow"),
         ("[0.74, 0.75]", '{ values = [0.74, 0.75], sweep = "up" }', "branches need no sweep"),
     ],

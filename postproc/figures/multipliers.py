@@ -1,0 +1,93 @@
+"""Floquet multipliers along branches: in the complex plane, and their moduli over the axis followed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.figures.branch_lines import mark_events, runs
+from postproc.figures.drawing import Drawing
+from postproc.figures.palette import categories
+from postproc.store.axes import source
+from postproc.store.branch_points import is_of_points, one_case
+from postproc.store.units import displayed
+from rubhpc.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+    from postproc.figures.options import Count
+
+_LARGEST = 1.5  # modulus that is shown, unless all are smaller
+
+
+def multipliers(cases: xr.Dataset, *, branch: Count | None = None) -> Drawing:
+    """Floquet multipliers of branches: where they cross the unit circle.
+
+    On the left the complex plane with the unit circle, on the right the largest modulus over the axis that
+    the branches follow, full where the motion is stable and dashed where it is not, with all events.
+
+    Parameters
+    ----------
+    cases
+        A branch study; axes but the one followed are taken at their first value.
+    branch
+        Number of one branch [default: all].
+    """
+    if not is_of_points(cases):
+        raise InputError(f"{source(cases)}: has no multipliers; give the store of a study with [branch]")
+    points, along, notes = one_case(cases)
+    if branch is not None:
+        known = np.unique(points["branch"].values)
+        if branch not in known:
+            raise InputError(f"{source(cases)}: branch: there is no {branch}; give one of 1 to {known.max()}")
+        points = points.isel(point=np.flatnonzero(points["branch"].values == branch))
+    shown = points[["multiplier_real", "multiplier_imag", "stability", "event"]]
+
+    def draw(axes: list[Axes]) -> None:
+        draw_plane(shown, axes[0])
+        draw_moduli(shown, along, axes[1])
+        axes[0].figure.legend(loc="outside upper right", ncols=9, handletextpad=0.4, columnspacing=1.0)
+
+    return Drawing(
+        shown=shown, draw=draw, panels=(1, 2), is_shared=False, height=80, width=180, lines=tuple(notes)
+    )
+
+
+def draw_plane(data: xr.Dataset, ax: Axes) -> Axes:
+    """Draw all multipliers in the complex plane, coloured by the period of their motion."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 361)
+    ax.plot(np.cos(turn), np.sin(turn), color="0.6", linewidth=0.8)
+    periods = data["period"].values
+    for code, (_, shade) in categories("period", periods).items():
+        of_period = periods == code
+        re, im = (data[f"multiplier_{part}"].values[of_period].ravel() for part in ("real", "imag"))
+        ax.plot(re, im, linestyle="", marker="o", markersize=1.8, markeredgewidth=0.0, color=shade)
+    size = np.hypot(data["multiplier_real"].values, data["multiplier_imag"].values)
+    limit = 1.06 * max(1.0, min(_LARGEST, float(np.nanmax(size))))
+    ax.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
+    ax.set(xlabel="Real part of the multiplier", ylabel="Imaginary part")
+    return ax
+
+
+def draw_moduli(data: xr.Dataset, along: str, ax: Axes) -> Axes:
+    """Draw the largest modulus over the axis followed, with the events."""
+    x, x_label = displayed(data[along])
+    size = np.hypot(data["multiplier_real"].values, data["multiplier_imag"].values)[:, 0]
+    ax.axhline(1.0, color="0.6", linewidth=0.8)
+    color = categories("period", data["period"].values)
+    named: set[str] = set()
+    for rows in runs(data):
+        is_stable = bool(data["stability"].values[rows[0 if rows.size < 2 else 1]])
+        name, shade = color[int(data["period"].values[rows[0]])]
+        label = f"{name}, {'stable' if is_stable else 'unstable'}"
+        style = "-" if is_stable else "--"
+        first = None if label in named else label
+        ax.plot(x[rows], size[rows], style, color=shade, linewidth=1.1, label=first)
+        named.add(label)
+    mark_events(data, x, size[:, None], ax)
+    top = float(np.nanmax(size))
+    ax.set(xlabel=x_label, ylabel="Largest modulus", ylim=(0.0, 1.06 * max(1.0, min(2.0 * _LARGEST, top))))
+    return ax
