@@ -68,7 +68,8 @@ class ContactSteppingMarch(ModalMarch):
             law=setup.law,
         )
         self._work = workspace(self._pairs, step)
-        self._ends = np.full((2, q * N_DEGREE), np.nan)
+        self._ends = np.full((4, q * N_DEGREE), np.nan)
+        self._placed = np.zeros((2, self.bodies.stiffness.shape[0]))
         self._work.force[:] = initial.contact_force  # a contact under way does not begin anew
 
     def touching(self) -> NDArray[np.bool_]:
@@ -129,6 +130,7 @@ class ContactSteppingMarch(ModalMarch):
         power = tables.power_re[0, level] + 1j * tables.power_im[0, level]
         drifted, shifted = degree @ enter[n:] * power, degree @ enter[:n]
         positions, rates = degree @ motion[:n], degree @ motion[n:]
+        skew = 0.5 * (self.bodies.stiffness - self.bodies.stiffness.T)
         return ContactImpulses(
             level=level,
             degree_re=np.ascontiguousarray(positions.real),
@@ -141,6 +143,7 @@ class ContactSteppingMarch(ModalMarch):
             shifted_im=np.ascontiguousarray(shifted.imag),
             twist_response=degree @ setup.reduced.output[2],
             probe_response=setup.reduced.probe[2] @ degree.T,
+            skew=skew if np.any(skew) else skew[:0],
         )
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
@@ -157,6 +160,7 @@ class ContactSteppingMarch(ModalMarch):
             self._z,
             self._z_next,
             self._ends,
+            self._placed,
             self._recorder,
             samples,
             accumulator,

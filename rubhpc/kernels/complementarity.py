@@ -9,14 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit, jit_inline
+from rubhpc.kernels._jit import jit_inline, jit_lean
 
 Floats = NDArray[np.float64]
 
 UNSOLVED = -1
 
 
-@jit
+@jit_lean
 def solve_active(
     compliance: Floats, gap: Floats, active: NDArray[np.bool_], force: Floats, work: Floats
 ) -> bool:
@@ -74,7 +74,7 @@ def natural_residual(give: float, force: float, gap: float) -> float:
     return float(abs(min(give * force, gap)))
 
 
-@jit
+@jit_lean
 def residual_of(compliance: Floats, gap: Floats, force: Floats) -> tuple[float, float]:
     """Largest residual of a problem at `force`, and the most that a force moves its own gap."""
     largest, moved = 0.0, 0.0
@@ -87,7 +87,7 @@ def residual_of(compliance: Floats, gap: Floats, force: Floats) -> tuple[float, 
     return largest, moved
 
 
-@jit
+@jit_lean
 def solve_complementarity(
     compliance: Floats,
     gap: Floats,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rubhpc.kernels._jit import jit, jit_inline
+from rubhpc.kernels._jit import jit_inline, jit_lean
 from rubhpc.kernels.complementarity import UNSOLVED, natural_residual, solve_complementarity
 from rubhpc.kernels.contact_pairs import (
     N_DEGREE,
@@ -22,7 +22,7 @@ N_NEWTON = 25  # passes for the curved gap; two or three are taken
 MOST_RESIDUAL = 1e-6  # over what the forces moved: rounding leaves 1e-9, and more is no solution
 
 
-@jit
+@jit_lean
 def fill_compliances(pairs: Pairs, work: Workspace, step: float) -> None:
     """What unit forces do to gaps and slips over a step; the directions are filled already."""
     if is_set_valued(pairs.law):
@@ -30,14 +30,17 @@ def fill_compliances(pairs: Pairs, work: Workspace, step: float) -> None:
         fill_matrix(pairs, work.gap_jacobian, work.friction_direction, work.coupling)
         fill_matrix(pairs, work.friction_direction, work.gap_jacobian, work.tangential[0])
         fill_matrix(pairs, work.friction_direction, work.friction_direction, work.tangential[1])
-        work.tangential[:] *= -1.0
+        for i in range(pairs.radius.size):
+            for j in range(pairs.radius.size):
+                work.tangential[0, i, j] *= -1.0
+                work.tangential[1, i, j] *= -1.0
     else:
         fill_matrix(pairs, work.gap_jacobian, work.force_direction, work.matrix)
     for i in range(pairs.radius.size):
         work.matrix[i, i] += softness(pairs.law, step)
 
 
-@jit
+@jit_lean
 def fill_targets(pairs: Pairs, work: Workspace, step: float) -> None:
     """Gap that each pair asks for at the end of the step, and the delay of its impact (`laws.gap_target`)."""
     for i in range(pairs.radius.size):
@@ -66,7 +69,7 @@ def fill_residual(pairs: Pairs, work: Workspace) -> None:
     work.solution[1], work.solution[2] = distance, moved
 
 
-@jit
+@jit_lean
 def solve_contact(pairs: Pairs, work: Workspace, step: float, spin: float) -> int:
     """Contact forces of a step (s) at a spin (rad/s); returns the pairs in contact, or UNSOLVED.
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit, jit_inline
+from rubhpc.kernels._jit import jit_inline, jit_lean
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace
 from rubhpc.kernels.laws import friction_coefficient
@@ -27,7 +27,7 @@ ROUNDING = 1e-12  # share of a force that counts as zero
 UNNOTICED = 1e-6  # share of what friction can change in a step that counts as no slip
 
 
-@jit
+@jit_lean
 def fill_slip(pairs: Pairs, work: Workspace, step: float, spin: float) -> None:
     """Slip of every pair over the step without forces, m, into `work.slip`."""
     for i in range(pairs.radius.size):
@@ -37,7 +37,7 @@ def fill_slip(pairs: Pairs, work: Workspace, step: float, spin: float) -> None:
         work.slip[i] = total
 
 
-@jit
+@jit_lean
 def solve_friction(pairs: Pairs, work: Workspace, step: float, spin: float) -> int:
     """Forces N and T of all pairs, into `work.force` and `work.traction`; pivots taken, or UNSOLVED.
 
@@ -85,7 +85,7 @@ def slip_speed_before(pairs: Pairs, work: Workspace, i: int, spin: float) -> flo
     return speed
 
 
-@jit
+@jit_lean
 def feeds_energy(pairs: Pairs, work: Workspace, i: int, step: float, spin: float) -> bool:
     """Whether the friction of pair i works with, not against, the mean of the slips before and after it."""
     before = step * pairs.radius[i] * spin
@@ -112,7 +112,7 @@ def friction_residual(work: Workspace, i: int) -> tuple[float, float]:
     return give * abs(work.traction[i] - wanted), give * abs(work.traction[i])
 
 
-@jit
+@jit_lean
 def solve_cones(work: Workspace) -> int:
     """Forces for the given `work.cone`; pivots taken, or UNSOLVED.
 
@@ -149,7 +149,7 @@ def solve_cones(work: Workspace) -> int:
     return UNSOLVED
 
 
-@jit
+@jit_lean
 def solve_members(work: Workspace, q: int) -> int:
     """Forces of the first q `work.members`; pivots taken, or UNSOLVED.
 

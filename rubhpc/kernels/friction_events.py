@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit, jit_inline, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline, jit_lean, jit_lean_sum
 from rubhpc.kernels.accumulators import (
     DRIVE_WORK,
     FRICTION_LOSS,
@@ -38,7 +38,7 @@ class FrictionWork(NamedTuple):
     impulse: Floats  # (q,), accumulated before the event, N s
 
 
-@jit
+@jit_lean
 def solve_event(bodies: FrictionBodies, work: FrictionWork, feeds_none: bool) -> int:
     """Forces or impulses that obey the laws with `solver.gap` and `slip`; pivots taken, or UNSOLVED.
 
@@ -92,7 +92,7 @@ def gap_change(solver: Workspace, i: int) -> float:
     return change
 
 
-@jit
+@jit_lean
 def observe_event(problem: int, pivots: int, solver: Workspace, accumulator: Accumulator) -> None:
     """Note what a problem has taken, and how far its solution is from the laws."""
     distance, moved = 0.0, 0.0
@@ -200,7 +200,7 @@ def change_states(
     return remaining
 
 
-@jit
+@jit_lean
 def observe_impacts(bodies: FrictionBodies, work: FrictionWork, accumulator: Accumulator) -> None:
     """Add impulses and their work, which is that of the mean of the velocities before and after."""
     solver = work.solver
@@ -217,7 +217,7 @@ def observe_impacts(bodies: FrictionBodies, work: FrictionWork, accumulator: Acc
             accumulator.energy[IMPACT_LOSS] -= solver.force[i] * (work.rate[i] + 0.5 * gap_change(solver, i))
 
 
-@jit
+@jit_lean
 def observe_states(states: int, accumulator: Accumulator) -> None:
     """Note the senses in which pairs slide in a set of states."""
     for i in range(accumulator.sense.size):

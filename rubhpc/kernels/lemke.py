@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit
+from rubhpc.kernels._jit import jit_lean
 from rubhpc.kernels.complementarity import UNSOLVED
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ TIE = 1e-12
 PIVOTS_A_ROW = 20
 
 
-@jit
+@jit_lean
 def exchange(tableau: Floats, basis: Ints, n: int, row: int, column: int) -> int:
     """Take the variable of `column` into the basis at `row`, of n rows; returns the one that leaves."""
     width = 2 * n + 2
@@ -38,7 +38,7 @@ def exchange(tableau: Floats, basis: Ints, n: int, row: int, column: int) -> int
     return int(leaving)
 
 
-@jit
+@jit_lean
 def solve_lemke(tableau: Floats, basis: Ints, n: int) -> int:
     """Pivots taken until the problem of n rows is solved, or UNSOLVED.
 

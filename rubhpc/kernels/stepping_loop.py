@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_sum
+from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     STEP,
@@ -50,10 +50,11 @@ class ContactImpulses(NamedTuple):
     shifted_re: Floats  # (5 q, m), those of the displacement that a unit impulse makes in a second
     shifted_im: Floats
     twist_response: Floats  # (5 q,), torsional acceleration of the output node for a unit force
+    skew: Floats  # (n, n), skew part of the reduced stiffness; (0, n) where there is none
     probe_response: Floats  # (n_probe, 5 q), what a probe of acceleration sees of a unit force, at once
 
 
-@jit_sum
+@jit_lean_sum
 def book_step(
     reduced: Reduced, skew: Floats, step: float, angle: float, x: Floats, x_after: Floats, energy: Floats
 ) -> None:
@@ -84,7 +85,7 @@ def book_step(
     energy[UNBALANCE_WORK] += gain
 
 
-@jit_sum
+@jit_lean_sum
 def take_back(
     impulses: ContactImpulses,
     work: Workspace,
@@ -111,7 +112,7 @@ def take_back(
         now[a] += moved
 
 
-@jit_sum
+@jit_lean_sum
 def advance_by_steps(
     tables: ModeTables,
     reduced: Reduced,
@@ -125,14 +126,16 @@ def advance_by_steps(
     z: Floats,
     z_next: Floats,
     ends: Floats,
+    placed: Floats,
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
 ) -> int:
     """Advance a case from the tick reached to `last_tick`, as `event_loop.advance` does.
 
-    `tables` holds the open mode alone; `pairs.row` numbers the 5 q degrees of `impulses`. `ends` (2, 5 q)
-    keeps the degrees at the beginning and the end of the step before, where that was as short; else NaN.
+    `tables` holds the open mode alone; `pairs.row` numbers the 5 q degrees of `impulses`. `ends` (4, 5 q)
+    keeps the degrees at the beginning and the end of the step before, where that was as short, else NaN; two
+    rows of it, and `placed` (2, n), are work space.
     """
     q = pairs.radius.size
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
@@ -147,12 +150,11 @@ def advance_by_steps(
     )
     motion_re, motion_im = tables.motion_re, tables.motion_im
     n_degree = q * N_DEGREE
-    before, now, after, rate = ends[0], ends[1], np.zeros(n_degree), np.zeros(n_degree)
-    x, x_after = np.zeros(reduced.gap_jacobian.shape[1]), np.zeros(reduced.gap_jacobian.shape[1])
+    before, now, after, rate = ends[0], ends[1], ends[2], ends[3]
+    x, x_after = placed[0], placed[1]
+    for a in range(n_degree):
+        after[a] = 0.0
     is_placed = False  # whether x is where the step begins
-    skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
-    if not np.any(skew):
-        skew = skew[:0]
     step = clock.tick * (1 << impulses.level)
     interval = clock.tick * (1 << clock.sample_level)
     end_tick = clock.n_sample << clock.sample_level
@@ -162,7 +164,9 @@ def advance_by_steps(
     bounces = is_bouncing(pairs.law)
     is_followed = is_recorded or not is_direct  # the steps before and after a force are looked at
     last_step = progress.n_step + MOST_STEPS
-    was_touching = bool(np.any(work.force > 0.0))
+    was_touching = False
+    for i in range(q):
+        was_touching = was_touching or work.force[i] > 0.0
     while True:
         t = progress.tick
         if progress.n_step > last_step:
@@ -251,8 +255,9 @@ def advance_by_steps(
                     x[k] = dot(motion_re[0, k], motion_im[0, k], z_re, z_im)
                 x_after[k] = dot(motion_re[0, k], motion_im[0, k], next_re, next_im)
             angle = clock.spin * clock.tick * (t % per_revolution) + 0.5 * clock.spin * step
-            book_step(reduced, skew, step, angle, x, x_after, accumulator.energy)
-            x[:] = x_after
+            book_step(reduced, impulses.skew, step, angle, x, x_after, accumulator.energy)
+            for k in range(x.size):
+                x[k] = x_after[k]
         elif is_recorded and progress.energy_from < 0:
             begin_span(tables, z, progress, recorder)
         if is_recorded and (is_touching or was_touching):

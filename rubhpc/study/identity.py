@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before
-RING_PHYSICS = 6  # that of several stators in the modal scheme
-CLOSED_FORM_PHYSICS = 7  # that of motion from event to event; the next version of all is 8
+RING_PHYSICS = 8  # that of several stators in short steps, of either scheme
+CLOSED_FORM_PHYSICS = 7  # that of motion from event to event; the next version of all is 9
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
@@ -28,7 +28,7 @@ def physics_of(study: Study) -> int:
     is_modal = study.integrator.method == "modal"
     if is_modal and contact.closed_form == "always":
         return max(PHYSICS, CLOSED_FORM_PHYSICS)
-    if is_modal and len(study.rig.stator) > 1:
+    if len(study.rig.stator) > 1:
         return max(PHYSICS, RING_PHYSICS)
     return PHYSICS
 
