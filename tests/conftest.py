@@ -76,19 +76,27 @@ SLOW = (
 LONGEST = (
     "running/test_parts.py",
     "running/test_workers.py",
+    "faults/test_refusals.py",
+    "cases/test_reduction_of_stores.py",
+    "storage/test_growth.py",
+    "faults/test_misplaced.py",
     "validation/test_full_order.py",
     "report/test_report.py",
     "browser/test_report_page.py",
     "validation/test_rub.py",
+    "figures/test_figure_commands.py",
     "running/test_driver.py",
     "commands/test_modes_command.py",
     "kernels/test_jit.py",
+    "faults/test_many_cases.py",
     "integrate/test_event_driven_march.py",
+    "faults/test_fuzz.py",
     "running/test_continuation_runs.py",
     "kernels/test_contact_pairs.py",
-    "integrate/test_branch.py",
     "integrate/test_contact_stepping_march.py",
     "running/test_added_measure.py",
+    "storage/test_zarr_store.py",
+    "storage/test_shards.py",
 )
 # These have deadlines, or start ranks that wait for each other busily: nothing else may run at the same time.
 SERIAL = (

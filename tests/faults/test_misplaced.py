@@ -194,8 +194,16 @@ def check_said(code: int, err: str) -> None:
     assert re.fullmatch(r"[^\x00-\x09\x0b-\x1f]*", err), err
 
 
+def one_in(count: int) -> list[Any]:
+    """The damages, of which one in `count` is done here, and all with `make faults`."""
+    return [
+        pytest.param(*how, id=name, marks=[pytest.mark.long] if i % count else [])
+        for i, (name, *how) in enumerate(DAMAGES)
+    ]
+
+
 @pytest.mark.timeout(120, func_only=True)
-@pytest.mark.parametrize(("where", "how"), [d[1:] for d in DAMAGES], ids=[d[0] for d in DAMAGES])
+@pytest.mark.parametrize(("where", "how"), one_in(2))
 def test_a_damage_is_reported_in_a_line_and_repaired(finished, tmp_path, capsys, where, how):
     store = damaged(finished, tmp_path, where, how)
     for command in ("status", "verify"):
@@ -205,15 +213,8 @@ def test_a_damage_is_reported_in_a_line_and_repaired(finished, tmp_path, capsys,
     assert not verify(store)
 
 
-# A page takes longer than all the rest: one damage in three here, the others with `make faults`.
-PAGES = [
-    pytest.param(*how, id=name, marks=[pytest.mark.long] if i % 3 else [])
-    for i, (name, *how) in enumerate(DAMAGES)
-]
-
-
 @pytest.mark.timeout(120, func_only=True)
-@pytest.mark.parametrize(("where", "how"), PAGES)
+@pytest.mark.parametrize(("where", "how"), one_in(7))  # a page takes longer than all the rest
 def test_a_damage_does_not_break_the_report(finished, tmp_path, capsys, where, how):
     store = damaged(finished, tmp_path, where, how)
     check_said(*called(capsys, "report", store, "--output", tmp_path / "report.html"))
