@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rubhpc.rig.reading import read_rig
     from rubhpc.rig.rig import Rig
     from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
+    from rubhpc.run_up import run_up
     from rubhpc.running.driver import run
     from rubhpc.simulate import simulate
     from rubhpc.storage.summary import Summary
@@ -62,6 +63,7 @@ __all__ = [
     "read_rig",
     "read_study",
     "run",
+    "run_up",
     "simulate",
 ]
 
@@ -94,6 +96,7 @@ _HOMES = {
     "read_rig": "rubhpc.rig.reading:read_rig",
     "read_study": "rubhpc.study.study:read_study",
     "run": "rubhpc.running.driver:run",
+    "run_up": "rubhpc.run_up:run_up",
     "simulate": "rubhpc.simulate:simulate",
 }
 
@@ -102,7 +105,7 @@ class _Package(ModuleType):
     """The package; a module, once imported, does not hide the function of its name."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        is_hiding = isinstance(value, ModuleType) and name in ("branch", "periodic", "simulate")
+        is_hiding = isinstance(value, ModuleType) and name in ("branch", "periodic", "run_up", "simulate")
         super().__setattr__(name, getattr(value, name) if is_hiding else value)
 
 

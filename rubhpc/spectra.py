@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
 
 
 def amplitude_spectrum(signal: Floats) -> Floats:
@@ -34,3 +35,29 @@ def amplitude_spectrum(signal: Floats) -> Floats:
     if n_sample % 2 == 0:
         spectrum[..., -1] *= 0.5
     return spectrum
+
+
+def track_order(signal: Floats, per_revolution: int, order: float, window: int) -> Complexes:
+    """Return the complex amplitude of an order in every revolution of a shaft-locked signal, (n_revolution,).
+
+    The signal is `Re(c exp(i order angle))` where that order is all there is: `abs(c)` is its amplitude, zero
+    to peak, and the argument its lead over the order of the shaft's angle.
+
+    Parameters
+    ----------
+    signal : (n_sample,)
+        Whole revolutions.
+    order : float
+        Multiple of the spin frequency; the window holds whole periods of it.
+    window : int
+        Revolutions over which it is taken, around each; those at the ends have the window of the first, or
+        last, that fits.
+    """
+    n = signal.size // per_revolution
+    window = min(window, n)
+    turning = np.exp(-2j * np.pi * order / per_revolution * np.arange(signal.size))
+    sums = (signal * turning).reshape(n, per_revolution).sum(axis=1)
+    whole: Complexes = np.convolve(sums, np.ones(window, dtype=np.complex128), mode="valid")
+    whole = whole * (2.0 / (window * per_revolution))
+    followed: Complexes = whole[np.clip(np.arange(n) - window // 2, 0, whole.size - 1)]
+    return followed

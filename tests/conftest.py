@@ -41,6 +41,7 @@ SLOW = (
     "integrate/test_periodic.py::test_failure_says_why",
     "integrate/test_periodic.py::test_motion_beside_it_draws_near_by_the_largest_multiplier",
     "integrate/test_regimes_lyapunov.py",
+    "integrate/test_run_up.py",
     "kernels/test_accumulators.py",
     "kernels/test_coulomb_friction.py",
     "kernels/test_jit.py",

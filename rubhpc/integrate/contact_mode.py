@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 WORST_CONDITION = 1e11  # of the eigenvectors; beyond it modes coincide and their sum loses its digits
 
 
+class KeptParts(dict[bytes, "tuple[Complexes, Complexes, Complexes]"]):
+    """Parts as they are known to `modes_of`, to which it adds those that it solves."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ContactMode:
     """Motion with one set of pairs closed: `x = Re(motion @ z)`, x (2 n,) displacements, then velocities.
@@ -156,7 +160,7 @@ def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Co
     """Exponents, shapes and inverse shapes of a first-order system; one of each conjugate pair, doubled.
 
     What nothing couples is solved by itself: of a ring of stators only those that touch move with the rotor.
-    Parts among those `known`, such as open stators, are not solved again.
+    Parts among those `known`, such as open stators, are not solved again; `KeptParts` keeps the others.
     """
     n_state = len(system)
     exponents: list[Complexes] = [np.zeros(0, dtype=np.complex128)]  # a mass on a rigid wall has no modes
@@ -165,7 +169,9 @@ def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Co
     for rows in _parts(system):
         part = system[np.ix_(rows, rows)]
         solved = known.get(part.tobytes()) if known else None
-        exponent, shape, inverse = solved or solve_part(part)
+        exponent, shape, inverse = solved = solved or solve_part(part)
+        if isinstance(known, KeptParts):
+            known[part.tobytes()] = solved
         wide, tall = np.zeros((2, n_state, exponent.size), dtype=np.complex128)
         wide[rows], tall[rows] = shape, inverse.T
         exponents.append(exponent)

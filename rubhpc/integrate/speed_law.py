@@ -1,0 +1,72 @@
+"""Spin speeds that change: straight lines over the time, and when the shaft reaches an angle."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedLaw:
+    """A spin speed given at some times and linear between them; the shaft's angle is 0 at the first.
+
+    Attributes
+    ----------
+    time : tuple of float, s
+        Rising.
+    speed : tuple of float, rad/s
+        As many, all positive.
+    """
+
+    time: tuple[float, ...]
+    speed: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.time) < 2 or len(self.time) != len(self.speed):
+            raise InputError("law: needs a time and a speed of two points or more; write [[t, speed], ...]")
+        if any(a >= b for a, b in itertools.pairwise(self.time)):
+            raise InputError("law: its times do not rise; put its points in the order of time")
+        if min(self.speed) <= 0.0:
+            problem = f"{min(self.speed):g} rad/s is out of range"
+            raise InputError(f"law: {problem}; sampling is locked to the shaft, which turns above 0")
+        if self.n_revolution < 1:
+            turns = self._angle[-1] / (2 * math.pi)
+            raise InputError(f"law: the shaft turns by {turns:.3g} of a revolution; give it more time")
+
+    @property
+    def n_revolution(self) -> int:
+        """Whole revolutions."""
+        return math.floor(float(self._angle[-1]) / (2.0 * math.pi) * (1.0 + 1e-12))
+
+    @cached_property
+    def acceleration(self) -> Floats:
+        """Angular acceleration between the points, (n_point - 1,), rad/s^2."""
+        return np.diff(self.speed) / np.diff(self.time)
+
+    def at_angle(self, angle: ArrayLike) -> tuple[Floats, Floats, Floats]:
+        """Time (s), speed (rad/s) and acceleration (rad/s^2) where the shaft has turned by an angle, rad."""
+        turned = np.asarray(angle, dtype=np.float64)
+        place = np.searchsorted(self._angle[1:-1], turned, side="right")
+        ahead = turned - self._angle[place]
+        begin, rate = np.array(self.speed)[place], self.acceleration[place]
+        speed = np.sqrt(np.maximum(begin**2 + 2.0 * rate * ahead, 0.0))
+        # The root of the parabola that does not cancel.
+        return np.array(self.time)[place] + 2.0 * ahead / (begin + speed), speed, rate
+
+    @cached_property
+    def _angle(self) -> Floats:
+        """Angle at the points, (n_point,), rad."""
+        speed = np.array(self.speed)
+        return np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(self.time))])

@@ -1,0 +1,194 @@
+"""The face of a run-up or coast-down: arguments with units in, a labelled dataset out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.case_arguments import CaseArguments, case_of, read_probes
+from rubhpc.errors import InputError
+from rubhpc.input.quantity import parse_quantity
+from rubhpc.integrate.measures import by_name
+from rubhpc.integrate.run_up import integrate_run_up
+from rubhpc.integrate.setup import ModalSetup
+from rubhpc.integrate.speed_law import SpeedLaw
+from rubhpc.schema import PROBE, VARIABLES, probe_variables
+from rubhpc.spectra import track_order
+from rubhpc.study.initial import CONTACT_FREE
+from rubhpc.threads import on_one_thread
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from os import PathLike
+    from typing import Any, Unpack
+
+    import xarray as xr
+
+    from rubhpc.integrate.record import State
+    from rubhpc.rig.probes import Probe
+    from rubhpc.rig.rig import Rig
+
+ORDERS = (1 / 3, 1 / 2, 1.0, 2.0)  # of the spin, whose amplitudes and phases are followed
+WINDOW = 6  # revolutions, which hold whole periods of all of them
+_TRACKED = ("vertical", "horizontal", "torsion")
+
+
+@on_one_thread
+def run_up(
+    rig: Rig | str | PathLike[str],
+    *,
+    start: float | str | None = None,
+    stop: float | str | None = None,
+    time: float | str | None = None,
+    speed_law: Sequence[tuple[float | str, float | str]] | None = None,
+    pieces_per_revolution: int = 1,
+    initial: State | Mapping[str, float | str] | None = None,
+    samples_per_revolution: int = 256,
+    probes: Sequence[Probe | Mapping[str, object]] = (),
+    **case: Unpack[CaseArguments],
+) -> xr.Dataset:
+    """Simulate a rotor that runs up or coasts down, and record every revolution.
+
+    Parameters
+    ----------
+    rig : Rig, str or path
+        A rig, the name of a packaged one ("mokhtar2017"), or the path of a rig file.
+    start, stop : float (rad/s) or str with a unit
+        Spin speeds; stop below start is a coast-down.
+    time : float (s) or str with a unit
+        From start to stop, at constant angular acceleration.
+    speed_law : sequence of (time, speed), optional
+        In place of these three: speeds at some times, linear between them.
+    pieces_per_revolution : int
+        Pieces of constant speed into which a revolution is cut; the error of the changing speed falls with
+        the square of their number.
+    initial : State or dict, optional
+        Where to start; by default in the contact-free motion at the first speed.
+    samples_per_revolution : int
+        Samples in each, locked to the shaft.
+    probes : sequence of Probe or dict
+        What is measured besides, as in `simulate`.
+    **case
+        Clearance, friction, laws and accuracy as of `simulate`; `clearance` is needed.
+
+    Returns
+    -------
+    xarray.Dataset
+        Signals as of `simulate` over `sample`; over `turn`, the revolutions, `speed` (rad/s), `time` (s),
+        `contact_fraction`, `peak_contact_force` and `friction_work`; and over `turn` and `order` the
+        amplitude (zero to peak) and phase of the displacements of the disc, its torsion and the probes, over
+        six revolutions: `amplitude_vertical`, `phase_vertical` (rad, by which the signal leads the order of
+        the shaft's angle), and so on. A case that ends early says why in the attribute `reason`.
+
+    Raises
+    ------
+    InputError
+        If an argument cannot be used; its text says which one and how to fix it.
+
+    Examples
+    --------
+    >>> passage = run_up("mokhtar2017", start="1200 rpm", stop="2400 rpm", time="1 s", clearance="5 mm")
+    >>> round(float(passage.speed[passage.amplitude_vertical.sel(order=1).argmax()]) * 9.5493)
+    2037
+    """
+    law = _read_law(start, stop, time, speed_law)
+    for name in ("speed", "speed_ratio", "clearance_ratio"):
+        if case.get(name) is not None:
+            fix = "give clearance" if name == "clearance_ratio" else "give start, stop and time"
+            raise InputError(f"run_up: {name}: the speed changes; {fix}")
+    measured = read_probes("run_up", probes)
+    case["speed"] = max(law.speed)
+    one = case_of(
+        "run_up",
+        rig,
+        case,
+        samples_per_revolution=samples_per_revolution,
+        initial={"from": CONTACT_FREE} if initial is None else initial,
+        probes=measured,
+    )
+    if not isinstance(one.setup, ModalSetup):
+        raise InputError(f'run_up: method: {case["method"]} holds the speed; take method = "modal"')
+    found = integrate_run_up(
+        one.setup,
+        law,
+        clearance=one.clearance,
+        friction=one.friction,
+        initial=one.initial,
+        pieces_per_revolution=pieces_per_revolution,
+    )
+    signals = by_name(found.whole, one.setup.model)
+    known = VARIABLES | probe_variables((probe.name, probe.quantity) for probe in measured)
+    variables: dict[str, Any] = {
+        name: (known[name].dims, values, _about(known[name].unit, known[name].long_name))
+        for name, values in signals.items()
+    }
+    variables["speed"] = "turn", found.speed, _about("rad s-1", "mean spin speed of the revolution")
+    variables["time"] = "turn", found.time, _about("s", "beginning of the revolution")
+    for name in ("contact_fraction", "peak_contact_force", "friction_work"):
+        about = _about(known[name].unit, known[name].long_name)
+        variables[name] = ("turn", "stator"), getattr(found, name), about
+    for name in (*_TRACKED, *(name for name in signals if name.startswith(PROBE))):
+        lines = np.stack(
+            [track_order(signals[name], samples_per_revolution, order, WINDOW) for order in ORDERS], axis=-1
+        )
+        text = known[name].long_name
+        over = ("turn", "order")
+        variables[f"amplitude_{name}"] = (
+            over,
+            np.abs(lines),
+            _about(known[name].unit, f"amplitude of the {text}"),
+        )
+        variables[f"phase_{name}"] = over, np.angle(lines), _about("rad", f"phase of the {text}")
+    return _dataset(variables, len(found.speed), samples_per_revolution, found.reason, one.note)
+
+
+def _read_law(
+    start: float | str | None,
+    stop: float | str | None,
+    time: float | str | None,
+    law: Sequence[tuple[float | str, float | str]] | None,
+) -> SpeedLaw:
+    """The speed over the time, from either way to state it."""
+    if (law is None) == (start is None and stop is None and time is None):
+        raise InputError("run_up: give start, stop and time, or a speed_law, one of the two")
+    if law is None:
+        for name, value in (("start", start), ("stop", stop), ("time", time)):
+            if value is None:
+                raise InputError(f"run_up: {name}: missing; give start, stop and time")
+        law = [(0.0, start or 0.0), (time or 0.0, stop or 0.0)]
+    try:
+        times = tuple(parse_quantity(t, "s", "time") for t, _ in law)
+        speeds = tuple(parse_quantity(speed, "rad/s", "speed") for _, speed in law)
+        return SpeedLaw(time=times, speed=speeds)
+    except (TypeError, ValueError):
+        raise InputError("run_up: speed_law: is no list of pairs; write [(0, 30), (10, 300)]") from None
+    except InputError as error:
+        raise InputError(f"run_up: {error}") from None
+
+
+def _about(unit: str, long_name: str) -> dict[str, str]:
+    return {"units": unit, "long_name": long_name}
+
+
+def _dataset(
+    variables: dict[str, Any], n_turn: int, per_revolution: int, reason: str, note: str
+) -> xr.Dataset:
+    import xarray as xr
+
+    n_stator = variables["contact_force"][1].shape[0]
+    found = xr.Dataset(
+        variables,
+        coords={
+            "revolution": (
+                "sample",
+                np.arange(n_turn * per_revolution) / per_revolution,
+                _about("1", "revolution"),
+            ),
+            "turn": ("turn", np.arange(n_turn), _about("1", "number of the revolution, from 0")),
+            "order": ("order", np.array(ORDERS), _about("1", "order of the spin frequency")),
+            "stator": ("stator", np.arange(1, n_stator + 1), _about("1", "number of the stator")),
+        },
+    )
+    found.attrs |= {"reason": reason, "note": note}
+    return found

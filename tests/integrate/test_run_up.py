@@ -1,0 +1,243 @@
+"""Run-ups and coast-downs: held to full-order time stepping, to Lewis, and to the steady speed."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from trial_rig import trial_rig
+
+from rubhpc import LumpedStator, Rig, Unbalance, run_up, simulate
+from rubhpc.errors import InputError
+from rubhpc.integrate.speed_law import SpeedLaw
+from rubhpc.rig.bearing_table import BearingTable
+from rubhpc.spectra import track_order
+
+M = np.diag([5.0, 5.0, 1e-2, 1e-2, 8e-3])
+C = np.diag([30.0, 30.0, 1e-3, 1e-3, 1e-2])
+K = np.diag([2e5, 2.4e5, 60.0, 60.0, 90.0])
+K[0, 3] = K[3, 0] = 300.0
+K[1, 2] = K[2, 1] = -300.0
+G = np.zeros((5, 5))
+G[2, 3], G[3, 2] = 2e-2, -2e-2
+DEGREES = [(1, "v"), (1, "w"), (1, "thy"), (1, "thz"), (1, "thx")]
+STOP = LumpedStator(node=1, angle=0.0, mass=0.4, stiffness=4e5, damping=40.0, radius=0.05)
+RIG = Rig.from_matrices(
+    M,
+    C,
+    K,
+    G,
+    degrees=DEGREES,
+    stators=[STOP],
+    unbalance=[Unbalance(node=1, mass=0.01, radius=0.05, phase=0.4)],
+)
+MOMENT = 0.01 * 0.05 * np.exp(0.4j)
+SPINNING = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
+
+
+def sample_times(start, stop, time, n):
+    law = SpeedLaw(time=(0.0, time), speed=(start, stop))
+    return law.at_angle(2 * math.pi * np.arange(law.n_revolution * n) / n)[0]
+
+
+def stepped(
+    start, stop, time, per_revolution, clearance=1.0, friction=0.0, table=None, gravity=0.0, most=None
+):
+    """Vertical, horizontal and torsional motion by Dormand and Prince's method, with inelastic impacts."""
+    rate = (stop - start) / time
+    n = 6  # and the tip
+    mass, damping, stiffness = (np.zeros((n, n)) for _ in range(3))
+    mass[:5, :5], mass[5, 5] = M, STOP.mass
+    damping[5, 5], stiffness[5, 5] = STOP.damping, STOP.stiffness
+    inverse = np.linalg.inv(mass)
+    gap = np.array([-1.0, 0, 0, 0, 0, 1.0])
+    push = np.array([-1.0, -friction, 0, 0, -friction * STOP.radius, 1.0])
+
+    def accelerations(t, y):
+        spin, angle = start + rate * t, start * t + rate * t**2 / 2
+        turning = MOMENT * (spin**2 - 1j * rate) * np.exp(1j * angle)
+        damping[:5, :5] = C + spin * G
+        stiffness[:5, :5] = K + rate * G
+        if table is not None:
+            k, c = table.at(spin)
+            stiffness[:2, :2] += k
+            damping[:2, :2] += c
+        force = -damping @ y[n:] - stiffness @ y[:n]
+        force[:5] += np.array([turning.real - gravity * M[0, 0], turning.imag, 0, 0, 0]) - rate * M @ SPINNING
+        return inverse @ force
+
+    def pressing(t, y):
+        return -(gap @ accelerations(t, y)) / (gap @ inverse @ push)
+
+    def open_rates(t, y):
+        return np.concatenate([y[n:], accelerations(t, y)])
+
+    def closed_rates(t, y):
+        return np.concatenate([y[n:], accelerations(t, y) + inverse @ push * pressing(t, y)])
+
+    def touches(t, y):
+        return clearance + gap @ y[:n]
+
+    touches.terminal = pressing.terminal = True
+    touches.direction = pressing.direction = -1
+    times = sample_times(start, stop, time, per_revolution)[:most]
+    y = np.zeros(2 * n)
+    k = np.zeros((5, 5)) if table is None else np.pad(table.at(start)[0], (0, 3))
+    y[:5] = np.linalg.solve(K + k, -rate * M @ SPINNING - gravity * M[:, 0])
+    found, t, is_closed = np.zeros((2 * n, times.size)), 0.0, False
+    while t < times[-1]:
+        rates, event = (closed_rates, pressing) if is_closed else (open_rates, touches)
+        part = solve_ivp(
+            rates, (t, times[-1]), y, method="DOP853", rtol=1e-9, atol=1e-12, events=event, dense_output=True
+        )
+        inside = (times >= t) & (times <= part.t[-1])
+        if inside.any():
+            found[:, inside] = part.sol(times[inside])
+        t, y = part.t[-1], part.y[:, -1].copy()
+        if part.status == 1 and not is_closed:
+            y[n:] -= inverse @ push * (gap @ y[n:]) / (gap @ inverse @ push)
+        is_closed = not is_closed and pressing(t, y) > 0.0  # or it parts at once
+    return found[[0, 1, 4]]
+
+
+def test_free_passages_meet_full_order_stepping_in_second_order():
+    """A hundredth of the usual time, so that the speed changes by 4 % a revolution."""
+    law = {"start": 120.0, "stop": 300.0, "time": 2.0}
+    expected = stepped(*law.values(), 64)
+    errors = []
+    for pieces in (1, 2, 4):
+        found = run_up(
+            RIG,
+            **law,
+            clearance=1.0,
+            initial={"from": "rest"},
+            samples_per_revolution=64,
+            pieces_per_revolution=pieces,
+        )
+        rows = np.array([found.vertical, found.horizontal])
+        errors.append(np.linalg.norm(rows - expected[:2]) / np.linalg.norm(expected[:2]))
+        assert found.torsion.values == pytest.approx(expected[2], rel=1e-6)  # of the shaft's own inertia
+    assert errors[0] < 8e-3
+    assert errors[2] < errors[0] / 12
+
+
+@pytest.mark.parametrize(("start", "stop", "time"), [(150.0, 250.0, 4.0), (235.0, 205.0, 1.2)])
+def test_rub_in_a_passage_meets_full_order_stepping(start, stop, time):
+    law = {"start": start, "stop": stop, "time": time}
+    found = run_up(
+        RIG,
+        **law,
+        clearance=6e-4,
+        friction=0.2,
+        initial={"from": "rest"},
+        samples_per_revolution=32,
+        pieces_per_revolution=4,
+    )
+    touched = np.flatnonzero(found.contact_fraction[:, 0])
+    assert touched.size > 12
+    end = (touched[0] + 12) * 32  # a touch that all but grazes parts them later
+    expected = stepped(*law.values(), 32, clearance=6e-4, friction=0.2, most=end)
+    rows = np.array([found.vertical, found.horizontal, found.torsion])[:, :end]
+    scale = np.abs(expected).max(axis=1)
+    assert (np.abs(rows - expected).max(axis=1) / scale).max() < 2e-3
+
+
+def test_passage_through_resonance_reaches_what_lewis_found():
+    """F. M. Lewis, Trans. ASME 54 (1932) 253: undamped, 3.67 sqrt(q) + 1/4 times the static deflection.
+
+    q is the square of the natural frequency over the rate of the frequency, both in cycles. The force of an
+    unbalance grows with the speed; it is taken at resonance, which the motion remembers.
+    """
+    rig = Rig.from_matrices(
+        np.diag([1.0, 1.0]),
+        None,
+        np.diag([1e4, 9e6]),
+        degrees=[(1, "v"), (1, "w")],
+        stators=[LumpedStator(node=1, mass=1e-3, stiffness=1e5, damping=1.0, radius=0.1)],
+        unbalance=[Unbalance(node=1, mass=1e-4, radius=0.1)],
+    )
+    start, stop, time = 60.0, 130.0, 5.0
+    q = (100.0 / (2 * math.pi)) ** 2 / ((stop - start) / time / (2 * math.pi))
+    found = run_up(rig, start=start, stop=stop, time=time, clearance=1.0)
+    static = 1e-5  # m, at 100 rad/s
+    assert float(abs(found.vertical).max()) / static == pytest.approx(3.67 * math.sqrt(q) + 0.25, rel=0.02)
+
+
+def test_a_law_of_constant_speed_is_a_simulation():
+    case = {"clearance": "60 um", "samples_per_revolution": 64}
+    steady = simulate(trial_rig(2), speed=210.0, transient=0, revolutions=12, **case)
+    found = run_up(
+        trial_rig(2),
+        start=210.0,
+        stop=210.0,
+        time=12.01 * 2 * math.pi / 210.0,
+        initial={"from": "rest"},
+        **case,
+    )
+    assert steady.contact_force.max() > 0.0
+    for name in ("vertical", "torsion", "stator_axial", "contact_force"):
+        signal = steady.signals[name]
+        assert found[name].values == pytest.approx(signal, abs=1e-6 * np.abs(signal).max()), name
+    assert found.contact_fraction.mean("turn").values == pytest.approx(steady.contact_fraction, rel=1e-4)
+    assert found.friction_work.mean("turn").values == pytest.approx(steady.friction_work, rel=1e-4)
+
+
+def test_bearings_have_their_coefficients_at_the_speed_reached():
+    table = BearingTable(
+        node=1, speed=(0.0, 400.0), stiffness=(2e4, 1.4e5), damping=(60.0, 10.0), interpolation="linear"
+    )
+    rig = replace(RIG, rotor=replace(RIG.rotor, bearing=(table,), gravity=9.81))
+    law = {"start": 150.0, "stop": 240.0, "time": 2.0}
+    found = run_up(
+        rig,
+        **law,
+        clearance=1.0,
+        initial={"from": "rest"},
+        samples_per_revolution=32,
+        pieces_per_revolution=4,
+    )
+    expected = stepped(*law.values(), 32, table=table, gravity=9.81)
+    rows = np.array([found.vertical, found.horizontal])
+    assert np.linalg.norm(rows - expected[:2]) < 5e-3 * np.linalg.norm(expected[:2])
+
+
+def test_orders_are_followed():
+    angle = 2 * math.pi * np.arange(64 * 40) / 64
+    growth = 1.0 + 1e-3 * angle
+    signal = 3.0 + growth * np.cos(angle + 0.3) + 0.5 * np.sin(angle / 3)
+    first, third = (track_order(signal, 64, order, 6) for order in (1.0, 1 / 3))
+    assert np.abs(first[6:-6]) == pytest.approx(growth[::64][6:-6], rel=2e-3)
+    assert np.angle(first) == pytest.approx(0.3, abs=5e-3)
+    assert np.abs(third[6:-6]) == pytest.approx(0.5, rel=5e-3)
+    assert np.angle(third[6:-6]) == pytest.approx(-math.pi / 2, abs=5e-3)
+
+
+def test_a_law_of_several_points_is_run_through_in_turn():
+    law = SpeedLaw(time=(0.0, 1.0, 3.0), speed=(10.0, 30.0, 20.0))
+    time, speed, rate = law.at_angle([0.0, 20.0, 47.5])
+    assert time == pytest.approx([0.0, 1.0, 2.0])
+    assert speed == pytest.approx([10.0, 30.0, 25.0])
+    assert rate == pytest.approx([20.0, -5.0, -5.0])
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"start": 10.0}, "stop: missing; give start, stop and time"),
+        ({}, "give start, stop and time, or a speed_law"),
+        ({"start": 0.0, "stop": 10.0, "time": 1.0}, "0 rad/s is out of range"),
+        ({"start": 10.0, "stop": 20.0, "time": 1e-3}, "0.00239 of a revolution; give it more time"),
+        ({"speed_law": [(0.0, 10.0), (0.0, 20.0)]}, "times do not rise"),
+        ({"start": 90.0, "stop": 99.0, "time": 1.0, "speed": 3.0}, "speed: the speed changes; give start"),
+        ({"start": 90.0, "stop": 99.0, "time": 1.0, "clearance_ratio": 0.7}, "give clearance"),
+        ({"start": 90.0, "stop": 99.0, "time": 1.0, "method": "central-difference"}, "holds the speed"),
+        (
+            {"start": 90.0, "stop": 99.0, "time": 1.0, "pieces_per_revolution": 3},
+            "3 is no divisor of the 256",
+        ),
+    ],
+)
+def test_what_is_no_run_up_is_refused(keys, says):
+    with pytest.raises(InputError, match=says):
+        run_up(RIG, **({"clearance": 1e-3} if "clearance_ratio" not in keys else {}), **keys)
