@@ -1,0 +1,97 @@
+"""The Bode plot: amplitude and phase of an order over the speed, of a run-up or of the cases of a study."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postproc.figures.drawing import Drawing
+from postproc.figures.overlay import overlaid
+from postproc.signals.orders import order_over_speed
+from postproc.store.units import scale_for, short_name
+from postproc.store.variables import require_results
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+    from postproc.figures.options import Axis, Positive
+
+_RPM = 30 / math.pi
+
+
+def bode(
+    cases: xr.Dataset, signal: str | Sequence[str] = (), *, order: Positive = 1.0, over: Axis | None = None
+) -> Drawing:
+    """Bode plot: amplitude and phase of an order over the speed.
+
+    Of a run-up by revolution, or of the cases of a study along its speeds, whose waveforms it needs.
+
+    Parameters
+    ----------
+    cases
+        All axes but the speed and `over` are of one value, or selected.
+    signal
+        May be repeated [default: vertical].
+    order
+        Multiple of the spin speed; 1 is 1X.
+    over
+        Draw the cases along AXIS over one another.
+    """
+    named = (signal,) if isinstance(signal, str) else signal
+    signals = tuple(dict.fromkeys(named)) or ("vertical",)
+    shown = order_over_speed(cases, signals, order, over)
+    for name in signals:
+        require_results(shown[f"amplitude_{name}"], cases)
+
+    def draw(axes: list[Axes]) -> None:
+        draw_bode(shown, signals, axes, order)
+
+    return Drawing(shown=shown, draw=draw, panels=(2, 1), height=90)
+
+
+def draw_bode(data: xr.Dataset, signals: Sequence[str], axes: list[Axes], order: float = 1.0) -> None:
+    """Draw amplitude (zero to peak) over phase lead, of each signal and case by its own colour."""
+    from matplotlib.ticker import MultipleLocator
+
+    top, bottom = axes
+    rpm = data["speed"].values * _RPM
+    unit = str(data[f"amplitude_{signals[0]}"].attrs.get("units", "1"))
+    sizes = [float(np.nanmax(data[f"amplitude_{name}"].values)) for name in signals]
+    scale = scale_for(unit, max(sizes))
+    is_sparse = rpm.size < 40
+    style: dict[str, Any] = {"marker": "." if is_sparse else "", "markersize": 4, "linewidth": 0.8}
+    n_curve = 0
+    for name in signals:
+        amplitude, phase = data[f"amplitude_{name}"], data[f"phase_{name}"]
+        curves = zip(overlaid(amplitude, "speed"), overlaid(phase, "speed"), strict=True)
+        for (case, height), (_, lead) in curves:
+            own = name.removeprefix("probe_").replace("_", " ") if len(signals) > 1 else None
+            label = ", ".join(text for text in (own, case) if text) or None
+            top.plot(rpm, height.values * scale.factor, label=label, **style)
+            bottom.plot(rpm, np.degrees(lead.values), **style)
+            n_curve += 1
+    first = (
+        short_name(data[f"amplitude_{signals[0]}"].rename(signals[0])) if len(signals) == 1 else "Amplitude"
+    )
+    top.set(ylabel=scale.label(f"{first}, {_written(order)}"), xlim=(rpm[0], rpm[-1]))
+    top.set_ylim(bottom=0.0)
+    if n_curve > 1:
+        top.legend(loc="best", fontsize=6)
+    bottom.set(xlabel="Spin speed (rpm)", ylabel="Phase lead (\N{DEGREE SIGN})")
+    low, high = bottom.get_ylim()
+    bottom.yaxis.set_major_locator(MultipleLocator(90 * max(1, round((high - low) / 450))))
+    bottom.ticklabel_format(axis="x", style="plain", useOffset=False)
+    top.figure.align_ylabels(axes)
+
+
+def _written(order: float) -> str:
+    """An order as engineers write it: 1X, 1/2X, 2X."""
+    for part in range(1, 9):
+        if abs(order * part - round(order * part)) < 1e-3:
+            return f"{round(order * part)}{'' if part == 1 else f'/{part}'}X"
+    return f"{order:.3g}X"

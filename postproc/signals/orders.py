@@ -1,0 +1,121 @@
+"""Amplitude and phase of an order of the spin over the speed: of a run-up, or of the cases of a study."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from postproc.signals.spectra import check_signal, samples_per_revolution
+from postproc.store.axes import axes_of, find_axis, source
+from postproc.store.select import narrow
+from rubhpc.errors import InputError
+from rubhpc.study.axes import SPEED_AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+WHOLE = 0.02  # of a revolution: by how much an order may miss a whole number of periods of a record
+NEAR = 1e-3  # of an order, within which a run-up follows it
+
+
+def order_over_speed(
+    store: xr.Dataset, signals: Sequence[str], order: float = 1.0, over: str | None = None
+) -> xr.Dataset:
+    """Return the amplitude (zero to peak) and phase of an order over the spin speed, loaded.
+
+    Parameters
+    ----------
+    store : Dataset
+        Of `rubhpc.run_up`, or a store with an axis of speeds and waveforms, in which axes but this and `over`
+        have been selected.
+    signals : sequence of str
+    order : float
+        Multiple of the spin frequency.
+    over : str, optional
+        An axis along which the cases are to be kept.
+
+    Returns
+    -------
+    Dataset
+        `amplitude_NAME` in the unit of the signal and `phase_NAME`, rad, by which it leads the order of the
+        shaft's angle, unwrapped, over `speed` (rad/s), rising, and `over`.
+
+    Raises
+    ------
+    InputError
+        There is no axis of speeds, no such signal, or the record does not hold whole periods of the order.
+    """
+    for signal in signals:
+        check_signal(signal)
+    found = (
+        _of_run_up(store, signals, order) if "turn" in store.dims else _of_cases(store, signals, order, over)
+    )
+    found = found.sortby("speed")
+    for signal in signals:
+        phase = found[f"phase_{signal}"]
+        unwrapped = np.unwrap(phase.values, axis=phase.get_axis_num("speed"))
+        found[f"phase_{signal}"] = phase.copy(
+            data=unwrapped - 2 * np.pi * round(_mean(unwrapped) / (2 * np.pi))
+        )
+    found["speed"].attrs |= {"units": "rad s-1", "long_name": "spin speed"}
+    return found
+
+
+def _mean(values: NDArray[np.float64]) -> float:
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else 0.0
+
+
+def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float) -> xr.Dataset:
+    near = np.flatnonzero(np.abs(store["order"].values - order) < NEAR)
+    if not near.size:
+        followed = ", ".join(f"{value:.4g}" for value in store["order"].values)
+        raise InputError(f"order: {order:g} is not followed in this run-up; choose one of {followed}")
+    names = [f"{what}_{signal}" for signal in signals for what in ("amplitude", "phase")]
+    for name in names:
+        if name not in store:
+            known = ", ".join(
+                str(n).removeprefix("phase_") for n in store.data_vars if str(n).startswith("phase_")
+            )
+            raise InputError(f"{name.split('_', 1)[1]}: no order of it is followed; choose one of {known}")
+    rows = store[names].isel(order=int(near[0])).drop_vars(["order", "stator"], errors="ignore")
+    return (
+        rows.assign_coords(speed=("turn", store["speed"].values))
+        .swap_dims(turn="speed")
+        .drop_vars("turn")
+        .load()
+    )
+
+
+def _of_cases(store: xr.Dataset, signals: Sequence[str], order: float, over: str | None) -> xr.Dataset:
+    along = next((axis for axis in axes_of(store) if axis in SPEED_AXES), None)
+    if along is None or store.sizes[along] < 2:
+        raise InputError(f"{source(store)}: bode needs an axis of several speeds")
+    spread = [along, *([find_axis(store, over)] if over else [])]
+    data = narrow(store, [*signals, "spin_speed"], spread).load()
+    variables = {}
+    for signal in signals:
+        n = samples_per_revolution(data[signal])
+        turns = data.sizes["sample"] // n
+        if abs(turns * order - round(turns * order)) > WHOLE:
+            problem = f"{turns} revolutions hold no whole number of periods of order {order:g}"
+            raise InputError(f"{source(store)}: {problem}; record a multiple of its period")
+        dims = [dim for dim in data[signal].dims if dim != "sample"]
+        rows = data[signal].transpose(*dims, "sample").values.astype(float)
+        turning = np.exp(-2j * np.pi * order / n * np.arange(rows.shape[-1]))
+        lines = rows @ turning * (2.0 / rows.shape[-1])
+        about = data[signal].attrs
+        variables[f"amplitude_{signal}"] = (dims, np.abs(lines), {**about})
+        variables[f"phase_{signal}"] = (dims, np.angle(lines), {"units": "rad", "long_name": "phase"})
+    speed = data["spin_speed"]
+    if speed.dims != (along,):
+        problem = f"the speeds depend on {', '.join(str(d) for d in speed.dims if d != along)} too"
+        raise InputError(f"{source(store)}: {problem}; select one value of it")
+    coords = {name: at for name, at in data.coords.items() if "sample" not in at.dims and name != "speed"}
+    found = xr.Dataset(variables, coords=coords)
+    found = found.assign_coords(speed=(along, speed.values))
+    return found if along == "speed" else found.swap_dims({along: "speed"})

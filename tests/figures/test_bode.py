@@ -1,0 +1,77 @@
+"""Bode plots: what an order is over the speed, of a study and of a run-up."""
+
+import math
+
+import numpy as np
+import pytest
+import synthetic_store
+import xarray as xr
+
+from postproc.figures.bode import bode
+from postproc.signals.orders import order_over_speed
+from rubhpc.errors import InputError
+
+N = 32  # samples a revolution
+
+
+def study(turns=6):
+    """Two frictions, three speeds: amplitude 1 um per rad/s and friction, lagging by 0.01 rad per rad/s."""
+    angle = 2 * math.pi * np.arange(N * turns) / N
+    speed, friction = np.array([300.0, 100.0, 200.0]), np.array([1.0, 2.0])
+    size = 1e-6 * speed[:, None, None] * friction[:, None]
+    signal = size * np.cos(angle - 0.01 * speed[:, None, None]) + 1e-4 * np.cos(0.5 * angle + 0.7)
+    return xr.Dataset(
+        {
+            "vertical": (("speed", "friction", "sample"), signal, {"units": "m"}),
+            "status": (("speed", "friction"), np.ones((3, 2), dtype=np.int8)),
+            "spin_speed": ("speed", speed, {"units": "rad s-1"}),
+        },
+        coords={"speed": speed, "friction": friction, "revolution": ("sample", np.arange(N * turns) / N)},
+    )
+
+
+def test_amplitude_and_phase_are_those_of_the_order():
+    found = order_over_speed(study().isel(friction=0), ["vertical"])
+    assert found["speed"].values == pytest.approx([100.0, 200.0, 300.0])
+    assert found["amplitude_vertical"].values == pytest.approx([1e-4, 2e-4, 3e-4])
+    assert found["phase_vertical"].values == pytest.approx([-1.0, -2.0, -3.0])
+    half = order_over_speed(study().isel(friction=0), ["vertical"], order=0.5)
+    assert half["amplitude_vertical"].values == pytest.approx([1e-4] * 3)
+    assert half["phase_vertical"].values == pytest.approx([0.7] * 3)
+
+
+def test_cases_lie_over_one_another():
+    axes = bode(study(), over="friction").show()
+    assert [len(ax.lines) for ax in axes] == [2, 2]
+    assert axes[0].get_ylabel() == "Vertical displacement, 1X (µm)"
+    assert axes[1].get_xlabel() == "Spin speed (rpm)"
+
+
+def test_a_run_up_is_drawn_by_revolution():
+    lines = np.array([[1.0, 2.0], [3.0, 4.0]]) * 1e-6
+    run_up = xr.Dataset(
+        {
+            "speed": ("turn", [100.0, 90.0]),
+            "amplitude_probe_a": (("turn", "order"), lines, {"units": "m", "long_name": "amplitude"}),
+            "phase_probe_a": (("turn", "order"), lines * 1e6),
+        },
+        coords={"order": [0.5, 1.0], "turn": [0, 1]},
+    )
+    found = order_over_speed(run_up, ["probe_a"], order=1.0)
+    assert found["amplitude_probe_a"].values == pytest.approx([4e-6, 2e-6])  # by rising speed
+    assert len(bode(run_up, "probe_a", order=0.5).show()[0].lines) == 1
+    with pytest.raises(InputError, match=r"order: 3 is not followed in this run-up; choose one of 0\.5, 1"):
+        order_over_speed(run_up, ["probe_a"], order=3.0)
+    with pytest.raises(InputError, match=r"vertical: no order of it is followed; choose one of probe_a"):
+        order_over_speed(run_up, ["vertical"])
+
+
+def test_what_has_no_bode_plot_is_refused():
+    with pytest.raises(InputError, match=r"5 revolutions hold no whole number of periods of order 0\.5"):
+        order_over_speed(study(turns=5).isel(friction=0), ["vertical"], order=0.5)
+    with pytest.raises(InputError, match="needs an axis of several speeds"):
+        order_over_speed(study().isel(speed=0, friction=0), ["vertical"])
+    with pytest.raises(InputError, match="select one value of friction"):
+        bode(study())
+    with pytest.raises(InputError, match="torsoin: no such signal"):
+        bode(synthetic_store.make(), "torsoin")
