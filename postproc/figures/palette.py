@@ -27,7 +27,7 @@ REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
 PERIOD_COLORS = ("#D55E00", "#88CCEE", "#332288", "#999933", "#CC79A7")  # none, P1 to P4
 SETTLED_COLORS = ("#D55E00", "#56B4E9")
 NOT_SETTLED = SETTLED[0].replace("_", " ")
-SCHEME_COLORS = ("#56B4E9", "#E69F00", "#009E73")
+SCHEME_COLORS = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7")
 STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00", "#B8DFD2")
 # Motions that starts reach, by number; the contact-free one has the colour of its regime.
 MOTION_COLORS = (

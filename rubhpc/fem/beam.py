@@ -144,6 +144,21 @@ def bending(
     return translational, rotary, stiffness
 
 
+def squared_slope(length: float, flexural_rigidity: float, shear_rigidity: float) -> Matrix:
+    """Return the matrix S (4, 4), 1/m, whose form `u^T S u` is the integral of the squared slope of a beam.
+
+    Degrees and parameters as in `bending`. Half of it is by how much the ends of a bent beam come nearer to
+    each other while its axis keeps its length; S is the stiffness that a unit axial tension adds.
+    """
+    L = length
+    phi = 12 * flexural_rigidity / (shear_rigidity * L**2)
+    a = 6 / 5 + 2 * phi + phi**2
+    e = (2 / 15 + phi / 6 + phi**2 / 12) * L**2
+    f = -(1 / 30 + phi / 6 + phi**2 / 12) * L**2
+    slope: Matrix = _symmetric(a, -a, L / 10, -L / 10, e, f) / (L * (1 + phi) ** 2)
+    return slope
+
+
 def _symmetric(a: float, b: float, c: float, d: float, e: float, f: float) -> Matrix:
     """Return the matrix of a beam that is symmetric about its middle."""
     return np.array([[a, c, b, -d], [c, e, d, f], [b, d, a, -c], [-d, f, -c, e]])
@@ -191,10 +206,10 @@ def stator_element(stator: Stator) -> Element:
     L = stator.length / stator.elements
     area = stator.width * stator.height
     second_moment = stator.width * stator.height**3 / 12
-    E, nu, rho = stator.youngs_modulus, stator.poissons_ratio, stator.density
-    shear_rigidity = shear_coefficient_rectangle(nu) * E / (2 * (1 + nu)) * area
+    E, rho = stator.youngs_modulus, stator.density
+    flexural_rigidity, shear_rigidity = _bending_rigidities(stator)
     translational, rotary, flexural = bending(
-        L, E * second_moment, shear_rigidity, rho * area, rho * second_moment
+        L, flexural_rigidity, shear_rigidity, rho * area, rho * second_moment
     )
 
     mass, stiffness = np.zeros((2, 6, 6))
@@ -202,3 +217,20 @@ def stator_element(stator: Stator) -> Element:
     mass[axial], stiffness[axial] = bar(L, E * area, rho * area)
     mass[lateral], stiffness[lateral] = translational + rotary, flexural
     return Element(mass=mass, gyroscopic=np.zeros((6, 6)), stiffness=stiffness)
+
+
+def stator_foreshortening(stator: Stator) -> Matrix:
+    """Return the squared slope of a meshed stator, (3 n_node, 3 n_node), 1/m: `squared_slope`, assembled."""
+    element = np.zeros((6, 6))
+    lateral = np.ix_((1, 2, 4, 5), (1, 2, 4, 5))
+    element[lateral] = squared_slope(stator.length / stator.elements, *_bending_rigidities(stator))
+    nothing = np.zeros_like(element)
+    part = Element(mass=nothing, gyroscopic=nothing, stiffness=element)
+    return join([part] * stator.elements).stiffness
+
+
+def _bending_rigidities(stator: Stator) -> tuple[float, float]:
+    """E I (N m^2) and kappa G A (N) of a stator."""
+    E, nu = stator.youngs_modulus, stator.poissons_ratio
+    shear = shear_coefficient_rectangle(nu) * E / (2 * (1 + nu)) * (stator.width * stator.height)
+    return E * (stator.width * stator.height**3 / 12), shear

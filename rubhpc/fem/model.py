@@ -160,6 +160,8 @@ class StatorModel:
     euler_load: float  # N
     axial: int  # row of the tip's axial displacement in the body
     lateral: int  # row of the tip's lateral displacement; -1 without lateral freedom
+    # (n_dof, n_dof), 1/m: the tip draws back by half the form of the displacements; None: not counted
+    squared_slope: NDArray[np.float64] | None = None
     alone: StatorModel | None = None  # on a carrier: while that is held; `body` is all that stands on it
 
     @property

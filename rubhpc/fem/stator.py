@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.fem.beam import STATOR_DEGREES, join, stator_element
+from rubhpc.fem.beam import STATOR_DEGREES, join, stator_element, stator_foreshortening
 from rubhpc.fem.damping import rayleigh_coefficients
 from rubhpc.fem.model import Body, StatorModel
-from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
+from rubhpc.rig.stators import SECOND_ORDER, LumpedStator, MatrixStator, Stator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -60,6 +60,7 @@ def _(stator: Stator, radius: float) -> StatorModel:
         euler_load=stator.euler_load,
         axial=body.index(tip, "axial"),
         lateral=body.index(tip, "lateral"),
+        squared_slope=stator_foreshortening(stator)[rows] if stator.geometry == SECOND_ORDER else None,
     )
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 _FEW = 12  # keys that an error lists
-_SETTABLE = ("quantity", "count", "flag")  # kinds of fields that one number can set
+_SETTABLE = ("quantity", "count", "flag", "choice")  # kinds of fields that one value can set
 
 
 def find_key(owner: object, dotted: str) -> dataclasses.Field[Any]:

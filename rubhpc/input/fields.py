@@ -85,9 +85,9 @@ def text(*, doc: str, example: str, default: Any = MISSING) -> Any:
     return _declare("text", doc, example, default)
 
 
-def choice(*, of: tuple[str, ...], doc: str, example: str, default: str) -> Any:
-    """Declare a field that holds one word of a list."""
-    return _declare("choice", doc, example, default, of=of)
+def choice(*, of: tuple[str, ...], doc: str, example: str, default: str, added: bool = False) -> Any:
+    """Declare a field that holds one word of a list; `added`: rigs of older stores have no such key."""
+    return _declare("choice", doc, example, default, of=of, added=added)
 
 
 def choices(*, of: tuple[str, ...], doc: str, example: str, default: tuple[str, ...]) -> Any:

@@ -10,6 +10,7 @@ from rubhpc.integrate.central_difference_march import CentralDifferenceMarch
 from rubhpc.integrate.closed_form import closed_form_march
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
+from rubhpc.integrate.curved_march import CurvedMarch
 from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.friction_march import FrictionMarch
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
 
 MARCHES: dict[Scheme, Callable[..., March]] = {
     Scheme.EVENT_DRIVEN: EventDrivenMarch,
+    Scheme.CURVED: CurvedMarch,
     Scheme.CONTACT_STEPPING: ContactSteppingMarch,
     Scheme.CENTRAL_DIFFERENCE: CentralDifferenceMarch,
 }
@@ -212,7 +214,7 @@ def _integrate(
 
 def _solver(march: March, setup: Setup, clearance: float, friction: float, final: State) -> Solver | None:
     """What finds periodic motions next to where a march has ended; None where it has no closed form."""
-    if isinstance(march, EventDrivenMarch) and isinstance(setup, ModalSetup):
+    if isinstance(march, EventDrivenMarch) and march.has_closed_form and isinstance(setup, ModalSetup):
         return Solver(setup, clearance, friction, final)
     return None
 
@@ -228,7 +230,7 @@ def _neighbours(
     """The motion from where a march has ended, and one beside it."""
     if solver is not None and solver.has_begun:
         march = start(final)  # the tables may have been filled anew
-    if isinstance(march, EventDrivenMarch) and not isinstance(march, FrictionMarch):
+    if isinstance(march, EventDrivenMarch) and not isinstance(march, CurvedMarch | FrictionMarch):
         return NeighbourMotions(march)
     return Marches(start, final, setup, recording)
 

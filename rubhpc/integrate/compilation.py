@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 # Kernels that are announced by themselves -> what for; they are compiled when a case first needs them.
 _PARTS = {
     "advance_by_steps": "for contact in short steps",
+    "advance_curved": "for curved gaps",
     "next_event": "for periodic motions",
     "part": "for neighbouring motions, which distinguish chaos from order",
 }

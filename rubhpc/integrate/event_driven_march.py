@@ -39,6 +39,8 @@ class NoClosedForm(Exception):  # noqa: N818 - a state of the motion, never seen
 class EventDrivenMarch(ModalMarch):
     """A case that goes from one contact mode to another; `NoClosedForm` leaves it to contact stepping."""
 
+    has_closed_form = True  # of its closed contacts
+
     def __init__(
         self,
         setup: ModalSetup,

@@ -19,7 +19,7 @@ from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import ModalSetup
 from rubhpc.kernels.complementarity import solve_complementarity
-from rubhpc.kernels.contact_pairs import normal_and_gap
+from rubhpc.kernels.contact_pairs import AXIAL, normal_and_gap
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -98,11 +98,17 @@ def gaps(displacement: Floats, setup: Setup, clearance: float) -> tuple[Floats, 
     gap, gap_jacobian = np.zeros(len(degree)), np.zeros((len(degree), displacement.size))
     for i, (stator, rows) in enumerate(zip(model.stators, degree, strict=True)):
         at = np.where(rows >= 0, displacement[rows], 0.0)
+        body = slice(model.stator_start[i], model.stator_start[i] + stator.body.n_dof)
+        drawn = np.zeros(stator.body.n_dof)
+        if stator.squared_slope is not None:
+            drawn = stator.squared_slope @ displacement[body]
+            at[AXIAL] += 0.5 * displacement[body] @ drawn
         ey, ez = float(np.cos(stator.angle)), float(np.sin(stator.angle))
         reach = clearance + stator.clearance_offset
         ny, nz, gap[i] = normal_and_gap(ey, ez, stator.radius, reach, 0.0, setup.is_updated, at)
         change = np.array([-ny, -nz, 0.0, ny * ey + nz * ez, ny * -ez + nz * ey])
         gap_jacobian[i, rows[rows >= 0]] = change[rows >= 0]
+        gap_jacobian[i, body] += change[AXIAL] * drawn
     return gap, gap_jacobian
 
 

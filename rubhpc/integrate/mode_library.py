@@ -100,7 +100,8 @@ class ModeLibrary:
 
     def tables(self) -> kernel.ModeTables:
         """All contact modes as arrays."""
-        return self._tables.view()
+        tables: kernel.ModeTables = self._tables.view()
+        return tables
 
     def exponents(self, mask: int) -> tuple[Floats, Floats]:
         """Of the coordinates of a mode, 1/s: (2, m), real and imaginary, and the drift (m,) of those of 0."""

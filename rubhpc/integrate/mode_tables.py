@@ -39,16 +39,17 @@ class TableStack:
         self.n_most = max(n_least, n_most)
         self._n_least, self._n_filled = n_least, 0
         self._room: list[Any] = []
-        self._view: kernel.ModeTables | None = None
+        self._view: Any = None
 
-    def add(self, row: kernel.ModeTables) -> None:
-        """Take in the tables of a mode, (1, ...) each."""
+    def add(self, row: Any) -> None:
+        """Take in the tables of a mode, a named tuple of (1, ...) each."""
         rows: list[Any] = list(row)
         if not self._room:
             n_bytes = sum(field.nbytes for field in rows)
             self.n_most = max(self._n_least, min(self.n_most, MOST_BYTES // n_bytes))
             n_room = min(self._n_least, FIRST_ROOM)
             self._room = [np.empty((n_room, *field.shape[1:]), field.dtype) for field in rows]
+            self._kind = type(row)
         elif self._n_filled == len(self._room[0]):  # twice the room: most books never need it
             n_room = min(2 * self._n_filled, self.n_most)
             self._room = [np.resize(field, (n_room, *field.shape[1:])) for field in self._room]
@@ -61,10 +62,10 @@ class TableStack:
         """Give all room back to contact modes to come."""
         self._n_filled, self._view = 0, None
 
-    def view(self) -> kernel.ModeTables:
+    def view(self) -> Any:
         """The tables of all contact modes."""
         if self._view is None:
-            self._view = kernel.ModeTables(*(field[: self._n_filled] for field in self._room))
+            self._view = self._kind(*(field[: self._n_filled] for field in self._room))
         return self._view
 
 

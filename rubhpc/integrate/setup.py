@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.probes import with_probes
 from rubhpc.fem.response import step_limit
 from rubhpc.integrate.contact_mode import ContactMode, confine, solve_contact_mode, solve_parts
+from rubhpc.integrate.curved_library import CurvedLibrary
 from rubhpc.integrate.divergence import energy_limit
 from rubhpc.integrate.friction_mode import FrictionPairs, solve_friction_mode
 from rubhpc.integrate.mode_library import (
@@ -30,7 +31,7 @@ from rubhpc.integrate.reduction import ReducedModel, directions, reduce_model
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.schema import SCHEMES
-from rubhpc.study.tables import SEARCH_STEP
+from rubhpc.study.tables import SEARCH_STEP, check_bent
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from rubhpc.rig.rig import Rig
     from rubhpc.study.study import Contact, Integrator
 
+L = TypeVar("L", bound=ModeLibrary)
 FINEST_TICK = 1.5e-9  # s
 FEWEST_STEPS = 16  # a revolution: none is longer than the power of two below it
 
@@ -51,6 +53,9 @@ class Scheme(Enum):
     """How a case is integrated."""
 
     EVENT_DRIVEN = "event-driven"  # closed-form motion from event to event
+    CURVED = (
+        "curved"  # closed-form flights from event to event, steps of order 4 where a curved gap is closed
+    )
     CONTACT_STEPPING = "contact-stepping"  # closed-form motion between short steps of contact
     CENTRAL_DIFFERENCE = "central-difference"  # the paper's
 
@@ -60,10 +65,20 @@ class Scheme(Enum):
         return SCHEMES.index(self.value.replace("-", "_"))
 
 
-def scheme_of(contact: Contact, integrator: Integrator) -> Scheme:
-    """Return the scheme with which a case of a study begins."""
+def scheme_of(contact: Contact, integrator: Integrator, *, is_bent: bool = False) -> Scheme:
+    """Return the scheme with which a case of a study begins; `is_bent`: a stator's gap knows its bending.
+
+    Raises
+    ------
+    InputError
+        For a bent stator with laws or an integrator that have none.
+    """
+    if is_bent:
+        check_bent(contact, integrator)
     if integrator.method == "central-difference":
         return Scheme.CENTRAL_DIFFERENCE
+    if contact.is_smooth and (is_bent or contact.normal == "updated"):
+        return Scheme.CURVED
     return Scheme.CONTACT_STEPPING if contact.closed_form == "never" else Scheme.EVENT_DRIVEN
 
 
@@ -102,7 +117,9 @@ class ModalSetup:
     is_updated: bool  # normal
     displacement_limit: float  # m
     law: Law = MULTIPLIER
+    accuracy: float = 1e-3  # relative, of loads where gaps are curved
     _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
+    _curved_libraries: dict[float, CurvedLibrary] = field(default_factory=dict)
     _friction_libraries: dict[float, FrictionLibrary] = field(default_factory=dict)
     _penalty_libraries: dict[float, PenaltyLibrary] = field(default_factory=dict)
     _open_tables: dict[float, ModeTables] = field(default_factory=dict)
@@ -146,17 +163,26 @@ class ModalSetup:
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, shared by its cases."""
         if friction not in self._libraries:
-            self._libraries[friction] = ModeLibrary(
-                self.reduced,
-                self.model,
-                friction,
-                opened=self._opened,
-                known=self._known_of_ring,
-                tick=self.tick,
-                sample_level=self.sample_level,
-                n_level=self._n_level,
-            )
+            self._libraries[friction] = self._make_library(ModeLibrary, friction)
         return self._libraries[friction]
+
+    def curved_library(self, friction: float) -> CurvedLibrary:
+        """Contact modes of a friction with what curved gaps need, shared by its cases."""
+        if friction not in self._curved_libraries:
+            self._curved_libraries[friction] = self._make_library(CurvedLibrary, friction)
+        return self._curved_libraries[friction]
+
+    def _make_library(self, kind: type[L], friction: float) -> L:
+        return kind(
+            self.reduced,
+            self.model,
+            friction,
+            opened=self._opened,
+            known=self._known_of_ring,
+            tick=self.tick,
+            sample_level=self.sample_level,
+            n_level=self._n_level,
+        )
 
     @cached_property
     def _known(self) -> Solved:
@@ -268,14 +294,17 @@ def prepare(
     if speed == 0.0 or not math.isfinite(speed):
         raise InputError(f"speed: {speed} rad/s; sampling is locked to the shaft, so it has to turn")
     model = with_probes(model_at(model or assemble(rig), speed), rig, probes, speed)
+    is_bent = any(stator.squared_slope is not None for stator in model.stators)
+    scheme = scheme_of(contact, integrator, is_bent=is_bent)
     if integrator.method == "modal":
         return ModalSetup(
-            scheme=scheme_of(contact, integrator),
+            scheme=scheme,
             model=model,
             reduced=reduce_model(model, speed, integrator.accuracy),
             spin=speed,
             step=SEARCH_STEP if integrator.step is None else integrator.step,
             contact_step=integrator.contact_step(contact),
+            accuracy=integrator.accuracy,
             samples_per_revolution=samples_per_revolution,
             is_updated=contact.normal == "updated",
             law=law_of(contact),

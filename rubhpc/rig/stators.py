@@ -9,10 +9,22 @@ from typing import TypeAlias
 import numpy as np  # noqa: TC002 - annotations are read when a rig is built
 from numpy.typing import NDArray  # noqa: TC002
 
-from rubhpc.input.fields import FieldError, check_fields, count, flag, matrix, quantity, table, text, words
+from rubhpc.input.fields import (
+    FieldError,
+    check_fields,
+    choice,
+    count,
+    flag,
+    matrix,
+    quantity,
+    table,
+    text,
+    words,
+)
 from rubhpc.rig.matrix_body import check_body, checked_matrices
 from rubhpc.rig.parts import MOST_ELEMENTS, UNDAMPED, Damping
 
+LINEAR, SECOND_ORDER = "linear", "second_order"
 MOST_STATORS = 62  # a contact mode is numbered by the bits of an integer
 
 
@@ -74,6 +86,23 @@ class Stator(Seat):
         doc="Whether the stator bends in the tangential direction.", example="true", default=True
     )
     damping: Damping = table(doc="Rayleigh damping.", default=UNDAMPED)
+    geometry: str = choice(
+        doc="Whether a stator that bends keeps its length along its axis (linear), or its tip draws back and "
+        "an axial force lowers its lateral stiffness (second_order).",
+        example='"second_order"',
+        of=(LINEAR, SECOND_ORDER),
+        default=LINEAR,
+        added=True,
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.geometry == SECOND_ORDER and not self.lateral:
+            problem = "a stator with lateral = false does not bend"
+            raise FieldError("geometry", f'{problem}; set lateral = true, or geometry = "linear"')
+        if self.geometry == SECOND_ORDER and self.carrier is not None:
+            problem = "second_order needs a stator on the ground, and this one stands on a carrier"
+            raise FieldError("geometry", f'{problem}; take geometry = "linear", or remove carrier')
 
     @property
     def euler_load(self) -> float:
@@ -164,6 +193,11 @@ class MatrixStator(Seat):
 
 
 AnyStator: TypeAlias = Stator | LumpedStator | MatrixStator
+
+
+def has_bent_stator(stators: tuple[AnyStator, ...]) -> bool:
+    """Whether the gap of a stator knows that it bends."""
+    return any(isinstance(stator, Stator) and stator.geometry == SECOND_ORDER for stator in stators)
 
 
 def single_stators(stators: tuple[AnyStator, ...]) -> tuple[AnyStator, ...]:

@@ -269,7 +269,7 @@ def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
     try:
-        return find_key(rig, name)
+        declared = find_key(rig, name)
     except InputError as error:
         hint = nearest(name, _OWN)
         if "." not in name and "?" in hint:
@@ -279,6 +279,9 @@ def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
                 f"{where}: unknown axis; there is {', '.join(_OWN)} and any key of the rig"
             ) from None
         raise InputError(f"{where}: {str(error).replace('unknown key', 'unknown axis')}") from None
+    if declared.metadata["kind"] == "choice":
+        raise InputError(f"{where}: a word of the rig is no axis; set it in [override], one study for each")
+    return declared
 
 
 def _read_table(table: Mapping[str, object], where: str) -> tuple[object, str]:

@@ -83,8 +83,10 @@ def contact_at(stated: ContactKeys, values: Mapping[str, float]) -> Contact:
     return Contact(**keys)
 
 
-def check_contacts(stated: ContactKeys, axes: Sequence[Tried]) -> None:
-    """Refuse contact axes some of whose combinations cannot be, and keys of [contact] that no case uses.
+def check_contacts(stated: ContactKeys, axes: Sequence[Tried]) -> list[Contact]:
+    """Return the contacts of a study, of ranges those at their ends.
+
+    Contact axes are refused some of whose combinations cannot be, and keys of [contact] that no case uses.
 
     Raises
     ------
@@ -105,6 +107,7 @@ def check_contacts(stated: ContactKeys, axes: Sequence[Tried]) -> None:
             kind, laws, _ = NEEDS_LAW[key]
             listed = " or ".join(f'"{law}"' for law in laws)
             raise InputError(f"[contact] {key}: no case has {kind} = {listed}; leave it out")
+    return found
 
 
 def _word(name: str, value: float) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.input.reading import plain
 from rubhpc.rig.reading import with_keys
+from rubhpc.rig.stators import has_bent_stator
 from rubhpc.study import contact_axes, initial
 from rubhpc.study.axes import FROM_REST
 
@@ -15,7 +16,8 @@ if TYPE_CHECKING:
 
 PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before
 RING_PHYSICS = 8  # that of several stators in short steps, of either scheme
-CLOSED_FORM_PHYSICS = 7  # that of motion from event to event; the next version of all is 9
+CLOSED_FORM_PHYSICS = 7  # that of motion from event to event
+CURVED_PHYSICS = 9  # that of curved gaps from event to event; the next version of all is 10
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
@@ -26,11 +28,21 @@ def physics_of(study: Study) -> int:
     """Version of the physics with which a study is computed."""
     contact = study.contact
     is_modal = study.integrator.method == "modal"
+    if is_modal and contact.is_smooth and (has_updated_normal(study) or has_bent_stator(study.rig.stator)):
+        return max(PHYSICS, CURVED_PHYSICS)
     if is_modal and contact.closed_form == "always":
         return max(PHYSICS, CLOSED_FORM_PHYSICS)
     if len(study.rig.stator) > 1:
         return max(PHYSICS, RING_PHYSICS)
     return PHYSICS
+
+
+def has_updated_normal(study: Study) -> bool:
+    """Whether the normal of a case follows the line of centres."""
+    name = f"{contact_axes.PREFIX}normal"
+    words = contact_axes.choices_of(name)
+    normals = {words[int(value)] for axis in study.axes if axis.name == name for value in axis.values}
+    return "updated" in (normals or {study.contact.normal})
 
 
 def identity_parts(study: Study) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from rubhpc.input.fields import place
 from rubhpc.input.quantity import brief, parse_quantity
 from rubhpc.input.reading import build, plain, read_toml, refuse_unknown
 from rubhpc.rig.reading import read_rig, with_keys
+from rubhpc.rig.stators import has_bent_stator
 from rubhpc.study import contact_axes
 from rubhpc.study.axes import (
     BOTH,
@@ -29,7 +30,7 @@ from rubhpc.study.contact_axes import check_contacts
 from rubhpc.study.initial import Initial, check_initials
 from rubhpc.study.refine import Refine
 from rubhpc.study.sampling import draw
-from rubhpc.study.tables import Contact, ContactKeys, Integrator, Recording, Run, Sample
+from rubhpc.study.tables import Contact, ContactKeys, Integrator, Recording, Run, Sample, check_bent
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -124,7 +125,7 @@ class Study:
         check_axes(self.axes)
         if self.refine is not None:
             self.refine.refined(self.axes)
-        check_contacts(self.contact, [axis for axis in self.axes if axis.is_contact_key])
+        contacts = check_contacts(self.contact, [axis for axis in self.axes if axis.is_contact_key])
         check_initials(self.initial, [axis for axis in self.axes if axis.is_initial_key])
         if self.branch is not None:
             check_branch(
@@ -136,6 +137,9 @@ class Study:
                 is_sampled=self.sample is not None,
             )
         check_rigs(self.rig, self.axes, self.recording.probe)
+        if has_bent_stator(self.rig.stator):
+            for contact in contacts:
+                check_bent(contact, self.integrator)
 
     def axis(self, *names: str) -> Axis:
         """Return the first axis that has one of these names."""

@@ -6,6 +6,7 @@ import itertools
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, check_fields, choice, choices, count, quantity, series, table
 from rubhpc.input.reading import plain
 from rubhpc.rig.probes import Probe  # noqa: TC001 - annotations are read when a table is built
@@ -112,6 +113,11 @@ class ContactKeys:
         check_fields(self)
 
     @property
+    def is_smooth(self) -> bool:
+        """Whether forces follow from closed gaps alone: multipliers under steady sliding."""
+        return self.law == "lagrange" and self.friction_law == "sliding"
+
+    @property
     def closed_form(self) -> ClosedForm:
         """When the modal scheme has a closed form of contact; elsewhere it takes short steps."""
         if self.normal == "updated" or (self.law == "penalty" and self.friction_law != "sliding"):
@@ -192,6 +198,24 @@ class Integrator:
     def step_within(self, limit: float) -> float:
         """Time step, s, of the central difference for matrices that are stable up to `limit`, s."""
         return self.step if self.step is not None else min(PAPER_STEP, SAFE_SHARE * limit)
+
+
+def check_bent(contact: Contact, integrator: Integrator) -> None:
+    """Refuse laws and integrators that do not know a stator of the second order.
+
+    Raises
+    ------
+    InputError
+        Says what it needs instead.
+    """
+    needed = {
+        '[integrator] method = "modal"': integrator.method == "modal",
+        '[contact] law = "lagrange"': contact.law == "lagrange",
+        '[contact] friction_law = "sliding"': contact.friction_law == "sliding",
+    }
+    for text, is_met in needed.items():
+        if not is_met:
+            raise InputError(f'[stator] geometry: second_order needs {text}; set it, or geometry = "linear"')
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,7 @@ def test_each_part_is_announced_once(monkeypatch):
 
 
 def test_parts_are_names_of_kernels():
-    from rubhpc.kernels import flow, separation, stepping_loop
+    from rubhpc.kernels import curved_loop, flow, separation, stepping_loop
 
-    kernels = {**vars(flow), **vars(separation), **vars(stepping_loop)}
+    kernels = {**vars(flow), **vars(separation), **vars(stepping_loop), **vars(curved_loop)}
     assert all(name in kernels for name in compilation._PARTS)

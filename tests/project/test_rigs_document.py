@@ -41,9 +41,11 @@ def test_oscillator_at_a_wall_prints_what_is_said(capsys):
 def test_tables_of_stators_are_read():
     tables = (tomllib.loads(text) for text in re.findall(r"```toml\n(\[\[.*?)```", DOCUMENT, re.DOTALL))
     found = [table for table in tables if "stator" in table or "carrier" in table]
-    ring, carried, lumped = (table["stator"] for table in found)
+    ring, bent, carried, lumped = (table["stator"] for table in found)
     packaged = read_rig("mokhtar2017").as_dict()
-    moved = packaged | {"stator": [packaged["stator"][0] | carried[0]], "carrier": found[1]["carrier"]}
+    moved = packaged | {"stator": [packaged["stator"][0] | carried[0]], "carrier": found[2]["carrier"]}
+    bending = rig_from_dict(packaged | {"stator": [packaged["stator"][0] | bent[0]]})
+    assert bending.stator[0].geometry == "second_order"
     assert rig_from_dict(moved).carrier[0].name == rig_from_dict(moved).stator[0].carrier
     rig = rig_from_dict(packaged | {"stator": [packaged["stator"][0] | ring[0], *lumped]})
     assert len(rig.stator) == 14

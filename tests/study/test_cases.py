@@ -18,7 +18,7 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.rig.reading import read_rig, with_key, with_keys
 from rubhpc.study.cases import CaseGrid
-from rubhpc.study.identity import CLOSED_FORM_PHYSICS, PHYSICS, RING_PHYSICS, physics_of
+from rubhpc.study.identity import CLOSED_FORM_PHYSICS, CURVED_PHYSICS, PHYSICS, RING_PHYSICS, physics_of
 from rubhpc.study.study import Contact, Integrator, Recording, Run, Study, make_axis
 
 RIG = read_rig("mokhtar2017")
@@ -137,8 +137,14 @@ def test_versions_of_the_physics_hold_for_what_they_change():
     updated = Contact(normal="updated")
     assert physics_of(study()) == physics_of(study(rig=ring)) == CLOSED_FORM_PHYSICS
     assert physics_of(study(contact=Contact(friction_law="coulomb"))) == CLOSED_FORM_PHYSICS
-    assert physics_of(study(contact=updated)) == PHYSICS
-    assert physics_of(study(rig=ring, contact=updated)) == RING_PHYSICS
+    assert (
+        physics_of(study(contact=updated)) == physics_of(study(rig=ring, contact=updated)) == CURVED_PHYSICS
+    )
+    assert physics_of(study({"contact.normal": ["fixed", "updated"]})) == CURVED_PHYSICS
+    assert physics_of(study(rig=with_key(RIG, "stator.geometry", "second_order"))) == CURVED_PHYSICS
+    stuck = Contact(normal="updated", friction_law="coulomb")
+    assert physics_of(study(contact=stuck)) == PHYSICS
+    assert physics_of(study(rig=ring, contact=stuck)) == RING_PHYSICS
     assert physics_of(study(rig=ring, integrator=Integrator(method="central-difference"))) == RING_PHYSICS
 
 

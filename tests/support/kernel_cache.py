@@ -22,6 +22,7 @@ SCHEMES = (
     "central differences",
     "periodic",
     "periodic stick and slip",
+    "curved gaps",
 )
 
 
@@ -47,7 +48,8 @@ def use(scheme: str) -> None:
     options = {
         "events": {},
         "stick and slip": {"friction_law": "coulomb"},
-        "short steps": {"normal": "updated"},
+        "short steps": {"friction_law": "stribeck", "static_friction_ratio": 1.2, "stribeck_speed": 0.1},
+        "curved gaps": {"normal": "updated"},
         "central differences": {"method": "central-difference"},
     }
     if scheme == "neighbours":

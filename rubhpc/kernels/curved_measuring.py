@@ -1,0 +1,199 @@
+"""What is measured while contacts with curved gaps are closed: samples, forces, slip and energies."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels.accumulators import (
+    DAMPING_LOSS,
+    DRIVE_WORK,
+    FRICTION_LOSS,
+    HORIZONTAL,
+    TWIST,
+    TWIST_ACCELERATION,
+    UNBALANCE_WORK,
+    VERTICAL,
+    Accumulator,
+    Samples,
+    observe_sense,
+)
+from rubhpc.kernels.contact_modes import (
+    LATERAL_ROW,
+    N_ROTOR_ROW,
+    TWIST_ACCELERATION_ROW,
+    ModeTables,
+    Reduced,
+    dot,
+)
+from rubhpc.kernels.curved_contact import N_NODE, CurvedPairs, CurvedTables, CurvedWork, is_closed
+from rubhpc.kernels.measuring import Recorder, widen_extrema
+
+Floats = NDArray[np.float64]
+
+
+@jit_lean_sum
+def place(
+    tables: ModeTables,
+    curved: CurvedTables,
+    mode: int,
+    z_re: Floats,
+    z_im: Floats,
+    h: Floats,
+    rate: Floats,
+    motion: Floats,
+) -> None:
+    """Reduced displacements and velocities, into `motion` (2 n,), at coordinates with h (q,) and its rate."""
+    n = curved.shift.shape[2]
+    for k in range(2 * n):
+        motion[k] = dot(tables.motion_re[mode, k], tables.motion_im[mode, k], z_re, z_im)
+    for i in range(h.size):
+        if is_closed(tables.mask[mode], i):
+            for k in range(n):
+                motion[k] -= curved.shift[mode, i, k] * h[i]
+                motion[n + k] -= curved.shift[mode, i, k] * rate[i]
+
+
+@jit_lean_sum
+def observe_power(
+    reduced: Reduced,
+    skew: Floats,
+    tables: ModeTables,
+    curved: CurvedTables,
+    mode: int,
+    node: int,
+    angle: float,
+    z_re: Floats,
+    z_im: Floats,
+    work: CurvedWork,
+) -> None:
+    """Power (W) that damping takes and the unbalance gives at a node of a step, the shaft at an angle (rad).
+
+    `skew` is the skew part of the stiffness, without rows where there is none.
+    """
+    n = reduced.damping.shape[0]
+    place(tables, curved, mode, z_re, z_im, work.h[node], work.rate[node], work.state)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    loss, gain = 0.0, 0.0
+    for k in range(n):
+        speed = work.state[n + k]
+        drawn = 0.0
+        row = reduced.damping[k]
+        for j in range(n):
+            drawn += row[j] * work.state[n + j]
+        loss += speed * drawn
+        gain += speed * (reduced.force_cosine[k] * cosine + reduced.force_sine[k] * sine)
+    for k in range(skew.shape[0]):
+        drawn = 0.0
+        for j in range(n):
+            drawn += skew[k, j] * work.state[j]
+        loss += work.state[n + k] * drawn
+    work.power[node, 0], work.power[node, 1] = loss, gain
+
+
+@jit_lean_sum
+def observe_curved_step(
+    reduced: Reduced,
+    mask: int,
+    step: float,
+    i_sample: int,
+    share: float,
+    work: CurvedWork,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> None:
+    """Add a step (s) of the closed pairs by Simpson's rule; `share` (1/s) as in `measuring.observe_step`."""
+    for i in range(reduced.radius.size):
+        if not is_closed(mask, i):
+            continue
+        first, middle, last = work.force[0, i], work.force[1, i], work.force[2, i]
+        impulse = (first + 4.0 * middle + last) * step / 6.0
+        friction_work = (
+            first * work.slip[0, i] + 4.0 * middle * work.slip[1, i] + last * work.slip[2, i]
+        ) * (reduced.friction[i] * step / 6.0)
+        samples.force[i, i_sample] += impulse * share
+        accumulator.contact_time[i] += step
+        accumulator.impulse[i] += impulse
+        accumulator.friction_work[i] += friction_work
+        accumulator.peak_force[i] = max(accumulator.peak_force[i], first, last, highest(first, middle, last))
+        for node in range(N_NODE):
+            slip = work.slip[node, i]
+            accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
+            if slip != 0.0:
+                observe_sense(i, 1 if slip > 0.0 else -1, accumulator)
+        accumulator.energy[FRICTION_LOSS] += friction_work
+        accumulator.energy[DRIVE_WORK] += reduced.friction[i] * reduced.rim_speed[i] * impulse
+    for a, kind in ((0, DAMPING_LOSS), (1, UNBALANCE_WORK)):
+        whole = work.power[0, a] + 4.0 * work.power[1, a] + work.power[2, a]
+        accumulator.energy[kind] += whole * step / 6.0
+
+
+@jit_lean_sum
+def highest(first: float, middle: float, last: float) -> float:
+    """Largest value of the parabola through the beginning, middle and end of a step, within it."""
+    slope, bend = 4.0 * middle - 3.0 * first - last, 2.0 * (first - 2.0 * middle + last)
+    if bend < 0.0 and 0.0 < slope < -2.0 * bend:
+        return first - 0.25 * slope * slope / bend
+    return max(first, middle, last)
+
+
+@jit_lean_sum
+def take_curved_sample(
+    tables: ModeTables,
+    curved: CurvedTables,
+    pairs: CurvedPairs,
+    reduced: Reduced,
+    mode: int,
+    angle: float,
+    z_re: Floats,
+    z_im: Floats,
+    i_sample: int,
+    interval: float,
+    work: CurvedWork,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> None:
+    """Record a sample at the beginning of a step; the one past the record counts for extrema alone.
+
+    The angle (rad) is that of the shaft, the interval (s) that between samples.
+    """
+    n, value = reduced.stiffness.shape[0], recorder.value
+    place(tables, curved, mode, z_re, z_im, work.h[0], work.rate[0], work.state)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    for k in range(n):
+        total = reduced.force_cosine[k] * cosine + reduced.force_sine[k] * sine
+        stiffness, damping = reduced.stiffness[k], reduced.damping[k]
+        for j in range(n):
+            total -= stiffness[j] * work.state[j] + damping[j] * work.state[n + j]
+        work.acceleration[k] = total
+    for i in range(work.h.shape[1]):
+        if is_closed(tables.mask[mode], i):
+            for a in range(pairs.row.shape[1]):
+                load = work.force[0, i] * work.direction[i, a]
+                row = pairs.row[i, a]
+                for k in range(n):
+                    work.acceleration[k] += load * row[k]
+    for r in range(pairs.output.shape[1]):
+        total = 0.0
+        at, moving, driven = pairs.output[0, r], pairs.output[1, r], pairs.output[2, r]
+        for k in range(n):
+            total += at[k] * work.state[k] + moving[k] * work.state[n + k]
+            total += driven[k] * work.acceleration[k]
+        value[r] = total
+    if i_sample < samples.rotor.shape[1]:
+        samples.rotor[VERTICAL, i_sample] = value[VERTICAL]
+        samples.rotor[HORIZONTAL, i_sample] = value[HORIZONTAL]
+        samples.rotor[TWIST, i_sample] = value[TWIST]
+        samples.rotor[TWIST_ACCELERATION, i_sample] = value[TWIST_ACCELERATION_ROW]
+        n_place = samples.axial.shape[0]
+        for i in range(n_place):
+            tip = N_ROTOR_ROW + 3 * i
+            samples.axial[i, i_sample] = value[tip]
+            samples.lateral[i, i_sample] = value[tip + LATERAL_ROW]
+        for i in range(samples.probe.shape[0]):
+            samples.probe[i, i_sample] = value[N_ROTOR_ROW + 3 * n_place + i]
+    widen_extrema(
+        value, 1, interval, recorder.last, accumulator.lowest, accumulator.highest, accumulator.peak_lateral
+    )

@@ -1,0 +1,59 @@
+"""The bent stator against a geometrically exact beam: the elastica, extensible, by collocation in its arc."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_bvp
+from trial_rig import trial_rig
+
+from rubhpc.fem.assemble import assemble
+
+LENGTH, WIDTH, HEIGHT, YOUNGS = 0.04, 0.005, 0.001, 3e9  # slender: shear adds 1e-3 of the deflection
+
+
+def elastica(axial, lateral):
+    """How far the tip of a cantilever draws back along its axis, and moves sideways, m, under forces, N.
+
+    `axial` presses towards the root. With the angle t, E I t'' = -(x' lateral + y' axial).
+    """
+    stretch, bend = YOUNGS * WIDTH * HEIGHT, YOUNGS * WIDTH * HEIGHT**3 / 12
+
+    def slopes(_, state):
+        angle, turn = state[:2]
+        strain = 1.0 + (lateral * np.sin(angle) - axial * np.cos(angle)) / stretch
+        x, y = strain * np.cos(angle), strain * np.sin(angle)
+        return np.array([turn, -(x * lateral + y * axial) / bend, x, y])
+
+    def ends(root, tip):
+        return np.array([root[0], tip[1], root[2], root[3]])
+
+    arc = np.linspace(0.0, LENGTH, 41)
+    start = np.vstack([np.zeros((2, arc.size)), arc, np.zeros_like(arc)])
+    found = solve_bvp(slopes, ends, arc, start, tol=1e-10, max_nodes=20_000)
+    assert found.success
+    return LENGTH - found.y[2, -1], found.y[3, -1]
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.05, 0.1])
+@pytest.mark.parametrize("friction", [0.2, 0.6])
+def test_tip_is_where_the_elastica_has_it(ratio, friction):
+    """To the square of the slope, which is what the second order leaves out."""
+    rig = trial_rig(1, length=LENGTH, width=WIDTH, height=HEIGHT, elements=6, geometry="second_order")
+    (stator,) = assemble(rig).stators
+    # (K - N S) u = T: the lateral force for which the tip moves by `ratio` of the length.
+    bending = np.array([i for i, (_, name) in enumerate(stator.body.degrees) if name != "axial"])
+    inside = np.ix_(bending, bending)
+    force = 1e-3
+    for _ in range(50):
+        load = np.where(bending == stator.lateral, friction * force, 0.0)
+        stiffness = stator.body.stiffness[inside] - force * stator.squared_slope[inside]
+        bent = np.linalg.solve(stiffness, load)
+        lateral = bent[bending == stator.lateral][0]
+        force *= 0.5 + 0.5 * ratio * LENGTH / lateral
+    assert lateral == pytest.approx(ratio * LENGTH, rel=1e-6)
+    shortened = 0.5 * bent @ stator.squared_slope[inside] @ bent
+    compressed = force * LENGTH / (YOUNGS * WIDTH * HEIGHT)
+    back, aside = elastica(force, friction * force)
+    assert lateral == pytest.approx(aside, rel=2e-3 + 2 * ratio**2)
+    assert compressed + shortened == pytest.approx(back, rel=4e-3 + 4 * ratio**2)
+    assert back > 5 * compressed  # which is all that a linear beam has
+    assert shortened == pytest.approx(0.6 * lateral**2 / LENGTH, rel=0.05)
