@@ -145,6 +145,12 @@ _MEASURES = (
     _measure("force_over_euler_load", "1", "peak contact force over the stator's Euler load", "stator"),
     _measure("tip_deflection_ratio", "1", "peak lateral tip deflection over the stator's length", "stator"),
     _measure(
+        "foreshortening_ratio",
+        "1",
+        "change of the gap by bending that the model leaves out, over the compression of the tip",
+        "stator",
+    ),
+    _measure(
         "carrier_displacement",
         "m",
         "peak displacement of what the stator stands on (0: the ground)",

@@ -92,11 +92,11 @@ def simulate(
     method : {"modal", "central-difference"}
         Integrator: the exact modal one, or the paper's.
     step : float (s) or str, optional
-        Time step in contact (modal; default 1 us; 0.25 us with the updated normal, set-valued friction or a
-        penalty) or everywhere (central difference; default 0.5 us, or 0.9 of the stability limit where that
-        is less).
+        Time step in contact (modal; default 1 us; 0.25 us where it takes short steps) or everywhere (central
+        difference; default 0.5 us, or 0.9 of the stability limit where that is less).
     accuracy : float
-        Relative accuracy of the modal integrator: how many modes it keeps.
+        Relative accuracy of the modal integrator: how many modes it keeps, and the error of steps where gaps
+        are curved.
     transient : int or "auto"
         Revolutions discarded; "auto" until displacements repeat themselves after 8 or 12 revolutions.
     transient_limit : int, optional

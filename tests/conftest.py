@@ -32,6 +32,7 @@ SLOW = (
     "input/test_reading.py::test_pint_stays_away_until_it_is_needed",
     "integrate/test_branch.py",
     "integrate/test_contact_stepping_march.py",
+    "integrate/test_curved_march.py",
     "integrate/test_event_driven_march.py::test_dry_whip_diverges_and_says_so",
     "integrate/test_event_driven_march.py::test_endless_events_are_left_to_short_steps",
     "integrate/test_event_driven_march.py::test_shorter_kernel_calls_change_nothing_but_rounding",

@@ -26,6 +26,7 @@ MOST_FACETS, MOST_PANELS = 2, 6
 VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
     "minimum_slip_speed": (1, "slip", lambda slip: slip < 0),
     "force_over_euler_load": (2, "Euler load", lambda ratio: ratio > 1),
+    "foreshortening_ratio": (4, "bending", lambda ratio: ratio > 0.3),
     "tip_deflection_ratio": (4, "bending", lambda ratio: ratio > 0.1),
 }
 
@@ -115,8 +116,8 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
     Dataset over (*facets, y, x), or (*facets, case)
         The value, `status`, `settled` where the store has it (0: the motion still changed in the record), and
         `validity`: 0 within the model's range, else the sum of 1 (slip reverses, so
-        that steady sliding is wrong), 2 (force over the stator's Euler load) and 4 (tip over a tenth of its
-        length).
+        that steady sliding is wrong), 2 (force over the stator's Euler load) and 4 (bending, of which the gap
+        knows too little, or by over a tenth of the length).
     """
     if not is_mappable(value):
         require_variables(store, [value])
@@ -147,12 +148,13 @@ def validity(store: xr.Dataset) -> xr.DataArray:
             bad = bad.any([d for d in ("stator",) if d in bad.dims])
             if name == "minimum_slip_speed" and _FRICTION_LAW in store.coords:
                 bad &= store[_FRICTION_LAW] != meanings(store[_FRICTION_LAW]).index("coulomb")
-            found = found + np.int8(bit) * bad.astype(np.int8)
-    legend = ", ".join(f"{bit} ({text} out of range)" for bit, text, _ in monitors(store).values())
+            found = found | np.int8(bit) * bad.astype(np.int8)
+    texts = {bit: text for bit, text, _ in monitors(store).values()}
+    legend = ", ".join(f"{bit} ({text} out of range)" for bit, text in texts.items())
     return found.rename("validity").assign_attrs(units="1", long_name=f"sum of {legend}")
 
 
 def reasons_of(data: xr.Dataset) -> str:
     """Return what leaves the model's range in any case of `map_data` that has values, as a list in words."""
     validity = np.where(np.isin(data["status"].values, HAS_VALUES), data["validity"].values, 0)
-    return ", ".join(text for bit, text, _ in VALIDITY.values() if (validity & bit).any())
+    return ", ".join(dict.fromkeys(text for bit, text, _ in VALIDITY.values() if (validity & bit).any()))

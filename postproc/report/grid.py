@@ -166,7 +166,9 @@ def _measured(name: str) -> str:
 
 def validity_text(code: int) -> str:
     """Name the limits of the model that a case breaks."""
-    return ", ".join(text for bit, text, _ in VALIDITY.values() if code & bit) or "within range"
+    return (
+        ", ".join({bit: text for bit, text, _ in VALIDITY.values() if code & bit}.values()) or "within range"
+    )
 
 
 def described_axes(store: xr.Dataset) -> list[dict[str, Any]]:

@@ -76,6 +76,7 @@ _SHORT = {
     "time": "Time",
     "wall_time": "Wall time",
     "tip_deflection_ratio": "Tip deflection over length",
+    "foreshortening_ratio": "Neglected curvature over compression",
     "force_over_euler_load": "Contact force over Euler load",
     "peak_torsion": "Peak torsion",
     "peak_to_peak_vertical": "Vertical peak to peak",

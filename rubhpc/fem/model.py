@@ -164,6 +164,12 @@ class StatorModel:
     squared_slope: NDArray[np.float64] | None = None
     alone: StatorModel | None = None  # on a carrier: while that is held; `body` is all that stands on it
 
+    @cached_property
+    def axial_compliance(self) -> float:
+        """Static axial displacement of the tip under a unit force, with what it stands on held, m/N."""
+        body, tip = self.held.body, self.held.axial
+        return float(np.linalg.inv(body.stiffness)[tip, tip]) if tip >= 0 else 0.0
+
     @property
     def held(self) -> StatorModel:
         """The stator by itself, with what it stands on held."""

@@ -192,6 +192,7 @@ def _integrate(
                 energy=(energy_before, march.energy()),
                 stators=setup.model.stators,
                 spin=setup.spin,
+                is_round=setup.is_updated,
                 samples_per_revolution=per_revolution,
                 growth=growth(lambda: _neighbours(march, solver, start, final, setup, recording)),
                 solve=solver,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.errors import InputError
 from rubhpc.integrate.curved_library import CurvedLibrary
 from rubhpc.integrate.curved_tables import curved_pairs
 from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
@@ -67,8 +68,20 @@ class CurvedMarch(EventDrivenMarch):
         return motion
 
     def find(self, mask: int) -> None:
-        """See that the tables hold a set of contacts."""
-        super().find(mask)
+        """See that the tables hold a set of contacts.
+
+        Raises
+        ------
+        InputError
+            Too many sets for bent stators, of which short steps know nothing.
+        """
+        try:
+            super().find(mask)
+        except NoClosedForm:
+            if not self._is_bent:
+                raise
+            problem = "too many sets of contacts for second_order"
+            raise InputError(f'[stator] geometry: {problem}; take geometry = "linear"') from None
         assert isinstance(self._library, CurvedLibrary)
         self._curved = self._library.curved_tables()
 

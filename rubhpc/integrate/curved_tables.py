@@ -80,9 +80,8 @@ def _bending(stator: StatorModel, reduced: ReducedModel, model: Model, i: int) -
 
 def _stiffness(stator: StatorModel, along: Floats, reduced: ReducedModel) -> float:
     """Static stiffness of a stator's tip along its axis, N/m; on a rigid wall that of the rotor."""
-    tip = stator.held
-    if tip.axial >= 0:
-        return float(1.0 / np.linalg.inv(tip.body.stiffness)[tip.axial, tip.axial])
+    if stator.axial_compliance > 0.0:
+        return 1.0 / stator.axial_compliance
     return float(1.0 / (along @ np.linalg.solve(reduced.stiffness, along)))
 
 

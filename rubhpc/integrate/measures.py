@@ -144,6 +144,7 @@ def measures_of(
     energy: tuple[float, float],
     stators: tuple[StatorModel, ...],
     spin: float,
+    is_round: bool,
     samples_per_revolution: int,
     growth: Iterable[float],
     solve: Callable[[int], Solution | None] | None,
@@ -155,6 +156,8 @@ def measures_of(
     energy : (float, float), J
         Mechanical energy at the beginning and at the end of the record.
     spin : float, rad/s
+    is_round : bool
+        Whether the gap knows that the rim is round (updated normal).
     growth : iterable of float
         How a small displacement grows after the record (`lyapunov.growth`); read where it decides the regime.
     solve : callable, optional
@@ -204,6 +207,9 @@ def measures_of(
         "force_over_euler_load": accumulator.peak_force / [stator.euler_load for stator in stators],
         "tip_deflection_ratio": accumulator.peak_lateral[: len(stators)]
         / [stator.length for stator in stators],
+        "foreshortening_ratio": foreshortening_ratio(
+            stators, accumulator.peak_lateral[: len(stators)], accumulator.peak_force, is_round=is_round
+        ),
         "peak_torsion": float(max(accumulator.highest[TWIST], -accumulator.lowest[TWIST])),
         "peak_to_peak_vertical": float(accumulator.highest[VERTICAL] - accumulator.lowest[VERTICAL]),
         "peak_to_peak_horizontal": float(accumulator.highest[HORIZONTAL] - accumulator.lowest[HORIZONTAL]),
@@ -220,6 +226,24 @@ def measures_of(
         "contact_iterations": int(accumulator.pivots[0]),
         "contact_residual": float(np.divide(distance, moved, out=np.zeros(3), where=moved > 0.0).max()),
     }
+
+
+def foreshortening_ratio(
+    stators: tuple[StatorModel, ...], deflection: Floats, force: Floats, *, is_round: bool
+) -> Floats:
+    """Return by how much a bent tip changes its gap without the model's knowing, over its compression, (q,).
+
+    A tip at a lateral `deflection` l (q,), m, draws back by 0.6 l^2 / L, and the rim, r away from its centre,
+    by l^2 / (2 r). The compression is the static one under the `force` (q,), N; without it the ratio is 0.
+    """
+    ratio = np.zeros(len(stators))
+    for i, stator in enumerate(stators):
+        drawn = 0.6 / stator.length if stator.squared_slope is None else 0.0
+        away = 0.0 if is_round else 0.5 / stator.radius
+        compression = force[i] * stator.axial_compliance
+        if compression > 0.0:
+            ratio[i] = (drawn + away) * deflection[i] ** 2 / compression
+    return ratio
 
 
 def diverged_record(

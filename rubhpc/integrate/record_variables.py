@@ -52,6 +52,7 @@ class RecordVariables:
         minimum_slip_speed: Floats  # (n_stator,); m s-1
         force_over_euler_load: Floats  # (n_stator,)
         tip_deflection_ratio: Floats  # (n_stator,)
+        foreshortening_ratio: Floats  # (n_stator,)
         carrier_displacement: Floats  # (n_stator,); m
         peak_torsion: float  # rad
         peak_to_peak_vertical: float  # m

@@ -84,6 +84,8 @@ def change_curved(
         radius=reduced.radius,
         rim_speed=reduced.rim_speed,
         restitution=reduced.restitution,
+        spring=reduced.spring,
+        damper=reduced.damper,
         clearance=reduced.clearance,
         translations=reduced.translations,
         displacement_limit=reduced.displacement_limit,

@@ -195,7 +195,7 @@ class OperatingPoints:
 
         def predict(index: Index) -> float:
             contact = self.contact(index)
-            if is_modal and contact.closed_form == "always":
+            if is_modal and (contact.closed_form == "always" or contact.is_smooth):
                 return float(modal_steps)
             unit = self._unit_speed_at(self._on(self._response_axes, index if self._is_few else first))
             speed = abs(self._on([self._speed_axis], index)[0]) * unit

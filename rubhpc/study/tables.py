@@ -18,7 +18,7 @@ PAPER_STEP = 0.5e-6  # s
 SAFE_SHARE = 0.9  # of the stability limit
 SEARCH_STEP = 1e-6  # s, of the modal scheme with the fixed normal
 SALTELLI, FEWEST_POINTS = "sobol", 8  # the design that Sobol' indices need
-TURNING_STEP = 0.25e-6  # s, with the updated one, set-valued friction or a penalty
+TURNING_STEP = 0.25e-6  # s, where it takes short steps of contact
 
 ClosedForm = Literal["always", "never"]
 CLOSED_FORM: dict[str, ClosedForm] = {  # of friction laws
@@ -157,9 +157,9 @@ def _check_table(speed: tuple[float, ...], ratio: tuple[float, ...]) -> None:
 class Integrator:
     """Scheme, time step and accuracy.
 
-    Without a step the modal scheme takes 1 us in contact (0.25 us with the updated normal, set-valued
-    friction or a penalty), the central difference 0.5 us, or 0.9 of the stability limit where that is less.
-    The accuracy (relative) sets how many modes the modal scheme keeps.
+    Without a step the modal scheme takes 1 us in contact (0.25 us where it takes short steps), the central
+    difference 0.5 us, or 0.9 of the stability limit where that is less. The accuracy (relative) sets how many
+    modes the modal scheme keeps, and the error of its steps where gaps are curved.
     """
 
     method: str = choice(
@@ -177,7 +177,7 @@ class Integrator:
     )
     accuracy: float = quantity(
         "",
-        doc="Relative accuracy that sets how many modes the modal scheme keeps.",
+        doc="Relative accuracy: how many modes the modal scheme keeps, its error where gaps are curved.",
         example="1e-3",
         default=1e-3,
         above=0,

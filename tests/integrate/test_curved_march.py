@@ -110,6 +110,17 @@ def test_bent_stator_moves_as_all_degrees_do_in_short_steps(normal):
     assert found.contact_force[0] == pytest.approx(force, rel=0, abs=4e-3 * force.max())
 
 
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+@pytest.mark.parametrize("geometry", ["linear", "second_order"])
+def test_foreshortening_ratio_is_of_what_the_gap_leaves_out(normal, geometry):
+    record = simulate(trial_rig(1, geometry=geometry), **(RUB | {"revolutions": 1}), normal=normal)
+    deflection = 0.04 * record.tip_deflection_ratio[0]
+    compression = record.peak_contact_force[0] * 0.04 / (3e9 * 25e-6)
+    left_out = (0.6 / 0.04 if geometry == "linear" else 0.0) + (0.5 / 0.06 if normal == "fixed" else 0.0)
+    assert deflection > 1e-4
+    assert record.foreshortening_ratio[0] == pytest.approx(left_out * deflection**2 / compression, rel=1e-9)
+
+
 def test_bent_stator_needs_what_it_needs():
     rig = trial_rig(1, geometry="second_order")
     for given in ({"method": "central-difference"}, {"law": "penalty", "stiffness": 1e8}):

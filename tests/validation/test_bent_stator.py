@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_bvp
 from trial_rig import trial_rig
 
+from rubhpc import simulate
 from rubhpc.fem.assemble import assemble
 
 LENGTH, WIDTH, HEIGHT, YOUNGS = 0.04, 0.005, 0.001, 3e9  # slender: shear adds 1e-3 of the deflection
@@ -57,3 +58,31 @@ def test_tip_is_where_the_elastica_has_it(ratio, friction):
     assert compressed + shortened == pytest.approx(back, rel=4e-3 + 4 * ratio**2)
     assert back > 5 * compressed  # which is all that a linear beam has
     assert shortened == pytest.approx(0.6 * lateral**2 / LENGTH, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("keys", "given", "force"),
+    [
+        ({}, {"speed_ratio": 0.75, "clearance": "84 um"}, (22.1, 17.3, 13.5)),
+        (
+            {"stator.youngs_modulus": "30 GPa"},
+            {"speed_ratio": 3.5, "clearance": "74 um"},
+            (2663.0, 598.0, 291.0),
+        ),
+    ],
+)
+def test_peak_forces_of_the_packaged_rig_are_those_of_all_degrees(keys, given, force):
+    """N, of another code with all degrees of freedom, geometric stiffness and foreshortening."""
+    models = (("fixed", "linear"), ("updated", "linear"), ("updated", "second_order"))
+    for (normal, geometry), known in zip(models, force, strict=True):
+        record = simulate(
+            "mokhtar2017",
+            **given,
+            friction=0.3,
+            normal=normal,
+            overrides=keys | {"stator.geometry": geometry},
+            revolutions=16,
+            keep=("section",),
+        )
+        assert record.peak_contact_force[0] == pytest.approx(known, rel=0.015)
+        assert (record.foreshortening_ratio[0] > 0.3) == (geometry == "linear")
