@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.figures.palette import categories
-from postproc.store.branch_points import other_axes
+from postproc.store.axes import source
+from postproc.store.branch_points import followed, is_of_points, other_axes
 from postproc.store.units import displayed, scale_of
+from rubhpc.errors import InputError
 from rubhpc.schema import BRANCH_EVENT
 
 if TYPE_CHECKING:
@@ -80,6 +82,38 @@ def mark_events(data: xr.Dataset, x: NDArray[Any], y: NDArray[Any], ax: Axes) ->
             label=text,
             zorder=4,
         )
+
+
+def events_at(points: xr.Dataset, shown: xr.Dataset, x: str, y: str) -> xr.Dataset:
+    """Return the events of branches in the plane of two axes of a map, at the values of its other axes.
+
+    Raises
+    ------
+    InputError
+        The store has no branches, or they do not run in this plane.
+    """
+    if not is_of_points(points):
+        raise InputError(
+            f"{source(points)}: events: has no branches; give the store of a study with [branch]"
+        )
+    lacking = [name for name in (x, y) if name not in points.coords]
+    if lacking or followed(points) not in (x, y):
+        why = f"its branches follow {followed(points)}, the map is over {x} and {y}"
+        raise InputError(f"{source(points)}: events: {why}; choose axes with --x and --y")
+    is_here = np.isin(points["event"].values, [BRANCH_EVENT.index(name) for name in MARKED])
+    for name in other_axes(points):
+        if name not in (x, y) and name in shown.coords and shown[name].ndim == 0:
+            is_here &= np.isclose(points[name].values, float(shown[name]), rtol=1e-6)
+    if not is_here.any():
+        raise InputError(f"{source(points)}: events: there is none at the values of the map; select others")
+    return points.isel(point=np.flatnonzero(is_here))
+
+
+def mark_over_map(points: xr.Dataset, shown: xr.Dataset, x: str, y: str, ax: Axes) -> None:
+    """Mark events over a map, in its units, and name them below it."""
+    places = [points[name].values * scale_of(shown[name]).factor for name in (x, y)]
+    mark_events(points, places[0], places[1][:, None], ax)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, handletextpad=0.4, columnspacing=1.0)
 
 
 def runs(data: xr.Dataset) -> Iterator[NDArray[np.intp]]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from postproc.cases.maps import default_axes, facet_axes, map_data, reasons_of, scatter_axes
+from postproc.figures.branch_lines import events_at, mark_over_map
 from postproc.figures.cells import cell_edges, hatch_cells, is_geometric
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import CATEGORIES, NOT_DONE, NOT_SETTLED, WARNING, coloured, paint_of
@@ -14,6 +15,7 @@ from postproc.figures.scatter import scatter_maps
 from postproc.figures.small_multiples import color_bar, legend_below, name_facets, write_over
 from postproc.figures.ticks import tick_levels
 from postproc.store.axes import drawn_axes, source
+from postproc.store.open import open_store
 from postproc.store.select import first_of_rest
 from postproc.store.units import displayed
 from postproc.store.variables import require_variables
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from postproc.figures.options import Axis, Bounds, Metavar
+    from postproc.figures.options import Axis, Bounds, File, Metavar
     from postproc.figures.palette import Paint
 
     Edges = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -49,6 +51,7 @@ def map(  # noqa: A001 - the name of the command
     contours: Annotated[int, Bounds(least=1), Metavar("N")] | None = None,
     log: bool = False,
     computed: bool = False,
+    events: File | None = None,
 ) -> Drawing:
     """Map of a measure, the regime or the status over two axes.
 
@@ -73,6 +76,8 @@ def map(  # noqa: A001 - the name of the command
         Colours on a logarithmic scale.
     computed
         Dots on the cases of a refined map that were computed; the others are inferred from them.
+    events
+        A store of branches: where motions meet, double their period or graze, over the map.
     """
     named = [facet] if isinstance(facet, str) else list(facet)
     is_sample = bool(drawn_axes(cases))
@@ -80,6 +85,8 @@ def map(  # noqa: A001 - the name of the command
         raise InputError(f"{source(cases)}: map: points of a sample have no contours; leave --contours out")
     if is_sample and computed:
         raise InputError(f"{source(cases)}: map: all cases of a sample are computed; leave --computed out")
+    if events is not None and (is_sample or named):
+        raise InputError(f"{source(cases)}: map: events go over one map of a grid; leave --facet out")
     across, up = scatter_axes(cases, x, y) if is_sample else default_axes(cases, x, y, named)
     spread = [CASE] if is_sample else [across, up]
     facets = facet_axes(cases, named, spread)
@@ -88,12 +95,15 @@ def map(  # noqa: A001 - the name of the command
         cases = worst_of_stators(cases, [value])
     cases, notes = first_of_rest(cases, [*spread, *facets], value)
     shown = map_data(cases, value, spread, facets)
+    marked = None if events is None else events_at(open_store(events), shown, across, up)
 
     def draw(axes: list[Axes]) -> None:
         if is_sample:
             scatter_maps(shown, value, across, up, axes, log)
         else:
             value_maps(shown, value, axes, log, contours or 0, computed)
+            if marked is not None:
+                mark_over_map(marked, shown, across, up, axes[0])
 
     if not facets:
         return Drawing(shown=shown, draw=draw, height=75.0, lines=tuple(notes))

@@ -4,11 +4,14 @@ import shutil
 
 import numpy as np
 import pytest
+import xarray as xr
+from matplotlib.figure import Figure
 
 import rubhpc
 from postproc.figures.bifurcation import bifurcation
-from postproc.figures.branch_lines import runs
+from postproc.figures.branch_lines import events_at, mark_over_map, runs
 from postproc.figures.multipliers import multipliers
+from postproc.store.open import open_store
 from rubhpc.errors import InputError
 from rubhpc.study.study import read_study
 
@@ -89,6 +92,24 @@ def test_branches_are_drawn_over_simulated_cases(store, tmp_path):
     assert all("unstable" in str(line.get_label()) or line.get_label().startswith("_") for line in dashed)
     with pytest.raises(InputError, match="over: is for branches"):
         bifurcation(rubhpc.open(tmp_path / "simulated.zarr"), over="other.zarr")
+
+
+def test_events_are_marked_over_a_map(store, synthetic_path):
+    points = rubhpc.open(store / "branches.zarr")
+    clearance, ratio = ("clearance", [1.1e-4, 1.2e-4], {"units": "m"}), ("speed_ratio", [0.74, 0.75])
+    shown = xr.Dataset(coords={"clearance": clearance, "speed_ratio": ratio, "friction": 0.3})
+    marked = events_at(points, shown, "clearance", "speed_ratio")
+    ax = Figure().subplots()
+    mark_over_map(marked, shown, "clearance", "speed_ratio", ax)
+    drawn = {line.get_label(): line for line in ax.lines}
+    assert drawn["grazing"].get_xdata().max() == pytest.approx(122.3228824, abs=1e-3)
+    assert set(drawn["grazing"].get_ydata()) == {0.74, 0.75}
+    with pytest.raises(InputError, match="there is none at the values of the map"):
+        events_at(points, shown.assign_coords(friction=0.1), "clearance", "speed_ratio")
+    with pytest.raises(InputError, match="its branches follow clearance, the map is over friction"):
+        events_at(points, shown, "friction", "speed_ratio")
+    with pytest.raises(InputError, match="events: has no branches"):
+        events_at(open_store(synthetic_path), shown, "clearance", "speed_ratio")
 
 
 def test_multipliers_are_drawn(store):
