@@ -16,9 +16,10 @@ MOTIONS = ("displacement", "velocity", "acceleration")
 class Probe:
     """A sensor at a node of the rotor or at a stator; its signals are stored under its name.
 
-    Attributes
+    Parameters
     ----------
     name : str
+        Letters, digits and _: of which those of the stored variables are made.
     node, stator : int, optional
         One of the two, from 1.
     angle : float, rad
