@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import Record, State
     from rubhpc.knocks import least_knock
     from rubhpc.periodic import periodic
+    from rubhpc.rig.carriers import Carrier, MatrixCarrier
     from rubhpc.rig.forces import Load, Unbalance
     from rubhpc.rig.probes import Probe
     from rubhpc.rig.reading import read_rig
@@ -37,9 +38,11 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Branch",
+    "Carrier",
     "InputError",
     "Load",
     "LumpedStator",
+    "MatrixCarrier",
     "MatrixStator",
     "NoPeriodicMotion",
     "PeriodicMotion",
@@ -70,9 +73,11 @@ __all__ = [
 # Module of each name; imported at first use, so that `import rubhpc` is fast.
 _HOMES = {
     "Branch": "rubhpc.integrate.branches:Branch",
+    "Carrier": "rubhpc.rig.carriers:Carrier",
     "InputError": "rubhpc.errors:InputError",
     "Load": "rubhpc.rig.forces:Load",
     "LumpedStator": "rubhpc.rig.stators:LumpedStator",
+    "MatrixCarrier": "rubhpc.rig.carriers:MatrixCarrier",
     "MatrixStator": "rubhpc.rig.stators:MatrixStator",
     "NoPeriodicMotion": "rubhpc.errors:NoPeriodicMotion",
     "PeriodicMotion": "rubhpc.integrate.periodic_motion:PeriodicMotion",

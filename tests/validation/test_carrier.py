@@ -9,11 +9,20 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rubhpc import LumpedStator, MatrixStator, Rig, Unbalance, assemble, read_rig, simulate
+from rubhpc import (
+    Carrier,
+    LumpedStator,
+    MatrixCarrier,
+    MatrixStator,
+    Rig,
+    Unbalance,
+    assemble,
+    read_rig,
+    simulate,
+)
 from rubhpc.errors import InputError
 from rubhpc.fem.annular import annular_rub
 from rubhpc.fem.modes import modes
-from rubhpc.rig.carriers import Carrier, MatrixCarrier
 from rubhpc.rig.reading import rig_from_dict
 
 BASE = read_rig("mokhtar2017")
