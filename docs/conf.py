@@ -58,6 +58,8 @@ napoleon_use_rtype = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 autodoc_preserve_defaults = True
+# Words of types, such as "name", are attributes of several classes: none of them is meant.
+suppress_warnings = ["ref.python"]
 copybutton_exclude = ".linenos, .gp, .go"
 
 
