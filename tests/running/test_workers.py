@@ -64,7 +64,7 @@ def test_a_script_needs_no_main_guard(tmp_path):
         [sys.executable, script], env=environment(), cwd=tmp_path, capture_output=True, text=True, timeout=120
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout == "(0, 12, 0, 0)\n"
+    assert done.stdout == "(0, 12, 0, 0, 0)\n"
 
 
 def test_the_loss_of_a_worker_does_not_end_the_run(tmp_path, whole):
