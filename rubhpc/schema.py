@@ -160,6 +160,7 @@ _MEASURES = (
     _measure("peak_to_peak_vertical", "m", "peak-to-peak vertical displacement"),
     _measure("peak_to_peak_horizontal", "m", "peak-to-peak horizontal displacement"),
     _measure("energy_residual", "1", "residual of the energy balance over the recorded revolutions"),
+    _measure("modal_error", "1", "estimated error by the modes left out, relative (NaN: unknown)"),
     _measure("settled", "1", "whether the motion had settled before the record", dtype="int8", flags=SETTLED),
     _measure("contact_iterations", "1", "most iterations that a contact problem took", dtype="int64"),
     _measure("contact_residual", "1", "largest residual of the contact problems, relative"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -108,6 +109,9 @@ def run_case(
         record = _integrate(starter(scheme), state, setup, clearance, friction, recording)
         record.measures["left_closed_form"] = 1
     record.measures["scheme"] = scheme.flag
+    record.measures["modal_error"] = setup.modal_error if isinstance(setup, ModalSetup) else math.nan
+    if isinstance(setup, ModalSetup):
+        record = replace(record, advice=setup.modes_missing)
     record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - seconds_compiling() - began
     return record

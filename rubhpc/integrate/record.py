@@ -108,6 +108,8 @@ class Record(RecordVariables):
         sections up to there, then NaN.
     note : str
         What is wrong with the rig at this speed: an unstable rotor.
+    advice : str
+        What to change where `modal_error` is above the accuracy asked for.
     signals : dict of (n_sample,) or (n_stator, n_sample)
         Shaft-locked samples over the recorded revolutions, SI units as in `rubhpc.schema`.
     spectra : dict of (n_order,) or (n_stator, n_order)
@@ -127,6 +129,7 @@ class Record(RecordVariables):
     status: int = DONE
     reason: str = ""
     note: str = ""
+    advice: str = ""
     samples_per_revolution: int
     signals: dict[str, Floats] = field(default_factory=dict)
     spectra: dict[str, Floats] = field(default_factory=dict)
@@ -158,6 +161,8 @@ class Record(RecordVariables):
         texts = [text for text in (self.reason, self.note) if text]
         if not self.reason and residual > MOST_RESIDUAL:
             texts.append(f"its energy balance is off by {100 * residual:.2g} %; take a shorter step")
+        if not self.reason and self.advice:
+            texts.append(self.advice)
         return "; ".join(texts)
 
     def __repr__(self) -> str:

@@ -58,6 +58,7 @@ class RecordVariables:
         peak_to_peak_vertical: float  # m
         peak_to_peak_horizontal: float  # m
         energy_residual: float
+        modal_error: float
         settled: int
         contact_iterations: int
         contact_residual: float

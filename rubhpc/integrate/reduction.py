@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import eigh
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from rubhpc.errors import InputError
 from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
+from rubhpc.integrate.standstill import Modes, at_standstill, cutoff_frequency, parted, seen_degrees
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.contact_pairs import N_DEGREE, V, W, rim_sense
 
@@ -25,15 +24,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
 
-# Modes up to this multiple of the contact frequency (or the spin, where that is higher), times
-# (1e-3 / accuracy)^(1/4): modes above are kept as static shapes, whose error goes with the fourth
-# power of the frequency ratio.
-CUTOFF_RATIO = 10.0
-FEWEST_MODES = 2  # kept of every part, whatever their frequency
 # Static response to a damper, as a share of the mode that it slows, times sqrt(accuracy), that is left out:
 # the mode's exponent errs by the square.
 LEAST_RESPONSE = 0.1
-FREE = 1e-12  # square of a frequency over the greatest, below which a mode is free motion
 UNSEEN = 1e-9  # relative motion or coupling below which a mode is taken for unseen
 
 
@@ -106,10 +99,10 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     """
     mass, damping, stiffness, force = whole_system(model, spin)
     degree, output, carrier = degrees_of(model), output_degrees(model), carrier_degrees(model)
-    standstill = _at_standstill(model)
+    standstill = at_standstill(model)
     cutoff = cutoff_frequency(model, spin, accuracy)
-    modes = [_parted(part, cutoff) for part in standstill.parts]
-    symmetric, seen = standstill.stiffness, _seen(model)
+    modes = [parted(part, cutoff) for part in standstill.parts]
+    symmetric, seen = standstill.stiffness, seen_degrees(model)
     kept = np.hstack([those.low for those in modes])
     frequency = np.concatenate([those.low_frequency for those in modes])
     drawn = np.hstack([0.5 * (damping + damping.T) @ kept, (stiffness - symmetric) @ (kept / frequency)])
@@ -133,110 +126,7 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     )
 
 
-def cutoff_frequency(model: Model, spin: float, accuracy: float) -> float:
-    """Frequency, rad/s, up to which modes are kept, and up to which probes see what the full model shows.
-
-    Ten times the contact frequency (the rotor's inertia on the stator's static stiffness), or the spin where
-    that is higher, times `(1e-3 / accuracy)^(1/4)`; infinite for rigid walls.
-    """
-    fastest = max(_at_standstill(model).contact_frequency, abs(spin))
-    return float(CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * fastest)
-
-
-class _Part(NamedTuple):
-    """Undamped modes of what mass and stiffness couple, orthonormal in the mass."""
-
-    n_seen: int  # of its degrees, and of their combinations, are seen by contact, outputs or probes
-    mode: Floats  # (n_all, n)
-    frequency: Floats  # (n,), rad/s
-
-
-class _Standstill(NamedTuple):
-    """What a model is at every speed."""
-
-    stiffness: Floats  # (n_all, n_all), its symmetric part
-    parts: list[_Part]  # those that contact or outputs feel
-    contact_frequency: float  # rad/s
-
-
-@lru_cache(maxsize=4)
-def _at_standstill(model: Model) -> _Standstill:
-    """Find the modes of a model, once for all speeds."""
-    mass, damping, stiffness, _ = whole_system(model, 1.0)  # at a speed, for what gyroscopic terms couple
-    symmetric, seen = 0.5 * (stiffness + stiffness.T), _seen(model)
-    coupled = (mass != 0) | (stiffness != 0)
-    n_part, number = connected_components(csr_array(coupled), directed=False)
-    _, whole = connected_components(csr_array(coupled | (damping != 0)), directed=False)
-    is_seen, is_felt = np.zeros((2, len(mass)), dtype=bool)
-    looked_at = model.probe_patterns != 0.0
-    is_seen[seen], is_felt[whole[seen]] = True, True
-    is_felt[whole[looked_at.any(axis=1)]] = True
-    parts = []
-    for i_part in range(n_part):
-        rows = np.flatnonzero(number == i_part)
-        if not is_felt[whole[rows[0]]]:
-            continue
-        square, shape = eigh(symmetric[np.ix_(rows, rows)], mass[np.ix_(rows, rows)])
-        if square[0] <= FREE * square[-1]:
-            raise InputError(
-                "[integrator] method: modal needs bodies that are held, and here one is free to move or to "
-                'turn; take method = "central-difference"'
-            )
-        mode = np.zeros((mass.shape[0], rows.size))
-        mode[rows] = shape
-        n_seen = is_seen[rows].sum() + looked_at[rows].any(axis=0).sum()
-        parts.append(_Part(int(n_seen), mode, np.sqrt(square)))
-    return _Standstill(symmetric, parts, _contact_frequency(parts, degrees_of(model), model))
-
-
-def _seen(model: Model) -> Ints:
-    """Degrees that contact or outputs see."""
-    places = (degrees_of(model), output_degrees(model), carrier_degrees(model))
-    return np.unique(np.concatenate([degree[degree >= 0] for degree in places]))
-
-
-def _contact_frequency(parts: list[_Part], degree: Ints, model: Model) -> float:
-    """Highest frequency, rad/s, of a contact: the rotor's inertia on the stator's static stiffness."""
-    mode = np.hstack([part.mode for part in parts])
-    square = np.concatenate([part.frequency for part in parts]) ** 2
-    highest = 0.0
-    for stator, (v, w, _, axial, _) in zip(model.stators, degree, strict=True):
-        if axial < 0:
-            return np.inf  # a rigid wall: no mode is too high
-        along = sum(
-            share * mode[row]
-            for row, share in ((v, np.cos(stator.angle)), (w, np.sin(stator.angle)))
-            if row >= 0
-        )
-        response = along / square  # to a unit force, mode by mode
-        inertia = (response @ response) / (along @ response) ** 2  # of that shape, as that of the first mode
-        compliance = mode[axial] @ (mode[axial] / square)
-        if stator.alone is not None:  # an impact meets the stator before the carrier moves
-            tip = stator.alone.axial
-            compliance = np.linalg.inv(stator.alone.body.stiffness)[tip, tip]
-        highest = max(highest, 1.0 / np.sqrt(inertia * compliance))
-    return float(highest)
-
-
-class _Modes(NamedTuple):
-    """Undamped modes of a part, orthonormal in the mass."""
-
-    low: Floats  # (n_all, n_low), kept
-    low_frequency: Floats  # (n_low,), rad/s
-    high: Floats  # (n_all, n_high), which only static shapes represent
-    high_frequency: Floats  # (n_high,), rad/s
-
-
-def _parted(part: _Part, cutoff: float) -> _Modes:
-    """Modes up to a cutoff, rad/s, and beyond; all are kept where modes and shapes would be as many."""
-    n_seen, mode, frequency = part
-    n_low = max(int(np.count_nonzero(frequency <= cutoff)), min(FEWEST_MODES, frequency.size))
-    if n_low + n_seen >= frequency.size:
-        n_low = frequency.size
-    return _Modes(mode[:, :n_low], frequency[:n_low], mode[:, n_low:], frequency[n_low:])
-
-
-def _attachment_modes(modes: _Modes, seen: Ints, patterns: Floats, drawn: Floats, least: float) -> Floats:
+def _attachment_modes(modes: Modes, seen: Ints, patterns: Floats, drawn: Floats, least: float) -> Floats:
     """Residual attachment modes: static responses of the modes above the cutoff, (n_all, n_shape).
 
     They are orthonormal in the mass, and respond to a unit force on each degree seen, to the `patterns`

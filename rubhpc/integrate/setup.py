@@ -28,6 +28,7 @@ from rubhpc.integrate.mode_tables import tabulate
 from rubhpc.integrate.packing import Packed, law_of, pack
 from rubhpc.integrate.penalty_mode import Penalty
 from rubhpc.integrate.reduction import ReducedModel, directions, reduce_model
+from rubhpc.integrate.truncation import modal_error, sufficient_accuracy
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.schema import SCHEMES
@@ -115,7 +116,7 @@ class ModalSetup:
     is_updated: bool  # normal
     displacement_limit: float  # m
     law: Law = MULTIPLIER
-    accuracy: float = 1e-3  # relative, of loads where gaps are curved
+    accuracy: float = 1e-3  # relative, of the modes kept, and of loads where gaps are curved
     _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
     _curved_libraries: dict[float, CurvedLibrary] = field(default_factory=dict)
     _friction_libraries: dict[float, FrictionLibrary] = field(default_factory=dict)
@@ -126,6 +127,21 @@ class ModalSetup:
     def energy_limit(self) -> float:
         """Mechanical energy, J, beyond which a motion has diverged."""
         return energy_limit(self.model, self.spin, self.displacement_limit)
+
+    @cached_property
+    def modal_error(self) -> float:
+        """Estimated error by the modes left out, as a share of each signal and force."""
+        return modal_error(self.model, self.spin, self.accuracy)
+
+    @cached_property
+    def modes_missing(self) -> str:
+        """What to do where that error is above the accuracy asked for; "" where it is not."""
+        if self.modal_error <= self.accuracy:
+            return ""
+        fix = sufficient_accuracy(self.model, self.spin, self.accuracy)
+        return (
+            f"the modes left out may change it by {100 * self.modal_error:.2g} %; take accuracy = {fix:.0e}"
+        )
 
     @cached_property
     def interval(self) -> float:
