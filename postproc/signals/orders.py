@@ -57,11 +57,19 @@ def order_over_speed(
     found = found.sortby("speed")
     for signal in signals:
         phase = found[f"phase_{signal}"]
-        unwrapped = np.unwrap(phase.values, axis=phase.get_axis_num("speed"))
+        unwrapped = np.apply_along_axis(_unwrap, phase.get_axis_num("speed"), phase.values)
         found[f"phase_{signal}"] = phase.copy(
             data=unwrapped - 2 * np.pi * round(_mean(unwrapped) / (2 * np.pi))
         )
     found["speed"].attrs |= {"units": "rad s-1", "long_name": "spin speed"}
+    return found
+
+
+def _unwrap(phase: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unwrap a phase (rad) over the values that there are: a diverged case has none."""
+    found = phase.copy()
+    finite = np.isfinite(phase)
+    found[finite] = np.unwrap(phase[finite])
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.branch_points import is_of_points
-from postproc.store.units import meanings, scale_for, typed
+from postproc.store.units import meanings, scale_of, typed
 from postproc.store.variables import require_variables
 from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
@@ -136,7 +136,7 @@ def _typed(axis: xr.DataArray, value: float) -> str:
     names = meanings(axis)
     if 0 <= value < len(names) and value == int(value):
         return names[int(value)]
-    scale = scale_for(str(axis.attrs.get("units", "1")), abs(value))
+    scale = scale_of(axis.copy(data=np.full(axis.shape, value)))  # speeds in rpm
     return f"{value * scale.factor:.6g} {typed(scale.unit)}".rstrip()
 
 

@@ -166,9 +166,12 @@ class StatorModel:
 
     @cached_property
     def axial_compliance(self) -> float:
-        """Static axial displacement of the tip under a unit force, with what it stands on held, m/N."""
+        """Static axial displacement of the tip under a unit force, with what it stands on held, m/N.
+
+        0 of a wall, and of a body that nothing holds, which no static force compresses.
+        """
         body, tip = self.held.body, self.held.axial
-        return float(np.linalg.inv(body.stiffness)[tip, tip]) if tip >= 0 else 0.0
+        return float(np.linalg.pinv(body.stiffness)[tip, tip]) if tip >= 0 else 0.0
 
     @property
     def held(self) -> StatorModel:

@@ -40,6 +40,14 @@ def test_amplitude_and_phase_are_those_of_the_order():
     assert half["phase_vertical"].values == pytest.approx([0.7] * 3)
 
 
+def test_a_diverged_case_leaves_the_phases_of_the_others():
+    data = study().isel(friction=0)
+    data["vertical"] = data["vertical"].where(data["speed"] != 200.0)
+    found = order_over_speed(data, ["vertical"])
+    assert found["phase_vertical"].values[[0, 2]] == pytest.approx([-1.0, -3.0])
+    assert np.isnan(found["phase_vertical"].values[1])
+
+
 def test_cases_lie_over_one_another():
     axes = bode(study(), over="friction").show()
     assert [len(ax.lines) for ax in axes] == [2, 2]
