@@ -234,7 +234,8 @@ def foreshortening_ratio(
     """Return by how much a bent tip changes its gap without the model's knowing, over its compression, (q,).
 
     A tip at a lateral `deflection` l (q,), m, draws back by 0.6 l^2 / L, and the rim, r away from its centre,
-    by l^2 / (2 r); a body without a length or a rim has neither. The compression is the static one under the `force` (q,), N; without it the ratio is 0.
+    by l^2 / (2 r); a body without a length or a rim has neither. The compression is the static one under the
+    `force` (q,), N; without it the ratio is 0.
     """
     ratio = np.zeros(len(stators))
     for i, stator in enumerate(stators):

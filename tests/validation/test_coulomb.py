@@ -156,7 +156,7 @@ def test_ordinary_rub_is_that_of_steady_sliding(normal):
             simulate("mokhtar2017", **given, **method, friction_law=law) for law in ("sliding", "coulomb")
         )
         assert sliding.minimum_slip_speed.min() > 0.0
-        # Curved gaps under Coulomb's law are taken in short steps, under steady sliding by a scheme of order 4.
+        # Coulomb's law takes curved gaps in short steps, steady sliding by a scheme of order 4.
         share = 1e-9 if method or normal == "fixed" else 1e-4
         for name in ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral"):
             one, other = getattr(sliding, name), getattr(coulomb, name)
