@@ -42,6 +42,7 @@ def test_a_million_cases_take(times, what, most):
     assert few[what] * (what != "run") + each * MILLION < most
 
 
+@pytest.mark.long
 def test_a_million_cases_fit_in_a_gigabyte(times):
     few, many = times
     assert few["memory"] + (many["memory"] - few["memory"]) / (N_MANY - N_FEW) * MILLION < 1000
