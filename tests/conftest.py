@@ -102,7 +102,6 @@ LONGEST = (
 )
 # These have deadlines, or start ranks that wait for each other busily: nothing else may run at the same time.
 SERIAL = (
-    "commands/test_cli.py::test_help_takes_no_time",
     "faults/test_deaths.py::test_a_case",
     "faults/test_kill_storm.py",
     "faults/test_stops.py",

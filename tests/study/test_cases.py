@@ -272,17 +272,17 @@ def test_a_refusal_of_the_settings_names_the_file(tmp_path):
 
 def test_a_million_cases_are_planned_at_once():
     many = {"start": 0.5, "stop": 5.5, "num": 100}
-    began = time.perf_counter()
+    began = time.process_time()
     case_grid = CaseGrid(
         study({"speed_ratio": many, "clearance_ratio": many | {"start": 0.1, "stop": 0.9}, "friction": many})
     )
     blocks = case_grid.blocks()
     case_grid.operating_points()
     assert sum(math.prod(b.shape) for b in blocks) == case_grid.n_case == 1_000_000
-    assert time.perf_counter() - began < 5.0  # 0.7 s alone on one core
-    began = time.perf_counter()
+    assert time.process_time() - began < 5.0  # 0.7 s alone on one core
+    began = time.process_time()
     n = sum(len(case_grid.case_ids(block)) for block in blocks[:500])
-    assert (time.perf_counter() - began) / n < 20e-6
+    assert (time.process_time() - began) / n < 20e-6
 
 
 def test_the_quick_start_fits_into_a_minute_of_two_cores():
