@@ -3,12 +3,10 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-import time
 from typing import TYPE_CHECKING
 
 import click
 import pytest
-import xarray as xr
 from running import environment, write_study
 
 from postproc.catalogue import figures
