@@ -20,6 +20,7 @@ from rubhpc.rig.probes import Probe
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.study.initial import Initial, check_initials
+from rubhpc.study.state_of_case import with_state
 from rubhpc.study.study import Contact, Integrator
 
 if TYPE_CHECKING:
@@ -189,6 +190,6 @@ def _read_initial(caller: str, initial: object) -> State | Initial:
     start = build(Initial, initial or {}, caller, "initial")
     try:
         check_initials(start, [])
+        return with_state(start) if start.is_from_store else start
     except InputError as error:
         raise InputError(f"{caller}: {error}") from None
-    return start

@@ -271,5 +271,6 @@ def case_measures() -> tuple[Variable, ...]:
     return tuple(v for v in VARIABLES.values() if v.role == "measure" or v.name == "regime")
 
 
-KEEPABLE = ("waveform", "spectrum", "section")  # what [record] keep may name; the rest is always stored
-STATE = "state"  # kept in a sweep, where it starts the next case
+STATE = "state"  # the final state; always kept in a sweep, where it starts the next case
+KEPT = ("waveform", "spectrum", "section")  # what [record] keep names by default
+KEEPABLE = (*KEPT, STATE)  # what it may name; measures are always stored

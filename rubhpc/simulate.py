@@ -108,13 +108,14 @@ def simulate(
     samples_per_revolution : int
         Samples in each, an even number.
     keep : tuple of {"waveform", "spectrum", "section"}
-        What the record holds besides its measures.
+        What the record holds besides its measures and its final state.
     probes : sequence of Probe or dict
         What is measured besides, by the keys of [[record.probe]], such as `{"name": "left", "node": 1,
         "angle": "-45 deg"}`: the record holds `probe_left` and `spectrum_probe_left`.
     initial : State or dict, optional
         Where to start, by default at rest: a record's `final`, or keys of [initial] such as
-        `{"from": "contact_free", "impulse": "0.1 N*s"}`.
+        `{"from": "contact_free", "impulse": "0.1 N*s"}` or `{"from": "sweep.zarr", "select": {"speed_ratio":
+        1.5}}`.
 
     Returns
     -------

@@ -128,6 +128,7 @@ def _kind(meta: Any) -> str:
         "matrix": "matrix",
         "degrees": "list of node and name",
         "series": "list of numbers",
+        "selection": "table of axes and values",
         "criteria": "list of flags and `{ measure = share }`",
     }
     kind = meta["kind"]

@@ -107,6 +107,11 @@ def criteria(
     return _declare("criteria", doc, example, default, flags=flags, measures=measures)
 
 
+def selection(*, doc: str, example: str) -> Any:
+    """Declare a field that holds pairs of an axis and a value, `{ friction = 0.3 }`; none by default."""
+    return _declare("selection", doc, example, ())
+
+
 def pairs(units: tuple[str, str], *, doc: str, example: str) -> Any:
     """Declare a field that holds pairs of numbers, written as a table `{ 31.56 = 0.09 }`; none by default."""
     return _declare("pairs", doc, example, (), units=units)
@@ -160,6 +165,8 @@ def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> 
         return tuple(value)
     if kind == "criteria":
         return _parse_criteria(value, declared, where)
+    if kind == "selection":
+        return _parse_selection(value, declared, where)
     if kind == "flag":
         if isinstance(value, float) and value in (0.0, 1.0):
             return bool(value)  # an axis holds floats
@@ -261,6 +268,23 @@ def _parse_criteria(value: object, declared: Any, where: str) -> tuple[tuple[str
             example = declared.metadata["example"]
             raise InputError(f"{where}: {brief(entry)} is no flag and no measure; write {example}")
     return tuple(pairs)
+
+
+def _parse_selection(value: object, declared: Any, where: str) -> tuple[tuple[str, str | float], ...]:
+    if not isinstance(value, dict):
+        raise InputError(f"{where}: {brief(value)} is not a table; write {declared.metadata['example']}")
+    found: list[tuple[str, str | float]] = []
+    for name, one in value.items():
+        if isinstance(one, dict):  # `stator.angle = 0` without quotes
+            inner = _parse_selection(one, declared, where)
+            found += [(f"{name}.{rest}", entry) for rest, entry in inner]
+        elif isinstance(one, bool) or not isinstance(one, str | int | float):
+            raise InputError(
+                f"{where}.{name}: {brief(one)} is no value; write {declared.metadata['example']}"
+            )
+        else:
+            found.append((name, one if isinstance(one, str) else float(one)))
+    return tuple(found)
 
 
 def _check_criteria(value: Any, bounds: Any) -> str:

@@ -70,7 +70,7 @@ def build(cls: type[T], table: object, file: str, name: str = "") -> T:
         raise InputError(
             f"{place(file, name)}: {brief(table)} is not a table; write [{name}] and its keys below"
         )
-    fields = {key_of(f): f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    fields = {key_of(f): f for f in dataclasses.fields(cls) if not f.metadata.get("derived")}  # type: ignore[arg-type]
     for key, declared in fields.items():  # first: an unknown choice explains unknown keys
         if declared.metadata.get("kind") == "choice" and (
             problem := check_value(declared, table.get(key, declared.default))
@@ -101,17 +101,22 @@ def refuse_unknown(table: Mapping[str, object], known: Mapping[str, object], fil
 def plain(value: Any) -> Any:
     """Return a dataclass as dicts, lists, numbers and text, which `build` reads back.
 
-    A field with `added` among its metadata is omitted at its default: rigs of older stores have no such key.
+    A field with `added` among its metadata is omitted at its default, as rigs of older stores have no such
+    key; one with `derived`, which is no key, always.
     """
     if not dataclasses.is_dataclass(value):
         return [plain(v) for v in value] if isinstance(value, tuple) else value
     result: dict[str, Any] = {}
     for declared in dataclasses.fields(value):
         entry, kind = getattr(value, declared.name), declared.metadata.get("kind")
+        if declared.metadata.get("derived"):
+            continue
         if kind == "matrix":
             result[key_of(declared)] = encode_matrix(entry)
         elif kind == "degrees":
             result[key_of(declared)] = [list(degree) for degree in entry]
+        elif kind == "selection":
+            result |= {key_of(declared): dict(entry)} if entry else {}
         elif kind == "pairs":
             result[key_of(declared)] = {repr(float(key)): float(number) for key, number in entry}
         elif entry is not None and not (declared.metadata.get("added") and entry == declared.default):

@@ -1,4 +1,4 @@
-"""Where a case of a study starts: at rest or in the contact-free motion, displaced, moving or knocked."""
+"""Where a case of a study starts: at rest, contact-free or where another has ended; displaced or knocked."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rubhpc.fem.response import check_response_node, steady_response
 from rubhpc.fem.stability import instability_message
 from rubhpc.integrate.initial_state import at_rest, fit_to_gaps, static_shapes
 from rubhpc.integrate.record import State
-from rubhpc.study.initial import CONTACT_FREE
+from rubhpc.study.initial import CONTACT_FREE, REST
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,13 +39,19 @@ def start_of(initial: Initial, setup: Setup, clearance: float) -> State:
     Raises
     ------
     InputError
-        The rotor has no contact-free motion, the output node is held in a direction given, or the node of
-        the impulse does not move sideways.
+        The rotor has no contact-free motion, the state of a store is of other bodies, the output node is held
+        in a direction given, or the node of the impulse does not move sideways.
     """
-    state = _contact_free(setup) if initial.from_ == CONTACT_FREE else at_rest(setup, clearance)
+    if initial.from_ == CONTACT_FREE:
+        state = _contact_free(setup)
+    elif initial.state is not None:
+        initial.state.check_fit(setup.model)
+        state = State.unpacked(initial.state.packed, setup.model)
+    else:
+        state = at_rest(setup, clearance)
     if initial.is_disturbed:
         state = _disturbed(state, initial, setup)
-    elif initial.from_ != CONTACT_FREE:
+    elif initial.from_ == REST:
         return state
     return fit_to_gaps(state, setup, clearance)
 

@@ -200,7 +200,7 @@ class Manifest:
                 "sample": n_sample,
                 "order": n_sample // 2 + 1,
                 "section": recording.revolutions,
-                **({"degree": grid.n_degree} if grid.continuation else {}),
+                **({"degree": grid.n_degree} if grid.n_degree else {}),
                 **(
                     {
                         "point": study.branch.points,
@@ -213,7 +213,7 @@ class Manifest:
             },
             keep=(BRANCH,)
             if study.branch
-            else tuple(sorted([*recording.keep, *([STATE] if grid.continuation else [])])),
+            else tuple(sorted({*recording.keep, *([STATE] if grid.continuation else [])})),
             files={},
             measures=(
                 *case_measures(),

@@ -19,6 +19,7 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.model import state_size
 from rubhpc.input.fields import place
 from rubhpc.rig.reading import with_keys
+from rubhpc.schema import STATE
 from rubhpc.study.axes import FROM_REST
 from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.identity import identity_parts
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.fem.model import Model
     from rubhpc.rig.rig import Rig
     from rubhpc.study.initial import Initial
     from rubhpc.study.study import Study
@@ -90,15 +92,15 @@ class CaseGrid:
     continuation : Continuation or None
         Of a sweep: from which case each one starts.
     n_degree : int
-        Length of the final state that is stored for a continuation; 0 without one.
+        Length of the final state where it is stored, as in a continuation; else 0.
     identity, identity_parts : str, dict
         SHA-256 of all that changes results but the values on the axes, and what went into it.
 
     Raises
     ------
     InputError
-        When the time step exceeds the stability limit of a rig, or rigs along a sweep differ in their degrees
-        of freedom.
+        When the time step exceeds the stability limit of a rig, or rigs whose final states are kept, or that
+        start from a state of a store, differ in their degrees of freedom.
     """
 
     def __init__(self, study: Study, chunk: tuple[int, ...] | None = None) -> None:
@@ -115,7 +117,9 @@ class CaseGrid:
         with _named(study):
             self._operating_points = OperatingPoints(study)
             self.continuation = continuation_of(study.axes)
-            self.n_degree = count_state(study) if self.continuation else 0
+            keeps_state = self.continuation is not None or STATE in study.recording.keep
+            self.n_degree = count_state(study) if keeps_state and study.branch is None else 0
+            check_start(study)
         self.chunk = chunk if chunk is not None else self._default_chunk()
         self.identity_parts = identity_parts(study)
         text = json.dumps(self.identity_parts, sort_keys=True, separators=(",", ":"), allow_nan=False)
@@ -272,15 +276,39 @@ def count_state(study: Study) -> int:
     InputError
         When it differs between cases: the final state of one cannot start another.
     """
+    models = _models(study)
+    n_state = state_size(next(models)[1])
+    for name, model in models:
+        if state_size(model) == n_state:
+            continue
+        swept = next((a.name for a in study.axes if a.sweep != FROM_REST), None)
+        problem = "changes the number of degrees of freedom"
+        if swept is None:
+            fix = f'remove this axis, or "{STATE}" from [record] keep'
+            raise InputError(f"[grid] {name}: {problem}, so final states differ in length; {fix}")
+        problem += ", so a final state cannot start the next case"
+        raise InputError(f"[grid] {name}: {problem}; remove this axis, or the sweep of {swept}")
+    return n_state
+
+
+def check_start(study: Study) -> None:
+    """Refuse a state of a store that does not fit the rigs of a study.
+
+    Raises
+    ------
+    InputError
+        Names the degrees of freedom of both.
+    """
+    if study.initial.state is not None:
+        for _, model in _models(study):
+            study.initial.state.check_fit(model)
+
+
+def _models(study: Study) -> Iterator[tuple[str, Model]]:
+    """The model at the first values, named "", then those along each axis of the rig, few of a long one."""
     first = {axis.name: axis.values[0] for axis in study.axes if axis.is_rig_key}
-    n_state = state_size(assemble(with_keys(study.rig, first)))
+    yield "", assemble(with_keys(study.rig, first))
     for axis in study.axes:
         values = axis.values if len(axis.values) <= _MOST_RIGS else axis.values[:: len(axis.values) - 1]
         for value in values if axis.is_rig_key else ():
-            if state_size(assemble(with_keys(study.rig, {**first, axis.name: value}))) != n_state:
-                swept = next(a.name for a in study.axes if a.sweep != FROM_REST)
-                problem = (
-                    "changes the number of degrees of freedom, so a final state cannot start the next case"
-                )
-                raise InputError(f"[grid] {axis.name}: {problem}; remove this axis, or the sweep of {swept}")
-    return n_state
+            yield axis.name, assemble(with_keys(study.rig, {**first, axis.name: value}))

@@ -74,7 +74,11 @@ def identity_parts(study: Study) -> dict[str, Any]:
     }
     starts = {axis.name.removeprefix(initial.PREFIX): _AXIS for axis in study.axes if axis.is_initial_key}
     if starts or study.initial != initial.Initial():  # absent in older stores
-        parts["initial"] = plain(study.initial) | starts
+        stated = plain(study.initial)
+        if study.initial.state is not None:  # wherever it has been read
+            stated = {k: v for k, v in stated.items() if k not in ("from", "select")}
+            stated["state"] = study.initial.state.digest
+        parts["initial"] = stated | starts
     if study.branch is not None:
         span = study.axis(study.branch.along).drawn_from
         parts["branch"] = asdict(study.branch) | (asdict(span) if span else {})

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
-from rubhpc.input.fields import check_fields, choice, count, nearest, quantity
+from rubhpc.input.fields import FieldError, check_fields, count, nearest, quantity, selection, text
+from rubhpc.study.stored_state import StoredState  # noqa: TC001 - annotations are read when a table is built
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,18 +23,22 @@ KNOCKED = PREFIX + "impulse_node"
 
 @dataclass(frozen=True, kw_only=True)
 class Initial:
-    """Where a case starts: at rest or in the contact-free motion, disturbed by what follows.
+    """Where a case starts: at rest, contact-free or where another has ended, disturbed by what follows.
 
     Displacement and velocity are those of the output node relative to that motion, at the shaft's angle 0;
     the rotor follows by the static shape under a force there. What they overlap is pushed apart, by static
     shapes too. The impulse is a knock at that instant. In a sweep they hold for its first case.
     """
 
-    from_: str = choice(
-        doc="Motion that the case starts from: the shaft at rest, or its steady unbalance response.",
-        example='"contact_free"',
-        of=(REST, CONTACT_FREE),
+    from_: str = text(
+        doc='Motion that the case starts from: "rest", "contact_free" (the steady unbalance response), or '
+        "where a case of a store has ended: its path.",
+        example='"sweep.zarr"',
         default=REST,
+    )
+    select: tuple[tuple[str, str | float], ...] = selection(
+        doc="Case of that store: a value on each axis that has several.",
+        example='{ speed_ratio = 1.5, direction = "down" }',
     )
     vertical: float = quantity(
         "m", doc="Vertical displacement of the output node.", example='"50 um"', default=0.0
@@ -59,9 +64,17 @@ class Initial:
         example="5",
         default=None,
     )
+    state: StoredState | None = field(default=None, metadata={"derived": True})
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if self.select and not self.is_from_store:
+            raise FieldError("select", 'it belongs to a store; write from = "STORE.zarr", or leave it out')
+
+    @property
+    def is_from_store(self) -> bool:
+        """Whether the case starts where one of a store has ended: in `state`, once that has been read."""
+        return self.from_ not in (REST, CONTACT_FREE)
 
     @property
     def is_disturbed(self) -> bool:
@@ -70,7 +83,8 @@ class Initial:
 
 
 DISTURBANCES = ("vertical", "horizontal", "vertical_velocity", "horizontal_velocity", "impulse")
-_AXES = {PREFIX + declared.name: declared for declared in fields(Initial) if declared.name != "from_"}
+_NO_AXES = ("from_", "select", "state")
+_AXES = {PREFIX + declared.name: declared for declared in fields(Initial) if declared.name not in _NO_AXES}
 
 
 def initial_field(name: str) -> Field[Any]:
@@ -97,11 +111,11 @@ def initial_at(stated: Initial, values: Mapping[str, float]) -> Initial:
     """
     if not values:
         return stated
-    set_here = {
+    set_here: dict[str, Any] = {
         name.removeprefix(PREFIX): int(value) if initial_field(name).metadata["kind"] == "count" else value
         for name, value in values.items()
     }
-    return Initial(**(asdict(stated) | set_here))
+    return replace(stated, **set_here)
 
 
 def check_initials(stated: Initial, axes: Sequence[Tried]) -> None:

@@ -30,6 +30,7 @@ from rubhpc.study.contact_axes import check_contacts
 from rubhpc.study.initial import Initial, check_initials
 from rubhpc.study.refine import Refine
 from rubhpc.study.sampling import draw
+from rubhpc.study.state_of_case import with_state
 from rubhpc.study.tables import Contact, ContactKeys, Integrator, Recording, Run, Sample, check_bent
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ class Study:
     contact : ContactKeys
         A `Contact`; of a grid with contact axes what they leave open, as far as it applies to a case's law.
     initial : Initial
-        Where cases start, but for what initial axes say.
+        Where cases start, but for what initial axes say; a state of a store is read here.
     output : Path
         The store.
     source : Path or None
@@ -122,6 +123,8 @@ class Study:
             raise InputError(f'output: {problem}; write output = "my_study.zarr", or another path')
         if any(axis.sweep == BOTH for axis in self.axes) and self.axes[-1].name != DIRECTION:
             object.__setattr__(self, "axes", (*self.axes, direction_axis()))
+        if self.initial.is_from_store:
+            object.__setattr__(self, "initial", with_state(self.initial))
         check_axes(self.axes)
         if self.refine is not None:
             self.refine.refined(self.axes)

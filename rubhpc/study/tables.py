@@ -10,7 +10,7 @@ from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, check_fields, choice, choices, count, quantity, series, table
 from rubhpc.input.reading import plain
 from rubhpc.rig.probes import Probe  # noqa: TC001 - annotations are read when a table is built
-from rubhpc.schema import KEEPABLE
+from rubhpc.schema import KEEPABLE, KEPT
 
 AUTO = "auto"  # transient until the motion has settled
 LONGEST_TRANSIENT, SETTLED_WITHIN = 240, 1e-4  # then
@@ -249,7 +249,10 @@ class Recording:
         doc="Samples per revolution, an even number.", example="256", default=256, at_least=16, at_most=65_536
     )
     keep: tuple[str, ...] = choices(
-        doc="Signals kept for each case.", example='["spectrum", "section"]', of=KEEPABLE, default=KEEPABLE
+        doc="What is kept of each case besides its measures.",
+        example='["spectrum", "section"]',
+        of=KEEPABLE,
+        default=KEPT,
     )
     probe: tuple[Probe, ...] = table(doc="What is measured besides, and where.", default=(), added=True)
 

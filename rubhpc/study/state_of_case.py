@@ -1,0 +1,156 @@
+"""Reads where one case of a store has ended, from the store's arrays."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.input.quantity import brief, parse_quantity
+from rubhpc.rig.reading import rig_from_dict, with_keys
+from rubhpc.schema import DONE, FINAL_STATE, STATUS
+from rubhpc.study.axes import coordinate_of, is_of_table
+from rubhpc.study.stored_state import StoredState
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import zarr
+    from numpy.typing import NDArray
+
+    from rubhpc.study.initial import Initial
+
+    Selection = Sequence[tuple[str, str | float]]
+
+# A value is on an axis when it is close to one of its values, relatively, and much closer than the next is.
+_CLOSE, _CLOSE_IN_SPACING = 5e-3, 0.1
+_MOST_WRITTEN = 6  # values of an axis in a message
+
+
+def with_state(initial: Initial) -> Initial:
+    """Return a start from a case of a store with the state that it names, read unless it has been.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    if initial.state is not None:
+        return initial
+    return replace(initial, state=read_state(initial.from_, initial.select))
+
+
+def read_state(path: str, select: Selection) -> StoredState:
+    """Return where one case of a store has ended.
+
+    Parameters
+    ----------
+    path : str
+        A store whose study keeps final states.
+    select : sequence of (axis, value)
+        Numbers in SI units or text, as of `--select`; axes of one value need none.
+
+    Raises
+    ------
+    InputError
+        There is no such store or case, it keeps no final states, or the case is not done.
+    """
+    import zarr
+
+    where = f"[initial] from: {path}"
+    if not Path(path).exists():
+        problem = f'{brief(path)} is not available; choose one of "rest", "contact_free"'
+        raise InputError(f"[initial] from: {problem}, or the path of a store")
+    try:
+        group = zarr.open_group(path, mode="r")
+        rig: Any = group.attrs["rig"]
+    except (OSError, KeyError, ValueError, TypeError):
+        raise InputError(f"{where}: is no store of a study; give the path of one") from None
+    if FINAL_STATE not in group:
+        fix = 'run its study with [record] keep = ["state", ...]'
+        raise InputError(f"{where}: keeps no final states; {fix}")
+    states = _array(group, FINAL_STATE)
+    dims = [str(d) for d in states.metadata.dimension_names or ()][:-1]  # type: ignore[union-attr]
+    index, chosen = _find_case(group, dims, select, path)
+    status = int(np.asarray(_array(group, "status")[index]))
+    values = np.asarray(states[index], dtype="<f8")
+    if status != DONE or not np.isfinite(values).all():
+        at = ", ".join(f"{name} = {value:g}" for name, value in chosen.items())
+        what = STATUS[status] if status != DONE else "not packed yet"
+        raise InputError(f"{where}: the case {at} is {what}; select another, or run its study to the end")
+    grid: Any = group.attrs["study"]
+    keys = {name: chosen[coordinate_of(name)] for name in _rig_keys(grid) if coordinate_of(name) in chosen}
+    return StoredState.of(values, assemble(with_keys(rig_from_dict(rig, f"{path}: rig"), keys)))
+
+
+def _find_case(
+    group: zarr.Group, dims: Sequence[str], select: Selection, path: str
+) -> tuple[tuple[int, ...], dict[str, float]]:
+    """Index of the case that is selected, and its values on all axes."""
+    wanted = {coordinate_of(name): value for name, value in select}
+    for name in wanted:
+        if name not in dims:
+            raise InputError(f"[initial] select: {path} has no axis {brief(name)}; it has {', '.join(dims)}")
+    index = []
+    for dim in dims:
+        axis = _array(group, dim)
+        values = np.asarray(axis[:], dtype=np.float64)
+        if dim not in wanted and values.size > 1:
+            example = f"select = {{ {_key(dim)} = {_written(axis, values[0])} }}"
+            problem = f"{path} has {values.size} values of {dim}, from which one has to be selected"
+            raise InputError(f"[initial] select: {problem}; write {example}")
+        index.append(_nearest(axis, values, dim, wanted[dim]) if dim in wanted else 0)
+    names = [name for name in group if _array_dims(group, name) in [(dim,) for dim in dims]]
+    chosen = {
+        name: float(np.asarray(_array(group, name)[index[dims.index(_array_dims(group, name)[0])]]))
+        for name in names
+    }
+    return tuple(index), chosen
+
+
+def _nearest(axis: zarr.Array[Any], values: NDArray[np.float64], dim: str, wanted: str | float) -> int:
+    meanings = str(axis.attrs.get("flag_meanings", "")).split()
+    if wanted in meanings:
+        return int(np.flatnonzero(values == meanings.index(str(wanted)))[0])
+    unit = str(axis.attrs.get("units", "1"))
+    spelt = "" if unit == "1" else re.sub(r"(?<=[A-Za-z])(-?\d+)", r"**\1", unit).replace(" ", " * ")
+    number = parse_quantity(wanted, spelt, f"[initial] select.{dim}")
+    i = int(np.argmin(np.abs(values - number)))
+    tolerance = _CLOSE * max(abs(number), abs(float(values[i])))
+    others = np.abs(np.delete(values, i) - values[i])
+    if others.size:
+        tolerance = min(tolerance, _CLOSE_IN_SPACING * float(others.min()))
+    if not abs(values[i] - number) <= tolerance:
+        near = values[np.sort(np.argsort(np.abs(values - number), kind="stable")[:_MOST_WRITTEN])]
+        listed = ", ".join(_written(axis, value) for value in near)
+        problem = f"{brief(wanted)} is not on the grid of the store"
+        raise InputError(f"[initial] select.{dim}: {problem}; take one of {listed}")
+    return i
+
+
+def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
+    array: zarr.Array[Any] = group[name]  # type: ignore[assignment]
+    return array
+
+
+def _array_dims(group: zarr.Group, name: str) -> tuple[str, ...]:
+    return tuple(str(d) for d in _array(group, name).metadata.dimension_names or ())  # type: ignore[union-attr]
+
+
+def _written(axis: zarr.Array[Any], value: float) -> str:
+    meanings = str(axis.attrs.get("flag_meanings", "")).split()
+    return f'"{meanings[int(value)]}"' if meanings else f"{value:.6g}"
+
+
+def _key(dim: str) -> str:
+    return dim if dim.isidentifier() else f'"{dim}"'
+
+
+def _rig_keys(study: Mapping[str, Any]) -> list[str]:
+    """Axes of a stored study that are keys of its rig."""
+    return [name for name in study.get("grid", {}) if "." in name and not is_of_table(name)]
