@@ -55,8 +55,8 @@ def track_order(signal: Floats, per_revolution: int, order: float, window: int) 
     """
     n = signal.size // per_revolution
     window = min(window, n)
-    turning = np.exp(-2j * np.pi * order / per_revolution * np.arange(signal.size))
-    sums = (signal * turning).reshape(n, per_revolution).sum(axis=1)
+    within = np.exp(-2j * np.pi * order / per_revolution * np.arange(per_revolution))
+    sums = (signal.reshape(n, per_revolution) @ within) * np.exp(-2j * np.pi * order * np.arange(n))
     whole: Complexes = np.convolve(sums, np.ones(window, dtype=np.complex128), mode="valid")
     whole = whole * (2.0 / (window * per_revolution))
     followed: Complexes = whole[np.clip(np.arange(n) - window // 2, 0, whole.size - 1)]

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+LAG = 0.003  # rad, by which the shaft may depart from its angle within a piece
+LONGEST_PIECE = 16  # revolutions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,3 +74,53 @@ class SpeedLaw:
         """Angle at the points, (n_point,), rad."""
         speed = np.array(self.speed)
         return np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(self.time))])
+
+
+def cut(law: SpeedLaw, per_revolution: int, pieces_per_revolution: int | None = None) -> Ints:
+    """Cut a law into pieces, each of which is taken at its mean speed.
+
+    Under the acceleration a the shaft's angle departs from that of a steady spin by `a T^2 / 12` over a piece
+    of the duration T, which is to be within `LAG`: pieces are of 1, 2, 4 ... revolutions or of halves,
+    quarters ... of one.
+
+    Parameters
+    ----------
+    per_revolution : int
+        Samples in a revolution; pieces are of whole numbers of them.
+    pieces_per_revolution : int, optional
+        Cut every revolution into as many, whatever the law.
+
+    Returns
+    -------
+    (n_piece + 1,)
+        Samples between which the pieces lie, from 0 to the end of the last whole revolution.
+
+    Raises
+    ------
+    InputError
+        `pieces_per_revolution` is no divisor of the samples in a revolution.
+    """
+    n = law.n_revolution
+    if pieces_per_revolution is not None:
+        if pieces_per_revolution < 1 or per_revolution % pieces_per_revolution:
+            problem = f"{pieces_per_revolution} is no divisor of the {per_revolution} samples in a revolution"
+            raise InputError(f"pieces_per_revolution: {problem}; choose another number")
+        return np.arange(n * pieces_per_revolution + 1) * (per_revolution // pieces_per_revolution)
+    time, _, rate = law.at_angle(2.0 * np.pi * np.arange(n + 1))
+    cuts, turn = [0], 0
+    while turn < n:
+        count = LONGEST_PIECE
+        while count > 1 and (
+            turn + count > n
+            or np.ptp(rate[turn : turn + count]) > 0.0  # a bend of the law is within
+            or abs(rate[turn]) * (time[turn + count] - time[turn]) ** 2 > 12.0 * LAG
+        ):
+            count //= 2
+        steepest = np.abs(rate[turn : turn + 2]).max()
+        parts, lag = 1, steepest * (time[turn + 1] - time[turn]) ** 2 / 12.0
+        while count == 1 and lag > LAG * parts**2 and per_revolution % (2 * parts) == 0:
+            parts *= 2
+        stride = per_revolution * count // parts
+        cuts += range(cuts[-1] + stride, cuts[-1] + per_revolution * count + 1, stride)
+        turn += count
+    return np.array(cuts)

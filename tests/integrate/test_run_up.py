@@ -10,7 +10,7 @@ from trial_rig import trial_rig
 
 from rubhpc import LumpedStator, Rig, Unbalance, run_up, simulate
 from rubhpc.errors import InputError
-from rubhpc.integrate.speed_law import SpeedLaw
+from rubhpc.integrate.speed_law import LAG, SpeedLaw, cut
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.spectra import track_order
 
@@ -219,6 +219,31 @@ def test_a_law_of_several_points_is_run_through_in_turn():
     assert time == pytest.approx([0.0, 1.0, 2.0])
     assert speed == pytest.approx([10.0, 30.0, 25.0])
     assert rate == pytest.approx([20.0, -5.0, -5.0])
+
+
+def test_pieces_are_as_long_as_the_acceleration_allows():
+    law = SpeedLaw(time=(0.0, 10.0, 12.0), speed=(20.0, 400.0, 400.0))
+    cuts = cut(law, 64)
+    assert cuts[0] == 0
+    assert cuts[-1] == 64 * law.n_revolution
+    lengths = np.diff(cuts)
+    assert set(lengths) == {4, 8, 16, 32, 64, 128, 256, 512, 1024}
+    assert all(length < 64 or first % 64 == 0 for first, length in zip(cuts, lengths, strict=False))
+    time, _, rate = law.at_angle(2 * math.pi * cuts / 64)
+    assert (rate[:-1] * np.diff(time) ** 2 / 12).max() <= LAG
+    assert np.diff(cut(law, 64, 2)) == pytest.approx(32)
+
+
+def test_pieces_of_several_revolutions_are_as_accurate_as_short_ones():
+    case = {"start": 185.0, "stop": 209.0, "time": 4.5, "clearance": 8e-4, "samples_per_revolution": 64}
+    assert np.diff(cut(SpeedLaw(time=(0.0, 4.5), speed=(185.0, 209.0)), 64)).max() == 128
+    found, fine = run_up(RIG, **case), run_up(RIG, **case, pieces_per_revolution=4)
+    assert fine.contact_fraction.max() > 0.0
+    touched = 64 * int(np.argmax(fine.contact_fraction.values[:, 0] > 0.0))
+    for name in ("vertical", "horizontal"):
+        expected = fine[name].values[: touched + 64 * 6]
+        error = np.abs(found[name].values[: touched + 64 * 6] - expected).max()
+        assert error < 0.01 * np.abs(expected).max(), name
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,171 @@
+"""The set-ups of the pieces of a run-up: matrices held over a range of speeds, tables tuned to each piece."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.fem.assemble import model_at
+from rubhpc.fem.statics import sag_under
+from rubhpc.integrate.contact_mode import KeptParts
+from rubhpc.integrate.held_matrices import held_range
+from rubhpc.integrate.packing import whole_system
+from rubhpc.integrate.retuned_modes import RetunedLibrary
+from rubhpc.integrate.setup import ModalSetup
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+    from rubhpc.integrate.contact_mode import Solved
+    from rubhpc.integrate.mode_library import ModeLibrary
+    from rubhpc.integrate.reduction import ReducedModel
+
+    Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
+
+SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the speed is taken
+ACCELERATION_STEP = 0.005  # of the square of the speed: a change of `phi'' G` below it is left out
+
+
+class HeldMatrices:
+    """Matrices at a speed, rad/s, and an acceleration, rad/s^2, and what has been solved of them."""
+
+    def __init__(
+        self, model: Model, reduced: ReducedModel, phasor: Complexes, reach: float, acceleration: float
+    ) -> None:
+        self.model, self.reduced = model, reduced
+        self.kept = KeptParts()
+        self._phasor, self._reach, self._acceleration = phasor, reach, acceleration
+        self._libraries: dict[tuple[float, int, int], RetunedLibrary] = {}
+
+    def serve(self, speed: float, acceleration: float) -> bool:
+        """Whether a piece may use them."""
+        is_near = abs(speed - self.reduced.spin) <= self._reach
+        return is_near and abs(acceleration - self._acceleration) <= ACCELERATION_STEP * speed**2
+
+    def tuned(self, piece: PieceSetup, friction: float) -> RetunedLibrary:
+        """Contact modes of a friction, tuned to a piece."""
+        key = friction, piece.sample_level, piece.n_level
+        if key not in self._libraries:
+            self._libraries[key] = RetunedLibrary(
+                self.reduced,
+                self.model,
+                friction,
+                phasor=self._phasor,
+                known=self.kept,
+                tick=piece.tick,
+                sample_level=piece.sample_level,
+                n_level=piece.n_level,
+            )
+        self._libraries[key].tune(piece.spin, piece.factor, piece.tick)
+        return self._libraries[key]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PieceSetup(ModalSetup):
+    """A set-up at the speed of a piece, whose matrices are those of other pieces too."""
+
+    held: HeldMatrices
+    factor: complex  # 1/s^2, by which the unbalance at unit speed acts
+    most_energy: float  # J, beyond which the motion has diverged, at the highest speed
+
+    @cached_property
+    def energy_limit(self) -> float:
+        """Mechanical energy, J, beyond which a motion has diverged."""
+        return self.most_energy
+
+    @property
+    def n_level(self) -> int:
+        """Levels for which exponentials are tabulated."""
+        return self._n_level
+
+    @property
+    def _known_of_ring(self) -> Solved:
+        return self.held.kept
+
+    @cached_property
+    def _known(self) -> Solved:
+        return self.held.kept
+
+    def library(self, friction: float) -> ModeLibrary:
+        """Contact modes of a friction, which serve until another piece asks for them."""
+        return self.held.tuned(self, friction)
+
+
+class Pieces:
+    """The set-ups of the pieces of a run-up, from that at its highest speed, which keeps the most modes."""
+
+    def __init__(self, fastest: ModalSetup) -> None:
+        self._fastest = fastest
+        self._basis = fastest.reduced.basis
+        self._held: HeldMatrices | None = None
+        model = fastest.model
+        rotor = model.rotor
+        self._inertia = rotor.mass @ np.array([float(name == "thx") for _, name in rotor.degrees])
+        n, n_all = rotor.n_dof, model.body_start[-1]
+        momentum = np.zeros((n_all, n_all))
+        momentum[:n, :n] = rotor.gyroscopic
+        self._momentum = self._basis.T @ momentum @ self._basis
+        phasor = (model.unbalance_cosine - 1j * model.unbalance_sine) @ self._basis[:n]
+        self._phasor = phasor.astype(np.complex128)
+
+    def setup(self, speed: float, acceleration: float, angle: float, duration: float) -> PieceSetup:
+        """The set-up of a piece: mean speed (rad/s), acceleration (rad/s^2), first angle, duration (s)."""
+        held, fastest = self._held, self._fastest
+        if held is None or not held.serve(speed, acceleration):
+            held = self._held = self._hold(speed, acceleration)
+        lag = acceleration * duration**2 / 12.0
+        factor = (speed**2 - 1j * acceleration) * complex(np.exp(1j * (angle - lag)))
+        phasor = self._phasor * factor
+        return PieceSetup(
+            scheme=fastest.scheme,
+            model=held.model,
+            reduced=replace(held.reduced, spin=speed, force=np.stack([phasor.real, -phasor.imag])),
+            spin=speed,
+            step=fastest.step,
+            contact_step=fastest.contact_step,
+            samples_per_revolution=fastest.samples_per_revolution,
+            is_updated=fastest.is_updated,
+            law=fastest.law,
+            displacement_limit=fastest.displacement_limit,
+            held=held,
+            factor=factor,
+            most_energy=fastest.energy_limit,
+        )
+
+    def _hold(self, speed: float, acceleration: float) -> HeldMatrices:
+        """Matrices for a speed at the near end of the range over which they may be held."""
+        _, damping, stiffness = self._matrices(speed, acceleration)
+        _, next_damping, next_stiffness = self._matrices(speed * (1.0 + SPEED_STEP), acceleration)
+        step = SPEED_STEP * speed
+        drift = (next_stiffness - stiffness) / step, (next_damping - damping) / step
+        reach = held_range(stiffness, damping, drift, speed, acceleration)
+        speed += np.sign(acceleration) * reach
+        model, damping, stiffness = self._matrices(speed, acceleration)
+        sag = sag_under(model.rotor, model.load - acceleration * self._inertia)
+        if model.probe is not None:
+            constant = model.probe_rows[0][:, : sag.size] @ sag
+            model = replace(model, probe=replace(model.probe, constant=constant))
+        phasor = self._phasor * speed**2
+        reduced = replace(
+            self._fastest.reduced,
+            spin=speed,
+            stiffness=stiffness,
+            damping=damping,
+            force=np.stack([phasor.real, -phasor.imag]),
+        )
+        near_end = reach * (1.0 + 1e-9)  # rounding apart
+        return HeldMatrices(replace(model, sag=sag), reduced, self._phasor, near_end, acceleration)
+
+    def _matrices(self, speed: float, acceleration: float) -> tuple[Model, Floats, Floats]:
+        """The model at a speed, within the tables of its bearings, its damping and its stiffness."""
+        model = self._fastest.model
+        if speeds := model.rotor.tabulated_speeds:
+            model = model_at(model, float(np.clip(speed, speeds[0], speeds[-1])))
+        _, damping, stiffness, _ = whole_system(model, speed)
+        stiffness = self._basis.T @ stiffness @ self._basis + acceleration * self._momentum
+        return model, self._basis.T @ damping @ self._basis, stiffness

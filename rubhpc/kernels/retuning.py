@@ -1,0 +1,192 @@
+"""Tables of a contact mode at another spin speed, its matrices staying what they are.
+
+Eigenmodes belong to the matrices. The spin speed changes the response to the unbalance, which follows from
+them in closed form, and with the tick the exponentials.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit
+from rubhpc.kernels.contact_modes import (
+    DYING,
+    FORCED_LEVEL,
+    SAMPLES_AT_ONCE,
+    ModeTables,
+)
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+GONE = -40.0  # exponent of what has died away
+STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
+
+
+class HeldMode(NamedTuple):
+    """What the spin speed leaves alone: m eigenmodes, m + 1 + q coordinates, padded to the tables' width.
+
+    n reduced degrees, q pairs, o output rows.
+    """
+
+    n_coordinate: int  # m + 1 + q
+    exponent: Complexes  # (width,), 1/s; that of the response is filled in
+    is_pair: NDArray[np.bool_]  # (m,), whether a mode stands for a conjugate pair, and is doubled
+    motion: Complexes  # (m, 2 n), displacements, then velocities
+    drive: Complexes  # (m,), share of the unbalance at unit speed
+    mirrored_drive: Complexes  # (m,), that of the conjugate modes
+    switch: Floats  # (q, 2 n), gap or force with the motion
+    reaction: Complexes  # (q,), force of closed pairs by the unbalance at unit speed
+    slip: Floats  # (q, n)
+    resistance: Floats  # (n, 2 n), [skew part of the stiffness, damping]
+    rate: Complexes  # (width, n), velocities
+    resisting: Complexes  # (width, n), resisting forces
+    phasor: Complexes  # (n,), unbalance at unit speed, kg m
+    work: Complexes  # (2, width), power of the unbalance and of its conjugate at unit speed
+    output: Floats  # (o, 3 n), what output rows see of displacements, rates and accelerations
+    row: Complexes  # (o, width), output rows; that of the response is filled in
+
+
+@jit
+def retune(
+    tables: ModeTables, mode: int, held: HeldMode, spin: float, factor: complex, tick: float, interval: float
+) -> None:
+    """Bring tables of a mode to a spin speed (rad/s), in place.
+
+    Parameters
+    ----------
+    mode : int
+        Index of the mode in the tables.
+    factor : complex
+        By which the unbalance at unit speed acts: `spin^2 exp(i angle)` at a steady speed, 1/s^2.
+    tick, interval : float, s
+        Resolution of events and interval of samples.
+    """
+    m, width, n_level = held.is_pair.size, held.exponent.size, tables.power_re.shape[1]
+    n, end = held.slip.shape[1], held.n_coordinate
+    turning = 1j * spin
+    exponent = held.exponent
+    exponent[m] = turning
+    x = np.zeros(2 * n, dtype=np.complex128)
+    for k in range(m):
+        direct = held.drive[k] * factor / (turning - exponent[k])
+        other = np.conj(direct)
+        if held.is_pair[k]:
+            mirrored = held.mirrored_drive[k] * factor / (turning - np.conj(exponent[k]))
+            other = np.conj(mirrored)
+            for a in range(2 * n):
+                x[a] += 0.5 * (held.motion[k, a] * direct + np.conj(held.motion[k, a]) * mirrored)
+        else:
+            for a in range(2 * n):
+                x[a] += held.motion[k, a] * direct
+        cosine, sine = 0.5 * (direct + other), 0.5j * (direct - other)
+        tables.enter_cosine[mode, 0, k], tables.enter_cosine[mode, 1, k] = cosine.real, cosine.imag
+        tables.enter_sine[mode, 0, k], tables.enter_sine[mode, 1, k] = sine.real, sine.imag
+    for a in range(2 * n):
+        tables.motion_re[mode, a, m], tables.motion_im[mode, a, m] = x[a].real, x[a].imag
+    for i in range(held.slip.shape[0]):
+        switch, slip = -factor * held.reaction[i], 0j
+        for a in range(2 * n):
+            switch += held.switch[i, a] * x[a]
+        for a in range(n):
+            slip += held.slip[i, a] * x[n + a]
+        tables.switch_re[mode, i, m], tables.switch_im[mode, i, m] = switch.real, switch.imag
+        tables.slip_re[mode, i, m], tables.slip_im[mode, i, m] = slip.real, slip.imag
+        switch, slip = switch * turning, slip * turning
+        tables.rate_re[mode, i, m], tables.rate_im[mode, i, m] = switch.real, switch.imag
+        tables.slip_rate_re[mode, i, m], tables.slip_rate_im[mode, i, m] = slip.real, slip.imag
+    for k in range(end):
+        _retune_powers(tables, mode, k, exponent[k], tick, n_level)
+    for o in range(held.output.shape[0]):
+        total = 0j
+        for a in range(n):
+            total += (
+                held.output[o, a] * x[a]
+                + (held.output[o, n + a] + held.output[o, 2 * n + a] * turning) * x[n + a]
+            )
+        held.row[o, m] = total
+    n_output = held.output.shape[0]
+    for k in range(end):
+        for later in range(SAMPLES_AT_ONCE):
+            ahead = np.exp(exponent[k] * (interval * later))
+            for o in range(n_output):
+                value = ahead * held.row[o, k]
+                tables.output[mode, k, later * n_output + o] = value.real
+                tables.output[mode, width + k, later * n_output + o] = -value.imag
+    _retune_energies(tables, mode, held, x, factor)
+
+
+@jit
+def _retune_powers(
+    tables: ModeTables, mode: int, k: int, exponent: complex, tick: float, n_level: int
+) -> None:
+    """Exponentials of a coordinate, and what bounds and paces have of them."""
+    for level in range(n_level):
+        power = np.exp(exponent * (tick * 2.0**level))
+        tables.power_re[mode, level, k], tables.power_im[mode, level, k] = power.real, power.imag
+    size = abs(exponent)
+    growth = np.exp(max(exponent.real, 0.0) * tick * 2.0 ** (n_level - 1))
+    for i in range(tables.bound.shape[1]):
+        share = np.hypot(tables.switch_re[mode, i, k], tables.switch_im[mode, i, k])
+        tables.bound[mode, i, k] = share * size * size * growth
+    is_gone = exponent.real * tick * 2.0**FORCED_LEVEL < GONE
+    tables.pace[mode, k] = DYING if is_gone else size
+
+
+@jit
+def _retune_energies(tables: ModeTables, mode: int, held: HeldMode, x: Complexes, factor: complex) -> None:
+    """Forms of the energies with the response `x` (2 n,)."""
+    m, n, width = held.is_pair.size, held.slip.shape[1], held.exponent.size
+    exponent = held.exponent
+    turning = exponent[m]
+    own = np.zeros(n, dtype=np.complex128)
+    greatest = 0.0
+    for k in range(width):
+        greatest = max(greatest, abs(exponent[k]))
+    least = 2.0 * STEADY * greatest
+    for a in range(n):
+        for b in range(2 * n):
+            own[a] += held.resistance[a, b] * x[b]
+        held.rate[m, a], held.resisting[m, a] = x[n + a], own[a]
+    work, work_conjugate, steady, driven = 0j, 0j, 0.0, 0.0
+    for a in range(n):
+        work += held.phasor[a] * x[n + a]
+        work_conjugate += np.conj(held.phasor[a]) * x[n + a]
+        steady += (x[n + a] * np.conj(own[a])).real
+        driven += (x[n + a] * np.conj(factor * held.phasor[a])).real
+    held.work[0, m], held.work[1, m] = work, work_conjugate
+    tables.steady_power[mode, 0], tables.steady_power[mode, 1] = 0.5 * steady, 0.5 * driven
+    for k in range(held.n_coordinate):
+        across, across_conjugate, down, down_conjugate = 0j, 0j, 0j, 0j
+        for a in range(n):
+            across += x[n + a] * held.resisting[k, a]
+            across_conjugate += x[n + a] * np.conj(held.resisting[k, a])
+            down += own[a] * held.rate[k, a]
+            down_conjugate += np.conj(own[a]) * held.rate[k, a]
+        across = _primitive(across, turning + exponent[k], least)
+        across_conjugate = _primitive(across_conjugate, turning + np.conj(exponent[k]), least)
+        down = _primitive(down, exponent[k] + turning, least)
+        down_conjugate = _primitive(down_conjugate, exponent[k] + np.conj(turning), least)
+        both = across_conjugate + down_conjugate
+        re_re = 0.25 * (across + down + both).real
+        re_im = 0.25 * (across_conjugate - across - down - down_conjugate).imag
+        im_re = 0.25 * (down_conjugate - down - across - across_conjugate).imag
+        im_im = 0.25 * (both - across - down).real
+        loss = tables.loss[mode]
+        loss[m, k] = loss[k, m] = re_re
+        loss[m, width + k] = loss[width + k, m] = re_im
+        loss[width + m, k] = loss[k, width + m] = im_re
+        loss[width + m, width + k] = loss[width + k, width + m] = im_im
+        first = 0.5 * _primitive(factor * held.work[0, k], exponent[k] + turning, least)
+        second = 0.5 * _primitive(np.conj(factor) * held.work[1, k], exponent[k] - turning, least)
+        tables.work_re[mode, 0, k], tables.work_im[mode, 0, k] = first.real, first.imag
+        tables.work_re[mode, 1, k], tables.work_im[mode, 1, k] = second.real, second.imag
+
+
+@jit
+def _primitive(power: complex, exponent: complex, least: float) -> complex:
+    """Power over its exponent, 1/s; zero where that is zero."""
+    return power / exponent if abs(exponent) > least else 0j
