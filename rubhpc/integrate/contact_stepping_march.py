@@ -109,7 +109,7 @@ class ContactSteppingMarch(ModalMarch):
         outcome = self._kernel(last_tick, samples, accumulator, is_recorded)
         if outcome == FINISHED:
             if is_recorded:
-                end_span(self.tables, clock, self._z, self.progress, self._recorder, accumulator)
+                end_span(self.tables, clock, self._z, self._bare_progress, self._recorder, accumulator)
             self.progress.energy_from = NONE
         return outcome
 
@@ -156,7 +156,7 @@ class ContactSteppingMarch(ModalMarch):
             self._work,
             last_tick,
             is_recorded,
-            self.progress,
+            self._bare_progress,
             self._z,
             self._z_next,
             self._ends,

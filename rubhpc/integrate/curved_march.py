@@ -104,7 +104,7 @@ class CurvedMarch(EventDrivenMarch):
                 LOAD_TOLERANCE * self._setup.accuracy,
                 last_tick,
                 is_recorded,
-                self.progress,
+                self._bare_progress,
                 self._z,
                 self._z_next,
                 self._motion,

@@ -146,7 +146,7 @@ class EventDrivenMarch(ModalMarch):
                 self.clock,
                 last_tick,
                 is_recorded,
-                self.progress,
+                self._bare_progress,
                 self._z,
                 self._z_next,
                 self._motion,

@@ -139,7 +139,7 @@ class FrictionMarch(EventDrivenMarch):
                 self.clock,
                 last_tick,
                 is_recorded,
-                self.progress,
+                self._bare_progress,
                 self._z,
                 self._z_next,
                 self._motion,

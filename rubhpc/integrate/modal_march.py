@@ -18,6 +18,7 @@ from rubhpc.kernels.case_progress import (
     DIVERGED,
     FINISHED,
     Clock,
+    bare,
     begin_in,
     new_progress,
     restart_clock,
@@ -74,7 +75,9 @@ class ModalMarch(March):
         )
         self._motion = self._reduce(initial)
         self._recorder = recorder(setup.model.n_place, setup.model.n_probe)
-        self.progress: Progress = new_progress(1)[0]
+        records = new_progress(1)
+        self.progress: Progress = records[0]
+        self._bare_progress = bare(records)[0]  # the same, for kernels
 
     @abstractmethod
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
@@ -90,8 +93,11 @@ class ModalMarch(March):
 
     def energy(self) -> float:
         """Mechanical energy, J."""
+        return self._energy_of(self.motion_of(self.progress, self._z))
+
+    def _energy_of(self, motion: Floats) -> float:
+        """Mechanical energy, J, of a reduced motion (2 n,)."""
         n = self.bodies.stiffness.shape[0]
-        motion = self.motion_of(self.progress, self._z)
         displacement, velocity = motion[:n], motion[n:]
         return float(0.5 * (velocity @ velocity + displacement @ self.bodies.stiffness @ displacement))
 
@@ -132,12 +138,12 @@ class ModalMarch(March):
         self, stop: int, samples: Samples, accumulator: Accumulator, *, is_recorded: bool
     ) -> str | None:
         sample_level = self.clock.sample_level
-        restart_clock(self.progress, self.sample << sample_level, self.sample, is_recorded=is_recorded)
+        restart_clock(self._bare_progress, self.sample << sample_level, self.sample, is_recorded=is_recorded)
         self.clock = self.clock._replace(n_sample=samples.rotor.shape[1])
         while True:
             outcome = self._kernel(stop << sample_level, samples, accumulator, is_recorded)
-            self.n_step = int(self.progress.n_step)
-            self.sample = int(self.progress.tick) >> sample_level
+            self.n_step = int(self._bare_progress["n_step"])
+            self.sample = int(self._bare_progress["tick"]) >> sample_level
             if outcome == CONTACT_UNSOLVED:
                 return self._unsolved()
             reason = self._why_diverged(outcome == DIVERGED, accumulator)
@@ -160,7 +166,7 @@ class ModalMarch(March):
             seen[:2] = np.maximum(np.abs(seen[:2]), reached)
         if not np.all(np.abs(seen) <= limit):
             return displacement_reason(setup.model, seen, limit)
-        if not is_at_event and not self.energy() <= setup.energy_limit:
+        if not is_at_event and not self._energy_of(motion) <= setup.energy_limit:
             return energy_reason(setup.energy_limit)
         return None
 

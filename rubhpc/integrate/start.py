@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -43,7 +45,7 @@ def start_of(initial: Initial, setup: Setup, clearance: float) -> State:
         in a direction given, or the node of the impulse does not move sideways.
     """
     if initial.from_ == CONTACT_FREE:
-        state = _contact_free(setup)
+        state = _shared(setup).contact_free
     elif initial.state is not None:
         initial.state.check_fit(setup.model)
         state = State.unpacked(initial.state.packed, setup.model)
@@ -56,17 +58,35 @@ def start_of(initial: Initial, setup: Setup, clearance: float) -> State:
     return fit_to_gaps(state, setup, clearance)
 
 
-def _contact_free(setup: Setup) -> State:
-    """The steady unbalance response about the sagged shaft; no stator touches."""
-    model = setup.model
-    if problem := instability_message(model, setup.spin):
-        raise InputError(f'[initial] from: {problem}; take from = "rest"')
-    response = steady_response(model, setup.spin)
-    return replace(
-        State.at_rest(model),
-        rotor_displacement=model.sag + response.real,
-        rotor_velocity=(1j * setup.spin * response).real,
-    )
+@dataclass(eq=False)
+class _Shared:
+    """What the starts of one rig and speed share, found when it is first needed."""
+
+    model: Model
+    spin: float
+    shapes: dict[tuple[int, ...], Floats] = field(default_factory=dict)
+
+    @cached_property
+    def contact_free(self) -> State:
+        """The steady unbalance response about the sagged shaft; no stator touches."""
+        if problem := instability_message(self.model, self.spin):
+            raise InputError(f'[initial] from: {problem}; take from = "rest"')
+        response = steady_response(self.model, self.spin)
+        return replace(
+            State.at_rest(self.model),
+            rotor_displacement=self.model.sag + response.real,
+            rotor_velocity=(1j * self.spin * response).real,
+        )
+
+
+_SHARED: WeakKeyDictionary[Setup, _Shared] = WeakKeyDictionary()
+
+
+def _shared(setup: Setup) -> _Shared:
+    """What the starts of a set-up share, as long as that is kept."""
+    if setup not in _SHARED:
+        _SHARED[setup] = _Shared(setup.model, setup.spin)
+    return _SHARED[setup]
 
 
 def _disturbed(state: State, initial: Initial, setup: Setup) -> State:
@@ -76,7 +96,11 @@ def _disturbed(state: State, initial: Initial, setup: Setup) -> State:
     moved = np.array([initial.vertical, initial.horizontal])
     moving = np.array([initial.vertical_velocity, initial.horizontal_velocity])
     if moved.any() or moving.any():
-        shape = _shapes_of_output(setup, np.flatnonzero((moved != 0.0) | (moving != 0.0)))
+        wanted = tuple(np.flatnonzero((moved != 0.0) | (moving != 0.0)).tolist())
+        shapes = _shared(setup).shapes
+        if wanted not in shapes:
+            shapes[wanted] = _shapes_of_output(setup, wanted)
+        shape = shapes[wanted]
         displacement = displacement + shape @ moved
         velocity = velocity + shape @ moving
     if initial.impulse != 0.0:
@@ -86,7 +110,7 @@ def _disturbed(state: State, initial: Initial, setup: Setup) -> State:
     return State.of_bodies(model, displacement, velocity, np.zeros_like(state.contact_force))
 
 
-def _shapes_of_output(setup: Setup, wanted: NDArray[np.intp]) -> Floats:
+def _shapes_of_output(setup: Setup, wanted: tuple[int, ...]) -> Floats:
     """Static shapes (n_dof, 2) of all bodies that move the output node by 1 m up, or sideways."""
     model = setup.model
     rows = [model.rotor.index(model.output_node, name) for name in ("v", "w")]

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.march import March
+    from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
@@ -21,14 +22,16 @@ if TYPE_CHECKING:
 # Revolutions between the cycles looked at: one is compared with those 8 and 12 later, which finds motions of
 # period 1, 2, 3, 4, 6, 8 and 12; the last is the first of the next three.
 PAUSES = (7, 3)
+DECAYED = 0.01  # of the largest value that a signal has had: smaller ones are compared with that
 
 
 def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]:
     """March through the transient, until the motion has settled where `recording` says "auto".
 
     It has settled when no displacement of output node, tips or carriers differs from one cycle of 8 or 12
-    revolutions before by more than `settled_within` of the signal's largest value. At the latest it ends with
-    `longest_transient` revolutions.
+    revolutions before by more than `settled_within` of the signal's largest value, or of a hundredth of the
+    largest that it has had: one that dies out has settled too. At the latest it ends with `longest_transient`
+    revolutions.
 
     Returns
     -------
@@ -45,11 +48,13 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
         empty_samples(n_place, recording.samples_per_revolution),
         new_accumulator(march.touching().size, n_place),
     )
+    idle = _idle(march)
     reference: Floats | None = None
+    largest: Floats | None = None
     for i, pause in enumerate(chain([0], cycle(PAUSES))):
         if done + pause + 1 > limit:
-            return pass_revolutions(march, recording, limit - done), limit
-        reason = pass_revolutions(march, recording, pause)
+            return pass_revolutions(march, recording, limit - done, idle), limit
+        reason = pass_revolutions(march, recording, pause, idle)
         done += pause
         if reason is None:
             reason = march.advance(
@@ -59,21 +64,38 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
             return reason, done
         done += 1
         latest = samples.whole[[VERTICAL, HORIZONTAL, TWIST, *range(4, 4 + 2 * n_place)]]
-        if reference is not None and has_settled(latest, reference, recording.settled_within):
+        reached = np.abs(latest).max(axis=1)
+        largest = reached if largest is None else np.maximum(largest, reached)
+        if reference is not None and has_settled(
+            latest, reference, recording.settled_within, DECAYED * largest
+        ):
             return None, done
         if i % len(PAUSES) == 0:
             reference = latest
     raise AssertionError  # the pauses never end
 
 
-def has_settled(cycle: Floats, earlier: Floats, tolerance: float) -> bool:
-    """Whether two cycles (signals, samples) are one, to a share of each signal's largest value."""
+def has_settled(cycle: Floats, earlier: Floats, tolerance: float, least: Floats | float = 0.0) -> bool:
+    """Whether two cycles (signals, samples) are one, to a share of each signal's largest value.
+
+    What is smaller than `least`, (signals,), is compared with that.
+    """
     change, size = np.abs(cycle - earlier).max(axis=1), np.abs(cycle).max(axis=1)
-    return bool(np.all(change <= tolerance * size))
+    return bool(np.all(change <= tolerance * np.maximum(size, least)))
 
 
-def pass_revolutions(march: March, recording: Recording, n_revolution: int) -> str | None:
-    """March some revolutions without a record; returns why the case cannot go on."""
-    samples, accumulator = empty_samples(march.n_place, 0), new_accumulator(march.touching().size)
+def pass_revolutions(
+    march: March, recording: Recording, n_revolution: int, idle: tuple[Samples, Accumulator] | None = None
+) -> str | None:
+    """March some revolutions without a record; returns why the case cannot go on.
+
+    What a march asks for to record into, and leaves as it is, may be given as `idle`.
+    """
+    samples, accumulator = idle or _idle(march)
     first = -n_revolution * recording.samples_per_revolution
     return march.advance(first, 0, samples, accumulator, is_recorded=False)
+
+
+def _idle(march: March) -> tuple[Samples, Accumulator]:
+    """Room for no samples, and sums."""
+    return empty_samples(march.n_place, 0), new_accumulator(march.touching().size)

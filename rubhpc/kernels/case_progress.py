@@ -62,13 +62,19 @@ def new_progress(n_case: int) -> Any:
     return progress
 
 
-def restart_clock(progress: Progress, tick: int, sample: int, *, is_recorded: bool) -> None:
-    """Count time anew: the case stands at `tick`, where `sample` is due."""
-    progress.entered += tick - progress.tick
-    progress.counted_from += tick - progress.tick
-    progress.tick, progress.next_sample, progress.n_event = tick, sample, 0
+def bare(progress: Any) -> Any:
+    """The same records as NumPy's own type, whose items are read, and given to kernels, 20 times as fast."""
+    return progress.view(np.ndarray).view(_RECORD)
+
+
+def restart_clock(record: Any, tick: int, sample: int, *, is_recorded: bool) -> None:
+    """Count time anew: the case of a bare record stands at `tick`, where `sample` is due."""
+    passed = tick - int(record["tick"])
+    record["entered"] += passed
+    record["counted_from"] += passed
+    record["tick"], record["next_sample"], record["n_event"] = tick, sample, 0
     if not is_recorded:
-        progress.energy_from = NONE
+        record["energy_from"] = NONE
 
 
 def begin_in(progress: Progress, mode: int) -> None:

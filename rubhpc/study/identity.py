@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before
 RING_PHYSICS = 8  # that of several stators in short steps, of either scheme
 CLOSED_FORM_PHYSICS = 7  # that of motion from event to event
-CURVED_PHYSICS = 9  # that of curved gaps from event to event; the next version of all is 10
+CURVED_PHYSICS = 9  # that of curved gaps from event to event
+AUTO_PHYSICS = 10  # that of transients that end where the motion has settled; the next version of all is 11
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
@@ -26,6 +27,8 @@ _AXIS = "axis"  # in place of a value that every case sets
 
 def physics_of(study: Study) -> int:
     """Version of the physics with which a study is computed."""
+    if study.recording.is_transient_auto:
+        return max(PHYSICS, AUTO_PHYSICS)
     contact = study.contact
     is_modal = study.integrator.method == "modal"
     if is_modal and contact.is_smooth and (has_updated_normal(study) or has_bent_stator(study.rig.stator)):

@@ -6,6 +6,7 @@ import pytest
 from rubhpc import simulate
 from rubhpc.errors import InputError
 from rubhpc.integrate.transient import has_settled
+from rubhpc.schema import REGIME
 from rubhpc.study.study import Recording
 
 CASE = {"speed_ratio": 0.75, "friction": 0.3, "revolutions": 4}
@@ -56,6 +57,28 @@ def test_one_signal_that_changes_has_not_settled():
     later[1, 2] += 2e-9
     assert has_settled(later, cycle, 1e-3)
     assert not has_settled(later, cycle, 5e-4)
+
+
+def test_a_signal_that_dies_out_has_settled():
+    """Free ringing changes by the same share from cycle to cycle, however small it has become."""
+    cycle, decay = np.array([[1.0, -1.0], [2e-5, -2e-5]]), np.array([[1.0], [0.5]])
+    assert not has_settled(cycle * decay, cycle, 1e-3)
+    assert not has_settled(cycle * decay, cycle, 1e-3, np.array([0.01, 1e-3]))
+    assert has_settled(cycle * decay, cycle, 1e-3, np.array([0.01, 1e-2]))
+
+
+def test_ringing_stators_do_not_prolong_the_transient():
+    """After a knock without lasting contact tips and torsion ring down to nothing."""
+    found = simulate(
+        "mokhtar2017",
+        transient="auto",
+        clearance="300 um",
+        initial={"from": "contact_free", "impulse": "0.1 N*s"},
+        **(CASE | {"speed_ratio": 1.5, "friction": 0.1}),
+    )
+    assert REGIME[found.regime] == "no_contact"
+    assert found.settled == 1
+    assert 20 < found.transient_revolutions < 100
 
 
 @pytest.mark.parametrize("key", ["transient_limit", "transient_tolerance"])
