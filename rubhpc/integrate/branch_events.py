@@ -6,7 +6,6 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from rubhpc.integrate.shooting import NotConverged
 
@@ -62,6 +61,8 @@ def crossings(branching: Branching, a: Point, b: Point) -> Iterator[tuple[Event,
         if share >= 1.0:
             return b
         return branching.correct(a, share * change, change / length)
+
+    from scipy.optimize import brentq  # 0.2 s to load, and a run without branches needs it nowhere
 
     found: list[tuple[float, Event, Point]] = []
     for rank in range(*sorted((a.n_unstable, b.n_unstable))):

@@ -70,7 +70,7 @@ def test_help_and_import_load_nothing_heavy():
 def test_a_run_loads_nothing_that_reading_needs():
     loaded = loaded_by("import rubhpc.running.driver, rubhpc.running.worker, rubhpc.simulate")
     assert "numba" in loaded
-    assert not {"xarray", "pandas", "dask", "matplotlib", "pint", "rich"} & loaded
+    assert not {"xarray", "pandas", "dask", "matplotlib", "pint", "rich", "scipy.optimize"} & loaded
 
 
 def test_status_loads_neither_mpi_nor_numba_nor_zarr(tmp_path):
