@@ -25,6 +25,7 @@ from rubhpc.storage.verify import verify
 
 COUNTED = Path(__file__).with_name("poisoned.py")
 RANKS, BLOCK = 2, 2  # cases in a block
+LONG = pytest.mark.long
 PATIENCE = 2.0  # s after which no process of a killed run may be left
 
 
@@ -96,7 +97,9 @@ def test_a_storm_of_twenty_kills_loses_nothing(tmp_path, launcher, seed):
 
 
 @each_launcher
-@pytest.mark.parametrize(("moment", "ranks"), [(0.3, 2), (1.0, 2), (1.0, 1)])
+@pytest.mark.parametrize(
+    ("moment", "ranks"), [pytest.param(0.3, 2, marks=LONG), (1.0, 2), pytest.param(1.0, 1, marks=LONG)]
+)
 def test_a_rank_ends_with_its_launcher(tmp_path, launcher, moment, ranks):
     store = tmp_path / "tiny.zarr"
     study = write_slow_study(tmp_path, transient=3000)

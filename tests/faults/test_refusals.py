@@ -32,16 +32,17 @@ POISONED = Path(__file__).with_name("poisoned.py")
 
 @each_launcher
 def test_poisoned_cases_fail_and_the_others_finish(tmp_path, launcher):
-    study = write_study(tmp_path, friction=[0.1, 0.3, 0.5, 0.7], run='case_time_limit = "2 s"')
+    poisoned = {"friction": [0.1, 0.3, 0.5, 0.7], "run": 'case_time_limit = "4 s"'}
+    study = write_study(tmp_path, speed_ratio=[0.9], **poisoned)
     done = run("cases", study, ranks=2, script=POISONED, launcher=launcher)
     assert done.returncode == 1, done.stderr
     line = complaint(done.stderr)
-    assert line.startswith(f"rubhpc: {tmp_path / 'tiny.zarr'}: 12 of 16 cases failed; the first, ")
+    assert line.startswith(f"rubhpc: {tmp_path / 'tiny.zarr'}: 6 of 8 cases failed; the first, ")
     told = run("status", tmp_path / "tiny.zarr").stdout
-    assert "16 cases: 4 done, 12 failed, 0 diverged, 0 missing" in told
+    assert "8 cases: 2 done, 6 failed, 0 diverged, 0 missing" in told
     reasons = {
         0.3: "ZeroDivisionError: a poisoned case",
-        0.5: "over its time limit of 2 s",
+        0.5: "over its time limit of 4 s",
         0.7: "FloatingPointError: torsion is not finite",
     }
     ledger = Store(tmp_path / "tiny.zarr").replay()
@@ -54,7 +55,7 @@ def test_poisoned_cases_fail_and_the_others_finish(tmp_path, launcher):
     assert not verify(tmp_path / "tiny.zarr")
     healthy = run(study, "--retry-failed")
     assert healthy.returncode == 0, healthy.stderr
-    assert "16 done; 12 computed" in healthy.stdout
+    assert "8 done; 6 computed" in healthy.stdout
 
 
 def test_a_second_run_on_a_store_is_refused_and_status_tells_of_the_first(tmp_path):

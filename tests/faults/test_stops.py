@@ -53,7 +53,13 @@ def complete(study: Path, store: Path, **rest: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "ranks"), [(signal.SIGTERM, 0), (signal.SIGTERM, 2), (signal.SIGINT, 0), (signal.SIGUSR1, 2)]
+    ("number", "ranks"),
+    [
+        pytest.param(signal.SIGTERM, 0, marks=pytest.mark.long),
+        (signal.SIGTERM, 2),
+        (signal.SIGINT, 0),
+        pytest.param(signal.SIGUSR1, 2, marks=pytest.mark.long),
+    ],
 )
 def test_a_signal_stops_a_run(tmp_path, number, ranks):
     study, store = write_slow_study(tmp_path, transient=LONG, block=1), tmp_path / "tiny.zarr"

@@ -42,9 +42,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 
 
 @each_launcher
-@pytest.mark.parametrize(
-    "ranks", [1, pytest.param(2, marks=pytest.mark.long), 3, pytest.param(4, marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("ranks", [*(pytest.param(n, marks=pytest.mark.long) for n in (1, 2, 4)), 3])
 def test_any_number_of_ranks_stores_equal_bytes(tmp_path, alone, ranks, launcher):
     done = run(write_slow_study(tmp_path), ranks=ranks, launcher=launcher)
     assert done.returncode == 0, done.stderr
@@ -52,6 +50,7 @@ def test_any_number_of_ranks_stores_equal_bytes(tmp_path, alone, ranks, launcher
     assert stored_bytes(tmp_path / "tiny.zarr") == alone
 
 
+@pytest.mark.long
 def test_the_modal_integrator_does_not_see_how_many_ranks_share_the_machine(tmp_path):
     """Four ranks on two cores: every kernel call takes longer than alone, and none may end elsewhere."""
     stored = []

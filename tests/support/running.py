@@ -6,8 +6,9 @@ import os
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +27,7 @@ rig = "mokhtar2017"
 output = "{output}"
 [grid]
 speed_ratio = {speed_ratio}
-clearance_ratio = [0.7, 0.85]
+clearance_ratio = {clearance_ratio}
 friction = {friction}
 [integrator]
 {integrator}
@@ -46,6 +47,7 @@ def write_study(folder: Path, name: str = "tiny.toml", **changes: object) -> Pat
     told = {
         "output": folder / "tiny.zarr",
         "speed_ratio": [0.9, 2.0],
+        "clearance_ratio": [0.7, 0.85],
         "friction": [0.1, 0.3, 0.5],
         "transient": 1,
         "revolutions": 2,
@@ -190,7 +192,12 @@ def run(
     timeout: float = 120,
     **variables: str,
 ) -> subprocess.CompletedProcess[str]:
-    """Run the program to its end."""
+    """Run the program to its end: in this process, unless launcher, script or environment are asked for.
+
+    To start a process takes two seconds, most of it imports.
+    """
+    if not (ranks or script or options or variables):
+        return run_here(*arguments)
     return subprocess.run(
         command(*arguments, ranks=ranks, script=script, launcher=launcher, options=options),
         env=environment(**variables),
@@ -200,6 +207,21 @@ def run(
         timeout=timeout,
         check=False,
     )
+
+
+def run_here(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run the program in this process, as a new one would see its environment and end."""
+    from rubhpc.cli import main
+
+    out, err, given = StringIO(), StringIO(), list(map(str, arguments))
+    before = dict(os.environ)
+    try:
+        with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as ended:
+            main(given)
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+    return subprocess.CompletedProcess(given, int(ended.value.code or 0), out.getvalue(), err.getvalue())
 
 
 def start(
