@@ -1,11 +1,11 @@
-"""What a store was made for: the study's identity, axes and chunks, and how another study differs from it."""
+"""What a store was made for: the study's identity, axes and chunks."""
 
 from __future__ import annotations
 
 import json
 import math
 import re
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
@@ -23,9 +23,8 @@ from rubhpc.schema import (
 from rubhpc.storage.disk import read_regular, write_whole
 from rubhpc.storage.journal import Header
 from rubhpc.storage.measures import from_json, to_json, unlisted_measures
-from rubhpc.study.axes import FROM_REST, coordinate_of, meanings_of, written
+from rubhpc.study.axes import FROM_REST, coordinate_of, written
 from rubhpc.study.continuation import CaseIds, continuation_of
-from rubhpc.study.identity import WHOLE
 from rubhpc.study.points import Points
 from rubhpc.study.refine import table_of
 
@@ -289,44 +288,6 @@ class Manifest:
                 names.append(name)
         return names
 
-    def differences(self, other: Manifest) -> list[str]:
-        """What keeps the study of `other` out of this store, a text each.
-
-        Its axes may have grown, anywhere, and the order of their values may be another.
-        """
-        found = [
-            f"{key} was {_short(mine)}, is {_short(yours)}"
-            for key, mine, yours in _leaves(self.parts, other.parts)
-            if mine != yours
-        ]
-        if self.dims != other.dims:
-            found.append(f"axes were {', '.join(self.dims)}, are {', '.join(other.dims)}")
-            return found
-        for dim in self.dims:
-            lost = sorted(set(self.points.along(dim)) - set(other.points.along(dim)))
-            names = [axis.name for axis in self.axes if axis.dimension == dim]
-            if lost and len(names) == 1:
-                rest = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
-                words = meanings_of(names[0])
-                values = ", ".join(words[int(v)] if words else f"{v:.12g}" for (v,) in lost[:3])
-                found.append(f"axis {names[0]} lacks {values}{rest}, which is stored")
-            elif lost and not any(WHOLE in text for text in found):
-                n_mine, n_yours = (dict(zip(m.dims, m.shape, strict=True))[dim] for m in (self, other))
-                why = "n can only grow" if n_yours < n_mine else "this SALib or SciPy draws other points"
-                found.append(f"the sample lacks {len(lost)} of its {n_mine} cases ({why})")
-        if not found and (
-            self.identity != other.identity or self.keep != other.keep or self.sizes != other.sizes
-        ):
-            found.append("its identity")
-        return found
-
-    def is_other_version(self, other: Manifest) -> bool:
-        """Whether nothing keeps the study of `other` out of this store but the version of the physics."""
-        same = {**self.parts, "physics": other.parts["physics"]}
-        return self.parts != same and not replace(self, parts=same, identity=other.identity).differences(
-            other
-        )
-
 
 def _probed(parts: dict[str, Any]) -> list[tuple[str, str]]:
     """Name and quantity of the probes of a study, from the parts of its identity."""
@@ -368,26 +329,3 @@ def _vouched(path: Path) -> bytes:
     elif head.startswith(b"{"):  # of version 1, which kept no checksum
         raise _OtherFormat
     raise ValueError("checksum")
-
-
-def _leaves(mine: Any, yours: Any, key: str = "") -> list[tuple[str, Any, Any]]:
-    """Every leaf of two nested objects, side by side, by its dotted key."""
-    if isinstance(mine, dict) and isinstance(yours, dict):
-        names = [*mine, *(name for name in yours if name not in mine)]
-        return [
-            leaf
-            for name in names
-            for leaf in _leaves(mine.get(name), yours.get(name), f"{key}.{name}" if key else str(name))
-        ]
-    if isinstance(mine, list) and isinstance(yours, list) and len(mine) == len(yours):
-        return [
-            leaf
-            for i, pair in enumerate(zip(mine, yours, strict=True), 1)
-            for leaf in _leaves(*pair, f"{key}.{i}" if key else str(i))
-        ]
-    return [(key, mine, yours)]
-
-
-def _short(value: Any) -> str:
-    text = "absent" if value is None else json.dumps(value)
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -10,6 +10,7 @@ import numpy as np
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE
+from rubhpc.storage.differences import differences, is_other_version
 from rubhpc.storage.growth import finish_growth, grow
 from rubhpc.storage.manifest import Manifest, manifests
 from rubhpc.storage.measures import added_measures
@@ -51,11 +52,11 @@ def grid_for(study: Study, *, accept_version: bool = False) -> CaseGrid:
 
 
 def _refuse_other(mine: Manifest, yours: Manifest, path: Path, *, accept_version: bool) -> None:
-    differences = mine.differences(yours)
-    is_version = mine.is_other_version(yours)
-    if not differences or (is_version and accept_version):
+    found = differences(mine, yours)
+    is_version = is_other_version(mine, yours)
+    if not found or (is_version and accept_version):
         return
-    listed = "; ".join(differences)
+    listed = "; ".join(found)
     if is_version:
         raise StoreError(
             f"{path}: was computed by another version of the physics: {listed}; "

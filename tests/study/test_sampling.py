@@ -17,6 +17,7 @@ from rubhpc.rig.reading import with_keys
 from rubhpc.running.driver import run as run_here
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
+from rubhpc.storage.differences import differences
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
@@ -220,8 +221,9 @@ def test_a_latin_hypercube_cannot_grow(tmp_path):
         Manifest.of(CaseGrid(read_study(write_sample(tmp_path, run=f'[sample]\nn = {n}\nmethod = "lhs"'))))
         for n in (8, 16)
     )
-    found = short.differences(long)
-    assert found == ["sample.n (this sample is drawn as a whole and cannot grow) was 8, is 16"]
+    assert differences(short, long) == [
+        "sample.n (this sample is drawn as a whole and cannot grow) was 8, is 16"
+    ]
 
 
 def test_a_sample_needs_a_range(tmp_path):

@@ -1,0 +1,75 @@
+"""How a study differs from the one that a store was made for."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from rubhpc.study.axes import meanings_of
+from rubhpc.study.identity import WHOLE
+
+if TYPE_CHECKING:
+    from rubhpc.storage.manifest import Manifest
+
+
+def differences(stored: Manifest, asked: Manifest) -> list[str]:
+    """What keeps a study out of a store, a text each.
+
+    Its axes may have grown, anywhere, and the order of their values may be another.
+    """
+    found = [
+        f"{key} was {_short(mine)}, is {_short(yours)}"
+        for key, mine, yours in _leaves(stored.parts, asked.parts)
+        if mine != yours
+    ]
+    if stored.dims != asked.dims:
+        found.append(f"axes were {', '.join(stored.dims)}, are {', '.join(asked.dims)}")
+        return found
+    for dim in stored.dims:
+        lost = sorted(set(stored.points.along(dim)) - set(asked.points.along(dim)))
+        names = [axis.name for axis in stored.axes if axis.dimension == dim]
+        if lost and len(names) == 1:
+            rest = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
+            words = meanings_of(names[0])
+            values = ", ".join(words[int(v)] if words else f"{v:.12g}" for (v,) in lost[:3])
+            found.append(f"axis {names[0]} lacks {values}{rest}, which is stored")
+        elif lost and not any(WHOLE in text for text in found):
+            n_mine, n_yours = (dict(zip(m.dims, m.shape, strict=True))[dim] for m in (stored, asked))
+            why = "n can only grow" if n_yours < n_mine else "this SALib or SciPy draws other points"
+            found.append(f"the sample lacks {len(lost)} of its {n_mine} cases ({why})")
+    is_same = (stored.identity, stored.keep, stored.sizes) == (asked.identity, asked.keep, asked.sizes)
+    if not found and not is_same:
+        found.append("its identity")
+    return found
+
+
+def is_other_version(stored: Manifest, asked: Manifest) -> bool:
+    """Whether nothing keeps a study out of a store but the version of the physics."""
+    same = {**stored.parts, "physics": asked.parts["physics"]}
+    return stored.parts != same and not differences(
+        replace(stored, parts=same, identity=asked.identity), asked
+    )
+
+
+def _leaves(mine: Any, yours: Any, key: str = "") -> list[tuple[str, Any, Any]]:
+    """Every leaf of two nested objects, side by side, by its dotted key."""
+    if isinstance(mine, dict) and isinstance(yours, dict):
+        names = [*mine, *(name for name in yours if name not in mine)]
+        return [
+            leaf
+            for name in names
+            for leaf in _leaves(mine.get(name), yours.get(name), f"{key}.{name}" if key else str(name))
+        ]
+    if isinstance(mine, list) and isinstance(yours, list) and len(mine) == len(yours):
+        return [
+            leaf
+            for i, pair in enumerate(zip(mine, yours, strict=True), 1)
+            for leaf in _leaves(*pair, f"{key}.{i}" if key else str(i))
+        ]
+    return [(key, mine, yours)]
+
+
+def _short(value: Any) -> str:
+    text = "absent" if value is None else json.dumps(value)
+    return text if len(text) <= 60 else text[:57] + "..."
