@@ -97,10 +97,12 @@ def simulate(
     accuracy : float
         Relative accuracy of the modal integrator: how many modes it keeps, and the error of steps where gaps
         are curved.
-    transient : int or "auto"
-        Revolutions discarded; "auto" until displacements repeat themselves after 8 or 12 revolutions.
+    transient : int, "auto" or "direct"
+        Revolutions discarded; "auto" until displacements repeat themselves after 8 or 12 revolutions;
+        "direct" until the motion draws near to a stable periodic one that is solved for, on which the record
+        begins.
     transient_limit : int, optional
-        Most revolutions discarded with `transient="auto"`; default 240.
+        Most revolutions discarded with `transient="auto"` or `"direct"`; default 240.
     transient_tolerance : float, optional
         Share of their largest value by which they may differ with `transient="auto"`; default 1e-4.
     revolutions : int

@@ -145,7 +145,7 @@ def _kind(meta: Any) -> str:
         )
         if meta.get(key) is not None
     ]
-    unlike = f', or `"{meta["or_word"]}"`' if meta.get("or_word") else ""
+    unlike = "".join(f', or `"{word}"`' for word in meta.get("or_words", ()))
     return ", ".join([names.get(kind, kind), *bounds]) + unlike
 
 

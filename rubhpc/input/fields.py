@@ -68,10 +68,10 @@ def count(
     at_least: int = 1,
     at_most: int | None = None,
     is_key: bool = True,
-    or_word: str = "",
+    or_words: tuple[str, ...] = (),
 ) -> Any:
-    """Declare a field that holds a bounded whole number, or `or_word`; `is_key`: a study may set it."""
-    bounds = {"at_least": at_least, "at_most": at_most, "or_word": or_word}
+    """Declare a field that holds a bounded whole number, or one of some words; a study may set a key."""
+    bounds = {"at_least": at_least, "at_most": at_most, "or_words": or_words}
     return _declare("count", doc, example, default, is_key=is_key, **bounds)
 
 
@@ -154,7 +154,7 @@ def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> 
         unit = declared.metadata["unit"]
         return tuple(parse_quantity(v, unit, f"{where}: value {i}") for i, v in enumerate(values, 1))
     if kind == "count":
-        return _parse_count(value, where, declared.metadata["or_word"])
+        return _parse_count(value, where, declared.metadata["or_words"])
     if kind == "matrix":
         return parse_matrix(value, where)
     if kind == "degrees":
@@ -225,15 +225,15 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return f"did you mean {close[0]}?" if close else f"choose one of {', '.join(known)}"
 
 
-def _parse_count(value: object, where: str, or_word: str) -> int | str:
-    if or_word and value == or_word:
-        return or_word
+def _parse_count(value: object, where: str, or_words: tuple[str, ...]) -> int | str:
+    if isinstance(value, str) and value in or_words:
+        return value
     if isinstance(value, float) and value.is_integer():
         return int(value)  # an axis holds floats
     if isinstance(value, bool) or not isinstance(value, int):
         raise InputError(
             f"{where}: {brief(value)} is not a whole number; write one such as 12, without quotes"
-            + (f', or "{or_word}"' if or_word else "")
+            + "".join(f', or "{word}"' for word in or_words)
         )
     return value
 
@@ -329,10 +329,11 @@ def _check_series(values: Any, bounds: Any) -> str:
 
 
 def _check_count(value: object, bounds: Any) -> str:
-    if bounds["or_word"] and value == bounds["or_word"]:
+    if isinstance(value, str) and value in bounds["or_words"]:
         return ""
     if isinstance(value, bool) or not isinstance(value, int):
-        return f"{brief(value)} is not a whole number; give one such as 12"
+        words = "".join(f', or "{word}"' for word in bounds["or_words"])
+        return f"{brief(value)} is not a whole number; give one such as 12{words}"
     if value < bounds["at_least"]:
         return f"{brief(value)} is out of range; it must be at least {bounds['at_least']}"
     if bounds["at_most"] is not None and value > bounds["at_most"]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from rubhpc.integrate.closed_form import closed_form_march
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
 from rubhpc.integrate.curved_march import CurvedMarch
+from rubhpc.integrate.direct import pass_directly
 from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.friction_march import FrictionMarch
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
@@ -30,6 +32,7 @@ from rubhpc.integrate.measures import (
     samples_within,
 )
 from rubhpc.integrate.neighbour_motions import NeighbourMotions
+from rubhpc.integrate.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.proof import Solver
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.setup import ModalSetup, Scheme
@@ -147,6 +150,7 @@ def _integrate(
 ) -> Record:
     """March through transient and record, then measure."""
     march = start(initial)
+    n_step = n_left = 0
     per_revolution = setup.samples_per_revolution
     n_stator = len(setup.model.stators)
     n_sample = recording.revolutions * per_revolution
@@ -154,10 +158,13 @@ def _integrate(
     accumulator = new_accumulator(n_stator, march.n_place)
     settings = {"spin_speed": setup.spin, "clearance": clearance}
 
-    reason, n_transient = pass_transient(march, recording)
-    n_step = n_left = 0
+    begin = partial(_solve_from, setup, clearance, friction)
+    if recording.is_transient_direct and isinstance(march, EventDrivenMarch) and march.has_closed_form:
+        march, reason, n_transient, n_step = pass_directly(march, start, begin, recording)
+    else:
+        reason, n_transient = pass_transient(march, recording)
     if reason is not None:  # what led to it is the record
-        n_step, n_left = march.n_step, march.n_left
+        n_step, n_left = n_step + march.n_step, march.n_left
         ended = n_transient + march.sample // per_revolution + 1
         march, n_transient = start(initial), max(0, ended - recording.revolutions)
         if pass_revolutions(march, recording, n_transient) is None:
@@ -216,6 +223,12 @@ def _integrate(
         left_closed_form=n_left + march.n_left,
     )
     return record
+
+
+def _solve_from(setup: Setup, clearance: float, friction: float, state: State) -> PiecewiseMotion:
+    """Piecewise motion of a case in closed form."""
+    assert isinstance(setup, ModalSetup)
+    return PiecewiseMotion(setup, clearance, friction, state)
 
 
 def _solver(march: March, setup: Setup, clearance: float, friction: float, final: State) -> Solver | None:

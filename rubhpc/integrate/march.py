@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
 LONGEST_CALL = 0.15  # s; stop signals are handled between kernel calls
+ALL_SAMPLES = 2**62  # in one kernel call, which pauses by itself
 STEPS_A_SECOND = 5e5  # half of what every integrator does
 NO_FORCES = "no contact forces that obey the laws were found"  # why a case ends
 
@@ -47,7 +48,8 @@ class March(ABC):
             self.sample = stop
             # By steps, not by the clock: where a call ends decides the last bits of the modal results.
             elapsed = max(self.n_step - before, 1) / STEPS_A_SECOND
-            self._stride = max(1, int(self._stride * min(2.0, 0.5 * LONGEST_CALL / elapsed)))
+            stride = int(self._stride * min(2.0, 0.5 * LONGEST_CALL / elapsed))
+            self._stride = min(max(1, stride), ALL_SAMPLES)  # a transient may be a thousand calls long
         return None
 
     @abstractmethod

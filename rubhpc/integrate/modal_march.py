@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.divergence import displacement_reason, energy_reason
-from rubhpc.integrate.march import March
+from rubhpc.integrate.march import ALL_SAMPLES, March
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduction import kernel_bodies
 from rubhpc.kernels.case_progress import (
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
-ALL_SAMPLES = 2**62  # in one kernel call, which pauses by itself
 
 
 class ModalMarch(March):

@@ -12,7 +12,7 @@ from rubhpc.input.reading import plain
 from rubhpc.rig.probes import Probe  # noqa: TC001 - annotations are read when a table is built
 from rubhpc.schema import KEEPABLE, KEPT
 
-AUTO = "auto"  # transient until the motion has settled
+AUTO, DIRECT = "auto", "direct"  # transient until the motion has settled, or is solved for
 LONGEST_TRANSIENT, SETTLED_WITHIN = 240, 1e-4  # then
 PAPER_STEP = 0.5e-6  # s
 SAFE_SHARE = 0.9  # of the stability limit
@@ -223,15 +223,16 @@ class Recording:
     """How long a case runs, in revolutions, and what is kept of it."""
 
     transient: int | str = count(
-        doc='Revolutions discarded; "auto" until the motion has settled.',
+        doc='Revolutions discarded; "auto" until the motion has settled, "direct" until it draws near to a '
+        "periodic motion that is solved for.",
         example='"auto"',
         default=120,
         at_least=0,
         at_most=1_000_000,
-        or_word=AUTO,
+        or_words=(AUTO, DIRECT),
     )
     transient_limit: int | None = count(
-        doc='Most revolutions discarded with transient = "auto"; by default 240.',
+        doc='Most revolutions discarded with transient = "auto" or "direct"; by default 240.',
         example="480",
         default=None,
         at_most=1_000_000,
@@ -262,7 +263,7 @@ class Recording:
             problem = f"{self.samples_per_revolution} is odd; give an even number such as 256"
             raise FieldError("samples_per_revolution", problem)
         for key in ("transient_limit", "transient_tolerance"):
-            if self.transient != AUTO and getattr(self, key) is not None:
+            if isinstance(self.transient, int) and getattr(self, key) is not None:
                 raise FieldError(key, f'it goes with transient = "{AUTO}"; leave it out, or set that')
         names = [probe.name for probe in self.probe]
         for i, name in enumerate(names, 1):
@@ -283,7 +284,12 @@ class Recording:
     @property
     def is_transient_auto(self) -> bool:
         """Whether the transient ends where the motion has settled."""
-        return self.transient == AUTO
+        return self.transient in (AUTO, DIRECT)  # the latter, where nothing is solved for
+
+    @property
+    def is_transient_direct(self) -> bool:
+        """Whether the transient ends where the periodic motion that follows is solved for."""
+        return self.transient == DIRECT
 
     @property
     def longest_transient(self) -> int:

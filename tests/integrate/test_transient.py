@@ -5,6 +5,7 @@ import pytest
 
 from rubhpc import simulate
 from rubhpc.errors import InputError
+from rubhpc.integrate.direct import Approach
 from rubhpc.integrate.transient import has_settled
 from rubhpc.schema import REGIME
 from rubhpc.study.study import Recording
@@ -87,5 +88,70 @@ def test_keys_of_auto_go_with_it_alone(key):
     with pytest.raises(InputError, match=f"{key}: it goes with transient"):
         Recording(transient=120, **{key: value})
     assert Recording(transient="auto", **{key: value}).is_transient_auto
-    with pytest.raises(InputError, match="transient"):
+    assert Recording(transient="direct", **{key: value}).is_transient_direct
+    with pytest.raises(InputError, match='or "auto", or "direct"'):
         simulate("mokhtar2017", transient="long", clearance="84 um", **CASE)
+
+
+LIGHT = {
+    "overrides": {"rotor.damping.alpha": 4.0},
+    "keep": ("section",),
+    "samples_per_revolution": 64,
+    "revolutions": 6,
+}
+
+
+@pytest.mark.parametrize(
+    ("speed_ratio", "clearance_ratio", "friction", "period"),
+    [(0.9, 0.523, 0.3, 1), (1.3, 0.968, 0.269, 1), (2.0, 0.637, 0.016, 3), (0.9, 1.5, 0.3, 1)],
+)
+def test_direct_way_leads_where_a_long_simulation_does(speed_ratio, clearance_ratio, friction, period):
+    """A rotor damped by 1 %: in less than 100 revolutions what 1000 lead to, a shift by revolutions apart."""
+    case = {"speed_ratio": speed_ratio, "clearance_ratio": clearance_ratio, "friction": friction} | LIGHT
+    found = simulate("mokhtar2017", transient="direct", **case)
+    settled = simulate("mokhtar2017", transient=1000, **case)
+    assert found.transient_revolutions < 100
+    assert found.period == settled.period == period
+    expected = settled.section_vertical
+    away = [np.abs(np.roll(found.section_vertical, k) - expected).max() for k in range(period)]
+    assert min(away) < 2e-7 * np.abs(expected).max()
+
+
+def test_direct_way_goes_on_to_the_limit_where_nothing_is_periodic():
+    found = simulate(
+        "mokhtar2017", transient="direct", transient_limit=70, clearance_ratio=0.696, speed_ratio=0.75,
+        friction=0.014, **LIGHT,
+    )  # fmt: skip
+    assert found.transient_revolutions == 70
+    plain = simulate(
+        "mokhtar2017", transient=70, clearance_ratio=0.696, speed_ratio=0.75, friction=0.014, **LIGHT,
+    )  # fmt: skip
+    assert found.section_vertical == pytest.approx(plain.section_vertical, rel=1e-6)
+
+
+def test_laws_without_closed_form_settle_as_with_auto():
+    case = {"clearance": "84 um", "normal": "updated", "transient_limit": 9, **CASE}
+    found, plain = (simulate("mokhtar2017", transient=word, **case) for word in ("direct", "auto"))
+    assert np.array_equal(found.vertical, plain.vertical)
+
+
+def test_distance_falls_though_the_energy_rises_at_first():
+    monodromy = np.array([[0.9, 5.0], [0.0, 0.8]])
+    approach, apart = Approach(monodromy, np.ones(2)), np.array([0.0, 1.0])
+    energies, squares = [], []
+    for k in range(5):
+        assert approach.square(apart) == pytest.approx(approach.expected(np.array([0.0, 1.0]), k))
+        energies.append(apart @ apart)
+        squares.append(approach.square(apart))
+        apart = monodromy @ apart
+    assert energies[1] > 20 * energies[0]
+    assert -np.diff(squares) == pytest.approx(energies[:-1], rel=1e-9)
+
+
+def test_transient_of_more_calls_than_a_double_has_doublings():
+    """The stride between kernel calls doubled until it was infinite, after 960 of them."""
+    found = simulate(
+        "mokhtar2017", transient="auto", transient_limit=3600, transient_tolerance=1e-15, clearance="1 mm",
+        speed_ratio=0.75, revolutions=1, samples_per_revolution=16, keep=(),
+    )  # fmt: skip
+    assert found.transient_revolutions == 3600

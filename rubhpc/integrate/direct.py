@@ -1,0 +1,234 @@
+"""The direct way through a transient: the periodic motion that a case is on its way to, solved for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.orbit_measures import LONGEST_PERIOD
+from rubhpc.integrate.shooting import NotConverged, Orbit, shoot
+from rubhpc.integrate.transient import pass_revolutions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.march import March
+    from rubhpc.integrate.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.record import State
+    from rubhpc.study.study import Recording
+
+    Floats = NDArray[np.float64]
+
+FIRST, LONGER = 32, 2.0  # revolutions before the first search, and by what those before the next are more
+WATCHED = 16  # revolutions, at least, in which a case must draw near
+SHARE = 0.5  # of what the linear theory takes from the square of its distance, that it loses at least
+THERE = 1e-8  # of the motion's size: a case as near as that has arrived
+NEARER = 0.3  # of its distance after one revolution: a return as near as that speaks for a longer period
+MOST_ITERATIONS, LEAST_STEP = 6, 1 / 4  # of Newton's method
+MOST_EVENTS = 24, 8  # in a revolution: of one pair, and more for each further one
+MOST_SQUARINGS = 60  # of the monodromy matrix, until nothing is left of it
+
+
+class Passed(NamedTuple):
+    """A transient that has been passed, or has ended the case."""
+
+    march: EventDrivenMarch  # from which the case goes on
+    reason: str | None  # why it cannot
+    n_revolution: int  # simulated
+    n_step: int  # taken by other marches than that one
+
+
+class Approach:
+    """How far a motion is from a stable periodic one, in a norm that falls while the distance is small.
+
+    Its square is `d'P d` with `P = sum over k of (M^k)'W M^k`: the sum over all periods to come of the energy
+    of the disturbance d, where M is the monodromy matrix and W the energy's. It falls by `d'W d` in a period.
+
+    Parameters
+    ----------
+    monodromy : (2 n, 2 n)
+        Its eigenvalues lie within the unit circle.
+    energy : (2 n,)
+        Diagonal of W.
+    """
+
+    def __init__(self, monodromy: Floats, energy: Floats) -> None:
+        """Sum the energies, twice as many periods at a time."""
+        self._monodromy = monodromy
+        power, form = monodromy, np.diag(energy)
+        for _ in range(MOST_SQUARINGS):
+            more = power.T @ form @ power
+            form = form + more
+            if np.abs(more).max() <= np.finfo(float).eps * np.abs(form).max():
+                break
+            power = power @ power
+        self._form = form
+
+    def square(self, apart: Floats) -> float:
+        """Square of the distance (2 n,)."""
+        return float(apart @ self._form @ apart)
+
+    def expected(self, apart: Floats, n_period: int) -> float:
+        """What it is some periods later, while the distance is small."""
+        return self.square(np.linalg.matrix_power(self._monodromy, n_period) @ apart)
+
+
+class _Walk:
+    """A case under way, with its motions (2 n,) at the ends of the last revolutions."""
+
+    def __init__(
+        self, march: EventDrivenMarch, start: Callable[[State], March], recording: Recording
+    ) -> None:
+        self.march, self._start, self._recording = march, start, recording
+        self.n_revolution = self.n_step = 0
+        self.passed: list[Floats] = []
+
+    def on(self, n_revolution: int) -> str | None:
+        """Go on, at most to the longest transient, and keep the last motions; returns why the case cannot."""
+        n_revolution = min(n_revolution, self._recording.longest_transient - self.n_revolution)
+        kept = min(n_revolution, LONGEST_PERIOD + 1)
+        if n_revolution > kept and (reason := self._pass(n_revolution - kept)) is not None:
+            return reason
+        self.passed = []
+        for _ in range(kept):
+            if (reason := self._pass(1)) is not None:
+                return reason
+            self.passed.append(self.march.motion_of(*self.march.place()))
+        return None
+
+    def repeat(self, period: int) -> tuple[Floats | None, str | None]:
+        """Go on by a period: the motion then, None where the transient ends before, and why it cannot."""
+        if self.n_revolution + period > self._recording.longest_transient:
+            return None, None
+        reason = self._pass(period)
+        return (self.march.motion_of(*self.march.place()) if reason is None else None), reason
+
+    def _pass(self, n_revolution: int) -> str | None:
+        self.n_revolution += n_revolution
+        return pass_revolutions(self.march, self._recording, n_revolution)
+
+    def begin_at(self, state: State) -> Floats:
+        """Take another state, or the same with tables that may have been filled anew; returns its motion."""
+        self.n_step += self.march.n_step
+        march = self._start(state)
+        assert isinstance(march, EventDrivenMarch)
+        self.march = march
+        return self.march.motion_of(*self.march.place())
+
+    def ended(self, reason: str | None) -> Passed:
+        return Passed(self.march, reason, self.n_revolution, self.n_step)
+
+
+def pass_directly(
+    march: EventDrivenMarch,
+    start: Callable[[State], March],
+    solve_from: Callable[[State], PiecewiseMotion],
+    recording: Recording,
+) -> Passed:
+    """March until a stable periodic motion is found that the case draws near to; go on from that motion.
+
+    After 32, 64, 128, ... revolutions the periodic motion is solved for from where the case stands, and the
+    case is simulated further to see whether it draws near (`_draws_near`). Where it does not, or none is
+    found, it goes on, at the latest to the longest transient.
+
+    Parameters
+    ----------
+    march : EventDrivenMarch
+        The case at its beginning.
+    start : callable
+        Makes the case's march from a state.
+    solve_from : callable
+        Makes its piecewise motion from a state.
+    """
+    walk, wanted = _Walk(march, start, recording), FIRST
+    while True:
+        reason = walk.on(wanted - walk.n_revolution)
+        if reason is not None or walk.n_revolution >= recording.longest_transient:
+            return walk.ended(reason)
+        wanted = int(LONGER * walk.n_revolution)
+        state = walk.march.final()
+        found = _search(solve_from, state, walk.passed)
+        motion = walk.begin_at(state)
+        if found is None:
+            continue
+        piecewise, orbit = found
+        force = piecewise.contact_force(orbit.states, orbit.motion)
+        aim = piecewise.march.state_of(orbit.motion, force)
+        is_near, reason = _draws_near(walk, piecewise, orbit, motion)
+        if is_near:
+            walk.begin_at(aim)
+        if is_near or reason is not None:
+            return walk.ended(reason)
+
+
+def _draws_near(
+    walk: _Walk, piecewise: PiecewiseMotion, orbit: Orbit, motion: Floats
+) -> tuple[bool, str | None]:
+    """Simulate a case further: whether it draws near to a stable motion, or why it cannot go on.
+
+    Its distance (`Approach`) is to fall in every period of 16 revolutions or more, by half at least of what
+    the linear theory says.
+    """
+    approach = Approach(orbit.monodromy, np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n))
+    first = motion - orbit.motion
+    begun = last = approach.square(first)
+    there = THERE * piecewise.size(orbit.motion)
+    n_period = -(-WATCHED // orbit.period)
+    if piecewise.size(first) <= there:
+        return True, None
+    for _ in range(n_period):
+        reached, reason = walk.repeat(orbit.period)
+        if reached is None:
+            return False, reason
+        apart = reached - orbit.motion
+        was, last = last, approach.square(apart)
+        if piecewise.size(apart) <= there:
+            return True, None
+        if last >= was:
+            return False, None
+    expected = approach.expected(first, n_period)
+    return begun - last >= SHARE * (begun - expected), None
+
+
+def _search(
+    solve_from: Callable[[State], PiecewiseMotion], state: State, passed: list[Floats]
+) -> tuple[PiecewiseMotion, Orbit] | None:
+    """Return the stable periodic motion next to a state: of one revolution, or of the period of its returns.
+
+    Of two the nearer one. An unstable motion whose disturbances change sides in every period is followed to
+    twice its period.
+    """
+    try:
+        piecewise = solve_from(state)
+    except NoClosedForm:
+        return None
+    back = np.array([piecewise.size(passed[-1] - motion) for motion in passed[-2::-1]])
+    nearest = 1 + int(np.argmin(back)) if back.size else 1
+    found: list[tuple[float, Orbit]] = []
+    for period in [1, nearest] if nearest > 1 and back[nearest - 1] <= NEARER * back[0] else [1]:
+        orbit = _solved(piecewise, asked := period)
+        while orbit and orbit.multipliers[0].real < -1.0 and (asked := 2 * asked) <= LONGEST_PERIOD:
+            orbit = _solved(piecewise, asked)
+        if orbit and abs(orbit.multipliers[0]) < 1.0:
+            found.append((piecewise.size(orbit.motion - piecewise.start), orbit))
+    return (piecewise, min(found, key=lambda one: one[0])[1]) if found else None
+
+
+def _solved(piecewise: PiecewiseMotion, period: int) -> Orbit | None:
+    """Periodic motion next to where a piecewise motion begins; None where none is found."""
+    try:
+        return shoot(
+            piecewise,
+            piecewise.start,
+            piecewise.states,
+            period,
+            most_iterations=MOST_ITERATIONS,
+            least_step=LEAST_STEP,
+            most_events=MOST_EVENTS[0] + MOST_EVENTS[1] * (piecewise.q - 1),
+        )
+    except (NoClosedForm, NotConverged):
+        return None
