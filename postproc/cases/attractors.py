@@ -1,4 +1,4 @@
-"""Which motion each start reaches: cases sorted by period and Poincaré section; basins and their sizes.
+"""Which motion each start reaches: cases sorted by the solution that was found, or by period and section.
 
 Cases that differ in nothing but their start (axes `initial_*`) share a setting. In each setting the settled
 motions are distinguished, and a motion keeps its number from one setting to the next.
@@ -14,7 +14,7 @@ import xarray as xr
 from postproc.store.axes import axes_of, drawn_axes, source
 from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
-from rubhpc.schema import DONE, REGIME, SECTION_NAMES
+from rubhpc.schema import DONE, INFERRED, REGIME, SECTION_NAMES
 from rubhpc.study.axes import coordinate_of
 from rubhpc.study.initial import PREFIX
 from rubhpc.study.sampling import CASE
@@ -28,11 +28,15 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
 
 TOLERANCE = 0.01  # of the section's size: periodic motions that differ by less are one
+SAME_MULTIPLIER = 1e-6  # cases whose largest multipliers differ by less may have one solution
+OF_ONE_SOLUTION = 3.0  # tolerances: records that agree with one solution to 1 % differ by twice that at most
 SPREAD_TOLERANCE = 0.25  # of the same: mean and spread of a section without a period, of a record's length
 SAME_MOTION = 1.0  # of the same: largest change of a motion from one setting to the next
+NO_CONTACT = REGIME.index("no_contact")
 NO_MOTION = 0  # of a case that is not done, or had not settled
-ENTROPY_BOX = 5  # starts along each side of the boxes of the basin entropy
 _SECTIONS = tuple(f"section_{name}" for name in SECTION_NAMES)
+_TORSION = SECTION_NAMES.index("torsion")  # the displacements come before it
+_IF_THERE = ("settled", "largest_multiplier", "multiplier_angle")  # older stores lack some
 _START = coordinate_of(PREFIX)
 
 
@@ -48,7 +52,7 @@ class _Motions(NamedTuple):
     feature : list of (n_section, n_feature)
         What distinguishes motions of one key, SI units.
     size : (n_section,)
-        Largest coordinates of the section in the setting, SI units.
+        Largest coordinate of the section in the setting, of both displacements, and of torsion, SI units.
     """
 
     label: Ints
@@ -97,20 +101,26 @@ def attractors(store: xr.Dataset, tolerance: float = TOLERANCE) -> xr.DataArray:
         1, 2, ...; `NO_MOTION` (0) where the case is not done, or had not settled. A motion has the number of
         the motion most like it in the setting before, on the last axis that has one, if both have the same
         period and are near (`SAME_MOTION`), or the only ones of that period. Numbers do not depend on the
-        order of the cases.
+        order of the cases. Cases that a refined map has inferred take the motion of the nearest computed case
+        with their regime and period.
 
     Notes
     -----
-    _Motions without a period up to 16, on a torus or chaotic, are compared by mean and standard deviation of
-    their section, to `SPREAD_TOLERANCE`, whatever their regime: a torus may pass for a long period. Two tori
-    of about one place and size count as one motion. Cases are joined by single linkage.
+    Where the periodic solution was found by shooting, it distinguishes motions: cases are of one if their
+    largest Floquet multipliers agree to `SAME_MULTIPLIER` and their sections, a shift by revolutions aside,
+    to `OF_ONE_SOLUTION` tolerances (mirrored solutions have the same multipliers). A periodic case without a
+    solution is of the nearest of these motions whose section is within the tolerance, if any. Motions without
+    a period up to 16, on a torus or chaotic, are compared by mean and standard deviation of their section, to
+    `SPREAD_TOLERANCE`, whatever their regime: a torus may pass for a long period. Two tori of about one place
+    and size count as one motion. Cases are joined by single linkage. The torsion of motions without contact,
+    which dies out, distinguishes none.
     """
     require_variables(store, ["regime", "period", *_SECTIONS])
     starts = start_axes(store)
     dims = [str(d) for d in store["status"].dims]
     settings = [d for d in dims if d not in starts]
     ordered = store.sortby([d for d in settings if store[d].dtype.kind in "fiu"]) if settings else store
-    names = ["status", "regime", "period", *_SECTIONS, *(n for n in ("settled",) if n in store)]
+    names = ["status", "regime", "period", *_SECTIONS, *(n for n in _IF_THERE if n in store)]
     cases = ordered[names].load().transpose(*settings, *starts, ...)
     shape = tuple(cases.sizes[d] for d in settings)
     number = np.zeros((*shape, int(np.prod([cases.sizes[d] for d in starts]))), dtype=np.int64)
@@ -126,8 +136,10 @@ def attractors(store: xr.Dataset, tolerance: float = TOLERANCE) -> xr.DataArray:
                 given[i] = n_known
         known[place] = motions, given
         number[place] = np.array([NO_MOTION, *given])[motions.label]
+    number = number.reshape(cases["status"].shape)
+    _take_from_surroundings(number, cases)
     found = xr.DataArray(
-        number.reshape(cases["status"].shape).astype(np.int16),
+        number.astype(np.int16),
         dims=cases["status"].dims,
         coords=cases["status"].coords,
         name="attractor",
@@ -147,16 +159,20 @@ def _motions_of(setting: xr.Dataset, tolerance: float = TOLERANCE) -> _Motions:
     size = np.zeros(sections.shape[1])
     if has_motion.any():
         size = np.abs(sections[has_motion]).max(axis=(0, 2))
+        size[:_TORSION] = size[:_TORSION].max()  # displacements, of which one may be nothing
     size = np.where(size > 0.0, size, 1.0)
     label = np.zeros(status.size, dtype=np.int64)
     keys: list[tuple[bool, int]] = []
     features: list[Floats] = []
-    is_contact = regime != REGIME.index("no_contact")
+    is_contact = regime != NO_CONTACT
+    multiplier = _multipliers(setting)
     for key in sorted({*zip(is_contact[has_motion].tolist(), period[has_motion].tolist(), strict=True)}):
         members = np.flatnonzero(has_motion & (is_contact == key[0]) & (period == key[1]))
         scaled = sections[members] / size[:, np.newaxis]
+        if not key[0]:
+            scaled[:, _TORSION] = 0.0
         feature, within = _features(scaled, key[1], tolerance)
-        group = _joined(feature, within)
+        group = _grouped(feature, within, multiplier[members]) if key[1] > 0 else _joined(feature, within)
         middles = [np.median(feature[group == g], axis=0) for g in range(group.max() + 1)]
         order = sorted(range(len(middles)), key=lambda g: tuple(np.round(middles[g] / within)))
         for g in order:
@@ -176,6 +192,52 @@ def _features(sections: Floats, period: int, tolerance: float) -> tuple[Floats, 
         return np.sort(sections[:, :, -period:], axis=2).reshape(len(sections), -1), tolerance
     both = np.stack([sections.mean(axis=2), sections.std(axis=2)], axis=2)
     return both.reshape(len(sections), -1), SPREAD_TOLERANCE
+
+
+def _multipliers(setting: xr.Dataset) -> NDArray[np.complex128]:
+    """Largest Floquet multiplier of each case, (n_case,); NaN where no solution was found."""
+    if "largest_multiplier" not in setting or "multiplier_angle" not in setting:
+        return np.full(setting["status"].size, np.nan + 0j)
+    size, angle = (setting[n].values.ravel() for n in ("largest_multiplier", "multiplier_angle"))
+    return np.asarray(size * np.exp(1j * angle))
+
+
+def _grouped(feature: Floats, within: float, multiplier: NDArray[np.complex128]) -> Ints:
+    """Groups of periodic motions of one period, numbered from 0, (n_case,): by solution where found."""
+    is_solved = np.isfinite(multiplier)
+    group = np.full(len(feature), -1)
+    n_group = 0
+    if is_solved.any():
+        solved, found = feature[is_solved], multiplier[is_solved]
+        scale = within / SAME_MULTIPLIER  # a difference of that counts as one of the tolerance
+        columns = [solved / OF_ONE_SOLUTION, scale * found.real[:, None], scale * found.imag[:, None]]
+        group[is_solved] = _joined(np.concatenate(columns, axis=1), within)
+        n_group = int(group.max()) + 1
+        middles = np.stack([np.median(feature[group == g], axis=0) for g in range(n_group)])
+        for i in np.flatnonzero(~is_solved):
+            apart = np.abs(feature[i] - middles).max(axis=1)
+            if apart.min() <= within:
+                group[i] = int(apart.argmin())
+    rest = group < 0
+    if rest.any():
+        group[rest] = n_group + _joined(feature[rest], within)
+    return group
+
+
+def _take_from_surroundings(number: Ints, cases: xr.Dataset) -> None:
+    """Give inferred cases, in place, the motion of the nearest computed case of their regime and period."""
+    from scipy.ndimage import distance_transform_edt
+
+    status, period = cases["status"].values, cases["period"].values
+    is_contact = cases["regime"].values != NO_CONTACT
+    is_inferred = status == INFERRED
+    for key in {*zip(is_contact[is_inferred].tolist(), period[is_inferred].tolist(), strict=True)}:
+        is_like = (is_contact == key[0]) & (period == key[1])
+        known = is_like & (number != NO_MOTION)
+        if known.any():
+            nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+            here = is_inferred & is_like
+            number[here] = number[tuple(nearest)][here]
 
 
 def _joined(feature: Floats, within: float) -> Ints:
@@ -217,85 +279,3 @@ def _carried_on(motions: _Motions, before: _Motions, numbers: Sequence[int]) -> 
         if cost[i, j] < SAME_MOTION:
             given[i] = numbers[j]
     return given
-
-
-def fractions(attractor: xr.DataArray, starts: Sequence[str], store: xr.Dataset) -> xr.Dataset:
-    """Return how many starts reach each motion, with 95 % intervals, and what the motion is.
-
-    Parameters
-    ----------
-    attractor : DataArray
-        From `attractors`.
-    starts : sequence of str
-        Dimensions over which starts differ.
-
-    Returns
-    -------
-    Dataset over (*settings, attractor)
-        `count`; `fraction` of the starts with a motion, its interval from `fraction_low` to `fraction_high`;
-        `motion_regime` and `motion_period`; over settings alone `n_start` with a motion, and
-        `n_without_motion`: not done, or not settled.
-    """
-    present = np.unique(attractor.values)
-    numbers = present[present != NO_MOTION]
-    is_of = attractor == xr.DataArray(numbers, dims="attractor", coords={"attractor": numbers})
-    count = is_of.sum(starts)
-    n_start = (attractor != NO_MOTION).sum(starts)
-    low, high = wilson(count, n_start)
-    return xr.Dataset(
-        {
-            "count": count.assign_attrs(units="1", long_name="Starts that reach the motion"),
-            "fraction": (count / n_start).assign_attrs(units="1", long_name="Basin fraction"),
-            "fraction_low": low.assign_attrs(units="1", long_name="Lower end of the 95 % interval"),
-            "fraction_high": high.assign_attrs(units="1", long_name="Upper end of the 95 % interval"),
-            "motion_regime": _most_common(store["regime"], is_of, starts, len(REGIME)),
-            "motion_period": store["period"].where(is_of, -1).max(starts).assign_attrs(store["period"].attrs),
-            "n_start": n_start.assign_attrs(units="1", long_name="Starts with a motion"),
-            "n_without_motion": (attractor == NO_MOTION)
-            .sum(starts)
-            .assign_attrs(units="1", long_name="Starts not done or not settled"),
-        }
-    )
-
-
-def _most_common(flag: xr.DataArray, is_of: xr.DataArray, starts: Sequence[str], n: int) -> xr.DataArray:
-    """Flag, of `n`, that most cases of each motion have; -1 where no case has the motion."""
-    counts = xr.concat([(is_of & (flag == code)).sum(starts) for code in range(n)], "code")
-    found = counts.argmax("code").where(counts.max("code") > 0, -1)
-    return found.astype(np.int8).assign_attrs(flag.attrs)
-
-
-def wilson(count: xr.DataArray, n: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return Wilson's 95 % interval of a share, of `count` out of `n` (Wilson, 1927)."""
-    z = 1.959963984540054
-    share = count / n
-    middle = (share + z**2 / (2 * n)) / (1 + z**2 / n)
-    half = z * np.sqrt(share * (1 - share) / n + z**2 / (4 * n**2)) / (1 + z**2 / n)
-    return (middle - half).clip(0.0, 1.0), (middle + half).clip(0.0, 1.0)
-
-
-def basin_entropy(attractor: xr.DataArray, x: str, y: str) -> tuple[float, float]:
-    """Return basin entropy and boundary basin entropy of starts on a grid, nat.
-
-    The mean Gibbs entropy of the motions in boxes of `ENTROPY_BOX` by `ENTROPY_BOX` starts, over all boxes,
-    and over those of more than one motion: above ln 2 the boundary is fractal (Daza and others, Sci. Rep. 6,
-    31416, 2016). NaN where the grid is smaller than a box, or no box has more than one motion.
-    """
-    grid = attractor.transpose(y, x).values
-    boxes = []
-    for i in range(0, grid.shape[0] - ENTROPY_BOX + 1, ENTROPY_BOX):
-        for j in range(0, grid.shape[1] - ENTROPY_BOX + 1, ENTROPY_BOX):
-            box = grid[i : i + ENTROPY_BOX, j : j + ENTROPY_BOX]
-            _, n = np.unique(box[box != NO_MOTION], return_counts=True)
-            share = n / max(n.sum(), 1)
-            boxes.append(float(-(share * np.log(share)).sum()) if n.size else np.nan)
-    found = np.array(boxes)
-    found = found[np.isfinite(found)]
-    mixed = found[found > 0.0]
-    return (float(found.mean()) if found.size else np.nan, float(mixed.mean()) if mixed.size else np.nan)
-
-
-def name_of(regime: int, period: int) -> str:
-    """Return what a motion is in words: "no contact", "P2", "chaotic"."""
-    text = REGIME[regime].replace("quasi_periodic", "quasi-periodic").replace("_", " ")
-    return f"P{period}" if text == "periodic" and period > 0 else text

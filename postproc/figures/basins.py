@@ -7,15 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from postproc.cases.attractors import (
-    NO_MOTION,
-    attractors,
-    basin_entropy,
-    fractions,
-    name_of,
-    start_axes,
-)
+from postproc.cases.attractors import NO_MOTION, attractors, start_axes
+from postproc.cases.basin_shares import basin_entropy, fractions, name_of
+from postproc.cases.motion_examples import examples
 from postproc.cases.saltelli import is_log
+from postproc.figures.basin_motions import draw_motions, draw_sections
 from postproc.figures.cells import cell_edges, hatch_cells, is_geometric
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import MOTION_COLORS, NOT_DONE, NOT_SETTLED, REGIME_COLORS
@@ -42,7 +38,7 @@ if TYPE_CHECKING:
     Edges = tuple[Floats, Floats]
 
 _MEASURES = ("peak_contact_force", "peak_to_peak_vertical")  # of a motion, by the mean over its cases
-_WIDE = 130.0  # mm
+_WIDE, _WIDE_PAIR = 130.0, 170.0  # mm
 
 
 def basins(
@@ -56,8 +52,9 @@ def basins(
     """Basins of attraction: the motion that each start reaches.
 
     The starts are axes of the study such as initial.vertical, or drawn from ranges of them. Cases are sorted
-    by period and Poincaré section; the share of the starts that reach each motion has a 95 % interval. Along
-    an axis, the shares are stacked.
+    by the periodic solution that they reach, or by period and Poincaré section; the share of the starts that
+    reach each motion has a 95 % interval. The orbits of the motions are drawn beside it. Along an axis, the
+    shares are stacked above the section points of each motion.
 
     Parameters
     ----------
@@ -93,10 +90,27 @@ def basins(
         entropy, boundary = basin_entropy(found, across, up)
         shown["basin_entropy"], shown["boundary_basin_entropy"] = entropy, boundary
         notes.append(f"basin entropy {entropy:.3g}, on the boundaries {boundary:.3g} (fractal above 0.693)")
+    if shown["fraction"].dims != ("attractor",) or not shown["attractor"].size:
+        return Drawing(
+            shown=shown,
+            draw=lambda axes: draw_basins(shown, across, up, axes[0]),
+            height=80.0,
+            lines=(*notes,),
+        )
+    shown = shown.assign(examples(found, cases, over).data_vars)
+
+    def draw(axes: list[Axes]) -> None:
+        draw_basins(shown, across, up, axes[0])
+        axes[0].locator_params(axis="x", nbins=6)
+        draw_motions(shown, cases, _colors(shown), axes[1])
+
     return Drawing(
         shown=shown,
-        draw=lambda axes: draw_basins(shown, across, up, axes[0]),
-        height=80.0,
+        draw=draw,
+        panels=(1, 2),
+        is_shared=False,
+        width=_WIDE_PAIR,
+        height=85.0,
         lines=(*notes, *_described(shown)),
     )
 
@@ -139,14 +153,22 @@ def _measures(found: xr.DataArray, cases: xr.Dataset, starts: Sequence[str]) -> 
 
 
 def _along(cases: xr.Dataset, axis: str, starts: Sequence[str], tolerance: float) -> Drawing:
-    """Shares of the motions along an axis."""
+    """Shares of the motions along an axis, above their sections."""
     cases, notes = first_of_rest(cases, [axis, *starts], "status")
     found = attractors(cases, tolerance)
-    shown = fractions(found, starts, cases).assign(_measures(found, cases, starts)).sortby(axis)
+    shown = fractions(found, starts, cases).assign(_measures(found, cases, starts))
+    shown = shown.assign(examples(found, cases, starts).data_vars).sortby(axis)
+
+    def draw(axes: list[Axes]) -> None:
+        draw_fractions(shown, axis, axes[0])
+        axes[0].set_xlabel("")
+        draw_sections(shown, axis, _colors(shown), axes[1])
+
     return Drawing(
         shown=shown,
-        draw=lambda axes: draw_fractions(shown, axis, axes[0]),
-        height=70.0,
+        draw=draw,
+        panels=(2, 1),
+        height=100.0,
         width=_WIDE,
         lines=tuple(notes),
     )
@@ -282,9 +304,7 @@ def _legend(data: xr.Dataset, number: int) -> str:
 
 
 def _described(data: xr.Dataset) -> list[str]:
-    """A line for each motion, where there is one setting."""
-    if data["fraction"].dims != ("attractor",):
-        return []
+    """A line for each motion, of one setting."""
     lines = []
     for number in _colors(data):
         motion = data.sel(attractor=number)

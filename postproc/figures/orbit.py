@@ -70,7 +70,7 @@ def draw_orbit(data: xr.Dataset, ax: Axes) -> Axes:
         _draw_probes(data.attrs["probes"], ax, 1.25 * size * scale.factor)
     if vertical.ndim == 1:
         if "probes" not in data.attrs:
-            _draw_stators(data, ax, scale.factor, 1.15 * size * scale.factor)
+            draw_stators(data, ax, scale.factor, 1.15 * size * scale.factor)
         _draw_one(vertical, horizontal, ax, scale.factor)
     else:
         curves = zip(overlaid(vertical, "sample"), overlaid(horizontal, "sample"), strict=True)
@@ -117,7 +117,7 @@ def _draw_one(vertical: xr.DataArray, horizontal: xr.DataArray, ax: Axes, factor
     ax.annotate("", (z[start + 2], y[start + 2]), xytext=(z[start], y[start]), arrowprops=arrow, zorder=4)
 
 
-def _draw_stators(data: xr.Dataset, ax: Axes, factor: float, reach: float) -> None:
+def draw_stators(data: xr.Dataset, ax: Axes, factor: float, reach: float) -> None:
     """Add the clearance circle and a stub of each stator; `reach` bounds what is worth showing."""
     from matplotlib.patches import Circle, Polygon
 

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from motions_store import NO_CONTACT, store_of
-from scipy.stats import binomtest
+from scipy.stats import binom, binomtest
 
-from postproc.cases.attractors import attractors, basin_entropy, fractions, start_axes, wilson
+from postproc.cases.attractors import attractors, start_axes
+from postproc.cases.basin_shares import basin_entropy, fractions, wilson
 from rubhpc.errors import InputError
+from rubhpc.schema import INFERRED
 
 
 def test_motions_are_told_apart_whatever_revolution_they_are_seen_in():
@@ -56,6 +58,67 @@ def test_intervals_are_wilson_s(count, n):
     expected = binomtest(count, n).proportion_ci(method="wilson")
     low, high = wilson(xr.DataArray(count), xr.DataArray(n))
     assert (float(low), float(high)) == pytest.approx(tuple(expected), abs=1e-12)
+
+
+@pytest.mark.parametrize("n", [40, 400])
+def test_intervals_hold_the_share_as_often_as_they_say(n):
+    """Binomial coverage, summed exactly: of Wilson's interval 95 % on average, at few shares less than 92."""
+    count = np.arange(n + 1)
+    low, high = (end.values for end in wilson(xr.DataArray(count), xr.DataArray(n)))
+    shares = np.linspace(0.02, 0.98, 193)
+    holds = (low <= shares[:, np.newaxis]) & (shares[:, np.newaxis] <= high)
+    coverage = np.where(holds, binom.pmf(count, n, shares[:, np.newaxis]), 0.0).sum(axis=1)
+    assert coverage.mean() == pytest.approx(0.95, abs=0.005)
+    assert np.quantile(coverage, 0.05) > 0.92
+
+
+def test_solutions_distinguish_motions_where_they_are_known():
+    """Equal sections with other multipliers are two motions; unlike ones with equal ones too: mirrored."""
+    kinds = ["P2", "P2", "P2", "other P1", "P1", "P2", "P1"]
+    store = store_of(kinds)
+    size = np.array([0.5, 0.5 + 1e-9, 0.6, 0.5, 0.5, np.nan, 0.5])
+    store["largest_multiplier"] = "initial_vertical", size
+    store["multiplier_angle"] = "initial_vertical", np.full(7, 0.3)
+    found = attractors(store).values
+    assert found[0] == found[1] != found[2]  # the second is seen a revolution later
+    assert found[5] in (found[0], found[2])  # not solved for: by its section
+    assert found[4] == found[6] != found[3]
+    assert len(set(found)) == 4
+
+
+def test_records_that_agree_with_a_solution_less_well_are_of_it():
+    store = store_of(["P1"] * 3)
+    for name in ("section_vertical", "section_torsion"):
+        store[name] = store[name] * xr.DataArray([1.0, 1.015, 0.985], dims="initial_vertical")
+    assert len(set(attractors(store).values)) == 3
+    store["largest_multiplier"] = "initial_vertical", np.array([0.5, 0.5, 0.5])
+    store["multiplier_angle"] = "initial_vertical", np.zeros(3)
+    assert len(set(attractors(store).values)) == 1
+
+
+def test_inferred_starts_take_the_motion_of_their_surroundings():
+    kinds = np.where(np.indices((6, 8))[1] < 4, "free", "P1")
+    kinds[5, 7] = "P2"
+    axes = {"initial_vertical": np.arange(6.0), "initial_horizontal": np.arange(8.0)}
+    whole = store_of(kinds, **axes)
+    expected = attractors(whole)
+    refined = whole.copy(deep=True)
+    inner = np.zeros((6, 8), bool)
+    inner[1:5, [1, 2, 5, 6]] = True
+    refined["status"].values[inner] = INFERRED
+    for name in ("section_vertical", "section_horizontal", "section_torsion"):
+        refined[name].values[inner] = np.nan
+    assert attractors(refined).equals(expected)
+    shares = fractions(attractors(refined), list(axes), refined)
+    assert int(shares["n_without_motion"]) == 0
+
+
+def test_torsion_that_dies_out_distinguishes_nothing():
+    store = store_of(["free"] * 4)
+    store["section_torsion"] = store["section_torsion"] + xr.DataArray(
+        [1e-9, 3e-9, 0.0, 7e-9], dims="initial_vertical"
+    )
+    assert set(attractors(store).values) == {1}
 
 
 def test_entropy_of_known_pictures():

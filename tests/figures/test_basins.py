@@ -9,6 +9,7 @@ from matplotlib.collections import PolyCollection
 from motions_store import store_of
 
 from postproc.catalogue import figures
+from postproc.figures.palette import MOTION_COLORS, REGIME_COLORS
 from rubhpc.errors import InputError
 from rubhpc.study.sampling import CASE
 
@@ -28,7 +29,10 @@ def plane() -> xr.Dataset:
 
 def test_cells_have_the_colour_of_their_motion(plane, tmp_path):
     drawing = FIGURE.of(plane)
-    ax = drawing.show()
+    ax, beside = drawing.show()
+    points = [line for line in beside.lines if line.get_marker() == "o"]
+    assert [line.get_color() for line in points] == [REGIME_COLORS[0], MOTION_COLORS[0]]
+    assert drawing.shown["example_initial_vertical"].sel(attractor=2) == pytest.approx(-1e-4)
     cells = ax.collections[0].get_array()
     reached = drawing.shown["attractor_reached"].transpose("initial_vertical", "initial_horizontal").values
     assert (np.asarray(cells).reshape(6, 7) + 1 == reached).all()
@@ -45,7 +49,9 @@ def test_shares_are_stacked_along_an_axis(plane):
     both = both.transpose("speed_ratio", ...)
     drawing = FIGURE.of(both, along="speed_ratio")
     assert drawing.shown["fraction"].sum("attractor").values == pytest.approx([1.0, 1.0])
-    ax = drawing.show()
+    ax, below = drawing.show()
+    assert below.get_xlabel() == "Speed ratio $r$"
+    assert {line.get_color() for line in below.lines} == {REGIME_COLORS[0], MOTION_COLORS[0]}
     areas = [area for area in ax.collections if isinstance(area, PolyCollection)]
     tops = [area.get_paths()[0].vertices[:, 1].max() for area in areas]
     assert tops[-1] == pytest.approx(1.0)
@@ -57,7 +63,7 @@ def test_points_of_a_sample(plane):
     stacked = plane.stack({CASE: ("initial_vertical", "initial_horizontal")}).reset_index(CASE)
     stacked = stacked.assign_coords({CASE: np.arange(stacked.sizes[CASE])}).transpose(CASE, ...)
     stacked.attrs["study"] = {"grid": {"initial.vertical": {}, "initial.horizontal": {}}}
-    ax = FIGURE.of(stacked).show()
+    ax, _ = FIGURE.of(stacked).show()
     assert sum(len(points.get_offsets()) for points in ax.collections) == 42
 
 

@@ -1,0 +1,98 @@
+"""Sizes of basins: how many starts reach each motion, with intervals; basin entropy."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from postproc.cases.attractors import NO_MOTION
+from rubhpc.schema import REGIME
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+ENTROPY_BOX = 5  # starts along each side of the boxes of the basin entropy
+
+
+def fractions(attractor: xr.DataArray, starts: Sequence[str], store: xr.Dataset) -> xr.Dataset:
+    """Return how many starts reach each motion, with 95 % intervals, and what the motion is.
+
+    Parameters
+    ----------
+    attractor : DataArray
+        From `attractors`.
+    starts : sequence of str
+        Dimensions over which starts differ.
+
+    Returns
+    -------
+    Dataset over (*settings, attractor)
+        `count`; `fraction` of the starts with a motion, its interval from `fraction_low` to `fraction_high`;
+        `motion_regime` and `motion_period`; over settings alone `n_start` with a motion, and
+        `n_without_motion`: not done, or not settled.
+    """
+    present = np.unique(attractor.values)
+    numbers = present[present != NO_MOTION]
+    is_of = attractor == xr.DataArray(numbers, dims="attractor", coords={"attractor": numbers})
+    count = is_of.sum(starts)
+    n_start = (attractor != NO_MOTION).sum(starts)
+    low, high = wilson(count, n_start)
+    return xr.Dataset(
+        {
+            "count": count.assign_attrs(units="1", long_name="Starts that reach the motion"),
+            "fraction": (count / n_start).assign_attrs(units="1", long_name="Basin fraction"),
+            "fraction_low": low.assign_attrs(units="1", long_name="Lower end of the 95 % interval"),
+            "fraction_high": high.assign_attrs(units="1", long_name="Upper end of the 95 % interval"),
+            "motion_regime": _most_common(store["regime"], is_of, starts, len(REGIME)),
+            "motion_period": store["period"].where(is_of, -1).max(starts).assign_attrs(store["period"].attrs),
+            "n_start": n_start.assign_attrs(units="1", long_name="Starts with a motion"),
+            "n_without_motion": (attractor == NO_MOTION)
+            .sum(starts)
+            .assign_attrs(units="1", long_name="Starts not done or not settled"),
+        }
+    )
+
+
+def _most_common(flag: xr.DataArray, is_of: xr.DataArray, starts: Sequence[str], n: int) -> xr.DataArray:
+    """Flag, of `n`, that most cases of each motion have; -1 where no case has the motion."""
+    counts = xr.concat([(is_of & (flag == code)).sum(starts) for code in range(n)], "code")
+    found = counts.argmax("code").where(counts.max("code") > 0, -1)
+    return found.astype(np.int8).assign_attrs(flag.attrs)
+
+
+def wilson(count: xr.DataArray, n: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    """Return Wilson's 95 % interval of a share, of `count` out of `n` (Wilson, 1927)."""
+    z = 1.959963984540054
+    share = count / n
+    middle = (share + z**2 / (2 * n)) / (1 + z**2 / n)
+    half = z * np.sqrt(share * (1 - share) / n + z**2 / (4 * n**2)) / (1 + z**2 / n)
+    return (middle - half).clip(0.0, 1.0), (middle + half).clip(0.0, 1.0)
+
+
+def basin_entropy(attractor: xr.DataArray, x: str, y: str) -> tuple[float, float]:
+    """Return basin entropy and boundary basin entropy of starts on a grid, nat.
+
+    The mean Gibbs entropy of the motions in boxes of `ENTROPY_BOX` by `ENTROPY_BOX` starts, over all boxes,
+    and over those of more than one motion: above ln 2 the boundary is fractal (Daza and others, Sci. Rep. 6,
+    31416, 2016). NaN where the grid is smaller than a box, or no box has more than one motion.
+    """
+    grid = attractor.transpose(y, x).values
+    boxes = []
+    for i in range(0, grid.shape[0] - ENTROPY_BOX + 1, ENTROPY_BOX):
+        for j in range(0, grid.shape[1] - ENTROPY_BOX + 1, ENTROPY_BOX):
+            box = grid[i : i + ENTROPY_BOX, j : j + ENTROPY_BOX]
+            _, n = np.unique(box[box != NO_MOTION], return_counts=True)
+            share = n / max(n.sum(), 1)
+            boxes.append(float(-(share * np.log(share)).sum()) if n.size else np.nan)
+    found = np.array(boxes)
+    found = found[np.isfinite(found)]
+    mixed = found[found > 0.0]
+    return (float(found.mean()) if found.size else np.nan, float(mixed.mean()) if mixed.size else np.nan)
+
+
+def name_of(regime: int, period: int) -> str:
+    """Return what a motion is in words: "no contact", "P2", "chaotic"."""
+    text = REGIME[regime].replace("quasi_periodic", "quasi-periodic").replace("_", " ")
+    return f"P{period}" if text == "periodic" and period > 0 else text
