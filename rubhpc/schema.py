@@ -217,6 +217,18 @@ def probe_variables(probes: Iterable[tuple[str, str]]) -> dict[str, Variable]:
     }
 
 
+def lyapunov_variables(n_exponent: int) -> dict[str, Variable]:
+    """Return the measures of the Lyapunov spectrum, of as many exponents; none of none."""
+    found = [
+        _measure(f"lyapunov_{k}", "1", f"Lyapunov exponent {k} per revolution, of the exact tangent map")
+        for k in range(1, n_exponent + 1)
+    ]
+    if found:
+        text = "dimension of the attractor in a section (Kaplan and Yorke; NaN: more exponents are needed)"
+        found.append(_measure("kaplan_yorke_dimension", "1", text))
+    return {variable.name: variable for variable in found}
+
+
 POINT, BRANCH = "point_", "branch"  # prefix of the variables of a branch study, and their role
 MULTIPLIERS = 8  # stored of every point
 # Name, dimensions after the point, unit, long name.

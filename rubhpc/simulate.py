@@ -48,6 +48,7 @@ def simulate(
     revolutions: int = 64,
     samples_per_revolution: int = 256,
     keep: str | tuple[str, ...] = ("waveform", "spectrum", "section"),
+    lyapunov: int = 0,
     probes: Sequence[Probe | Mapping[str, object]] = (),
     initial: State | Mapping[str, float | str] | None = None,
 ) -> Record:
@@ -111,6 +112,9 @@ def simulate(
         Samples in each, an even number.
     keep : tuple of {"waveform", "spectrum", "section"}
         What the record holds besides its measures and its final state.
+    lyapunov : int
+        Lyapunov exponents measured by the exact tangent map over 256 revolutions after the record:
+        `lyapunov_1` and on, and `kaplan_yorke_dimension`; NaN where the laws have no closed form.
     probes : sequence of Probe or dict
         What is measured besides, by the keys of [[record.probe]], such as `{"name": "left", "node": 1,
         "angle": "-45 deg"}`: the record holds `probe_left` and `spectrum_probe_left`.
@@ -153,6 +157,7 @@ def simulate(
         revolutions=revolutions,
         samples_per_revolution=samples_per_revolution,
         keep=tuple(keep),
+        lyapunov=lyapunov,
         probe=measured,
     )
     record = run_case(

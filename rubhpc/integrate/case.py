@@ -20,6 +20,7 @@ from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.friction_march import FrictionMarch
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
 from rubhpc.integrate.lyapunov import Marches, growth
+from rubhpc.integrate.lyapunov_spectrum import spectrum_of
 from rubhpc.integrate.measures import (
     add_sag,
     by_name,
@@ -39,7 +40,7 @@ from rubhpc.integrate.setup import ModalSetup, Scheme
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.kernels.accumulators import IMPACT_STEPS
-from rubhpc.schema import DONE, SECTION_NAMES
+from rubhpc.schema import DONE, SECTION_NAMES, lyapunov_variables
 from rubhpc.spectra import amplitude_spectrum
 from rubhpc.study.initial import Initial
 
@@ -214,7 +215,10 @@ def _integrate(
             settings=settings,
             final=final,
             probed=recording.probed,
+            n_exponent=recording.lyapunov,
         )
+        if recording.lyapunov:
+            record.measures.update(_spectrum(march, begin, final, recording.lyapunov))
         if "waveform" not in recording.keep:
             record.signals.clear()
     record.measures.update(
@@ -229,6 +233,17 @@ def _solve_from(setup: Setup, clearance: float, friction: float, state: State) -
     """Piecewise motion of a case in closed form."""
     assert isinstance(setup, ModalSetup)
     return PiecewiseMotion(setup, clearance, friction, state)
+
+
+def _spectrum(
+    march: March, begin: Callable[[State], PiecewiseMotion], final: State, n_exponent: int
+) -> dict[str, float]:
+    """Lyapunov exponents from where a march has ended; NaN where it has no closed form."""
+    if isinstance(march, EventDrivenMarch) and march.has_closed_form:
+        found = spectrum_of(partial(begin, final), n_exponent)
+        largest = found["lyapunov_1"]
+        return found if math.isnan(largest) else found | {"lyapunov_exponent": largest}
+    return dict.fromkeys(lyapunov_variables(n_exponent), math.nan)
 
 
 def _solver(march: March, setup: Setup, clearance: float, friction: float, final: State) -> Solver | None:

@@ -25,7 +25,7 @@ from rubhpc.kernels.accumulators import (
     Accumulator,
     Samples,
 )
-from rubhpc.schema import DIVERGED, PROBE, VARIABLES, probe_variables
+from rubhpc.schema import DIVERGED, PROBE, VARIABLES, lyapunov_variables, probe_variables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model, StatorModel
     from rubhpc.integrate.regimes import Solution
+    from rubhpc.schema import Variable
     from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
@@ -269,7 +270,7 @@ def diverged_record(
         "section": recording.revolutions,
     }
     groups: dict[str, dict[str, Any]] = {"waveform": {}, "spectrum": {}, "section": {}, "measure": {}}
-    for name, variable in (VARIABLES | probe_variables(recording.probed)).items():
+    for name, variable in _variables_of(recording).items():
         if variable.role == "measure" and not variable.dims:
             groups["measure"][name] = -1 if variable.dtype.startswith("int") else np.nan
         elif variable.role == "measure" or variable.role in recording.keep:
@@ -292,4 +293,10 @@ def diverged_record(
         settings=settings,
         final=final,
         probed=recording.probed,
+        n_exponent=recording.lyapunov,
     )
+
+
+def _variables_of(recording: Recording) -> dict[str, Variable]:
+    """Variables of a case that is recorded so."""
+    return VARIABLES | probe_variables(recording.probed) | lyapunov_variables(recording.lyapunov)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.integrate.record_variables import RecordVariables
-from rubhpc.schema import DONE, STATUS, VARIABLES, probe_variables
+from rubhpc.schema import DONE, STATUS, VARIABLES, lyapunov_variables, probe_variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -124,6 +124,8 @@ class Record(RecordVariables):
         Where the case ended: `initial=` of a run that goes on.
     probed : tuple of (name, quantity)
         Its probes.
+    n_exponent : int
+        How many Lyapunov exponents were measured by the exact tangent map.
     """
 
     status: int = DONE
@@ -138,6 +140,7 @@ class Record(RecordVariables):
     settings: dict[str, float] = field(default_factory=dict)
     final: State
     probed: tuple[tuple[str, str], ...] = ()
+    n_exponent: int = 0
 
     def _groups(self) -> tuple[dict[str, Any], ...]:
         return self.signals, self.spectra, self.sections, self.measures, self.settings
@@ -176,7 +179,7 @@ class Record(RecordVariables):
         import xarray as xr
 
         arrays = {**self.signals, **self.spectra, **self.sections, **self.measures, **self.settings}
-        variables = VARIABLES | probe_variables(self.probed)
+        variables = VARIABLES | probe_variables(self.probed) | lyapunov_variables(self.n_exponent)
         dataset = xr.Dataset(
             {
                 name: (

@@ -27,14 +27,21 @@ def monodromy(motion: PiecewiseMotion, revolutions: Iterable[Revolution]) -> Flo
     """
     tangent: Floats | None = None
     for revolution in revolutions:
-        for piece, following in pairwise([*revolution.pieces, None]):
-            assert piece is not None
-            moved = propagator(motion.mode(piece.states), piece.duration)
-            tangent = moved if tangent is None else moved @ tangent
-            if following is not None:
-                tangent = saltate(motion, piece, following, tangent)
+        tangent = carried(motion, revolution, tangent)
     assert tangent is not None
     return tangent
+
+
+def carried(motion: PiecewiseMotion, revolution: Revolution, columns: Floats | None) -> Floats:
+    """What becomes of small changes (2 n, k) of a revolution's beginning; by default of all unit ones."""
+    for piece, following in pairwise([*revolution.pieces, None]):
+        assert piece is not None
+        moved = propagator(motion.mode(piece.states), piece.duration)
+        columns = moved if columns is None else moved @ columns
+        if following is not None:
+            columns = saltate(motion, piece, following, columns)
+    assert columns is not None
+    return columns
 
 
 def by_clearance(motion: PiecewiseMotion, revolutions: Iterable[Revolution]) -> Floats:

@@ -18,6 +18,7 @@ from rubhpc.schema import (
     VARIABLES,
     branch_variables,
     case_measures,
+    lyapunov_variables,
     probe_variables,
 )
 from rubhpc.storage.disk import read_regular, write_whole
@@ -217,6 +218,7 @@ class Manifest:
             measures=(
                 *case_measures(),
                 *(v for v in probe_variables(recording.probed).values() if v.role == "measure"),
+                *lyapunov_variables(recording.lyapunov).values(),
             ),
             refine=None if study.refine is None else table_of(study.refine, study.axes),
         )

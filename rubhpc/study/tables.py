@@ -255,6 +255,13 @@ class Recording:
         of=KEEPABLE,
         default=KEPT,
     )
+    lyapunov: int = count(
+        doc="Lyapunov exponents measured by the exact tangent map over 256 revolutions after the record.",
+        example="3",
+        default=0,
+        at_least=0,
+        at_most=64,
+    )
     probe: tuple[Probe, ...] = table(doc="What is measured besides, and where.", default=(), added=True)
 
     def __post_init__(self) -> None:
@@ -271,9 +278,11 @@ class Recording:
                 raise FieldError(f"probe.{i}.name", f'"{name}" is another probe already; choose another name')
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the keys for JSON; probes only where there are any, as older stores have none."""
+        """Return the keys for JSON; probes and exponents only where there are any: older stores have none."""
         keys = asdict(self)
         del keys["probe"]
+        if not self.lyapunov:
+            del keys["lyapunov"]
         return keys | ({"probe": [plain(probe) for probe in self.probe]} if self.probe else {})
 
     @property

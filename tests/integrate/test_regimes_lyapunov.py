@@ -6,6 +6,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from impact_map import RESTITUTION, next_impact
 from scipy.optimize import brentq, fsolve
 
 from rubhpc import LumpedStator, Rig, State, Unbalance, simulate
@@ -19,7 +20,6 @@ from rubhpc.rig.reading import read_rig
 from rubhpc.schema import REGIME
 from rubhpc.study.study import Contact, Integrator, Recording
 
-RESTITUTION = 0.8
 MARCHES = {
     "modal": EventDrivenMarch,
     "stepped": ContactSteppingMarch,
@@ -71,21 +71,6 @@ def growth_of(rig, given, state, n_span, march=EventDrivenMarch):
         return neighbours
 
     return np.array(list(islice(growth(begin), n_span)))
-
-
-def next_impact(time, speed, spin):
-    """Closed form of the flight from an impact at x = 0: when the next one is, and the speed after it."""
-    share = 1 / (1 - spin**2)
-    a, b = -share * math.cos(spin * time), speed + share * spin * math.sin(spin * time)
-
-    def place(t):
-        return a * np.cos(t - time) + b * np.sin(t - time) + share * np.cos(spin * t)
-
-    ahead = time + np.arange(0.01, 30.0, 0.01)
-    i = int(np.argmax(place(ahead) >= 0.0))
-    end = brentq(place, ahead[i - 1], ahead[i], xtol=1e-14)
-    rate = -a * math.sin(end - time) + b * math.cos(end - time) - share * spin * math.sin(spin * end)
-    return np.array([end, -RESTITUTION * rate])
 
 
 def slope(time, speed, spin, by=1e-6):
