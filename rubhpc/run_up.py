@@ -11,11 +11,11 @@ from rubhpc.errors import InputError
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.integrate.measures import by_name
 from rubhpc.integrate.run_up import integrate_run_up
+from rubhpc.integrate.run_up_case import by_revolution
 from rubhpc.integrate.setup import ModalSetup
-from rubhpc.integrate.speed_law import SpeedLaw
-from rubhpc.schema import PROBE, VARIABLES, probe_variables
-from rubhpc.spectra import track_order
+from rubhpc.schema import AMPLITUDE, ORDERS, PHASE, TURNED, VARIABLES, probe_variables, run_up_variables
 from rubhpc.study.initial import CONTACT_FREE
+from rubhpc.study.speed_law import SpeedLaw
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
@@ -28,10 +28,6 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import State
     from rubhpc.rig.probes import Probe
     from rubhpc.rig.rig import Rig
-
-ORDERS = (1 / 3, 1 / 2, 1.0, 2.0)  # of the spin, whose amplitudes and phases are followed
-WINDOW = 6  # revolutions, which hold whole periods of all of them
-_TRACKED = ("vertical", "horizontal", "torsion")
 
 
 @on_one_thread
@@ -76,8 +72,8 @@ def run_up(
     Returns
     -------
     xarray.Dataset
-        Signals as of `simulate` over `sample`; over `turn`, the revolutions, `speed` (rad/s), `time` (s),
-        `contact_fraction`, `peak_contact_force` and `friction_work`; and over `turn` and `order` the
+        Signals as of `simulate` over `sample`; over `revolution` `speed` (rad/s), `time` (s),
+        `contact_fraction`, `peak_contact_force` and `friction_work`; and over `revolution` and `order` the
         amplitude (zero to peak) and phase of the displacements of the disc, its torsion and the probes, over
         six revolutions: `amplitude_vertical`, `phase_vertical` (rad, by which the signal leads the order of
         the shaft's angle), and so on. A case that ends early says why in the attribute `reason`.
@@ -124,23 +120,10 @@ def run_up(
         name: (known[name].dims, values, _about(known[name].unit, known[name].long_name))
         for name, values in signals.items()
     }
-    variables["speed"] = "turn", found.speed, _about("rad s-1", "mean spin speed of the revolution")
-    variables["time"] = "turn", found.time, _about("s", "beginning of the revolution")
-    for name in ("contact_fraction", "peak_contact_force", "friction_work"):
-        about = _about(known[name].unit, known[name].long_name)
-        variables[name] = ("turn", "stator"), getattr(found, name), about
-    for name in (*_TRACKED, *(name for name in signals if name.startswith(PROBE))):
-        lines = np.stack(
-            [track_order(signals[name], samples_per_revolution, order, WINDOW) for order in ORDERS], axis=-1
-        )
-        text = known[name].long_name
-        over = ("turn", "order")
-        variables[f"amplitude_{name}"] = (
-            over,
-            np.abs(lines),
-            _about(known[name].unit, f"amplitude of the {text}"),
-        )
-        variables[f"phase_{name}"] = over, np.angle(lines), _about("rad", f"phase of the {text}")
+    own = run_up_variables((probe.name, probe.quantity) for probe in measured)
+    for name, values in by_revolution(found, signals, samples_per_revolution).items():
+        short = name if name.startswith((AMPLITUDE, PHASE)) else name.removeprefix("revolution_")
+        variables[short] = own[name].dims, values, _about(own[name].unit, own[name].long_name)
     return _dataset(variables, len(found.speed), samples_per_revolution, found.reason, one.note)
 
 
@@ -181,12 +164,16 @@ def _dataset(
     found = xr.Dataset(
         variables,
         coords={
-            "revolution": (
+            TURNED: (
                 "sample",
                 np.arange(n_turn * per_revolution) / per_revolution,
-                _about("1", "revolution"),
+                _about("1", "revolutions turned"),
             ),
-            "turn": ("turn", np.arange(n_turn), _about("1", "number of the revolution, from 0")),
+            "revolution": (
+                "revolution",
+                np.arange(n_turn),
+                _about("1", "number of the revolution, from 0"),
+            ),
             "order": ("order", np.array(ORDERS), _about("1", "order of the spin frequency")),
             "stator": ("stator", np.arange(1, n_stator + 1), _about("1", "number of the stator")),
         },

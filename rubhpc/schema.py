@@ -264,12 +264,43 @@ def branch_variables() -> dict[str, Variable]:
     return {v.name: v for v in (*own, *measures, *sections)}
 
 
+RUN_UP = "run_up"  # role of what a run-up stores of every revolution
+TURNED = "turned"  # revolutions at a sample of a run-up, whose revolutions are a dimension
+ORDERS = (1 / 3, 1 / 2, 1.0, 2.0)  # of the spin, whose amplitudes and phases are followed
+TRACKED = ("vertical", "horizontal", "torsion")  # signals of which they are, besides the probes
+_OF_REVOLUTIONS = (
+    ("revolution_speed", (), "rad s-1", "mean spin speed of the revolution"),
+    ("revolution_time", (), "s", "beginning of the revolution"),
+    ("revolution_contact_fraction", ("stator",), "1", "fraction of the revolution in contact"),
+    ("revolution_peak_contact_force", ("stator",), "N", "peak contact force in the revolution"),
+    ("revolution_friction_work", ("stator",), "J", "work of friction in the revolution"),
+)
+AMPLITUDE, PHASE = "amplitude_", "phase_"
+
+
+def run_up_variables(probes: Iterable[tuple[str, str]] = ()) -> dict[str, Variable]:
+    """Return the variables of the revolutions of a run-up, NaN beyond the last one of a case."""
+    own = [
+        Variable(name=name, role=RUN_UP, dims=("revolution", *dims), unit=unit, long_name=text)
+        for name, dims, unit, text in _OF_REVOLUTIONS
+    ]
+    known = VARIABLES | probe_variables(probes)
+    for name in (*TRACKED, *(name for name in known if name.startswith(PROBE))):
+        dims, text = ("revolution", "order"), known[name].long_name
+        for prefix, unit, what in ((AMPLITUDE, known[name].unit, "amplitude"), (PHASE, "rad", "phase")):
+            long_name = f"{what} of the {text}"
+            own.append(Variable(name=prefix + name, role=RUN_UP, dims=dims, unit=unit, long_name=long_name))
+    return {v.name: v for v in own}
+
+
 def role_of(name: str) -> str:
     """Return the role of a variable, be it of a probe; "" where it is none of a store."""
     if name in VARIABLES:
         return VARIABLES[name].role
     if name.startswith(POINT):
         return BRANCH
+    if name.startswith(("revolution_", AMPLITUDE, PHASE)):
+        return RUN_UP
     return next((role for prefix, (role, *_) in _OF_PROBES.items() if name.startswith(prefix)), "")
 
 
@@ -284,5 +315,6 @@ def case_measures() -> tuple[Variable, ...]:
 
 
 STATE = "state"  # the final state; always kept in a sweep, where it starts the next case
-KEPT = ("waveform", "spectrum", "section")  # what [record] keep names by default
+WAVEFORM = "waveform"
+KEPT = (WAVEFORM, "spectrum", "section")  # what [record] keep names by default
 KEEPABLE = (*KEPT, STATE)  # what it may name; measures are always stored

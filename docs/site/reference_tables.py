@@ -26,6 +26,7 @@ from rubhpc.study.axes import OwnAxes
 from rubhpc.study.branch_keys import BranchKeys
 from rubhpc.study.initial import Initial
 from rubhpc.study.refine import Refine
+from rubhpc.study.run_up_keys import RunUpKeys
 from rubhpc.study.tables import Contact, Integrator, Recording, Run, Sample
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ STUDY_TABLES = {
     "[sample]": Sample,
     "[refine]": Refine,
     "[branch]": BranchKeys,
+    "[run_up]": RunUpKeys,
     "[run]": Run,
 }
 ROOMS = ("store", "signals", "cases", "figures")  # of postproc, whose functions the reference shows

@@ -10,6 +10,7 @@ import numpy as np
 from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
 from postproc.signals.orders import order_over_speed
+from postproc.store.run_ups import is_run_up
 from postproc.store.units import scale_for, short_name
 from postproc.store.variables import require_results
 
@@ -59,17 +60,22 @@ def draw_bode(data: xr.Dataset, signals: Sequence[str], axes: list[Axes], order:
     from matplotlib.ticker import MultipleLocator
 
     top, bottom = axes
-    rpm = data["speed"].values * _RPM
+    along = "revolution" if is_run_up(data) else "speed"
+    speeds = data["speed"]
+    ends = float(speeds.min()) * _RPM, float(speeds.max()) * _RPM
     unit = str(data[f"amplitude_{signals[0]}"].attrs.get("units", "1"))
     sizes = [float(np.nanmax(data[f"amplitude_{name}"].values)) for name in signals]
     scale = scale_for(unit, max(sizes))
-    is_sparse = rpm.size < 40
+    is_sparse = data.sizes[along] < 40
+    over = next((dim for dim in data[f"amplitude_{signals[0]}"].dims if dim != along), None)
     style: dict[str, Any] = {"marker": "." if is_sparse else "", "markersize": 4, "linewidth": 0.8}
     n_curve = 0
     for name in signals:
         amplitude, phase = data[f"amplitude_{name}"], data[f"phase_{name}"]
-        curves = zip(overlaid(amplitude, "speed"), overlaid(phase, "speed"), strict=True)
-        for (case, height), (_, lead) in curves:
+        curves = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
+        for i_case, ((case, height), (_, lead)) in enumerate(curves):
+            own_speeds = speeds.isel({over: i_case}) if over in speeds.dims else speeds
+            rpm = own_speeds.values * _RPM
             own = name.removeprefix("probe_").replace("_", " ") if len(signals) > 1 else None
             label = ", ".join(text for text in (own, case) if text) or None
             top.plot(rpm, height.values * scale.factor, label=label, **style)
@@ -78,7 +84,7 @@ def draw_bode(data: xr.Dataset, signals: Sequence[str], axes: list[Axes], order:
     first = (
         short_name(data[f"amplitude_{signals[0]}"].rename(signals[0])) if len(signals) == 1 else "Amplitude"
     )
-    top.set(ylabel=scale.label(f"{first}, {_written(order)}"), xlim=(rpm[0], rpm[-1]))
+    top.set(ylabel=scale.label(f"{first}, {_written(order)}"), xlim=ends)
     top.set_ylim(bottom=0.0)
     if n_curve > 1:
         top.legend(loc="best", fontsize=6)

@@ -9,6 +9,7 @@ import xarray as xr
 
 from postproc.signals.spectra import check_signal, samples_per_revolution
 from postproc.store.axes import axes_of, find_axis, source
+from postproc.store.run_ups import is_run_up
 from postproc.store.select import narrow
 from rubhpc.errors import InputError
 from rubhpc.study.axes import SPEED_AXES
@@ -30,8 +31,8 @@ def order_over_speed(
     Parameters
     ----------
     store : Dataset
-        Of `rubhpc.run_up`, or a store with an axis of speeds and waveforms, in which axes but this and `over`
-        have been selected.
+        Of `rubhpc.run_up`, a store of run-ups, or one with an axis of speeds and waveforms, in which axes but
+        this and `over` have been selected.
     signals : sequence of str
     order : float
         Multiple of the spin frequency.
@@ -42,7 +43,8 @@ def order_over_speed(
     -------
     Dataset
         `amplitude_NAME` in the unit of the signal and `phase_NAME`, rad, by which it leads the order of the
-        shaft's angle, unwrapped, over `speed` (rad/s), rising, and `over`.
+        shaft's angle, unwrapped, over `speed` (rad/s), rising, and `over`; of run-ups over `revolution`, with
+        `speed` as a variable.
 
     Raises
     ------
@@ -52,12 +54,16 @@ def order_over_speed(
     for signal in signals:
         check_signal(signal)
     found = (
-        _of_run_up(store, signals, order) if "turn" in store.dims else _of_cases(store, signals, order, over)
+        _of_run_up(store, signals, order, over)
+        if is_run_up(store)
+        else _of_cases(store, signals, order, over)
     )
-    found = found.sortby("speed")
+    along = "revolution" if is_run_up(store) else "speed"
+    if along == "speed":
+        found = found.sortby("speed")
     for signal in signals:
         phase = found[f"phase_{signal}"]
-        unwrapped = np.apply_along_axis(_unwrap, phase.get_axis_num("speed"), phase.values)
+        unwrapped = np.apply_along_axis(_unwrap, phase.get_axis_num(along), phase.values)
         found[f"phase_{signal}"] = phase.copy(
             data=unwrapped - 2 * np.pi * round(_mean(unwrapped) / (2 * np.pi))
         )
@@ -78,7 +84,7 @@ def _mean(values: NDArray[np.float64]) -> float:
     return float(finite.mean()) if finite.size else 0.0
 
 
-def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float) -> xr.Dataset:
+def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float, over: str | None) -> xr.Dataset:
     near = np.flatnonzero(np.abs(store["order"].values - order) < NEAR)
     if not near.size:
         followed = ", ".join(f"{value:.4g}" for value in store["order"].values)
@@ -90,13 +96,10 @@ def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float) -> xr.Da
                 str(n).removeprefix("phase_") for n in store.data_vars if str(n).startswith("phase_")
             )
             raise InputError(f"{name.split('_', 1)[1]}: no order of it is followed; choose one of {known}")
-    rows = store[names].isel(order=int(near[0])).drop_vars(["order", "stator"], errors="ignore")
-    return (
-        rows.assign_coords(speed=("turn", store["speed"].values))
-        .swap_dims(turn="speed")
-        .drop_vars("turn")
-        .load()
-    )
+    if "status" in store:
+        store = narrow(store, [*names, "speed"], [find_axis(store, over)] if over else [])
+    rows = store[[*names, "speed"]].isel(order=int(near[0]))
+    return rows.drop_vars(["order", "stator"], errors="ignore").load()
 
 
 def _of_cases(store: xr.Dataset, signals: Sequence[str], order: float, over: str | None) -> xr.Dataset:

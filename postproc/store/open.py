@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 from postproc.store.axes import drawn_axes
 from postproc.store.branch_points import as_points
 from postproc.store.inferred import fill_inferred
+from postproc.store.run_ups import as_run_ups, is_run_up
 from postproc.store.variables import LONG_ROLES
 from rubhpc.errors import StoreError
-from rubhpc.schema import POINT, VARIABLES, role_of
+from rubhpc.schema import POINT, TURNED, VARIABLES, role_of
 from rubhpc.storage.regular_files import CHECKED, RegularFiles
 from rubhpc.storage.store import is_damaged
 
@@ -26,7 +27,7 @@ def open_store(path: str | Path) -> xr.Dataset:
 
     Waveforms, spectra and sections keep the chunks of the disk, so that a selection reads only its own
     chunks; measures are read in pieces of about 100 MB, since a map needs all of them at once. A branch study
-    is returned as its points (`postproc.store.branch_points`).
+    is returned as its points (`postproc.store.branch_points`), one of run-ups with `speed` over `revolution`.
 
     Raises
     ------
@@ -54,7 +55,9 @@ def open_store(path: str | Path) -> xr.Dataset:
         raise StoreError(f"{path}: is not a rubhpc store; give the directory that a study was run into")
     store.encoding["source"] = str(path)
     _check_attributes(store, path)
-    return as_points(store) if f"{POINT}value" in store else fill_inferred(store, path)
+    if f"{POINT}value" in store:
+        return as_points(store)
+    return as_run_ups(store) if is_run_up(store) else fill_inferred(store, path)
 
 
 def _check_attributes(store: xr.Dataset, path: Path) -> None:
@@ -80,6 +83,6 @@ def _open(path: Path, chunks: Any, without: Sequence[str] = ()) -> xr.Dataset:
             decode_times=False,
             decode_timedelta=False,
         )
-    held = {n: store[n].compute() for n in ("revolution", *drawn_axes(store)) if n in store}
+    held = {n: store[n].compute() for n in ("revolution", TURNED, *drawn_axes(store)) if n in store}
     opened: xr.Dataset = store.assign_coords(held)
     return opened

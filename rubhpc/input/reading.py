@@ -150,6 +150,9 @@ def _kind_of(hint: Any, table: object) -> Any:
 def _parse_pairs(table: object, units: tuple[str, str], file: str, name: str) -> Any:
     """Pairs from a table of numbers; to TOML a bare `31.56` is the table 31 with the key 56."""
     key_unit, unit = units
+    if isinstance(table, list) and all(isinstance(pair, list) and len(pair) == 2 for pair in table):
+        where = place(file, name)
+        return tuple((parse_quantity(a, key_unit, where), parse_quantity(b, unit, where)) for a, b in table)
     if not isinstance(table, dict):
         raise InputError(f"{place(file, name)}: {brief(table)} is not a table; write {{ 31.56 = 0.09 }}")
     flat: dict[str, object] = {}

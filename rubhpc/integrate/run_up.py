@@ -22,10 +22,10 @@ from rubhpc.integrate.event_driven_march import NoClosedForm
 from rubhpc.integrate.measures import add_sag, empty_samples, new_accumulator
 from rubhpc.integrate.piece_setup import Pieces
 from rubhpc.integrate.record import State
-from rubhpc.integrate.speed_law import cut
 from rubhpc.integrate.start import start_of
 from rubhpc.kernels.accumulators import IMPACT_STEPS
 from rubhpc.study.initial import Initial
+from rubhpc.study.speed_law import cut
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.piece_setup import PieceSetup
     from rubhpc.integrate.setup import ModalSetup
-    from rubhpc.integrate.speed_law import SpeedLaw
     from rubhpc.kernels.accumulators import Accumulator
+    from rubhpc.study.speed_law import SpeedLaw
 
     Floats = NDArray[np.float64]
 

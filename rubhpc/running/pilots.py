@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 _PILOTS, _FEW_PILOTS, _ENOUGH = 9, 3, 20.0  # cases; run even if slow; seconds after which no more are started
 _FIRST_STEPS, _PILOT_TIME = 50_000, 1.0  # predicted, of a pilot's first try; seconds of its longest, about
 _STRETCHES, _MOST_COUNTED = 10, 2_000  # parts of a run, and cases in all, in which preparations are counted
+_RUN_UP_COST = 3.5  # times that of a constant speed
 _SECTION = 0.618  # golden: shares k * _SECTION (mod 1) spread evenly, however many
 
 _Kept: TypeAlias = "OrderedDict[tuple[int, float], tuple[Rig, set[float]]]"  # rig and speed -> its frictions
@@ -139,6 +140,15 @@ def _pilot(grid: CaseGrid, index: tuple[int, ...], steps: float) -> Pace:
     """
     study, case = grid.study, grid.case(index)
     whole = study.recording
+    if case.speed_law is not None:  # timed at its highest speed
+        whole = replace(
+            whole,
+            transient=0,
+            transient_limit=None,
+            transient_tolerance=None,
+            revolutions=case.speed_law.n_revolution,
+        )
+        steps /= _RUN_UP_COST
 
     def seconds(recording: Recording, setup: Setup) -> float:
         while True:

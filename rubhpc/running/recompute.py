@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError, RubError, StoreError
-from rubhpc.integrate.case import run_case
-from rubhpc.integrate.record import State
+from rubhpc.integrate.record import Record, State
 from rubhpc.running.initial_states import is_intact
-from rubhpc.running.worker import packed_measures, put, set_up
+from rubhpc.running.worker import integrate, packed_measures, put_any, set_up
 from rubhpc.schema import DONE, FINAL_STATE, MISSING, STATUS
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.measures import blank_records
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.record import Record
+    from rubhpc.integrate.run_up_case import RunUpRecord
     from rubhpc.study.cases import Case, CaseGrid
     from rubhpc.study.study import Study
 
@@ -84,7 +83,7 @@ def reproduce(study: Study, name: str) -> Reproduction:
     try:
         record = _compute(grid, case)
         data = {v.name: np.full((1, *manifest.extent(v)), np.nan, v.dtype) for v in manifest.variables}
-        put(record, data, 0)
+        put_any(record, data, 0)
     except Exception as error:
         text = " ".join(str(error).split())
         raise RubError(f"case {case.id}, {at}: {type(error).__name__}: {text}") from error
@@ -100,7 +99,7 @@ def reproduce(study: Study, name: str) -> Reproduction:
     )
 
 
-def _compute(grid: CaseGrid, case: Case) -> Record:
+def _compute(grid: CaseGrid, case: Case) -> Record | RunUpRecord:
     """The record of a case; its predecessors are read from the store, or computed first."""
     study, behind, state = grid.study, [case], None
     while (index := grid.predecessor(behind[-1].index)) is not None:
@@ -112,14 +111,9 @@ def _compute(grid: CaseGrid, case: Case) -> Record:
     for each in reversed(behind):
         setup = set_up(study, each)
         initial = each.initial if state is None else State.unpacked(state, setup.model)
-        record = run_case(
-            setup,
-            clearance=each.clearance,
-            friction=each.friction,
-            recording=study.recording,
-            initial=initial,
-        )
-        state = record.final.packed() if record.status == DONE else None
+        record = integrate(study, each, setup, initial)
+        is_before = isinstance(record, Record) and record.status == DONE
+        state = record.final.packed() if is_before else None  # type: ignore[union-attr]
     return record
 
 

@@ -14,6 +14,7 @@ from rubhpc.integrate.case import run_case
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.family import CLEARANCES, SPEEDS, Operation
 from rubhpc.integrate.record import State
+from rubhpc.integrate.run_up_case import RunUpRecord, record_run_up
 from rubhpc.integrate.setup import prepare
 from rubhpc.running.initial_states import InitialState, InitialStates
 from rubhpc.running.pool import Totals
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from rubhpc.storage.ledger import Ledger
     from rubhpc.storage.store import Store
     from rubhpc.study.cases import Block, Case, CaseGrid
+    from rubhpc.study.initial import Initial
     from rubhpc.study.study import Study
     from rubhpc.study.tables import Contact
 
@@ -218,10 +220,7 @@ class Worker:
         self.watch.begin(flat, case.id)
         try:
             record = self._compute(case, start)
-            if isinstance(record, BranchRecord):
-                put_points(record, data, i_case)
-            else:
-                put(record, data, i_case)
+            put_any(record, data, i_case)
             measures = packed_measures(record, self._record_type).tobytes()
         except Stopped:
             raise
@@ -234,7 +233,7 @@ class Worker:
         remark = "; ".join(text for text in (start.note, record.remark) if text)
         return Entry(flat, case.id, record.status, case_checksum(data, i_case), measures, remark)
 
-    def _compute(self, case: Case, start: InitialState) -> Record | BranchRecord:
+    def _compute(self, case: Case, start: InitialState) -> Record | BranchRecord | RunUpRecord:
         study = self.grid.study
         limit = self.watch.limit
         end = time.monotonic() + limit if limit else float("inf")
@@ -263,14 +262,44 @@ class Worker:
             self._setups[key] = (case.rig, setup)
             if len(self._setups) > MOST_SETUPS:
                 self._setups.popitem(last=False)
+        initial = case.initial if start.state is None else State.unpacked(start.state, setup.model)
+        return integrate(study, case, setup, initial, check)
+
+
+def integrate(
+    study: Study,
+    case: Case,
+    setup: Setup,
+    initial: State | Initial,
+    check: Callable[[], None] | None = None,
+) -> Record | RunUpRecord:
+    """The record of a case, at its speed or over its speeds; `check` is called several times a second."""
+    if case.speed_law is None:
         return run_case(
             setup,
             clearance=case.clearance,
             friction=case.friction,
             recording=study.recording,
-            initial=case.initial if start.state is None else State.unpacked(start.state, setup.model),
+            initial=initial,
             check=check,
         )
+    return record_run_up(
+        setup,
+        case.speed_law,
+        clearance=case.clearance,
+        friction=case.friction,
+        recording=study.recording,
+        initial=initial,
+        check=check,
+    )
+
+
+def put_any(record: Record | BranchRecord | RunUpRecord, data: Arrays, i_case: int) -> None:
+    """Put the arrays of a record into those of a block."""
+    if isinstance(record, BranchRecord | RunUpRecord):
+        put_points(record, data, i_case)
+    else:
+        put(record, data, i_case)
 
 
 def put(record: Record, data: Arrays, i_case: int) -> None:
@@ -292,11 +321,13 @@ def put(record: Record, data: Arrays, i_case: int) -> None:
         values[i_case] = arrays[name]
 
 
-def put_points(record: BranchRecord, data: Arrays, i_case: int) -> None:
-    """Put the points of the branches of a case into the arrays of a block."""
+def put_points(record: BranchRecord | RunUpRecord, data: Arrays, i_case: int) -> None:
+    """Put the points of branches, or the revolutions and samples of a run-up, into the arrays of a block."""
     for name, values in data.items():
         values[i_case] = np.nan
-        values[i_case, : len(record.arrays[name])] = record.arrays[name]
+        found = record.arrays.get(name, np.zeros(0))
+        place = tuple(slice(n) for n in found.shape)
+        values[i_case][place] = found
 
 
 def operation_of(grid: CaseGrid, case: Case) -> Operation:
@@ -313,7 +344,7 @@ def operation_of(grid: CaseGrid, case: Case) -> Operation:
     )
 
 
-def packed_measures(record: Record | BranchRecord, kind: np.dtype[np.void]) -> NDArray[np.void]:
+def packed_measures(record: Record | BranchRecord | RunUpRecord, kind: np.dtype[np.void]) -> NDArray[np.void]:
     """The measures of a record, packed; one that this version does not know is missing."""
     row = np.zeros((), kind)
     for name in kind.names or ():

@@ -18,7 +18,7 @@ from numcodecs.blosc import Blosc
 from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.storage import MemoryStore
 
-from rubhpc.schema import VARIABLES
+from rubhpc.schema import ORDERS, TURNED, VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.manifest import PRIVATE, Manifest
 from rubhpc.study.axes import meanings_of
@@ -137,7 +137,8 @@ def _create(
     extent = manifest.extent(variable)
     attributes: dict[str, Any] = {"units": variable.unit, "long_name": variable.long_name}
     if "sample" in variable.dims:
-        attributes["coordinates"] = "revolution"  # CF: a coordinate that is no dimension
+        # CF: a coordinate that is no dimension
+        attributes["coordinates"] = TURNED if manifest.has_revolutions else "revolution"
     if variable.flags:
         attributes |= _flags(variable.flags)
     group.create_array(
@@ -180,6 +181,11 @@ def _static(grid: CaseGrid) -> dict[str, tuple[tuple[str, ...], NDArray[Any], di
         "order": (np.arange(sizes["order"]) / recording.revolutions, "multiple of the spin speed"),
         "section": (np.arange(sizes["section"]), "revolution of the section"),
     }
+    if "revolution" in sizes:  # of a run-up, a dimension of its own
+        own[TURNED] = own["revolution"]
+        own["revolution"] = np.arange(sizes["revolution"]), "number of the revolution, from 0"
+        own["order"] = np.array(ORDERS), "multiple of the spin speed"
+        del own["section"]
     static: dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]] = {
         axis.coordinate: (
             (axis.dimension,),
@@ -193,7 +199,8 @@ def _static(grid: CaseGrid) -> dict[str, tuple[tuple[str, ...], NDArray[Any], di
         if dim not in static:
             own[dim] = (np.arange(n_case), "number of the case in its sample")
     for name, (values, text) in own.items():
-        dim = "sample" if name == "revolution" else name
+        is_of_samples = name == TURNED or (name == "revolution" and "revolution" not in sizes)
+        dim = "sample" if is_of_samples else name
         static[name] = ((dim,), values, {"units": "1", "long_name": text})
     for name, attribute, unit, text in _PLACES:
         if not any(axis.name.endswith(f".{attribute}") for axis in grid.study.axes):  # or it is many places
@@ -224,7 +231,9 @@ def _attributes(grid: CaseGrid, *, accepted: tuple[int, ...]) -> dict[str, Any]:
             **{name: _version(name) for name in _PACKAGES},
         },
         # also where no array over the samples is kept
-        "coordinates": " ".join(("revolution", *(name for name, *_ in _PLACES), *_drawn(study))),
+        "coordinates": " ".join(
+            (TURNED if study.run_up else "revolution", *(name for name, *_ in _PLACES), *_drawn(study))
+        ),
         **({"accepted_physics": list(accepted)} if accepted else {}),
     }
 

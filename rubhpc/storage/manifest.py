@@ -14,12 +14,16 @@ from rubhpc.errors import StoreError
 from rubhpc.schema import (
     BRANCH,
     MULTIPLIERS,
+    ORDERS,
+    RUN_UP,
     STATE,
     VARIABLES,
+    WAVEFORM,
     branch_variables,
     case_measures,
     lyapunov_variables,
     probe_variables,
+    run_up_variables,
 )
 from rubhpc.storage.disk import read_regular, write_whole
 from rubhpc.storage.journal import Header
@@ -108,6 +112,11 @@ class Manifest:
     shard: tuple[int, ...] = ()
     refine: dict[str, Any] | None = None
 
+    @property
+    def has_revolutions(self) -> bool:
+        """Whether its cases run up, revolution by revolution."""
+        return "revolution" in self.sizes
+
     @cached_property
     def points(self) -> Points:
         """Where the cases lie."""
@@ -152,7 +161,8 @@ class Manifest:
     @property
     def variables(self) -> tuple[Variable, ...]:
         """The arrays stored for every case and written block by block, in the order of their checksum."""
-        known = VARIABLES | probe_variables(_probed(self.parts)) | branch_variables()
+        probed = _probed(self.parts)
+        known = VARIABLES | probe_variables(probed) | branch_variables() | run_up_variables(probed)
         return tuple(v for v in known.values() if v.role in self.keep)
 
     @property
@@ -200,6 +210,15 @@ class Manifest:
                 "sample": n_sample,
                 "order": n_sample // 2 + 1,
                 "section": recording.revolutions,
+                **(
+                    {
+                        "sample": grid.most_revolutions * recording.samples_per_revolution,
+                        "revolution": grid.most_revolutions,
+                        "order": len(ORDERS),
+                    }
+                    if study.run_up
+                    else {}
+                ),
                 **({"degree": grid.n_degree} if grid.n_degree else {}),
                 **(
                     {
@@ -211,9 +230,7 @@ class Manifest:
                     else {}
                 ),
             },
-            keep=(BRANCH,)
-            if study.branch
-            else tuple(sorted({*recording.keep, *([STATE] if grid.continuation else [])})),
+            keep=_kept(grid),
             files={},
             measures=(
                 *case_measures(),
@@ -289,6 +306,16 @@ class Manifest:
             except (ValueError, OSError):
                 names.append(name)
         return names
+
+
+def _kept(grid: CaseGrid) -> tuple[str, ...]:
+    """Roles of the arrays that are stored for every case."""
+    study = grid.study
+    if study.branch is not None:
+        return (BRANCH,)
+    if study.run_up is not None:
+        return (RUN_UP, *(role for role in study.recording.keep if role == WAVEFORM))
+    return tuple(sorted({*study.recording.keep, *([STATE] if grid.continuation else [])}))
 
 
 def _probed(parts: dict[str, Any]) -> list[tuple[str, str]]:

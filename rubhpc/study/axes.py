@@ -42,7 +42,17 @@ class OwnAxes:
     friction: float = quantity("", doc="Coefficient of friction.", example="[0.1, 0.3, 0.5]", at_least=0)
 
 
-_OWN = {declared.name: declared for declared in fields(OwnAxes)}
+@dataclass(frozen=True, kw_only=True)
+class RunUpAxes:
+    """The axes that are keys of [run_up]."""
+
+    time: float = quantity("s", doc="Duration of the run-up.", example='["5 s", "20 s"]', above=0)
+
+
+RUN_UP_PREFIX, RUN_UP_TIME = "run_up.", "run_up.time"
+_OWN = {declared.name: declared for declared in fields(OwnAxes)} | {
+    RUN_UP_PREFIX + declared.name: declared for declared in fields(RunUpAxes)
+}
 SPEED_AXES = ("speed_ratio", "speed")
 CLEARANCE_AXES = ("clearance_ratio", "clearance")
 _TABLE_KEYS = ("values", *RANGE_KEYS, "sweep")
@@ -135,8 +145,8 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     Parameters
     ----------
     name : str
-        A dotted key of the rig, "contact." and a key of [contact], "initial." and one of [initial], or one of
-        speed_ratio, speed, clearance_ratio, clearance, friction.
+        A dotted key of the rig, "contact." and a key of [contact], "initial." and one of [initial],
+        "run_up.time", or one of speed_ratio, speed, clearance_ratio, clearance, friction.
     values : list, dict or single value
         A dict is a range, stop included: `{start, stop, step}`, or `{start, stop, num}` with the `scale`
         "lin" or "log"; or it holds `values`. Either may say how the axis is swept: `{values, sweep}`.
@@ -210,8 +220,8 @@ def make_range(name: str, table: Mapping[str, object], rig: Rig, file: str = "")
 
 
 def is_of_table(name: str) -> bool:
-    """Whether an axis sets a key of [contact] or [initial]."""
-    return name.startswith((contact_axes.PREFIX, initial.PREFIX))
+    """Whether an axis sets a key of [contact], [initial] or [run_up]."""
+    return name.startswith((contact_axes.PREFIX, initial.PREFIX, RUN_UP_PREFIX))
 
 
 def coordinate_of(name: str) -> str:

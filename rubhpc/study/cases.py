@@ -20,7 +20,7 @@ from rubhpc.fem.model import state_size
 from rubhpc.input.fields import place
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import STATE
-from rubhpc.study.axes import FROM_REST
+from rubhpc.study.axes import FROM_REST, RUN_UP_TIME
 from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.identity import identity_parts
 from rubhpc.study.operating_points import OperatingPoints
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.rig.rig import Rig
     from rubhpc.study.initial import Initial
+    from rubhpc.study.speed_law import SpeedLaw
     from rubhpc.study.study import Study
     from rubhpc.study.tables import Contact
 
@@ -56,6 +57,7 @@ class Case:
     contact: Contact
     initial: Initial
     contact_free_amplitude: float  # m
+    speed_law: SpeedLaw | None = None  # of a run-up, whose highest speed is `speed`
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -215,6 +217,16 @@ class CaseGrid:
         """Return what the study is to be warned of: unstable speeds, sag beyond the clearance."""
         return warnings_of(self._operating_points)
 
+    @property
+    def most_revolutions(self) -> int:
+        """Revolutions of the longest case, of a study that runs up."""
+        axes = [axis for axis in self.study.axes if axis.name == RUN_UP_TIME]
+        run_up = self.study.run_up
+        if run_up is None:
+            return 0
+        times = axes[0].values if axes else (None,)
+        return max(run_up.law_at(time).n_revolution for time in times)
+
     def _case(self, index: tuple[int, ...], name: str) -> Case:
         speed, amplitude = self._operating_points.response(index)
         return Case(
@@ -227,6 +239,7 @@ class CaseGrid:
             contact=self._operating_points.contact(index),
             initial=self._operating_points.initial(index),
             contact_free_amplitude=amplitude,
+            speed_law=None if self.study.run_up is None else self._operating_points.speed_law(index),
         )
 
     def _default_chunk(self) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ from rubhpc.input.reading import plain
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.stators import has_bent_stator
 from rubhpc.study import contact_axes, initial
-from rubhpc.study.axes import FROM_REST
+from rubhpc.study.axes import FROM_REST, RUN_UP_PREFIX, RUN_UP_TIME
 
 if TYPE_CHECKING:
     from rubhpc.study.study import Study
@@ -85,6 +85,9 @@ def identity_parts(study: Study) -> dict[str, Any]:
     if study.branch is not None:
         span = study.axis(study.branch.along).drawn_from
         parts["branch"] = asdict(study.branch) | (asdict(span) if span else {})
+    if study.run_up is not None:
+        varied = [axis.name for axis in study.axes if axis.name == RUN_UP_TIME]
+        parts["run_up"] = asdict(study.run_up) | {n.removeprefix(RUN_UP_PREFIX): _AXIS for n in varied}
     if study.sample is not None:
         ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
         parts["sample"] = {

@@ -21,7 +21,7 @@ from rubhpc.fem.response import (
 from rubhpc.fem.stability import instability_message, is_passive
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.axes import CLEARANCE_AXES, SPEED_AXES
+from rubhpc.study.axes import CLEARANCE_AXES, RUN_UP_TIME, SPEED_AXES
 from rubhpc.study.contact_axes import choices_of, contact_at
 from rubhpc.study.initial import CONTACT_FREE, KNOCKED, initial_at
 from rubhpc.study.points import Points
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from rubhpc.rig.rig import Rig
     from rubhpc.study.initial import Initial
     from rubhpc.study.points import Index, Values
+    from rubhpc.study.speed_law import SpeedLaw
     from rubhpc.study.study import Study
     from rubhpc.study.tables import Contact
 
@@ -80,6 +81,7 @@ class OperatingPoints:
         self._contact_axes = [i for i, axis in enumerate(study.axes) if axis.is_contact_key]
         self._initial_axes = [i for i, axis in enumerate(study.axes) if axis.is_initial_key]
         self._rig_axes = [i for i, axis in enumerate(study.axes) if axis.is_rig_key]
+        self._run_up_axes = [i for i, name in enumerate(names) if name == RUN_UP_TIME]
         rotor_axes = [i for i in self._rig_axes if names[i].startswith("rotor.")]
         # The contact-free response depends on the rotor, and on the stator's node, at which it is evaluated.
         node_axes = [
@@ -138,6 +140,11 @@ class OperatingPoints:
         """Contact of a case."""
         return self._contact_at(self._on(self._contact_axes, index))
 
+    def speed_law(self, index: Index) -> SpeedLaw:
+        """Speed over the time of a case that runs up."""
+        assert self.study.run_up is not None
+        return self.study.run_up.law_at(next(iter(self._on(self._run_up_axes, index)), None))
+
     def initial(self, index: Index) -> Initial:
         """Where a case starts."""
         return self._initial_at(self._on(self._initial_axes, index))
@@ -183,7 +190,7 @@ class OperatingPoints:
     def steps(self) -> NDArray[np.float64]:
         """Predicted integration steps of a case, of length 1 along the dimensions that do not change them."""
         rig_axes = self._rig_axes if self._is_few else []
-        along = self._dims(self._speed_axis, *rig_axes, *self._contact_axes)
+        along = self._dims(self._speed_axis, *rig_axes, *self._contact_axes, *self._run_up_axes)
         recording = self.study.recording
         turns = recording.longest_transient + recording.revolutions
 
@@ -192,9 +199,12 @@ class OperatingPoints:
             _EVENT_STEPS + recording.samples_per_revolution
         )
         first = (0,) * len(self.points.dims)
+        per_revolution = _EVENT_STEPS + recording.samples_per_revolution
 
         def predict(index: Index) -> float:
             contact = self.contact(index)
+            if self.study.run_up is not None:
+                return float(self.speed_law(index).n_revolution * per_revolution)
             if is_modal and (contact.closed_form == "always" or contact.is_smooth):
                 return float(modal_steps)
             unit = self._unit_speed_at(self._on(self._response_axes, index if self._is_few else first))

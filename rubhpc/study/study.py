@@ -17,6 +17,7 @@ from rubhpc.study.axes import (
     BOTH,
     DIRECTION,
     FROM_REST,
+    SPEED_AXES,
     Axis,
     direction_axis,
     flatten,
@@ -27,8 +28,9 @@ from rubhpc.study.axes import (
 from rubhpc.study.branch_keys import BranchKeys, branch_axis, check_branch
 from rubhpc.study.checks import check_axes, check_rigs
 from rubhpc.study.contact_axes import check_contacts
-from rubhpc.study.initial import Initial, check_initials
+from rubhpc.study.initial import CONTACT_FREE, Initial, check_initials
 from rubhpc.study.refine import Refine
+from rubhpc.study.run_up_keys import RunUpKeys, check_run_up, refuse_speeds, speed_axis
 from rubhpc.study.sampling import draw
 from rubhpc.study.state_of_case import with_state
 from rubhpc.study.tables import Contact, ContactKeys, Integrator, Recording, Run, Sample, check_bent
@@ -54,7 +56,7 @@ __all__ = [
 ]
 
 _TABLES = (
-    *("title", "rig", "output", "grid", "sample", "refine", "branch", "override"),
+    *("title", "rig", "output", "grid", "sample", "refine", "branch", "run_up", "override"),
     *("contact", "initial", "integrator", "record", "run"),
 )
 _MOST_AXES = 32  # arrays have 64 dimensions at most
@@ -88,6 +90,8 @@ class Study:
         Which cases are computed, where the others are inferred; it changes the result of no case.
     branch : BranchKeys or None
         Along which axis periodic motions are followed; that axis has one case, and `drawn_from` is its range.
+    run_up : RunUpKeys or None
+        How the spin speed changes within every case; the axis of speeds then holds the highest one alone.
     contact : ContactKeys
         A `Contact`; of a grid with contact axes what they leave open, as far as it applies to a case's law.
     initial : Initial
@@ -109,6 +113,7 @@ class Study:
     sample: Sample | None = None
     refine: Refine | None = None
     branch: BranchKeys | None = None
+    run_up: RunUpKeys | None = None
     contact: ContactKeys = DEFAULT_CONTACT
     initial: Initial = DEFAULT_INITIAL
     integrator: Integrator = DEFAULT_INTEGRATOR
@@ -125,6 +130,9 @@ class Study:
             object.__setattr__(self, "axes", (*self.axes, direction_axis()))
         if self.initial.is_from_store:
             object.__setattr__(self, "initial", with_state(self.initial))
+        tables = {"refine": self.refine, "branch": self.branch}
+        others = next((name for name, table in tables.items() if table is not None), "")
+        check_run_up(self.run_up, self.axes, self.integrator, self.recording, others)
         check_axes(self.axes)
         if self.refine is not None:
             self.refine.refined(self.axes)
@@ -161,10 +169,11 @@ class Study:
                 | (asdict(axis.drawn_from) if axis.drawn_from else {"values": [*(axis.words or axis.values)]})
                 | ({"sweep": axis.sweep} if axis.sweep != FROM_REST else {})
                 for axis in self.axes
-                if axis.name != DIRECTION
+                if axis.name != DIRECTION and not (self.run_up and axis.name in SPEED_AXES)
             },
             **({"sample": asdict(self.sample)} if self.sample else {}),
             **({"branch": asdict(self.branch)} if self.branch else {}),
+            **({"run_up": asdict(self.run_up)} if self.run_up else {}),
             "contact": {
                 key: value
                 for key, value in asdict(self.contact).items()
@@ -219,7 +228,14 @@ def read_study(
         branch = _read_branch(
             _table(table, "branch", file), grid, rig, sample, file, is_refined=refine is not None
         )
+    run_up = build(RunUpKeys, table["run_up"], file, "run_up") if "run_up" in table else None
     axes = _read_axes(grid, rig, sample, file, branch.along if branch else "")
+    if run_up is not None:
+        try:
+            refuse_speeds([axis.name for axis in axes])
+        except InputError as error:
+            raise InputError(f"{place(file)}: {error}") from None
+        axes = (*axes, speed_axis(run_up))
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
         raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
     for name in ("contact", "initial"):
@@ -228,7 +244,8 @@ def read_study(
                 raise InputError(f"{place(file, name, key)}: is an axis of the grid too; leave one out")
     is_varied = any(axis.is_contact_key for axis in axes)
     contact = build(ContactKeys if is_varied else Contact, table.get("contact", {}), file, "contact")
-    initial = build(Initial, table.get("initial", {}), file, "initial")
+    starts = {"from": CONTACT_FREE} if run_up is not None else {}
+    initial = build(Initial, starts | _table(table, "initial", file), file, "initial")
     integrator = build(Integrator, table.get("integrator", {}), file, "integrator")
     recording = build(Recording, table.get("record", {}), file, "record")
     run = build(Run, table.get("run", {}), file, "run")
@@ -240,6 +257,7 @@ def read_study(
             sample=sample,
             refine=refine,
             branch=branch,
+            run_up=run_up,
             contact=contact,
             initial=initial,
             integrator=integrator,

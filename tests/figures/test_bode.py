@@ -55,19 +55,24 @@ def test_cases_lie_over_one_another():
     assert axes[1].get_xlabel() == "Spin speed (rpm)"
 
 
-def test_a_run_up_is_drawn_by_revolution():
+def run_ups():
     lines = np.array([[1.0, 2.0], [3.0, 4.0]]) * 1e-6
-    run_up = xr.Dataset(
+    return xr.Dataset(
         {
-            "speed": ("turn", [100.0, 90.0]),
-            "amplitude_probe_a": (("turn", "order"), lines, {"units": "m", "long_name": "amplitude"}),
-            "phase_probe_a": (("turn", "order"), lines * 1e6),
+            "speed": ("revolution", [100.0, 90.0]),
+            "amplitude_probe_a": (("revolution", "order"), lines, {"units": "m", "long_name": "amplitude"}),
+            "phase_probe_a": (("revolution", "order"), lines * 1e6),
         },
-        coords={"order": [0.5, 1.0], "turn": [0, 1]},
+        coords={"order": [0.5, 1.0], "revolution": [0, 1]},
     )
+
+
+def test_a_run_up_is_drawn_by_revolution():
+    run_up = run_ups()
     found = order_over_speed(run_up, ["probe_a"], order=1.0)
-    assert found["amplitude_probe_a"].values == pytest.approx([4e-6, 2e-6])  # by rising speed
-    assert len(bode(run_up, "probe_a", order=0.5).show()[0].lines) == 1
+    assert found["amplitude_probe_a"].values == pytest.approx([2e-6, 4e-6])
+    assert found["speed"].values == pytest.approx([100.0, 90.0])
+    assert bode(run_up, "probe_a", order=0.5).show()[0].lines[0].get_ydata() == pytest.approx([1.0, 3.0])
     with pytest.raises(InputError, match=r"order: 3 is not followed in this run-up; choose one of 0\.5, 1"):
         order_over_speed(run_up, ["probe_a"], order=3.0)
     with pytest.raises(InputError, match=r"vertical: no order of it is followed; choose one of probe_a"):

@@ -1,0 +1,141 @@
+"""Studies with [run_up]: what is stored and opened, resumption, one case again, and what is refused."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+import rubhpc
+from postproc.figures.bode import bode
+from rubhpc.errors import InputError
+from rubhpc.running.plan import make_plan
+from rubhpc.running.recompute import reproduce
+from rubhpc.storage.store import Store
+from rubhpc.study.study import read_study
+
+STUDY = """
+rig = "mokhtar2017"
+[run_up]
+start = "1800 rpm"
+stop = "1500 rpm"
+[grid]
+"run_up.time" = ["0.3 s", "0.5 s"]
+clearance = ["100 um", "5 mm"]
+friction = 0.2
+[record]
+samples_per_revolution = 32
+[[record.probe]]
+name = "left"
+node = 1
+angle = "-45 deg"
+[run]
+block = 1
+"""
+
+
+def study_of(folder, text=STUDY):
+    (folder / "study.toml").write_text(text)
+    return read_study(folder / "study.toml", folder / "run_ups.zarr")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run_ups")
+    rubhpc.run(study_of(folder), quiet=True)
+    return folder
+
+
+def test_cases_are_those_of_the_function(folder):
+    store = rubhpc.open(folder / "run_ups.zarr")
+    assert store.speed.dims == ("run_up_time", "clearance", "friction", "revolution")
+    assert store.sizes["revolution"] == 13
+    case = store.sel(run_up_time=0.3, clearance=1e-4, friction=0.2)
+    alone = rubhpc.run_up(
+        "mokhtar2017",
+        start="1800 rpm",
+        stop="1500 rpm",
+        time="0.3 s",
+        clearance="100 um",
+        friction=0.2,
+        samples_per_revolution=32,
+        probes=[{"name": "left", "node": 1, "angle": "-45 deg"}],
+    )
+    n = alone.sizes["revolution"]
+    assert n == 8
+    assert alone.contact_fraction.max() > 0.0
+    for name in ("speed", "time", "amplitude_probe_left", "phase_torsion"):
+        assert np.array_equal(case[name].values[:n], alone[name].values), name
+        assert np.isnan(case[name].values[n:]).all(), name
+    assert np.array_equal(case.probe_left.values[: 32 * n], alone.probe_left.values.astype(np.float32))
+    force = alone.peak_contact_force.values
+    assert np.array_equal(case.revolution_peak_contact_force.values[:n], force)
+    assert case.peak_contact_force.values == pytest.approx(force.max(axis=0))
+    work = alone.friction_work.values.sum(axis=0)
+    assert case.friction_work.values * n == pytest.approx(work)
+
+
+def test_a_resumed_study_has_the_same_bytes(folder, tmp_path):
+    shutil.copytree(folder / "run_ups.zarr", tmp_path / "run_ups.zarr")
+    study = study_of(tmp_path)
+    lost = tmp_path / "run_ups.zarr" / "revolution_speed" / "c"
+    first = sorted(path for path in lost.rglob("*") if path.is_file())[0]
+    content = first.read_bytes()
+    first.unlink()
+    rubhpc.run(study, quiet=True)
+    assert first.read_bytes() == content
+
+
+def test_a_plan_counts_the_revolutions_of_every_case(tmp_path):
+    first, second = (
+        make_plan(study_of(tmp_path, STUDY.replace('["0.3 s", "0.5 s"]', f'"{time} s"'))).steps
+        for time in (0.3, 0.5)
+    )
+    assert first / second == pytest.approx(8 / 13)
+
+
+def test_one_case_is_computed_again(folder):
+    study = study_of(folder)
+    name = Store(folder / "run_ups.zarr").manifest.case_id(2)
+    assert "holds the same, bit for bit" in reproduce(study, name).verdict
+
+
+def test_bode_plots_lay_cases_over_one_another(folder):
+    store = rubhpc.open(folder / "run_ups.zarr").isel(run_up_time=1)
+    amplitude, phase = bode(store, "probe_left", over="clearance").show()
+    assert len(amplitude.lines) == len(phase.lines) == 2
+    assert amplitude.get_xlim() == pytest.approx((1530, 1778), abs=20)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('start = "1800 rpm"', "", "[run_up] start: missing; give start, stop and time, or law"),
+        ('"run_up.time" = ["0.3 s", "0.5 s"]', "", "[run_up] time: missing; give one, or the axis"),
+        ('stop = "1500 rpm"', 'stop = "1500 rpm"\ntime = "1 s"', "[run_up] time: run_up.time is an axis"),
+        ('stop = "1500 rpm"', 'stop = "1500 rpm"\nlaw = [[0, 9], [1, 9]]', "start: conflicts with law"),
+        ('["0.3 s", "0.5 s"]', '"1 ms"', "run_up.time: 0.001 s: law: the shaft turns by 0.0275"),
+        ("friction = 0.2", "friction = 0.2\nspeed = 100.0", "[grid] speed: conflicts with [run_up]"),
+        ('clearance = ["100 um", "5 mm"]', "clearance_ratio = 0.7", "clearance_ratio: the speed changes"),
+        ("[record]", '[integrator]\nmethod = "central-difference"\n[record]', "holds the speed"),
+        ("[record]", "[refine]\n[record]", "not combined with [refine]"),
+        ("friction = 0.2", 'friction = { values = [0.1, 0.2], sweep = "up" }', "remove sweep"),
+        ('[run_up]\nstart = "1800 rpm"\nstop = "1500 rpm"', "", "add the table [run_up]"),
+    ],
+)
+def test_what_is_no_run_up_is_refused(tmp_path, old, new, says):
+    assert old in STUDY
+    with pytest.raises(InputError) as error:
+        study_of(tmp_path, STUDY.replace(old, new, 1))
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_law_takes_the_place_of_start_and_stop(tmp_path):
+    text = STUDY.replace(
+        'start = "1800 rpm"\nstop = "1500 rpm"', 'law = [["0 s", 100], ["1 s", 120], [2, 90]]'
+    )
+    study = study_of(tmp_path, text.replace('"run_up.time" = ["0.3 s", "0.5 s"]', ""))
+    law = study.run_up.law_at(None)
+    assert law.time == (0.0, 1.0, 2.0)
+    assert law.speed == (100.0, 120.0, 90.0)
+    assert study.axis("speed").values == (120.0,)
