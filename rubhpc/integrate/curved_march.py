@@ -51,9 +51,6 @@ class CurvedMarch(EventDrivenMarch):
         self._pairs = curved_pairs(
             setup.reduced, setup.model, friction, self._clearance, is_round=setup.is_updated
         )
-        stiffness = setup.reduced.stiffness
-        skew = 0.5 * (stiffness - stiffness.T)
-        self._skew = skew if np.any(skew) else skew[:0]
         _, n_row, n = self._pairs.row.shape
         self._work = curved_work(self._clearance.size, n_row, n, self._z.shape[1])
 
@@ -99,7 +96,6 @@ class CurvedMarch(EventDrivenMarch):
                 self._curved,
                 self._pairs,
                 self.bodies,
-                self._skew,
                 self.clock,
                 LOAD_TOLERANCE * self._setup.accuracy,
                 last_tick,

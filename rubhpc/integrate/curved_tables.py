@@ -33,10 +33,13 @@ def curved_pairs(
     row = motion_rows(reduced, model)
     flat = row.reshape(-1, row.shape[2])
     sense = rim_sense(reduced.spin)
+    skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
     return CurvedPairs(
         row=row,
         gram=(flat @ flat.T).reshape(*row.shape[:2], *row.shape[:2]),
         output=_outputs(reduced),
+        resisting=0.5 * (reduced.damping + reduced.damping.T),
+        skew=skew if np.any(skew) else skew[:0],
         radius=np.array([stator.radius for stator in model.stators]),
         clearance=clearance,
         aside=sag_at_stators(model)[1],
@@ -144,6 +147,7 @@ def tabulate_curved(
     n_level = min(n_level, max(1, int(np.log2(LONGEST_STEP / tick))))
     weight = np.array([_weights(exponent, tick * 2.0**level) for level in range(n_level)])
     growth = np.exp(np.maximum(exponent.real, 0.0) * tick * 2.0 ** (n_level - 1))
+    inverse = np.divide(1.0, exponent, out=np.zeros_like(exponent), where=exponent != 0.0)
     reach = np.zeros((n_level, 2, 3, read.shape[1], d + 2))
     if q == 1 and closed:
         reach = np.einsum("rm,lakm,jm->lakrj", read[0], weight, load[0], optimize=True).real
@@ -162,6 +166,8 @@ def tabulate_curved(
         reach=reach,
         half_re=np.exp(0.5 * exponent * tick).real,
         half_im=np.exp(0.5 * exponent * tick).imag,
+        inverse_re=inverse.real,
+        inverse_im=inverse.imag,
     )
     fields: list[Any] = [np.array(field[None], order="C") for field in table]
     return CurvedTables(*fields)

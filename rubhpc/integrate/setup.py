@@ -239,8 +239,9 @@ class ModalSetup:
 
     def forget(self, friction: float) -> None:
         """Free the contact modes of a friction."""
-        held_by = self._libraries, self._friction_libraries, self._penalty_libraries, self._open_tables
-        for held in held_by:
+        self._open_tables.pop(friction, None)
+        libraries = self._libraries, self._curved_libraries, self._friction_libraries, self._penalty_libraries
+        for held in libraries:
             held.pop(friction, None)
 
     def penalty_library(self, friction: float) -> PenaltyLibrary:

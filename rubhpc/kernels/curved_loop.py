@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
-    DIVERGED,
     FINISHED,
     MODE_WANTED,
     MOST_STEPS,
@@ -26,52 +25,34 @@ from rubhpc.kernels.case_progress import (
     Progress,
     shaft_angle,
 )
-from rubhpc.kernels.contact_modes import (
-    FORCED_LEVEL,
-    ModeTables,
-    Reduced,
-    bounded,
-    dot,
-    enter,
-    event_free_interval,
-    find_mode,
-    is_beyond,
-    propagate,
-)
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, enter, find_mode, propagate
 from rubhpc.kernels.curved_contact import (
     ALONG,
+    BEFORE,
+    LARGEST,
+    RESOLVED,
     CurvedPairs,
     CurvedTables,
     CurvedWork,
-    evaluate,
-    fill_geometry,
     is_closed,
-    read_motion,
 )
-from rubhpc.kernels.curved_events import change_curved
+from rubhpc.kernels.curved_event import take_curved_event
+from rubhpc.kernels.curved_forces import evaluate
 from rubhpc.kernels.curved_measuring import (
+    begin_curved_span,
     observe_curved_step,
-    observe_power,
-    place,
+    observe_energies,
     take_curved_sample,
 )
+from rubhpc.kernels.curved_search import closed_crossing, curved_free_interval, open_crossing
 from rubhpc.kernels.curved_step import go_on, take_step
-from rubhpc.kernels.event_loop import MOST_EVENTS, EventWork
-from rubhpc.kernels.event_steps import (
-    GAP_TOLERANCE,
-    choose_step,
-    contact_age,
-    end_record,
-    longest_step,
-    record_event,
-    record_touch,
-    sample_step,
-)
-from rubhpc.kernels.measuring import Recorder, begin_span, end_span
+from rubhpc.kernels.event_steps import choose_step, contact_age, end_record, longest_step, sample_step
+from rubhpc.kernels.measuring import Recorder, begin_span, end_span, resolved_contact
 from rubhpc.kernels.mode_change import product
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.event_loop import EventWork
 
 Floats = NDArray[np.float64]
 
@@ -82,7 +63,6 @@ def advance_curved(
     curved: CurvedTables,
     pairs: CurvedPairs,
     reduced: Reduced,
-    skew: Floats,
     clock: Clock,
     tolerance: float,
     last_tick: int,
@@ -101,8 +81,6 @@ def advance_curved(
 
     Parameters
     ----------
-    skew : (n, n) or (0, n)
-        Skew part of the stiffness; without rows where there is none.
     tolerance : float
         Of the loads of closed contacts (`curved_step.take_step`).
     """
@@ -112,7 +90,6 @@ def advance_curved(
     highest_level = tables.power_re.shape[1] - 1
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
-    is_begun = False
     while True:
         if progress.wanted >= 0:
             found = find_mode(mask, progress.wanted)
@@ -120,17 +97,14 @@ def advance_curved(
                 return MODE_WANTED
             if not enter_curved(tables, curved, pairs, reduced, clock, found, progress, z, motion, work):
                 return CONTACT_UNSOLVED
-            is_begun = False
         mode = progress.mode
         closed = int(mask[mode])
-        if is_recorded and not is_begun:
+        if is_recorded and progress.energy_from < 0:
             if closed == 0:
-                if progress.energy_from < 0:
-                    begin_span(tables, z, progress, recorder)
+                begin_span(tables, z, progress, recorder)
             else:
                 angle = shaft_angle(clock, progress.tick)
-                observe_power(reduced, skew, tables, curved, mode, 0, angle, z_re, z_im, work)
-        is_begun = True
+                begin_curved_span(reduced, pairs, tables, curved, angle, z, progress, work, recorder)
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
         is_end = progress.tick >= last_tick
         is_last = is_end and is_recorded and progress.tick == clock.n_sample << clock.sample_level
@@ -156,6 +130,8 @@ def advance_curved(
         if is_end:
             if is_recorded and closed == 0:
                 end_record(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
+            elif is_last:
+                end_span(tables, clock, work.transient, progress, recorder, accumulator)
             return FINISHED
         is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
         if progress.n_step > last_step and not is_at_event:
@@ -182,7 +158,12 @@ def advance_curved(
             level = min(longest, age if is_recorded else max(age, FORCED_LEVEL), progress.resolved_level)
             level = min(level, curved.weight_re.shape[1] - 1)
             if is_recorded:
+                if age != progress.contact_age:
+                    progress.contact_age = age
+                    work.span[RESOLVED] = resolved_contact(tables, mode, z_re, z_im)
                 level = min(level, clock.contact_level)
+                while level > FORCED_LEVEL and (1 << level) * clock.tick > work.span[RESOLVED]:
+                    level -= 1
             is_event_free = progress.tick - progress.entered < 1 << FORCED_LEVEL  # so that time goes on
             if progress.halving_level >= 0:
                 level = min(level, progress.halving_level)
@@ -230,11 +211,9 @@ def advance_curved(
         if closed != 0:
             step = (1 << level) * clock.tick
             if is_recorded:
-                angle = shaft_angle(clock, progress.tick) + 0.5 * clock.spin * step
-                middle = work.middle
-                observe_power(reduced, skew, tables, curved, mode, 1, angle, middle[0], middle[1], work)
-                angle += 0.5 * clock.spin * step
-                observe_power(reduced, skew, tables, curved, mode, 2, angle, next_re, next_im, work)
+                observe_energies(
+                    reduced, pairs, tables, curved, clock, level, z_next, progress, work, accumulator
+                )
                 i_sample = progress.tick >> clock.sample_level
                 observe_curved_step(
                     reduced, closed, step, i_sample, 1.0 / interval, work, samples, accumulator
@@ -276,154 +255,8 @@ def enter_curved(
     enter(tables, found, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
     progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
     progress.resolved_level, progress.halving_level, progress.is_after_event = FORCED_LEVEL, NONE, 1
-    work.span[0], work.span[1] = 0.0, 0.0
+    progress.contact_age = NONE
+    work.span[BEFORE], work.span[LARGEST] = 0.0, 0.0
     if closed == 0:
         return True
     return evaluate(pairs, curved, reduced.rim_speed, found, closed, 0, z[0], z[1], work)
-
-
-@jit_lean_sum
-def curved_free_interval(
-    tables: ModeTables,
-    curved: CurvedTables,
-    pairs: CurvedPairs,
-    mode: int,
-    enough: float,
-    z_re: Floats,
-    z_im: Floats,
-    work: CurvedWork,
-) -> float:
-    """Time, s, in which no gap closes, all being open; it need not be longer than `enough`.
-
-    A gap along the stator's axis is the smaller one. Where it does not do, the gap is continued along its
-    momentary normal, below which a convex function of the motion does not go.
-    """
-    free = event_free_interval(
-        tables.switch_re, tables.switch_im, tables.rate_re, tables.rate_im, tables.bound, mode, z_re, z_im
-    )
-    if free >= enough:
-        return free
-    d = curved.bound.shape[2]
-    read_motion(curved, mode, 0, z_re, z_im, work.motion)
-    free = np.inf
-    for i in range(pairs.radius.size):
-        gap, _ = fill_geometry(pairs, i, d, work)
-        rate, bound = 0.0, 0.0
-        for j in range(d):
-            rate += work.jacobian[i, j] * work.motion[1, i, j]
-            bound += abs(work.jacobian[i, j]) * bounded(curved.bound[mode, i, j], z_re, z_im)
-        if not gap > 0.0:
-            free = 0.0
-        elif bound > 0.0:
-            free = min(free, (rate + np.sqrt(rate * rate + 2.0 * bound * gap)) / bound)
-        elif rate < 0.0:
-            free = min(free, -gap / rate)
-    return free
-
-
-@jit_lean_sum
-def open_crossing(
-    tables: ModeTables,
-    curved: CurvedTables,
-    pairs: CurvedPairs,
-    mode: int,
-    z_re: Floats,
-    z_im: Floats,
-    work: CurvedWork,
-) -> int:
-    """Set of the pairs, all open, whose gap is negative."""
-    crossing = int(np.int64(0))
-    is_near = False
-    for i in range(pairs.radius.size):
-        gap = dot(tables.switch_re[mode, i], tables.switch_im[mode, i], z_re, z_im)
-        is_near = is_near or gap < -GAP_TOLERANCE
-    if not is_near:
-        return crossing
-    read_motion(curved, mode, 0, z_re, z_im, work.motion)
-    for i in range(pairs.radius.size):
-        gap, _ = fill_geometry(pairs, i, curved.bound.shape[2], work)
-        if gap < -GAP_TOLERANCE:
-            crossing |= 1 << i
-    return crossing
-
-
-@jit_lean_sum
-def closed_crossing(closed: int, step: float, work: CurvedWork) -> int:
-    """Set of the pairs whose force or, of those open, gap is negative at a node of a step (s)."""
-    crossing = int(np.int64(0))
-    for i in range(work.h.shape[1]):
-        if is_closed(closed, i):
-            first, middle, last = work.force[0, i], work.force[1, i], work.force[2, i]
-            if min(middle, last) < 0.0 or lowest(first, middle, last) < 0.0 < first:
-                crossing |= 1 << i
-        elif min(work.gap[0, 1, i], work.gap[0, 2, i]) < -GAP_TOLERANCE:
-            crossing |= 1 << i
-    return crossing
-
-
-@jit_lean_sum
-def lowest(first: float, middle: float, last: float) -> float:
-    """Least value of the parabola through the beginning, middle and end of a step, within it."""
-    slope, bend = 4.0 * middle - 3.0 * first - last, 2.0 * (first - 2.0 * middle + last)
-    if bend > 0.0 and 0.0 < -slope < 2.0 * bend:
-        return first - 0.25 * slope * slope / bend
-    return min(first, middle, last)
-
-
-@jit_lean_sum
-def take_curved_event(
-    tables: ModeTables,
-    curved: CurvedTables,
-    pairs: CurvedPairs,
-    reduced: Reduced,
-    clock: Clock,
-    crossing: int,
-    is_recorded: bool,
-    progress: Progress,
-    z: Floats,
-    motion: Floats,
-    work: CurvedWork,
-    events: EventWork,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
-) -> int:
-    """Take the event of the pairs `crossing`, as `event_loop.take_event` does."""
-    q = reduced.gap_jacobian.shape[0]
-    mode = progress.mode
-    closed = int(tables.mask[mode])
-    progress.n_event += 1
-    place(tables, curved, mode, z[0], z[1], work.h[0], work.rate[0], motion)
-    if is_beyond(reduced, motion):
-        return DIVERGED
-    if is_recorded:
-        if closed == 0:
-            end_span(tables, clock, z, progress, recorder, accumulator)
-        for i in range(q):
-            events.impulse[i] = accumulator.impulse[i]
-    angle = shaft_angle(clock, progress.tick)
-    progress.wanted = change_curved(
-        pairs,
-        reduced,
-        closed,
-        crossing,
-        clock.spin,
-        (1 << FORCED_LEVEL) * clock.tick,
-        np.cos(angle),
-        np.sin(angle),
-        motion,
-        is_recorded,
-        work,
-        events.force,
-        events.speed,
-        events.active,
-        events.elimination,
-        accumulator,
-    )
-    if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
-        return CONTACT_UNSOLVED
-    if is_recorded:
-        for i in range(q):
-            record_event(clock, progress, events.impulse, i, samples, accumulator)
-            record_touch(i, is_closed(progress.wanted, i), accumulator)
-    return UNDER_WAY

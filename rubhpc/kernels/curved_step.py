@@ -8,14 +8,17 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.contact_modes import ModeTables, propagate
 from rubhpc.kernels.curved_contact import (
+    BEFORE,
+    LARGEST,
     N_NODE,
     CurvedPairs,
     CurvedTables,
     CurvedWork,
-    add_responses,
-    evaluate,
-    find_forces,
     is_closed,
+)
+from rubhpc.kernels.curved_forces import evaluate, find_forces
+from rubhpc.kernels.curved_response import (
+    add_responses,
     load_change,
     lone_pair,
     predict_loads,
@@ -66,7 +69,7 @@ def take_step(
         Whether the next step may be twice as long.
     """
     mask = int(tables.mask[mode])
-    scale = work.span[1]
+    scale = work.span[LARGEST]
     for i in range(pairs.radius.size):
         if is_closed(mask, i):
             scale = max(scale, work.force[0, i], pairs.stiffness[i] * LEAST_TRAVEL * pairs.clearance[i])
@@ -130,11 +133,10 @@ def go_on(mask: int, step: float, work: CurvedWork) -> None:
             for node in range(N_NODE):
                 for a in range(work.load.shape[2]):
                     work.before[node, i, a] = work.load[node, i, a]
-                work.span[1] = max(work.span[1], work.force[node, i])
+                work.span[LARGEST] = max(work.span[LARGEST], work.force[node, i])
             for a in range(work.load.shape[2]):
                 work.load[0, i, a] = work.load[2, i, a]
         work.h[0, i], work.rate[0, i] = work.h[2, i], work.rate[2, i]
         work.force[0, i], work.slip[0, i] = work.force[2, i], work.slip[2, i]
         work.gap[0, 0, i], work.gap[1, 0, i] = work.gap[0, 2, i], work.gap[1, 2, i]
-    work.power[0, 0], work.power[0, 1] = work.power[2, 0], work.power[2, 1]
-    work.span[0] = step
+    work.span[BEFORE] = step

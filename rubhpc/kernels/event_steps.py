@@ -166,9 +166,26 @@ def leave_mode(
     Returns False where the motion diverges.
     """
     mode = progress.mode
-    progress.n_event += 1
     for k in range(motion.size):
         motion[k] = dot(tables.motion_re[mode, k], tables.motion_im[mode, k], z[0], z[1])
+    return end_mode(tables, reduced, clock, is_recorded, progress, z, motion, impulse, recorder, accumulator)
+
+
+@jit_inline_sum
+def end_mode(
+    tables: ModeTables,
+    reduced: Reduced,
+    clock: Clock,
+    is_recorded: bool,
+    progress: Progress,
+    z: Floats,
+    motion: Floats,
+    impulse: Floats,
+    recorder: Recorder,
+    accumulator: Accumulator,
+) -> bool:
+    """Go on where `leave_mode` has filled the motion; `z` are the coordinates of the span that ends."""
+    progress.n_event += 1
     if is_beyond(reduced, motion):
         return False
     if is_recorded:

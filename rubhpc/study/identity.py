@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before
 RING_PHYSICS = 8  # that of several stators in short steps, of either scheme
 CLOSED_FORM_PHYSICS = 7  # that of motion from event to event
-CURVED_PHYSICS = 9  # that of curved gaps from event to event
-AUTO_PHYSICS = 10  # that of transients that end where the motion has settled; the next version of all is 11
+AUTO_PHYSICS = 10  # that of transients that end where the motion has settled
+CURVED_PHYSICS = 11  # that of curved gaps from event to event; the next version of all is 12
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")

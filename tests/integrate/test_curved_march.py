@@ -88,7 +88,7 @@ def test_error_is_controlled():
     for accuracy, most in ((1e-6, 2e-7), (1e-5, 1e-6), (1e-3, 1e-5)):
         found = simulate(rig, **UPDATED, accuracy=accuracy)
         assert distance(found, known) < most
-        assert found.energy_residual < 1e-4
+        assert found.energy_residual < 1e-7
 
 
 @pytest.mark.parametrize("normal", ["fixed", "updated"])

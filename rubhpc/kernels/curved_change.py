@@ -7,12 +7,15 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.accumulators import IMPACT, PRESSING, Accumulator, observe_solution
-from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_complementarity
+from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_active, solve_complementarity
 from rubhpc.kernels.contact_modes import Reduced
-from rubhpc.kernels.curved_contact import CurvedPairs, CurvedWork, fill_geometry, is_closed
+from rubhpc.kernels.curved_contact import CurvedPairs, CurvedWork, is_closed
+from rubhpc.kernels.curved_forces import fill_geometry
 from rubhpc.kernels.mode_change import OPENING, observe_impact, product
 
 Floats = NDArray[np.float64]
+
+AT_REST = 1e-12  # m/s, of gaps that stay closed
 
 
 @jit_lean_sum
@@ -129,9 +132,22 @@ def change_curved(
         residual, moved = residual_of(delassus, speed, force)
         observe_solution(PRESSING, pivots, residual, moved, accumulator)
     remaining = 0
+    parts = 0.0
     for i in range(q):
-        if force[i] > 0.0:
+        active[i] = force[i] > 0.0
+        if active[i]:
             remaining |= 1 << i
+            speed[i] = product(rate_row[i], velocity)
+            parts = max(parts, speed[i])
         elif is_recorded and reduced.restitution > 0.0 and is_closed(crossing & ~closed, i):
             accumulator.n_contact[i] += 1  # it has bounced off
+    if parts > AT_REST:  # what parts for a moment lacks as much of its impulse as presses it together again
+        if not solve_active(delassus, speed, active, force, elimination):
+            return -1
+        for i in range(q):
+            if active[i]:
+                if is_recorded:
+                    observe_impact(whole, i, spin, force[i], velocity, accumulator)
+                for k in range(n):
+                    velocity[k] += force_row[i, k] * force[i]
     return remaining

@@ -1,0 +1,85 @@
+"""An event of curved gaps in the course of a case: what it makes of the motion, and of the record."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels.case_progress import (
+    CONTACT_UNSOLVED,
+    DIVERGED,
+    UNDER_WAY,
+    Clock,
+    Progress,
+    shaft_angle,
+)
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
+from rubhpc.kernels.curved_change import change_curved
+from rubhpc.kernels.curved_contact import CurvedPairs, CurvedTables, CurvedWork, is_closed
+from rubhpc.kernels.curved_measuring import place
+from rubhpc.kernels.event_loop import MOST_EVENTS, EventWork
+from rubhpc.kernels.event_steps import end_mode, record_event, record_touch
+
+if TYPE_CHECKING:
+    from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.measuring import Recorder
+
+Floats = NDArray[np.float64]
+
+
+@jit_lean_sum
+def take_curved_event(
+    tables: ModeTables,
+    curved: CurvedTables,
+    pairs: CurvedPairs,
+    reduced: Reduced,
+    clock: Clock,
+    crossing: int,
+    is_recorded: bool,
+    progress: Progress,
+    z: Floats,
+    motion: Floats,
+    work: CurvedWork,
+    events: EventWork,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> int:
+    """Take the event of the pairs `crossing`, as `event_loop.take_event` does."""
+    mode = progress.mode
+    closed = int(tables.mask[mode])
+    place(tables, curved, mode, z[0], z[1], work.h[0], work.rate[0], motion)
+    alone = z if closed == 0 else work.transient
+    if not end_mode(
+        tables, reduced, clock, is_recorded, progress, alone, motion, events.impulse, recorder, accumulator
+    ):
+        return DIVERGED
+    angle = shaft_angle(clock, progress.tick)
+    progress.wanted = change_curved(
+        pairs,
+        reduced,
+        closed,
+        crossing,
+        clock.spin,
+        (1 << FORCED_LEVEL) * clock.tick,
+        np.cos(angle),
+        np.sin(angle),
+        motion,
+        is_recorded,
+        work,
+        events.force,
+        events.speed,
+        events.active,
+        events.elimination,
+        accumulator,
+    )
+    if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
+        return CONTACT_UNSOLVED
+    if is_recorded:
+        for i in range(reduced.radius.size):
+            record_event(clock, progress, events.impulse, i, samples, accumulator)
+            record_touch(i, is_closed(progress.wanted, i), accumulator)
+    return UNDER_WAY

@@ -1,0 +1,239 @@
+"""What closed contacts with curved gaps do at given coordinates: heights, normals, slips and forces."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels.complementarity import solve_active
+from rubhpc.kernels.contact_modes import dot
+from rubhpc.kernels.curved_contact import (
+    ACROSS,
+    ALONG,
+    BENDING,
+    HEIGHT,
+    HEIGHT_RATE,
+    LOAD_ACROSS,
+    LOAD_ALONG,
+    CurvedPairs,
+    CurvedTables,
+    CurvedWork,
+    is_closed,
+)
+
+Floats = NDArray[np.float64]
+
+MOST_PASSES = 8  # for h at given coordinates; two or three are taken
+EXACT = 1e-17  # m, change of h at which they end
+
+
+@jit_inline_sum
+def curvature(radius: float, across: float, is_round: bool) -> float:
+    """What a round rim adds to the gap of a closed pair, m: r - sqrt(r^2 - d^2), without cancellation."""
+    if not is_round:
+        return 0.0
+    square = across * across
+    return float(square / (radius + np.sqrt(radius * radius - square)))
+
+
+@jit_lean_sum
+def read_motion(
+    tables: CurvedTables, mode: int, mask: int, z_re: Floats, z_im: Floats, motion: Floats
+) -> None:
+    """Motions (3, q, 3 + b) of all pairs, their rates and free accelerations, with the h of all taken for 0.
+
+    Accelerations are those of the closed pairs, and of the others too where any is closed.
+    """
+    q, d = tables.bound.shape[1], tables.bound.shape[2]
+    for i in range(q):
+        for j in range(d):
+            motion[0, i, j] = dot(tables.read_re[mode, i, j], tables.read_im[mode, i, j], z_re, z_im)
+        for j in range(d + 1):
+            a = d + j
+            motion[1, i, j] = dot(tables.read_re[mode, i, a], tables.read_im[mode, i, a], z_re, z_im)
+        if is_closed(mask, i):
+            for j in range(d):
+                a = 2 * d + 1 + j
+                motion[2, i, j] = dot(tables.read_re[mode, i, a], tables.read_im[mode, i, a], z_re, z_im)
+
+
+@jit_lean_sum
+def find_heights(
+    pairs: CurvedPairs, tables: CurvedTables, mode: int, mask: int, node: int, work: CurvedWork
+) -> None:
+    """Find h of the closed pairs, and its rate, at a node; `work.motion` becomes the whole motion."""
+    q, d = tables.bound.shape[1], tables.bound.shape[2]
+    motion, moved, h, rate = work.motion, tables.moved, work.h, work.rate
+    for _ in range(MOST_PASSES):
+        change = 0.0
+        for i in range(q):
+            if is_closed(mask, i):
+                new = 0.0
+                for j in range(ACROSS, d):
+                    at = motion[0, i, j] + (pairs.aside[i] if j == ACROSS else 0.0)
+                    for k in range(q):
+                        if is_closed(mask, k):
+                            at -= moved[mode, i, j, k] * h[node, k]
+                    new += curvature(pairs.radius[i], at, pairs.is_round) if j == ACROSS else 0.5 * at * at
+                change = max(change, abs(new - h[node, i]))
+                h[node, i] = new
+        if change <= EXACT:
+            break
+    for i in range(q):
+        for k in range(q):
+            if is_closed(mask, k):
+                for j in range(d):
+                    motion[0, i, j] -= moved[mode, i, j, k] * h[node, k]
+    for i in range(q):  # how fast h follows the motions
+        if is_closed(mask, i):
+            across = motion[0, i, ACROSS] + pairs.aside[i]
+            steep = 0.0
+            if pairs.is_round:
+                steep = across / np.sqrt(pairs.radius[i] * pairs.radius[i] - across * across)
+            work.jacobian[i, ALONG], work.jacobian[i, ACROSS] = 0.0, steep
+            for j in range(BENDING, d):
+                work.jacobian[i, j] = motion[0, i, j]
+    for _ in range(MOST_PASSES):
+        change = 0.0
+        for i in range(q):
+            if is_closed(mask, i):
+                new = 0.0
+                for j in range(ACROSS, d):
+                    now = motion[1, i, j]
+                    for k in range(q):
+                        if is_closed(mask, k):
+                            now -= moved[mode, i, j, k] * rate[node, k]
+                    new += work.jacobian[i, j] * now
+                change = max(change, abs(new - rate[node, i]))
+                rate[node, i] = new
+        if change <= 1e4 * EXACT:
+            break
+    for i in range(q):
+        for k in range(q):
+            if is_closed(mask, k):
+                for j in range(d + 1):
+                    motion[1, i, j] -= moved[mode, i, j, k] * rate[node, k]
+                if is_closed(mask, i):
+                    for j in range(d):
+                        motion[2, i, j] += (
+                            tables.accel[mode, i, j, k] * h[node, k]
+                            + tables.accel_rate[mode, i, j, k] * rate[node, k]
+                        )
+
+
+@jit_lean_sum
+def fill_geometry(pairs: CurvedPairs, i: int, d: int, work: CurvedWork) -> tuple[float, float]:
+    """Normal, gap Jacobian and force direction of pair i at `work.motion`; gap (m) and what bends it (m/s2).
+
+    The latter is the acceleration of the gap at constant rates of the motions.
+    """
+    motion = work.motion
+    back, bending, turning = 0.0, 0.0, 0.0
+    for j in range(BENDING, d):
+        back += 0.5 * motion[0, i, j] * motion[0, i, j]
+        bending += motion[1, i, j] * motion[1, i, j]
+        turning += motion[0, i, j] * motion[1, i, j]
+    reach = pairs.radius[i] + pairs.clearance[i] + motion[0, i, ALONG] + back
+    across = pairs.aside[i] + motion[0, i, ACROSS]
+    along, aslant, distance = 1.0, 0.0, reach
+    if pairs.is_round:
+        distance = np.sqrt(reach * reach + across * across)
+        along, aslant = reach / distance, across / distance
+    slide = along * motion[1, i, ACROSS] - aslant * (motion[1, i, ALONG] + turning)
+    bends = along * bending
+    if pairs.is_round:
+        bends += slide * slide / distance
+    friction = pairs.friction[i]
+    pressing = along - friction * aslant
+    work.normal[0, i], work.normal[1, i] = along, aslant
+    work.jacobian[i, ALONG], work.jacobian[i, ACROSS], work.jacobian[i, d] = along, aslant, 0.0
+    work.direction[i, ALONG], work.direction[i, ACROSS] = pressing, aslant + friction * along
+    work.direction[i, d] = -friction * pairs.radius[i]
+    for j in range(BENDING, d):
+        work.jacobian[i, j] = along * motion[0, i, j]
+        work.direction[i, j] = pressing * motion[0, i, j]
+    return distance - pairs.radius[i], bends
+
+
+@jit_lean_sum
+def slip_of(pairs: CurvedPairs, i: int, d: int, rim_speed: float, work: CurvedWork) -> float:
+    """Slip speed, m/s, of pair i, of which the geometry is filled; positive in steady sliding."""
+    motion = work.motion
+    turning = 0.0
+    for j in range(BENDING, d):
+        turning += motion[0, i, j] * motion[1, i, j]
+    slide = work.normal[0, i] * motion[1, i, ACROSS] - work.normal[1, i] * (motion[1, i, ALONG] + turning)
+    return float(rim_speed + pairs.sense * (pairs.radius[i] * motion[1, i, d] - slide))
+
+
+@jit_lean_sum
+def evaluate(
+    pairs: CurvedPairs,
+    tables: CurvedTables,
+    rim_speed: Floats,
+    mode: int,
+    mask: int,
+    node: int,
+    z_re: Floats,
+    z_im: Floats,
+    work: CurvedWork,
+) -> bool:
+    """Forces, slips and loads of the closed pairs at a node, and gaps of the others; False without forces.
+
+    The forces are those under which the gaps stay closed: with J the gap Jacobian and F the directions of the
+    forces, `J F N = -(J a + b)`, a the free accelerations and b those at constant rates.
+    """
+    read_motion(tables, mode, mask, z_re, z_im, work.motion)
+    return find_forces(pairs, tables, rim_speed, mode, mask, node, work)
+
+
+@jit_lean_sum
+def find_forces(
+    pairs: CurvedPairs,
+    tables: CurvedTables,
+    rim_speed: Floats,
+    mode: int,
+    mask: int,
+    node: int,
+    work: CurvedWork,
+) -> bool:
+    """Go on where `evaluate` has read the motions into `work.motion`."""
+    q, d = tables.bound.shape[1], tables.bound.shape[2]
+    find_heights(pairs, tables, mode, mask, node, work)
+    for i in range(q):
+        gap, bends = fill_geometry(pairs, i, d, work)
+        work.active[i] = is_closed(mask, i)
+        if work.active[i]:
+            for j in range(d):
+                bends += work.jacobian[i, j] * work.motion[2, i, j]
+            work.opening[i] = bends
+            work.slip[node, i] = slip_of(pairs, i, d, rim_speed[i], work)
+        else:
+            opens = 0.0
+            for j in range(d):
+                opens += work.jacobian[i, j] * work.motion[1, i, j]
+            work.gap[0, node, i], work.gap[1, node, i] = gap, opens
+    for i in range(q):
+        if work.active[i]:
+            for k in range(q):
+                if work.active[k]:
+                    total = 0.0
+                    for a in range(d + 1):
+                        if work.jacobian[i, a] != 0.0:
+                            for c in range(d + 1):
+                                total += work.jacobian[i, a] * pairs.gram[i, a, k, c] * work.direction[k, c]
+                    work.matrix[i, k] = total
+    if not solve_active(work.matrix, work.opening, work.active, work.force[node], work.elimination):
+        return False
+    is_finite = True
+    for i in range(q):
+        if work.active[i]:
+            force = work.force[node, i]
+            is_finite = is_finite and np.isfinite(force)
+            work.load[node, i, HEIGHT], work.load[node, i, HEIGHT_RATE] = work.h[node, i], work.rate[node, i]
+            work.load[node, i, LOAD_ALONG] = force * (work.direction[i, ALONG] - 1.0)
+            work.load[node, i, LOAD_ACROSS] = force * (work.direction[i, ACROSS] - pairs.friction[i])
+            for j in range(BENDING, d):
+                work.load[node, i, j + 2] = force * work.direction[i, j]
+    return is_finite
