@@ -29,7 +29,9 @@ paper: $(VENV)/.installed ## the studies behind the paper's figures, its figures
 
 # Each worker has a copy of the compiled kernels; all tests of a file have one worker, which makes its fixtures once.
 # Files come in the order of tests/conftest.py, the longest first.
-PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder --durations=15
+PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder --durations=15 --ignore=tests/bench
+# Where the tests are that run alone (SERIAL in tests/conftest.py): to collect all takes a third of a minute.
+ALONE := tests/faults tests/mpi tests/integrate
 ORDINARY := not bench and not long
 
 check: $(VENV)/.ready ## the inner loop, under a minute: style, and the fast tests with the layers of imports
@@ -39,7 +41,7 @@ check: $(VENV)/.ready ## the inner loop, under a minute: style, and the fast tes
 
 test: $(VENV)/.ready ## all tests but those of `make faults` and `make bench`
 	$(BIN)/python -m pytest $(PARALLEL) -m "$(ORDINARY) and not serial"
-	$(BIN)/python -m pytest --durations=15 -m "$(ORDINARY) and serial"
+	$(BIN)/python -m pytest --durations=15 $(ALONE) -m "$(ORDINARY) and serial"
 
 kernels: $(VENV)/.ready ## compile the kernels, half a minute to two, unless that is done
 	$(BIN)/python tests/support/kernel_cache.py

@@ -101,6 +101,7 @@ LONGEST = (
     "storage/test_shards.py",
 )
 # These have deadlines, or start ranks that wait for each other busily: nothing else may run at the same time.
+# ALONE in the Makefile names their folders.
 SERIAL = (
     "faults/test_deaths.py::test_a_case",
     "faults/test_kill_storm.py",
