@@ -135,7 +135,7 @@ def compile_kernels(
     What some cases call as well, contact in short steps and neighbouring motions, is compiled when the first
     of them does.
     """
-    short = replace(recording, transient=1, revolutions=1)
+    short = replace(recording, transient=1, transient_limit=None, transient_tolerance=None, revolutions=1)
     record = run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)
     if isinstance(setup, ModalSetup) and setup.scheme is Scheme.EVENT_DRIVEN and record.status == DONE:
         Solver(setup, clearance, friction, record.final)(1)

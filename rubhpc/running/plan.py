@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.running.pilots import count_preparations, seconds_of, time_pilots
+from rubhpc.running.pilots import Timing, seconds_of, time_pilots
+from rubhpc.running.preparations import count_preparations
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
 from rubhpc.storage.duration import duration
 from rubhpc.storage.growth import origins
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 _LINE = 400  # bytes of a case in a journal, about, for one stator
 _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the settings
+_AT_EDGES = 1.6  # cases that a refined map computes over all cases, seconds a step: 1.5 and 1.65 in two maps
 _PRIVATE_FILES = 8  # manifests, journals, records of runs
 
 
@@ -55,12 +57,14 @@ class Plan:
         For what is missing, from the pilot cases; NaN where they failed.
     start_up : float
         Processor seconds that each process takes to start and to end, about; 0 where that is unknown.
-    failures : tuple of str
-        Coordinates of the pilot cases that failed, and why.
+    timing : Timing
+        What the pilot cases have shown.
     warnings : tuple of str
         Unstable speeds, and a sag beyond the clearance.
     n_expected : int or None
         Cases that a refined map computes in all, about; `steps` and `core_hours` are for the rest of them.
+    most_core_hours : float
+        Those of a refined map if all its cases are computed; otherwise as `core_hours`.
     part : str
         The part of the study to which counts, steps and core-hours refer, as "3/64"; "" for all of it.
     """
@@ -77,11 +81,12 @@ class Plan:
     n_byte: int
     steps: int
     core_hours: float
+    timing: Timing
     start_up: float = 0.0
-    failures: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     part: str = ""
     n_expected: int | None = None
+    most_core_hours: float = math.nan
 
     @property
     def _files(self) -> str:
@@ -91,6 +96,19 @@ class Plan:
             else ""
         )
         return f"{self.n_file} files{more}"
+
+    @property
+    def _timed(self) -> list[str]:
+        """How many cases were timed, and how well they stand for the rest."""
+        timing = self.timing
+        if not timing.n_pilot:
+            return []
+        within = (
+            f"; they differ, so the core-hours are good to {200.0 * timing.spread:.0f} %, about"
+            if math.isfinite(timing.spread)
+            else ""
+        )
+        return [f"timed       {timing.n_pilot} case{'s' * (timing.n_pilot > 1)}{within}"]
 
     @property
     def _idle(self) -> str:
@@ -104,7 +122,8 @@ class Plan:
         n_case = math.prod(self.shape.values())
         sizes = " x ".join(f"{n} {name}" for name, n in self.shape.items())
         cost = (
-            f"{self.core_hours:.3g} core-hours ({duration(self.core_hours * 3600)} on one core)"
+            f"{'at least ' * self.timing.is_bound}{self.core_hours:.3g} core-hours "
+            f"({duration(self.core_hours * 3600)} on one core)"
             if math.isfinite(self.core_hours)
             else "core-hours unknown: the pilot cases failed"
         )
@@ -117,7 +136,10 @@ class Plan:
                 f"blocks      {self.n_block}, at most {self.n_per_block} cases each; {self._idle}",
                 f"store       {_size(self.n_byte)} before compression, {self._files}",
                 *(
-                    [f"refined     computes at most all {n_case} cases, about {self.n_expected}"]
+                    [
+                        f"refined     computes at most all {n_case} cases, about {self.n_expected}"
+                        f"; at most {self.most_core_hours:.3g} core-hours"
+                    ]
                     if self.n_expected is not None
                     else []
                 ),
@@ -129,18 +151,18 @@ class Plan:
                     if i != INFERRED or self.counts[i]
                 ),
                 f"to compute  {self.steps:.3g} steps, {cost}",
-                *(f"failed      a pilot case: {text}" for text in self.failures),
+                *self._timed,
+                *(f"failed      a pilot case: {text}" for text in self.timing.failures),
                 *(f"warning     {text}" for text in self.warnings),
             ]
         )
 
 
 @on_one_thread
-def make_plan(study: Study, part: str | None = None, *, start_up: float = 0.0) -> Plan:
+def make_plan(study: Study, part: str | None = None) -> Plan:
     """Count, look into the store if there is one, and time pilot cases; writes nothing.
 
-    With a part, as "3/64", what is left of it is counted and timed. `start_up` is that of the plan, in
-    processor seconds.
+    With a part, as "3/64", what is left of it is counted and timed.
 
     Raises
     ------
@@ -177,9 +199,16 @@ def make_plan(study: Study, part: str | None = None, *, start_up: float = 0.0) -
         is_in_part = shares.cases(chosen.number, manifest)
     missing = (is_in_part & (status == MISSING)).reshape(grid.shape)
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
-    steps = left_of_all * sum(block.cost * share for block, share in left)
-    pace, failures = time_pilots(grid, manifest, [block for block, _ in left])
-    seconds = seconds_of(pace, steps, count_preparations(grid, missing)) if left else 0.0
+    all_steps = sum(block.cost * share for block, share in left)
+    steps = left_of_all * all_steps
+    timing = time_pilots(grid, manifest, [block for block, _ in left], missing)
+    seconds = most = 0.0
+    if left:
+        prepared = count_preparations(grid, missing)
+        most = seconds = seconds_of(timing.pace, all_steps, prepared, len(left))
+        if manifest.refine is not None:
+            at_edges = timing.pace._replace(step=_AT_EDGES * timing.pace.step)
+            seconds = min(most, seconds_of(at_edges, steps, prepared, round(left_of_all * len(left))))
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
     shards = zip(manifest.shape, manifest.shard, strict=False)
     n_shard = math.prod(-(-n // s) for n, s in shards) if manifest.shard else 0
@@ -203,8 +232,8 @@ def make_plan(study: Study, part: str | None = None, *, start_up: float = 0.0) -
         n_byte=grid.n_case * (per_case + 2 * _LINE),
         steps=round(steps),
         core_hours=seconds / 3600,
-        start_up=start_up,
-        failures=tuple(failures),
+        most_core_hours=most / 3600,
+        timing=timing,
         warnings=grid.warnings(),
         part="" if chosen is None else str(chosen),
         n_expected=n_expected,

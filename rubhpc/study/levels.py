@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-_FIRST, _LATER = 0.5, 0.3  # share of the middles that are computed, as long as no result says it
+# Share of the middles that are computed, as long as no result says it, fitted to two maps of 1620 and 20 000
+# cases: along the first axis times the root of the distance between neighbours, as a share of the axis.
+_FIRST, _LATER = 1.6, 0.22
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,8 +133,10 @@ class Levels:
     def _expected(self, asked: NDArray[np.bool_], n_done: int) -> int:
         """About how many cases there will be: an edge takes as many more on each level of its axis."""
         counts, most, axes, nodes = [int(asked[self._at(self._first())].sum())], [], [-1], self._first()
-        before = self._size(nodes)
+        before, shares = self._size(nodes), []
         for axis, fine in self._halvings():
+            is_first = axis == self.refined[0]
+            shares.append(min(1.0, _FIRST * (len(nodes[axis]) - 1) ** -0.5) if is_first else _LATER)
             nodes = {**nodes, axis: fine}
             counts.append(int(asked[self._at(nodes)].sum()))
             most.append(self._size(nodes) - before)
@@ -142,8 +146,8 @@ class Levels:
         if n_done:
             added = float(counts[n_done] - counts[n_done - 1])
         for i in range(n_done + 1, len(counts)):
-            if axes[i] != axes[i - 1]:
-                added = (_FIRST if i == 1 else _LATER) * most[i - 1]
+            if n_done == 0 or axes[i] != axes[n_done]:
+                added = shares[i - 1] * most[i - 1]
             added = min(added, most[i - 1])
             total += added
         return round(total)

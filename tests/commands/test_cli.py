@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import math
 import re
 import subprocess
 import sys
 from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 import pytest
 from running import environment, write_study
 
@@ -206,6 +208,23 @@ def test_the_python_face(tmp_path: Path):
         rubhpc.nothing  # noqa: B018
 
 
+def test_plan_extrapolates_cases_that_take_long_from_where_they_rub(tmp_path, monkeypatch):
+    """Of a case that is shortened, the revolutions before its first contact are the cheapest."""
+    from rubhpc.running import pilots
+    from rubhpc.running.plan import make_plan
+    from rubhpc.study.study import read_study
+
+    def seconds(_pilots, _case, _setup, recording):
+        return 0.01 * max(0, recording.longest_transient + recording.revolutions - 5)
+
+    monkeypatch.setattr(pilots._Pilots, "_run", seconds)
+    study = read_study(write_study(tmp_path, transient=60, revolutions=64))
+    found = make_plan(study)
+    assert found.timing.pace.friction == 0.0
+    steps = found.timing.pace.step * found.steps
+    assert steps == pytest.approx(found.counts[0] * 0.01 * (60 + 64 - 5), rel=0.2)  # speeds differ in steps
+
+
 def test_plan_names_the_start_of_a_process(tmp_path, capsys):
     code, out, _ = call(capsys, "plan", write_study(tmp_path))
     assert code == 0
@@ -228,16 +247,61 @@ def test_pilots_see_every_value_of_an_axis_within_blocks(tmp_path, monkeypatch):
     from rubhpc.study.study import read_study
 
     asked = []
-    monkeypatch.setattr(
-        pilots,
-        "_pilot",
-        lambda case_grid, index, steps: (
-            asked.append(case_grid.case(index)) or pilots.Pace(1.0, 0.0, 0.0, 0.0)
-        ),
-    )
+
+    def pace(self, index, steps):
+        asked.append(self._grid.case(index))
+        return pilots.Pace(1.0, 0.0, 0.0, 0.0)
+
+    monkeypatch.setattr(pilots._Pilots, "pace", pace)
     study = read_study(write_study(tmp_path))
     plan.make_plan(study)
     assert {case.friction for case in asked} == set(study.axis("friction").values)
+    assert len(asked) == len({case.id for case in asked})
+
+
+def test_pilots_stand_for_all_cases(tmp_path, monkeypatch):
+    """Their mean pace is that of the whole study where dear cases take more steps, too; few cases suffice."""
+    from rubhpc.running import pilots, plan
+    from rubhpc.study.cases import CaseGrid
+    from rubhpc.study.study import read_study
+
+    speeds = [0.9 + 0.1 * i for i in range(40)]
+    study = read_study(write_study(tmp_path, speed_ratio=speeds, clearance_ratio=[0.5, 0.6, 0.7, 0.8]))
+
+    def seconds(index, steps):
+        return steps * (1.0 + index[0]) * (1.0 + 2.0 * (index[1] == 3))
+
+    paces = {}
+
+    def pace(self, index, steps):
+        paces[index] = seconds(index, steps) / steps
+        return pilots.Pace(paces[index], 0.0, 0.0, 0.0)
+
+    monkeypatch.setattr(pilots._Pilots, "pace", pace)
+    grid = CaseGrid(study)
+    cost = {
+        case.index: block.cost / math.prod(block.shape)
+        for block in grid.blocks()
+        for case in grid.cases(block)
+    }
+    whole = sum(seconds(index, steps) for index, steps in cost.items())
+    found = plan.make_plan(study)
+    assert found.timing.n_pilot == len(paces) < len(cost) / 2
+    assert found.core_hours * 3600 == pytest.approx(whole, rel=3 * found.timing.spread)
+    assert found.timing.spread < 0.1
+
+
+def test_only_missing_cases_are_timed(tmp_path, monkeypatch):
+    from rubhpc.running import pilots
+    from rubhpc.study.cases import CaseGrid
+    from rubhpc.study.study import read_study
+
+    grid = CaseGrid(read_study(write_study(tmp_path)))
+    missing = np.zeros(grid.shape, bool)
+    missing[-1, ..., 0] = True
+    blocks = [block for block in grid.blocks() if pilots.share_of(block, missing).any()]
+    picked = [index for index, _ in pilots._picked(blocks, missing)]
+    assert sorted(picked) == [tuple(index) for index in np.argwhere(missing).tolist()]
 
 
 def test_plan_tells_why_its_pilots_failed(tmp_path, monkeypatch, capsys):

@@ -19,7 +19,7 @@ from rubhpc.errors import InputError, StoppedEarly, StoreError
 from rubhpc.kernels._jit import compilation
 from rubhpc.running import computing, driver, job, stopping, worker
 from rubhpc.running.driver import run
-from rubhpc.running.pilots import count_preparations
+from rubhpc.running.preparations import count_preparations
 from rubhpc.schema import (
     DIVERGED,
     DONE,
@@ -419,7 +419,7 @@ def test_as_many_speeds_are_prepared_as_are_foreseen(physics, tmp_path, write):
 def test_preparations_of_many_cases_are_foreseen_from_a_part(tmp_path, monkeypatch):
     grid = CaseGrid(read_study(write_sample(tmp_path, n=64)))
     whole = count_preparations(grid, np.ones(grid.shape, bool))
-    monkeypatch.setattr("rubhpc.running.pilots._MOST_COUNTED", 200)
+    monkeypatch.setattr("rubhpc.running.preparations._MOST_COUNTED", 200)
     part = count_preparations(grid, np.ones(grid.shape, bool))
     assert part.speed == pytest.approx(whole.speed, rel=0.25)
     assert part.friction == pytest.approx(whole.friction, rel=0.25)
