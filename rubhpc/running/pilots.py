@@ -229,7 +229,7 @@ class _Pilots:
         """Shares of the case that were run, each longer than the last, what they took, s, and the longest."""
         whole = self._whole(case)
         known = max(self._paces, default=math.nan) * steps
-        ends_by_itself = isinstance(self._study.recording.transient, str)  # nobody knows when, but by trying
+        ends_by_itself = isinstance(whole.transient, str)  # nobody knows when, but by trying
         share = 1.0 if ends_by_itself or known < _LONG else min(1 / 16, _FIRST_STEPS / steps)
         runs: list[tuple[float, float]] = []
         while True:
