@@ -11,6 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from postproc.report.branches import branch_facts
 from postproc.report.cases import Cases
 from postproc.report.end_view import end_view
 from postproc.report.facts import (
@@ -103,6 +104,7 @@ class Page:
             "failures": failures(store, axes),
             "n_done": len(self.cases.done),
             "design": design_facts(store),
+            "branches": branch_facts(store),
         }
 
     def _embedded_facts(self, names: list[str], *, is_served: bool) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from postproc.store.branch_points import is_of_points
 from postproc.store.inferred import fill_inferred
 from postproc.store.open import open_store
 from rubhpc.storage.disk import disk_errors
@@ -44,7 +45,7 @@ def open_live(path: Path) -> xr.Dataset:
         holders = [holder] if holder is not None and is_alive(holder, lock) else store.parts.running()
         running = "; ".join(map(str, holders))
         runs = [asdict(run) for run in read_runs(path)]
-    if not is_packed:
+    if not is_packed and not is_of_points(dataset):  # points have no values of cases
         packed = store.packed_values(ledger)
         dataset = dataset.assign(
             {name: (dataset[name].dims, values, dataset[name].attrs) for name, values in packed.items()}

@@ -11,6 +11,8 @@ import rubhpc
 from postproc.figures.bifurcation import bifurcation
 from postproc.figures.branch_lines import events_at, mark_over_map, runs
 from postproc.figures.multipliers import multipliers
+from postproc.report.page import Page
+from postproc.store.live import open_live
 from postproc.store.open import open_store
 from rubhpc.errors import InputError
 from rubhpc.study.study import read_study
@@ -76,6 +78,14 @@ def test_what_is_lost_is_computed_anew_to_the_same_bytes(store):
     lost.unlink()
     rubhpc.run(read_study(store / "study.toml", path), quiet=True)
     assert {file: file.read_bytes() for file in kept} == kept
+
+
+def test_report_has_the_branches_of_each_case(store):
+    page = Page(open_live(store / "branches.zarr")).html(values={})
+    assert page.count("data:image/png;base64,") == 4
+    assert "Speed ratio r 0.74" in page
+    assert "Speed ratio r 0.75" in page
+    assert "periodic motions along clearance" in page
 
 
 def test_branches_are_drawn_over_simulated_cases(store, tmp_path):
