@@ -16,7 +16,7 @@ import pytest
 from lone_bodies import body, set_up_modal, tip
 
 import rubhpc
-from rubhpc import LumpedStator, read_rig
+from rubhpc import LumpedStator, Rig, Unbalance, read_rig
 from rubhpc.integrate.arclength import follow
 from rubhpc.integrate.branch_events import Event
 from rubhpc.integrate.branch_point import Branching
@@ -24,8 +24,9 @@ from rubhpc.integrate.branch_search import search
 from rubhpc.integrate.family import Family
 from rubhpc.integrate.periodic_motion import find_periodic_motion
 from rubhpc.integrate.piecewise_motion import PiecewiseMotion
+from rubhpc.integrate.setup import prepare
 from rubhpc.study.initial import Initial
-from rubhpc.study.study import Contact, Recording
+from rubhpc.study.study import Contact, Integrator, Recording
 
 WALL = tip(body(1.0, 1.0, ((1, "axial"),)), 0.0, axial=-1)  # it is held
 
@@ -103,6 +104,43 @@ def test_two_motions_meet_at_the_fold_of_the_closed_form():
     assert [with_one[0].n_unstable, with_one[-1].n_unstable] == [0, 1]
 
 
+class CrossCoupled(Family):
+    """A whirling mass with u'' + c u' + k u + cross (w, -v) = unbalance, over the cross-coupled stiffness."""
+
+    def __init__(self, span):
+        super().__init__(None, "cross", span)
+        self._known = {}
+
+    def settings(self, value):
+        if value not in self._known:
+            rig = Rig.from_matrices(
+                np.eye(2), 0.08 * np.eye(2), [[1.69, value], [-value, 1.69]],
+                degrees=[(1, "v"), (1, "w")],
+                stators=[LumpedStator(node=1, rigid=True, radius=1.0)],
+                unbalance=[Unbalance(node=1, mass=1.0, radius=1.0)],
+            )  # fmt: skip
+            self._known[value] = prepare(
+                rig, 2.0, contact=Contact(), integrator=Integrator(step=1e-3), samples_per_revolution=64
+            )
+        return self._known[value], 100.0, 0.0
+
+
+def test_whirl_becomes_unstable_where_cross_coupling_outweighs_damping():
+    """At cross = c sqrt(k / m), with the angle of the multipliers that of a natural period a revolution."""
+    branching = Branching(CrossCoupled(0.1), 0.02)
+    case = branching.family.at(0.06)
+    first = branching.begin(0.06, case.start, case.states, 1)
+    track = follow(branching, [first], 1.0, low=0.06, high=0.16, most=40)
+    (at,) = [k for k, event in enumerate(track.events) if event is Event.NEIMARK_SACKER]
+    point = track.points[at]
+    assert point.value == pytest.approx(0.08 * 1.3, rel=1e-8)
+    pair = point.multipliers[np.abs(np.abs(point.multipliers) - 1.0) < 1e-6]
+    assert np.abs(pair.imag) == pytest.approx(abs(math.sin(2 * math.pi * 1.3 / 2.0)), abs=1e-6)
+    assert pair.size == 2
+    assert [point.n_unstable for point in (track.points[0], track.points[-1])] == [0, 2]
+    assert track.end == "the range ends"
+
+
 def test_ring_of_springs_over_its_clearance():
     """A rub, an unstable rub and the motion without contact, which grazes at the contact-free amplitude."""
     springs = LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)
@@ -118,3 +156,17 @@ def test_ring_of_springs_over_its_clearance():
     assert [point.touches for point in (found.points[0], found.points[-1])] == [8, 0]
     lowest, highest = (found.values[[p.event == "fold" for p in found.points]][k] for k in (1, 0))
     assert lowest < free < highest
+
+
+@pytest.mark.long
+def test_ring_of_springs_over_its_speed():
+    """In closed form the rub ends at a fold at r 1.343, and the motion without contact grazes at 1.195."""
+    springs = LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)
+    ring = replace(read_rig("mokhtar2017"), stator=(springs,))
+    (whole,) = rubhpc.branch(
+        ring, along="speed_ratio", start=1.17, stop=1.4, clearance="300 um", friction=0.0, keep=()
+    )
+    folds = [value for name, value in whole.events() if name == "fold"]
+    assert max(folds) == pytest.approx(1.343, rel=6e-3)  # eight springs, not a ring: 1.337
+    assert whole.events()[-1][0] == "grazing"
+    assert whole.events()[-1][1] == pytest.approx(1.195, abs=1e-3)

@@ -1,0 +1,53 @@
+"""A branch study is killed on its way, again and again: its bytes do not change."""
+
+from __future__ import annotations
+
+import random
+import time
+
+import pytest
+from running import run, start, stored_bytes
+
+from rubhpc.storage.verify import verify
+
+STUDY = """
+rig = "mokhtar2017"
+[grid]
+clearance = { start = "112 um", stop = "124 um" }
+speed_ratio = [0.73, 0.74, 0.75, 0.76]
+friction = 0.3
+[branch]
+along = "clearance"
+periods = [1, 2]
+step = "4 um"
+sweeps = 1
+points = 60
+[record]
+transient = 40
+samples_per_revolution = 64
+"""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("how", [{"options": ("--workers", "2")}, {"ranks": 2}], ids=["workers", "ranks"])
+def test_kills_leave_the_same_bytes(tmp_path, how):
+    options, under = how.get("options", ()), {"ranks": how.get("ranks", 0)}
+    whole, study, store = (tmp_path / name for name in ("whole.toml", "killed.toml", "killed.zarr"))
+    for path in (whole, study):
+        path.write_text(f'title = "branches"\noutput = "{path.with_suffix(".zarr")}"\n{STUDY}')
+    assert run(whole).returncode == 0
+    moments = random.Random(3)
+    n_killed = 0
+    for _ in range(3):
+        job = start(study, *options, **under)
+        while job.poll() is None and not any((store / ".rubhpc" / "journal").glob("*.journal")):
+            time.sleep(0.02)
+        time.sleep(moments.uniform(0.5, 4.0))
+        n_killed += job.poll() is None
+        job.kill()
+        job.communicate()
+        time.sleep(1.0)
+        assert not verify(store)
+    assert n_killed
+    assert run(study, *options, **under).returncode == 0
+    assert stored_bytes(store) == stored_bytes(tmp_path / "whole.zarr")
