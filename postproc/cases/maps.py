@@ -154,7 +154,15 @@ def validity(store: xr.Dataset) -> xr.DataArray:
     return found.rename("validity").assign_attrs(units="1", long_name=f"sum of {legend}")
 
 
-def reasons_of(data: xr.Dataset) -> str:
-    """Return what leaves the model's range in any case of `map_data` that has values, as a list in words."""
-    validity = np.where(np.isin(data["status"].values, HAS_VALUES), data["validity"].values, 0)
-    return ", ".join(dict.fromkeys(text for bit, text, _ in VALIDITY.values() if (validity & bit).any()))
+def out_of_range(data: xr.Dataset) -> tuple[str, bool]:
+    """Return what is out of the model's range in `map_data`, in words, and whether most cases are.
+
+    The words name the reasons and count the cases, of those that have values.
+    """
+    has_values = np.isin(data["status"].values, HAS_VALUES)
+    validity = np.where(has_values, data["validity"].values, 0)
+    counts = {text: np.count_nonzero(validity & bit) for bit, text, _ in VALIDITY.values()}
+    reasons = ", ".join(f"{text} ({n})" for text, n in counts.items() if n)
+    n, n_all = np.count_nonzero(validity), np.count_nonzero(has_values)
+    count = f"all {n} cases" if n == n_all else f"{n} of {n_all} cases"
+    return f"out of range in {count}: {reasons}", bool(n > 0.5 * n_all)

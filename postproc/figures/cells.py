@@ -1,4 +1,4 @@
-"""Cells of a grid picture: their edges around the grid values, and hatching of some of them."""
+"""Cells of a grid picture: their edges around the grid values, and hatching or a line around some of them."""
 
 from __future__ import annotations
 
@@ -60,6 +60,30 @@ def hatch_cells(
     codes = np.tile([Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY], row.size)
     style = {"hatch": hatch, "facecolor": facecolor, "edgecolor": color, "linewidth": 0.0, "label": label}
     return [ax.add_patch(PathPatch(Path(corners, codes), **style))]
+
+
+def outline_cells(
+    ax: Axes,
+    edges: tuple[NDArray[np.float64], NDArray[np.float64]],
+    mask: NDArray[np.bool_],
+    label: str,
+    color: str = "0.25",
+) -> list[Artist]:
+    """Draw a line around the cells of a mask (n_y, n_x); return it for a legend, or [] where none is."""
+    from matplotlib.collections import LineCollection
+
+    if not mask.any():
+        return []
+    x, y = edges
+    row, column = np.nonzero(np.diff(np.pad(mask.astype(np.int8), ((0, 0), (1, 1))), axis=1))
+    upright = np.stack([np.stack([x[column], y[row]], 1), np.stack([x[column], y[row + 1]], 1)], 1)
+    row, column = np.nonzero(np.diff(np.pad(mask.astype(np.int8), ((1, 1), (0, 0))), axis=0))
+    level = np.stack([np.stack([x[column], y[row]], 1), np.stack([x[column + 1], y[row]], 1)], 1)
+    lines = LineCollection(
+        np.concatenate([upright, level]).tolist(), colors=color, linewidths=1.4, label=label, clip_on=False
+    )
+    lines.set_capstyle("round")
+    return [ax.add_collection(lines, autolim=False)]
 
 
 def is_geometric(values: NDArray[np.float64]) -> bool:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from postproc.cases.maps import default_axes, facet_axes, map_data, reasons_of, scatter_axes
+from postproc.cases.maps import default_axes, facet_axes, map_data, out_of_range, scatter_axes
 from postproc.figures.branch_lines import events_at, mark_over_map
-from postproc.figures.cells import cell_edges, hatch_cells, is_geometric
+from postproc.figures.cells import cell_edges, hatch_cells, is_geometric, outline_cells
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import CATEGORIES, NOT_DONE, NOT_SETTLED, WARNING, coloured, paint_of
 from postproc.figures.scatter import scatter_maps
@@ -130,7 +130,7 @@ def value_maps(
 
     Flags and periods have distinct colours, other measures a continuous bar and, where asked for, contours.
     Cases without a result are grey and hatched by their status; those that had not settled, or are out of the
-    model's range, by lines.
+    model's range, by lines; where most are out of range, a line around these leaves the colours to be seen.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def value_maps(
         if len(inside):
             ax.contour(x, y, cells, levels=inside, colors="white", linewidths=0.5)
         if not is_known:
-            for patch in _hatch(ax, edges, data.isel(here), value, reasons_of(data)):
+            for patch in _hatch(ax, edges, data.isel(here), value, *out_of_range(data)):
                 handles[str(patch.get_label())] = patch
         if computed:
             handles |= _dots(ax, x, y, data["status"].isel(here).values)
@@ -201,8 +201,11 @@ def _dots(
     return {"computed": dots}
 
 
-def _hatch(ax: Axes, edges: Edges, data: xr.Dataset, value: str, reasons: str) -> list[Artist]:
-    """Hatch what has no result, no value, or is out of the model's range, and return what names them."""
+def _hatch(ax: Axes, edges: Edges, data: xr.Dataset, value: str, beyond: str, is_most: bool) -> list[Artist]:
+    """Hatch what has no result, no value, or is out of the model's range, and return what names them.
+
+    `beyond` names what is out of range; where that is most of the figure, it is surrounded by a line.
+    """
     status = data["status"].values
     has_values = np.isin(status, HAS_VALUES)
     handles: list[Artist] = []
@@ -216,7 +219,9 @@ def _hatch(ax: Axes, edges: Edges, data: xr.Dataset, value: str, reasons: str) -
         moving = has_values & (data["settled"].values == 0)
         handles += hatch_cells(ax, edges, moving, NOT_SETTLED, "||||", color=color)
     invalid = has_values & (data["validity"].values > 0)
-    return handles + hatch_cells(ax, edges, invalid, f"out of range: {reasons}", "\\\\\\\\", color=color)
+    if is_most:
+        return handles + outline_cells(ax, edges, invalid, beyond, color=color)
+    return handles + hatch_cells(ax, edges, invalid, beyond, "\\\\\\\\", color=color)
 
 
 def _levels(paint: Paint, n_contour: int) -> NDArray[np.float64]:

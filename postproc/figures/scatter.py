@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.cases.maps import reasons_of
+from postproc.cases.maps import out_of_range
 from postproc.cases.saltelli import is_log
 from postproc.figures.palette import CATEGORIES, NOT_DONE, NOT_SETTLED, WARNING, coloured, paint_of
 from postproc.figures.small_multiples import color_bar, legend_below, name_facets, write_over
@@ -64,7 +64,7 @@ def scatter_maps(
             zorder=2,
         )
         if not is_known:
-            for mark in _marks(ax, across, up, data.isel(at), value, size, reasons_of(data)):
+            for mark in _marks(ax, across, up, data.isel(at), value, size, out_of_range(data)[0]):
                 handles[str(mark.get_label())] = mark
         for name, set_scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
             if is_log(data, name):
@@ -85,7 +85,7 @@ def _marks(
     data: xr.Dataset,
     value: str,
     size: float,
-    reasons: str,
+    beyond: str,
 ) -> list[Artist]:
     """Cross what has no result or no value, ring what is out of the model's range; return legend handles."""
     status = data["status"].values
@@ -101,8 +101,7 @@ def _marks(
     if "settled" in data and value != "settled":
         square = ring | {"s": 4.0 * size, "marker": "s", "label": NOT_SETTLED, "edgecolors": colour}
         marked.append((is_done & (data["settled"].values == 0), square))
-    beyond = is_done & (data["validity"].values > 0)
-    marked.append((beyond, ring | {"label": f"out of range: {reasons}", "edgecolors": colour}))
+    marked.append((is_done & (data["validity"].values > 0), ring | {"label": beyond, "edgecolors": colour}))
     return [
         ax.scatter(x[mask], y[mask], **{"s": size, "zorder": 3} | style)
         for mask, style in marked

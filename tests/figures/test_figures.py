@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.colors import to_rgba
 
 from postproc.cases.maps import default_axes, map_data
-from postproc.figures.cells import cell_edges, hatch_cells
+from postproc.figures.cells import cell_edges, hatch_cells, outline_cells
 from postproc.figures.map import value_maps
 from postproc.figures.orbit import draw_orbit, orbit
 from postproc.figures.overlay import overlaid
@@ -100,7 +100,12 @@ def test_a_map_is_drawn_with_units_and_hatching(plain_map, ax):
     assert ax.get_ylabel() == "Clearance (µm)"
     assert ax.figure.axes[1].get_ylabel() == "Peak contact force (N)"
     labels = [text.get_text() for text in ax.figure.legends[0].get_texts()]
-    assert labels == ["missing", "failed", "diverged", "out of range: slip, Euler load"]
+    assert labels == [
+        "missing",
+        "failed",
+        "diverged",
+        "out of range in 6 of 12 cases: slip (6), Euler load (3)",
+    ]
     ax.figure.canvas.draw()
 
 
@@ -374,3 +379,25 @@ def test_an_axis_of_few_values_is_ticked_at_them(plain_map, ax):
     assert ax.get_yticks() == pytest.approx([70, 84, 100])
     assert ax.get_xticks() == pytest.approx([0.75, 1.0, 1.25, 1.5, 1.7])
     assert [text.get_text() for text in ax.get_xticklabels()] == ["0.75", "1", "1.25", "1.5", "1.7"]
+
+
+def test_a_line_surrounds_what_is_out_of_range_where_that_is_most(plain_map, ax):
+    """Hatched all over, a map shows neither its colours nor where the model holds."""
+    shown = plain_map("peak_contact_force")
+    shown["validity"] = shown["validity"].where(shown["validity"] > 0, 4)
+    value_maps(shown, "peak_contact_force", [ax])
+    labels = [text.get_text() for text in ax.figure.legends[0].get_texts()]
+    n = int((shown["status"] == 1).sum())
+    assert labels[-1].startswith(f"out of range in all {n} cases: slip (6), Euler load (3), bending (")
+    assert not [patch for patch in ax.patches if patch.get_label().startswith("out of range")]
+    ax.figure.canvas.draw()
+
+
+def test_an_outline_is_the_edge_of_its_cells(ax):
+    edges = np.arange(4.0), np.arange(3.0)
+    mask = np.array([[True, True, False], [False, True, False]])
+    (lines,) = outline_cells(ax, edges, mask, "beyond")
+    segments = np.array(lines.get_segments())
+    assert np.ptp(segments, axis=1).sum() == pytest.approx(8.0)  # of three cells in an L
+    assert not np.isclose(segments.mean(axis=1), [1.0, 0.5]).all(axis=1).any()  # between two of them
+    assert outline_cells(ax, edges, np.zeros((2, 3), bool), "none") == []
