@@ -9,6 +9,7 @@ import numpy as np
 from rubhpc.case_arguments import CaseArguments, case_of, read_probes
 from rubhpc.errors import InputError
 from rubhpc.input.quantity import parse_quantity
+from rubhpc.input.reading import plain
 from rubhpc.integrate.measures import by_name
 from rubhpc.integrate.run_up import integrate_run_up
 from rubhpc.integrate.run_up_case import by_revolution
@@ -124,7 +125,13 @@ def run_up(
     for name, values in by_revolution(found, signals, samples_per_revolution).items():
         short = name if name.startswith((AMPLITUDE, PHASE)) else name.removeprefix("revolution_")
         variables[short] = own[name].dims, values, _about(own[name].unit, own[name].long_name)
-    return _dataset(variables, len(found.speed), samples_per_revolution, found.reason, one.note)
+    attributes = {
+        "reason": found.reason,
+        "note": one.note,
+        "rig": one.rig.as_dict(),
+        "study": {"record": {"probe": [plain(probe) for probe in measured]}},
+    }
+    return _dataset(variables, len(found.speed), samples_per_revolution, attributes)
 
 
 def _read_law(
@@ -156,7 +163,7 @@ def _about(unit: str, long_name: str) -> dict[str, str]:
 
 
 def _dataset(
-    variables: dict[str, Any], n_turn: int, per_revolution: int, reason: str, note: str
+    variables: dict[str, Any], n_turn: int, per_revolution: int, attributes: dict[str, Any]
 ) -> xr.Dataset:
     import xarray as xr
 
@@ -178,5 +185,5 @@ def _dataset(
             "stator": ("stator", np.arange(1, n_stator + 1), _about("1", "number of the stator")),
         },
     )
-    found.attrs |= {"reason": reason, "note": note}
+    found.attrs |= attributes
     return found

@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
+from postproc.figures.run_up_marks import critical_speeds
 from postproc.signals.orders import order_over_speed
 from postproc.store.run_ups import is_run_up
 from postproc.store.units import scale_for, short_name
@@ -28,9 +29,10 @@ _RPM = 30 / math.pi
 def bode(
     cases: xr.Dataset, signal: str | Sequence[str] = (), *, order: Positive = 1.0, over: Axis | None = None
 ) -> Drawing:
-    """Bode plot: amplitude and phase of an order over the speed.
+    """Bode plot: amplitude and phase lag of an order over the speed.
 
-    Of a run-up by revolution, or of the cases of a study along its speeds, whose waveforms it needs.
+    Of a run-up by revolution, or of the cases of a study along its speeds, whose waveforms it needs. Critical
+    speeds are marked.
 
     Parameters
     ----------
@@ -49,14 +51,23 @@ def bode(
     for name in signals:
         require_results(shown[f"amplitude_{name}"], cases)
 
+    speeds = shown["speed"].values
+    critical = critical_speeds(cases, float(np.nanmin(speeds)), float(np.nanmax(speeds)))
+
     def draw(axes: list[Axes]) -> None:
-        draw_bode(shown, signals, axes, order)
+        draw_bode(shown, signals, axes, order, critical)
 
     return Drawing(shown=shown, draw=draw, panels=(2, 1), height=90)
 
 
-def draw_bode(data: xr.Dataset, signals: Sequence[str], axes: list[Axes], order: float = 1.0) -> None:
-    """Draw amplitude (zero to peak) over phase lead, of each signal and case by its own colour."""
+def draw_bode(
+    data: xr.Dataset,
+    signals: Sequence[str],
+    axes: list[Axes],
+    order: float = 1.0,
+    critical: Sequence[float] = (),
+) -> None:
+    """Draw amplitude (zero to peak) and phase lag, which grows downwards; critical speeds in rad/s."""
     from matplotlib.ticker import MultipleLocator
 
     top, bottom = axes
@@ -79,23 +90,42 @@ def draw_bode(data: xr.Dataset, signals: Sequence[str], axes: list[Axes], order:
             own = name.removeprefix("probe_").replace("_", " ") if len(signals) > 1 else None
             label = ", ".join(text for text in (own, case) if text) or None
             top.plot(rpm, height.values * scale.factor, label=label, **style)
-            bottom.plot(rpm, np.degrees(lead.values), **style)
+            bottom.plot(rpm, -np.degrees(lead.values), **style)
             n_curve += 1
-    first = (
-        short_name(data[f"amplitude_{signals[0]}"].rename(signals[0])) if len(signals) == 1 else "Amplitude"
-    )
-    top.set(ylabel=scale.label(f"{first}, {_written(order)}"), xlim=ends)
+    first = signal_name(data[f"amplitude_{signals[0]}"]) if len(signals) == 1 else "Amplitude"
+    top.set(ylabel=scale.label(f"{first}, {written_order(order)}"), xlim=ends)
     top.set_ylim(bottom=0.0)
     if n_curve > 1:
         top.legend(loc="best", fontsize=6)
-    bottom.set(xlabel="Spin speed (rpm)", ylabel="Phase lead (\N{DEGREE SIGN})")
-    low, high = bottom.get_ylim()
+    bottom.set(xlabel="Spin speed (rpm)", ylabel="Phase lag (\N{DEGREE SIGN})")
+    for speed in critical:
+        for ax in axes:
+            ax.axvline(speed * _RPM, color="0.6", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0.5)
+        top.annotate(
+            f"critical, {speed * _RPM:.0f}",
+            (speed * _RPM, 0.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(2, 2),
+            textcoords="offset points",
+            va="bottom",
+            fontsize=6,
+            color="0.35",
+        )
+    bottom.invert_yaxis()
+    high, low = bottom.get_ylim()
     bottom.yaxis.set_major_locator(MultipleLocator(90 * max(1, round((high - low) / 450))))
     bottom.ticklabel_format(axis="x", style="plain", useOffset=False)
     top.figure.align_ylabels(axes)
 
 
-def _written(order: float) -> str:
+def signal_name(amplitude: xr.DataArray) -> str:
+    """Name of the signal whose amplitude this is."""
+    text = str(amplitude.attrs.get("long_name", "")).removeprefix("amplitude of the ")
+    signal = str(amplitude.name).removeprefix("amplitude_")
+    return short_name(amplitude.rename(signal).assign_attrs(long_name=text or signal))
+
+
+def written_order(order: float) -> str:
     """An order as engineers write it: 1X, 1/2X, 2X."""
     for part in range(1, 9):
         if abs(order * part - round(order * part)) < 1e-3:

@@ -79,15 +79,17 @@ def orbit_data(
     if probes is None:
         data = narrow(store, ["vertical", "horizontal", "clearance"], spread)
     else:
-        data = _seen_by_two(store, probes, spread)
+        data = seen_by_two(store, probes, spread)
     if revolutions is not None:
         kept = last_revolutions(data["vertical"], revolutions)
         data = data.isel(sample=slice(-kept.sizes["sample"], None))
     return data
 
 
-def _seen_by_two(store: xr.Dataset, probes: tuple[str, str], spread: Sequence[str]) -> xr.Dataset:
-    """Return vertical and horizontal motion from two displacements along other directions."""
+def seen_by_two(
+    store: xr.Dataset, probes: tuple[str, str], spread: Sequence[str] = (), others: Sequence[str] = ()
+) -> xr.Dataset:
+    """Return vertical and horizontal motion from two displacements along other directions, and `others`."""
     first, second = (probe_of(store, name) for name in probes)
     for probe in (first, second):
         if probe["quantity"] not in ("displacement", "velocity", "acceleration"):
@@ -107,7 +109,7 @@ def _seen_by_two(store: xr.Dataset, probes: tuple[str, str], spread: Sequence[st
         pair = f"{first['name']} and {second['name']}"
         raise InputError(f"{source(store)}: probes {pair}: look in one direction; choose two that do not")
     names = [f"{PROBE}{probe['name']}" for probe in (first, second)]
-    data = narrow(store, names, spread)
+    data = narrow(store, [*names, *others], spread)
     x, y = (data[name].astype(float) for name in names)
     where = f"node {first['node']}" if "node" in first else f"the tip of stator {first['stator']}"
     for name, value in (

@@ -1,0 +1,100 @@
+"""Spectra during a run-up, over windows of a few revolutions, and the mean of every revolution."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from postproc.signals.spectra import check_signal
+from postproc.store.axes import source
+from postproc.store.run_ups import is_run_up
+from postproc.store.select import narrow
+from rubhpc.errors import InputError
+from rubhpc.schema import TURNED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+
+def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> xr.Dataset:
+    """Return amplitude spectra of a run-up at `count` places, each over `window` revolutions, loaded.
+
+    Windows are Hann's: a line of a steady amplitude has its height, zero to peak.
+
+    Returns
+    -------
+    Dataset
+        `amplitude` over (place, order) in the unit of the signal, `frequency` (Hz) likewise, and over `place`
+        the mean `speed`, rad/s.
+
+    Raises
+    ------
+    InputError
+        It is no run-up of one case, or has no such signal.
+    """
+    data, per_revolution, n = _case(store, [signal])
+    window = min(window, n)
+    signal_rows = data[signal].values.astype(float)[: n * per_revolution]
+    speed = data["speed"].values[:n]
+    shape = 0.5 - 0.5 * np.cos(
+        2.0 * np.pi * (np.arange(window * per_revolution) + 0.5) / (window * per_revolution)
+    )
+    starts = np.unique(np.linspace(0, n - window, count).round().astype(int))
+    rows, speeds = [], []
+    for first in starts:
+        part = signal_rows[first * per_revolution : (first + window) * per_revolution]
+        rows.append(np.abs(np.fft.rfft((part - part.mean()) * shape)) * 2.0 / shape.sum())
+        speeds.append(window / np.sum(1.0 / speed[first : first + window]))
+    order = np.arange(rows[0].size) / window
+    about = data[signal].attrs
+    found = xr.Dataset(
+        {"amplitude": (("place", "order"), np.array(rows), {"units": about.get("units", "1")})},
+        coords={name: at for name, at in data.coords.items() if at.ndim == 0}
+        | {
+            "order": ("order", order, {"units": "1", "long_name": "order of the spin frequency"}),
+            "speed": ("place", np.array(speeds), {"units": "rad s-1", "long_name": "spin speed"}),
+            "frequency": (
+                ("place", "order"),
+                np.outer(speeds, order) / (2.0 * math.pi),
+                {"units": "Hz", "long_name": "frequency"},
+            ),
+        },
+    )
+    found["amplitude"].attrs["long_name"] = about.get("long_name", signal)
+    return found
+
+
+def mean_positions(store: xr.Dataset, signals: Sequence[str]) -> xr.Dataset:
+    """Return the mean of signals over every revolution of a run-up, with its `speed` (rad/s), loaded."""
+    data, per_revolution, n = _case(store, signals)
+    means = {
+        name: (
+            "revolution",
+            data[name].values.astype(float)[: n * per_revolution].reshape(n, -1).mean(axis=1),
+            data[name].attrs,
+        )
+        for name in signals
+    }
+    means["speed"] = "revolution", data["speed"].values[:n], data["speed"].attrs
+    return xr.Dataset(means, coords={name: at for name, at in data.coords.items() if at.ndim == 0})
+
+
+def _case(store: xr.Dataset, signals: Sequence[str]) -> tuple[xr.Dataset, int, int]:
+    """Signals and speed of one run-up, the samples in a revolution, and how many revolutions it has."""
+    for signal in signals:
+        check_signal(signal)
+    if not is_run_up(store):
+        raise InputError(f"{source(store)}: no speed changes in it; give a store of a study with [run_up]")
+    data = (narrow(store, [*signals, "speed"]) if "status" in store else store[[*signals, "speed"]]).load()
+    per_revolution = round(1.0 / float(data[TURNED][1] - data[TURNED][0]))
+    n = int(np.isfinite(data["speed"].values).sum())
+    if not n:
+        raise InputError(f"{source(store)}: this run-up has no whole revolution; select another case")
+    return data, per_revolution, n

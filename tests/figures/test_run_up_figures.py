@@ -1,0 +1,128 @@
+"""Figures of run-ups: what a signal of known orders and a known offset becomes in them."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from postproc.figures.bode import bode
+from postproc.figures.centreline import centreline
+from postproc.figures.polar import polar
+from postproc.figures.run_up_marks import critical_speeds
+from postproc.figures.waterfall import waterfall
+from postproc.signals.run_up_spectra import mean_positions, run_up_spectra
+from rubhpc import LumpedStator, Rig, Unbalance
+from rubhpc.errors import InputError
+
+N, TURNS = 32, 60
+
+
+def run_up(**attributes):
+    """1X of 2 um that lags by 30 degrees, 3X of 1 um, and an offset that grows; two probes at 45 degrees."""
+    angle = 2 * math.pi * np.arange(N * TURNS) / N
+    offset = 1e-8 * np.arange(N * TURNS) / N
+    moving = 2e-6 * np.cos(angle - math.pi / 6) + 1e-6 * np.cos(3 * angle)
+    lines = np.stack([np.full(TURNS, 1e-6), np.full(TURNS, 2e-6)], axis=-1)
+    phases = np.full((TURNS, 2), -math.pi / 6)
+    metres = {"units": "m", "long_name": "amplitude of the displacement"}
+    left = (offset + moving) * math.cos(math.pi / 4)
+    return xr.Dataset(
+        {
+            "vertical": ("sample", offset + moving, {"units": "m"}),
+            "horizontal": ("sample", 0.0 * moving, {"units": "m"}),
+            "probe_left": ("sample", left, {"units": "m"}),
+            "probe_right": ("sample", left, {"units": "m"}),
+            "speed": ("revolution", np.linspace(50.0, 150.0, TURNS), {"units": "rad s-1"}),
+            "amplitude_probe_left": (("revolution", "order"), lines, metres),
+            "phase_probe_left": (("revolution", "order"), phases),
+        },
+        coords={
+            "turned": ("sample", np.arange(N * TURNS) / N),
+            "order": [0.5, 1.0],
+            "revolution": np.arange(TURNS),
+        },
+        attrs={
+            "study": {
+                "record": {
+                    "probe": [
+                        {"name": name, "node": 1, "angle": angle, "quantity": "displacement"}
+                        for name, angle in (("left", -math.pi / 4), ("right", math.pi / 4))
+                    ]
+                }
+            }
+        }
+        | attributes,
+    )
+
+
+def test_spectra_have_the_heights_of_the_lines():
+    found = run_up_spectra(run_up(), "vertical", window=8, count=5)
+    assert found.sizes["place"] == 5
+    heights = found["amplitude"].sel(order=[1.0, 2.0, 3.0])
+    assert heights.values[:, 0] == pytest.approx(2e-6, rel=0.02)
+    assert heights.values[:, 1] == pytest.approx(0.0, abs=3e-8)
+    assert heights.values[:, 2] == pytest.approx(1e-6, rel=0.02)
+    rising = found["frequency"].sel(order=1.0).values
+    assert rising == pytest.approx(found["speed"].values / (2 * math.pi))
+
+
+def test_a_waterfall_stacks_them_at_their_speeds():
+    ax = waterfall(run_up(), window=8, count=5).show()
+    assert "2" in [text.get_text().split()[0] for text in ax.texts]  # the bar: 2 um
+    low, high = ax.get_ylim()
+    assert 470 < low < 600
+    assert high > 150 * 30 / math.pi - 60
+    colours = waterfall(run_up(), form="spectrogram", window=8, orders=True).show()
+    assert colours.get_ylim() == (0.0, 4.0)
+
+
+def test_a_polar_plot_turns_the_lag_against_the_rotation_from_the_probe():
+    ax = polar(run_up(), "probe_left").show()
+    curve = ax.get_lines()[np.argmax([line.get_xdata().size == TURNS for line in ax.get_lines()])]
+    place = complex(curve.get_ydata()[0], curve.get_xdata()[0])  # clockwise from straight up
+    assert abs(place) == pytest.approx(2.0)
+    assert math.degrees(np.angle(place)) == pytest.approx(-45 - 30)
+
+
+def test_the_phase_lag_grows_downwards():
+    _, phase = bode(run_up(), "probe_left").show()
+    assert phase.lines[0].get_ydata() == pytest.approx(30.0)
+    assert phase.get_ylim()[0] > phase.get_ylim()[1]
+
+
+def test_a_centreline_is_the_mean_of_each_revolution():
+    alone = mean_positions(run_up(), ["vertical", "horizontal"])
+    expected = 1e-8 * (np.arange(TURNS) + 0.5 * (N - 1) / N)
+    assert alone["vertical"].values == pytest.approx(expected, abs=1e-12)
+    ax = centreline(run_up(), probes=("left", "right")).show()
+    scale = 1e9 if "nm" in ax.get_ylabel() else 1e6
+    assert ax.lines[0].get_ydata() == pytest.approx(expected * scale, rel=1e-6)
+    assert ax.lines[0].get_xdata() == pytest.approx(0.0, abs=1e-9 * scale)
+
+
+def test_critical_speeds_are_those_that_the_unbalance_excites():
+    stator = LumpedStator(node=1, mass=0.1, stiffness=1e5, damping=1.0, radius=0.1)
+    rig = Rig.from_matrices(
+        np.diag([1.0, 1.0]),
+        None,
+        np.diag([1e4, 9e6]),
+        degrees=[(1, "v"), (1, "w")],
+        stators=[stator],
+        unbalance=[Unbalance(node=1, mass=1e-4, radius=0.1)],
+    )
+    cases = run_up(rig=rig.as_dict())
+    assert critical_speeds(cases, 50.0, 150.0) == pytest.approx([100.0])
+    assert critical_speeds(run_up(), 50.0, 150.0) == []
+    top, _ = bode(cases, "probe_left").show()
+    assert any("critical, 955" in text.get_text() for text in top.texts)
+
+
+def test_what_has_no_run_up_is_refused():
+    steady = xr.Dataset(
+        {"vertical": ("sample", np.zeros(8))}, coords={"revolution": ("sample", np.arange(8))}
+    )
+    with pytest.raises(InputError, match=r"no speed changes in it; give a store of a study with \[run_up\]"):
+        waterfall(steady)
+    with pytest.raises(InputError, match="no such signal"):
+        waterfall(run_up(), "vertcal")
