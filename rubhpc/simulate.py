@@ -96,8 +96,8 @@ def simulate(
         Time step in contact (modal; default 1 us; 0.25 us where it takes short steps) or everywhere (central
         difference; default 0.5 us, or 0.9 of the stability limit where that is less).
     accuracy : float
-        Relative accuracy of the modal integrator: how many modes it keeps, and the error of steps where gaps
-        are curved.
+        Relative error of each signal and force, of the modal integrator: by the modes that it leaves out, and
+        by its steps where gaps are curved.
     transient : int, "auto" or "direct"
         Revolutions discarded; "auto" until displacements repeat themselves after 8 or 12 revolutions;
         "direct" until the motion draws near to a stable periodic one that is solved for, on which the record

@@ -109,7 +109,7 @@ class Record(RecordVariables):
     note : str
         What is wrong with the rig at this speed: an unstable rotor.
     advice : str
-        What to change where `modal_error` is above the accuracy asked for.
+        What to do where `modal_error` is above the accuracy asked for.
     signals : dict of (n_sample,) or (n_stator, n_sample)
         Shaft-locked samples over the recorded revolutions, SI units as in `rubhpc.schema`.
     spectra : dict of (n_order,) or (n_stator, n_order)

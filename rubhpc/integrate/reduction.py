@@ -11,7 +11,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
-from rubhpc.integrate.standstill import Modes, at_standstill, cutoff_frequency, parted, seen_degrees
+from rubhpc.integrate.standstill import Modes, at_standstill, parted, seen_degrees
+from rubhpc.integrate.truncation import kept_modes
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.contact_pairs import N_DEGREE, V, W, rim_sense
 
@@ -79,17 +80,18 @@ class ReducedModel:
 def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     """Reduce a model so that contact and outputs are met to the accuracy asked for.
 
-    The basis of each uncoupled part holds its undamped modes at standstill up to a cutoff, and residual
-    attachment modes: the static responses of what lies above to a unit force on each degree that contact or
-    outputs see, or on those together that a probe sees, and to what dampers and cross-coupled springs draw
-    from the modes kept. Gyroscopic and damping terms are then projected. Modes that nothing sees are left
-    out.
+    The basis of each uncoupled part holds its undamped modes at standstill that `truncation.kept_modes`
+    chooses, and residual attachment modes: the static responses of the others to a unit force on each degree
+    that contact or outputs see, or on those together that a probe sees, and to what dampers and cross-coupled
+    springs draw from the modes kept. Gyroscopic and damping terms are then projected. Modes that nothing sees
+    are left out.
 
     Parameters
     ----------
     spin : float, rad/s
     accuracy : float
-        Relative; 1e-3 keeps waveforms to about 1e-4 on the packaged rig.
+        Relative, of each signal and force (`truncation.modal_error`); on the packaged rig 1e-3 keeps
+        waveforms to about 1e-4.
 
     Raises
     ------
@@ -100,11 +102,11 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     mass, damping, stiffness, force = whole_system(model, spin)
     degree, output, carrier = degrees_of(model), output_degrees(model), carrier_degrees(model)
     standstill = at_standstill(model)
-    cutoff = cutoff_frequency(model, spin, accuracy)
-    modes = [parted(part, cutoff) for part in standstill.parts]
+    are_kept = kept_modes(model, spin, accuracy)
+    modes = [parted(part, is_kept) for part, is_kept in zip(standstill.parts, are_kept, strict=True)]
     symmetric, seen = standstill.stiffness, seen_degrees(model)
-    kept = np.hstack([those.low for those in modes])
-    frequency = np.concatenate([those.low_frequency for those in modes])
+    kept = np.hstack([those.kept for those in modes])
+    frequency = np.concatenate([those.kept_frequency for those in modes])
     drawn = np.hstack([0.5 * (damping + damping.T) @ kept, (stiffness - symmetric) @ (kept / frequency)])
     least = LEAST_RESPONSE * np.sqrt(accuracy)
     patterns = model.probe_patterns
@@ -127,26 +129,26 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
 
 
 def _attachment_modes(modes: Modes, seen: Ints, patterns: Floats, drawn: Floats, least: float) -> Floats:
-    """Residual attachment modes: static responses of the modes above the cutoff, (n_all, n_shape).
+    """Residual attachment modes: static responses of the modes not kept, (n_all, n_shape).
 
     They are orthonormal in the mass, and respond to a unit force on each degree seen, to the `patterns`
     (n_all, n_pattern) of forces and to those combinations of the forces `drawn` (n_all, n_force) from modes
     at unit velocity whose strain energy is over `least`^2 of that mode's. Proportional damping draws none: it
     does not couple modes.
     """
-    if not modes.high_frequency.size:
-        return modes.high
-    response = modes.high.T / modes.high_frequency[:, np.newaxis]  # its square is twice the strain energy
+    if not modes.rest_frequency.size:
+        return modes.rest
+    response = modes.rest.T / modes.rest_frequency[:, np.newaxis]  # its square is twice the strain energy
     turn, size, _ = np.linalg.svd(response @ drawn, full_matrices=False)
     shape = (
         np.hstack([response[:, seen], response @ patterns, turn[:, size > least]])
-        / modes.high_frequency[:, np.newaxis]
+        / modes.rest_frequency[:, np.newaxis]
     )
     length = np.linalg.norm(shape, axis=0)
     shape = shape[:, length > 0.0] / length[length > 0.0]
     size, mix = np.linalg.eigh(shape.T @ shape)
     independent = size > 1e-8 * size[-1]
-    mixed: Floats = modes.high @ (shape @ mix[:, independent] / np.sqrt(size[independent]))
+    mixed: Floats = modes.rest @ (shape @ mix[:, independent] / np.sqrt(size[independent]))
     return mixed
 
 

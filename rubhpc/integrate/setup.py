@@ -28,7 +28,7 @@ from rubhpc.integrate.mode_tables import tabulate
 from rubhpc.integrate.packing import Packed, law_of, pack
 from rubhpc.integrate.penalty_mode import Penalty
 from rubhpc.integrate.reduction import ReducedModel, directions, reduce_model
-from rubhpc.integrate.truncation import modal_error, sufficient_accuracy
+from rubhpc.integrate.truncation import MOST_MODES, kept_modes, modal_error, sufficient_accuracy
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.schema import SCHEMES
@@ -131,16 +131,17 @@ class ModalSetup:
     @cached_property
     def modal_error(self) -> float:
         """Estimated error by the modes left out, as a share of each signal and force."""
-        return modal_error(self.model, self.spin, self.accuracy)
+        return modal_error(self.model, self.spin, kept_modes(self.model, self.spin, self.accuracy))
 
     @cached_property
     def modes_missing(self) -> str:
         """What to do where that error is above the accuracy asked for; "" where it is not."""
         if self.modal_error <= self.accuracy:
             return ""
-        fix = sufficient_accuracy(self.model, self.spin, self.accuracy)
+        fix = sufficient_accuracy(self.model, self.spin)
         return (
-            f"the modes left out may change it by {100 * self.modal_error:.2g} %; take accuracy = {fix:.0e}"
+            f"it needs more than {MOST_MODES} modes: those left out may change it by "
+            f"{100 * self.modal_error:.2g} %; accuracy = {fix:.0e} keeps all"
         )
 
     @cached_property

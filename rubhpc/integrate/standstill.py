@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 # Modes up to this multiple of the contact frequency (or the spin, where that is higher), times
 # (1e-3 / accuracy)^(1/4): modes above are kept as static shapes, whose error goes with the fourth
@@ -29,7 +30,7 @@ FREE = 1e-12  # square of a frequency over the greatest, below which a mode is f
 
 
 def cutoff_frequency(model: Model, spin: float, accuracy: float) -> float:
-    """Frequency, rad/s, up to which modes are kept, and up to which probes see what the full model shows.
+    """Frequency, rad/s, up to which all modes are kept, and up to which probes show what the full model does.
 
     Ten times the contact frequency (the rotor's inertia on the stator's static stiffness), or the spin where
     that is higher, times `(1e-3 / accuracy)^(1/4)`; infinite for rigid walls.
@@ -116,16 +117,25 @@ def _contact_frequency(parts: list[Part], degree: Ints, model: Model) -> float:
 class Modes(NamedTuple):
     """Undamped modes of a part, orthonormal in the mass."""
 
-    low: Floats  # (n_all, n_low), kept
-    low_frequency: Floats  # (n_low,), rad/s
-    high: Floats  # (n_all, n_high), which only static shapes represent
-    high_frequency: Floats  # (n_high,), rad/s
+    kept: Floats  # (n_all, n_kept)
+    kept_frequency: Floats  # (n_kept,), rad/s
+    rest: Floats  # (n_all, n_rest), which only static shapes represent
+    rest_frequency: Floats  # (n_rest,), rad/s
 
 
-def parted(part: Part, cutoff: float) -> Modes:
-    """Modes up to a cutoff, rad/s, and beyond; all are kept where modes and shapes would be as many."""
-    n_seen, mode, frequency = part
-    n_low = max(int(np.count_nonzero(frequency <= cutoff)), min(FEWEST_MODES, frequency.size))
-    if n_low + n_seen >= frequency.size:
-        n_low = frequency.size
-    return Modes(mode[:, :n_low], frequency[:n_low], mode[:, n_low:], frequency[n_low:])
+def parted(part: Part, is_kept: Bools) -> Modes:
+    """Modes kept (n,), and the others."""
+    order, n_kept = np.argsort(~is_kept, kind="stable"), np.count_nonzero(is_kept)
+    mode, frequency = part.mode.take(order, axis=1), part.frequency[order]
+    return Modes(mode[:, :n_kept], frequency[:n_kept], mode[:, n_kept:], frequency[n_kept:])
+
+
+def modes_below(part: Part, cutoff: float) -> Bools:
+    """Which modes (n,) are kept for a cutoff, rad/s."""
+    return completed(part, part.frequency <= cutoff)
+
+
+def completed(part: Part, is_kept: Bools) -> Bools:
+    """Modes kept (n,), two at least, and all of them where modes and shapes would be as many."""
+    is_kept = is_kept | (np.arange(is_kept.size) < FEWEST_MODES)
+    return is_kept | (np.count_nonzero(is_kept) + part.n_seen >= is_kept.size)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.input.reading import plain
 from rubhpc.rig.reading import with_keys
-from rubhpc.rig.stators import has_bent_stator
 from rubhpc.study import contact_axes, initial
 from rubhpc.study.axes import FROM_REST, RUN_UP_PREFIX, RUN_UP_TIME
 
@@ -15,10 +14,9 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before
-RING_PHYSICS = 8  # that of several stators in short steps, of either scheme
-CLOSED_FORM_PHYSICS = 7  # that of motion from event to event
-AUTO_PHYSICS = 10  # that of transients that end where the motion has settled
-CURVED_PHYSICS = 11  # that of curved gaps from event to event; the next version of all is 12
+RING_PHYSICS = 8  # that of several stators by the central difference
+AUTO_PHYSICS = 10  # that of transients that end where the motion has settled, by the central difference
+MODAL_PHYSICS = 12  # that of the modal scheme; the next version of all is 13
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
@@ -27,25 +25,13 @@ _AXIS = "axis"  # in place of a value that every case sets
 
 def physics_of(study: Study) -> int:
     """Version of the physics with which a study is computed."""
+    if study.integrator.method == "modal":
+        return max(PHYSICS, MODAL_PHYSICS)
     if study.recording.is_transient_auto:
         return max(PHYSICS, AUTO_PHYSICS)
-    contact = study.contact
-    is_modal = study.integrator.method == "modal"
-    if is_modal and contact.is_smooth and (has_updated_normal(study) or has_bent_stator(study.rig.stator)):
-        return max(PHYSICS, CURVED_PHYSICS)
-    if is_modal and contact.closed_form == "always":
-        return max(PHYSICS, CLOSED_FORM_PHYSICS)
     if len(study.rig.stator) > 1:
         return max(PHYSICS, RING_PHYSICS)
     return PHYSICS
-
-
-def has_updated_normal(study: Study) -> bool:
-    """Whether the normal of a case follows the line of centres."""
-    name = f"{contact_axes.PREFIX}normal"
-    words = contact_axes.choices_of(name)
-    normals = {words[int(value)] for axis in study.axes if axis.name == name for value in axis.values}
-    return "updated" in (normals or {study.contact.normal})
 
 
 def identity_parts(study: Study) -> dict[str, Any]:

@@ -158,8 +158,8 @@ class Integrator:
     """Scheme, time step and accuracy.
 
     Without a step the modal scheme takes 1 us in contact (0.25 us where it takes short steps), the central
-    difference 0.5 us, or 0.9 of the stability limit where that is less. The accuracy (relative) sets how many
-    modes the modal scheme keeps, and the error of its steps where gaps are curved.
+    difference 0.5 us, or 0.9 of the stability limit where that is less. The accuracy is the relative error of
+    each signal and force by modes that the modal scheme leaves out, and by its steps where gaps are curved.
     """
 
     method: str = choice(
@@ -177,7 +177,7 @@ class Integrator:
     )
     accuracy: float = quantity(
         "",
-        doc="Relative accuracy: how many modes the modal scheme keeps, its error where gaps are curved.",
+        doc="Relative error of signals and forces, modal: by modes left out, by steps where gaps are curved.",
         example="1e-3",
         default=1e-3,
         above=0,

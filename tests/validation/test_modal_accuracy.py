@@ -7,6 +7,7 @@ enough to leave it if it were not its own orbit.
 
 import numpy as np
 import pytest
+from random_rigs import found_error, random_rig
 
 from rubhpc import simulate
 
@@ -92,3 +93,14 @@ def test_chaotic_motion_has_the_same_statistics():
     # The counts of 400 revolutions scatter by 3 %.
     assert found.contacts_per_revolution == pytest.approx(known.contacts_per_revolution, rel=0.1)
     assert found.peak_contact_force == pytest.approx(known.peak_contact_force, rel=0.2)  # of a longer run
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(60))
+def test_random_rigs_are_as_accurate_as_asked(seed):
+    """Beams and masses anywhere along the shaft, against all modes."""
+    rig, case = random_rig(seed)
+    case = case | {"transient": 0, "revolutions": 4}
+    record, exact = simulate(rig, **case), simulate(rig, **case, accuracy=1e-15)
+    if np.any(exact.contact_impulse > 0.0):
+        assert found_error(record, exact) < 1e-3
