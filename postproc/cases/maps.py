@@ -26,7 +26,7 @@ MOST_FACETS, MOST_PANELS = 2, 6
 VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
     "minimum_slip_speed": (1, "slip", lambda slip: slip < 0),
     "force_over_euler_load": (2, "Euler load", lambda ratio: ratio > 1),
-    "foreshortening_ratio": (4, "bending", lambda ratio: ratio > 0.3),
+    "foreshortening_ratio": (4, "bending", lambda ratio: ratio > 0.1),
     "tip_deflection_ratio": (4, "bending", lambda ratio: ratio > 0.1),
 }
 

@@ -25,7 +25,7 @@ _NOTABLE_RESIDUAL = 0.01  # of the energy that goes through a case
 _LIMITS = {
     "minimum_slip_speed": "below 0: the rim slips backwards, which contradicts steady sliding",
     "force_over_euler_load": "above 1: the stator would buckle",
-    "foreshortening_ratio": "above 0.3: forces are too large by a tenth; count how the stator bends",
+    "foreshortening_ratio": "above 0.1: forces are too large by a tenth and more; count how the stator bends",
     "tip_deflection_ratio": "above 0.1: the stator is no longer a linear beam",
 }
 

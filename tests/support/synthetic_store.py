@@ -104,7 +104,7 @@ def _scalar(name: str, speed: np.ndarray, clearance: np.ndarray, shape: tuple[in
         "minimum_slip_speed": full + np.where(speed > 1.4, -0.5, 4.0),
         "force_over_euler_load": full + np.where(speed > 1.6, 1.2, 0.2),
         "tip_deflection_ratio": full + 0.02,
-        "foreshortening_ratio": full + 0.1,
+        "foreshortening_ratio": full + 0.05,
         "peak_to_peak_vertical": full + 2.1e-4,
         "peak_to_peak_horizontal": full + 2e-4,
         "peak_torsion": full + 0.3 * TORSION_PEAK,
