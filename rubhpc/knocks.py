@@ -2,103 +2,21 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fem.assemble import assemble
-from rubhpc.fem.response import check_response_node, first_lateral_frequency
-from rubhpc.integrate.case import run_case
-from rubhpc.integrate.setup import prepare
-from rubhpc.schema import DONE, REGIME
-from rubhpc.study.cases import CaseGrid
-from rubhpc.study.initial import CONTACT_FREE, Initial
+from rubhpc.knock_cases import LeastKnock, Progress, Search, search_cases
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from pathlib import Path
 
     import xarray as xr
 
-    from rubhpc.study.cases import Case
     from rubhpc.study.study import Study
-
-_RATIO = 1.25  # of one impulse tried to the one before
-_LOW, _HIGH = 0.02, 10.0  # first and last impulse tried, over mass x first frequency x clearance
-
-
-class Direction(NamedTuple):
-    """Where a knock acts: angle from straight up, rad, and node, or None for the output node."""
-
-    angle: float
-    node: int | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Found:
-    """The least knock.
-
-    Attributes
-    ----------
-    impulse : float
-        The smallest that leads to rub, N s; NaN where none does.
-    harmless : float
-        The largest below it of which no direction leads to rub, as far as it was tried, N s.
-    direction : Direction or None
-        Of the smallest.
-    n_tried : int
-        Knocks computed.
-    """
-
-    impulse: float
-    harmless: float
-    direction: Direction | None
-    n_tried: int
-
-
-def find_least(
-    leads_to_rub: Callable[[float, Direction], bool],
-    directions: Sequence[Direction],
-    low: float,
-    high: float,
-    tolerance: float,
-) -> Found:
-    """Return the least impulse that leads to rub in any of some directions.
-
-    Each impulse tried is a quarter larger than the one before, so that a narrower range of them that leads
-    to rub may be passed over. The step to the first that does is then bisected, in the directions that did.
-
-    Parameters
-    ----------
-    leads_to_rub : callable
-        Of impulse, N s, and direction.
-    low, high : float, N s
-        First and last impulse.
-    tolerance : float
-        Relative width of the interval that is left.
-    """
-    n_tried, harmless, impulse = 0, 0.0, low
-    while True:
-        rubbing = [d for d in directions if leads_to_rub(impulse, d)]
-        n_tried += len(directions)
-        if rubbing:
-            break
-        harmless = impulse
-        if impulse >= high:
-            return Found(impulse=math.nan, harmless=harmless, direction=None, n_tried=n_tried)
-        impulse = min(impulse * _RATIO, high)
-    while impulse - harmless > tolerance * impulse:
-        middle = 0.5 * (impulse + harmless)
-        nearer = [d for d in rubbing if leads_to_rub(middle, d)]
-        n_tried += len(rubbing)
-        if nearer:
-            impulse, rubbing = middle, nearer
-        else:
-            harmless = middle
-    return Found(impulse=impulse, harmless=harmless, direction=rubbing[0], n_tried=n_tried)
 
 
 @on_one_thread
@@ -109,6 +27,8 @@ def least_knock(
     nodes: Sequence[int] = (),
     most: float | None = None,
     tolerance: float = 0.02,
+    workers: int = 1,
+    progress: Path | None = None,
     report: Callable[[int, int], None] = lambda done, n_case: None,
 ) -> xr.Dataset:
     """Return the least knock of every case of a study, over its axes.
@@ -128,6 +48,10 @@ def least_knock(
         Largest impulse tried; by default ten times mass x first lateral frequency x clearance.
     tolerance : float
         Relative width of the interval in which the least impulse is found.
+    workers : int
+        Processes that share the cases; the result is the same for any number.
+    progress : Path, optional
+        A file that keeps the results of cases that are done; with it an interrupted search goes on.
     report : callable
         Called with the number of cases that are done, and of all.
 
@@ -148,30 +72,22 @@ def least_knock(
 
     if starts := [axis.name for axis in study.axes if axis.is_initial_key]:
         raise InputError(f"[grid] {starts[0]}: the knock itself is searched for; remove this axis")
+    if workers < 1:
+        raise InputError(f"workers {workers}: give 1 or more")
     if angles < 1 or not 0.0 < tolerance < 1.0 or (most is not None and not most > 0.0):
         raise InputError(f"angles {angles}, tolerance {tolerance:g}, most {most}: give numbers above 0")
-    grid = CaseGrid(replace(study, initial=Initial(), refine=None))
-    directions = [
-        Direction(2 * math.pi * i / angles, node) for node in (nodes or (None,)) for i in range(angles)
-    ]
-    names = ("least_impulse", "harmless_impulse", "worst_angle")
-    found = {name: np.full(grid.shape, np.nan) for name in names}
-    numbers = {name: np.zeros(grid.shape, np.int64) for name in ("worst_node", "knocks")}
-    is_free = np.zeros(grid.shape, bool)
-    for done, index in enumerate(np.ndindex(grid.shape)):
+    search = Search(study=study, angles=angles, nodes=tuple(nodes), most=most, tolerance=tolerance)
+    grid, kept = search.grid, Progress(progress)
+    keys = {index: search.key(index) for index in np.ndindex(grid.shape)}
+    left = [index for index, key in keys.items() if key not in kept.found]
+    report(grid.n_case - len(left), grid.n_case)
+    for done, (index, one) in enumerate(search_cases(search, left, workers), grid.n_case - len(left) + 1):
+        kept.enter(keys[index], one)
         report(done, grid.n_case)
-        knocks = _Knocks(study, grid.case(index), nodes)
-        is_free[index] = knocks.has_contact_free_motion()
-        if not is_free[index]:
-            continue
-        high = most if most is not None else _HIGH * knocks.scale
-        one = find_least(knocks, directions, min(_LOW * knocks.scale, high), high, tolerance)
-        found["least_impulse"][index], found["harmless_impulse"][index] = one.impulse, one.harmless
-        numbers["knocks"][index] = one.n_tried
-        if one.direction is not None:
-            found["worst_angle"][index] = one.direction.angle
-            numbers["worst_node"][index] = one.direction.node or 0
-    report(grid.n_case, grid.n_case)
+    columns = {
+        name: np.array([getattr(kept.found[key], name) for key in keys.values()]).reshape(grid.shape)
+        for name in LeastKnock.__annotations__
+    }
     about = {
         "least_impulse": ("N s", "least impulse that leads to rub"),
         "harmless_impulse": ("N s", "largest impulse below it that did not"),
@@ -183,7 +99,6 @@ def least_knock(
         "knocks": ("1", "knocks computed"),
         "has_contact_free_motion": ("1", "whether the machine can run free of contact"),
     }
-    columns = found | numbers | {"has_contact_free_motion": is_free}
     return xr.Dataset(
         {
             name: (grid.dims, values, {"units": about[name][0], "long_name": about[name][1]})
@@ -199,45 +114,3 @@ def least_knock(
         },
         attrs={"title": study.title},
     )
-
-
-class _Knocks:
-    """Knocks on one case; as a function of impulse and direction, whether one leads to rub."""
-
-    def __init__(self, study: Study, case: Case, nodes: Sequence[int]) -> None:
-        self._study, self._case = study, case
-        model = assemble(case.rig)
-        for node in nodes:
-            check_response_node(model, node, "node")
-        self._setup = prepare(
-            case.rig,
-            case.speed,
-            contact=case.contact,
-            integrator=study.integrator,
-            samples_per_revolution=study.recording.samples_per_revolution,
-            model=model,
-        )
-        is_vertical = np.array([name == "v" for _, name in model.rotor.degrees])
-        mass = float(model.rotor.mass[np.ix_(is_vertical, is_vertical)].sum())
-        self.scale = mass * first_lateral_frequency(model) * case.clearance
-
-    def has_contact_free_motion(self) -> bool:
-        """Whether the case stays free of contact without a knock."""
-        return not self(0.0, Direction(0.0, None))
-
-    def __call__(self, impulse: float, direction: Direction) -> bool:
-        """Whether a knock leads to rub: contact in the recorded revolutions."""
-        initial = Initial(
-            from_=CONTACT_FREE,
-            impulse=impulse,
-            impulse_angle=direction.angle,
-            impulse_node=direction.node,
-        )
-        record = run_case(
-            self._setup,
-            clearance=self._case.clearance,
-            friction=self._case.friction,
-            recording=replace(self._study.recording, keep=()),
-            initial=initial,
-        )
-        return record.status != DONE or record.measures["regime"] != REGIME.index("no_contact")

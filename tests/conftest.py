@@ -38,6 +38,7 @@ SLOW = (
     "integrate/test_event_driven_march.py::test_shorter_kernel_calls_change_nothing_but_rounding",
     "integrate/test_initial_state.py",
     "integrate/test_knocks.py::test_a_machine_without_a_contact_free_motion_and_its_figure",
+    "integrate/test_knocks.py::test_processes_change_nothing",
     "integrate/test_knocks.py::test_every_smaller_knock_of_a_grid_is_harmless",
     "integrate/test_periodic.py::test_failure_says_why",
     "integrate/test_periodic.py::test_motion_beside_it_draws_near_by_the_largest_multiplier",

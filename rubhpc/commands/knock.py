@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from rubhpc.commands.quantity import quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_GAP = 10.0  # s between lines that report the progress
 
 
 @click.command()
@@ -23,6 +30,9 @@ from rubhpc.commands.quantity import quantity
     show_default=True,
     help="Relative width of the interval of the least impulse.",
 )
+@click.option(
+    "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes of this machine."
+)
 @click.option("--figure", metavar="FILE", help=".png, .pdf or .svg [default: STUDY_knock.png here]")
 @click.option("--data", metavar="FILE", help="Write the data too: .csv, .json, .zarr or .nc.")
 @click.option(
@@ -34,6 +44,7 @@ def knock(
     nodes: tuple[int, ...],
     most: str | None,
     tolerance: float,
+    workers: int,
     figure: str | None,
     data: str | None,
     trust_rig: bool,
@@ -41,7 +52,8 @@ def knock(
     """Find the least knock that takes a machine from its contact-free motion to a rub that stays.
 
     For every case of STUDY.toml: the smallest impulse over all directions and nodes tried. A figure shows it
-    over the speed, the resilience curve of the machine. No store is made.
+    over the speed, the resilience curve of the machine. No store is made; cases that are done are kept in
+    a file beside the figure until it is drawn, so that the same command resumes an interrupted search.
     """
     from postproc.figures.resilience_curve import resilience
     from postproc.figures.style import check_figure_path
@@ -50,6 +62,7 @@ def knock(
     from rubhpc.study.study import read_study
 
     path = check_figure_path(figure or f"{study.stem}_knock.png")
+    progress = path.with_name(f".{path.stem}.progress")
     data_path = check_data_path(data) if data else None
     found = least_knock(
         read_study(study, trust_rig=trust_rig),
@@ -57,6 +70,9 @@ def knock(
         nodes=nodes,
         most=None if most is None else quantity(most, "N*s", "--most"),
         tolerance=tolerance,
+        workers=workers,
+        progress=progress,
+        report=_report(),
     )
     drawing = resilience(found)
     for line in drawing.lines:
@@ -64,4 +80,18 @@ def knock(
     click.echo(str(drawing.save(path)))
     if data_path is not None:
         click.echo(str(write_data(drawing.shown, data_path)))
+    progress.unlink(missing_ok=True)
     return 0
+
+
+def _report() -> Callable[[int, int], None]:
+    """Print how many cases are there, at first and then every few seconds."""
+    printed: list[float] = []
+
+    def report(n_done: int, n_case: int) -> None:
+        if not printed or time.monotonic() > printed[-1] + _GAP:
+            rest = "; searching the rest" if not printed else ""
+            click.echo(f"{n_done}/{n_case} cases are there{rest}")
+            printed.append(time.monotonic())
+
+    return report

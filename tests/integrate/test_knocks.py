@@ -9,7 +9,9 @@ import pytest
 
 from postproc.figures.resilience_curve import resilience
 from rubhpc.errors import InputError
-from rubhpc.knocks import Direction, find_least, least_knock
+from rubhpc.knock_cases import LeastKnock, Progress
+from rubhpc.knock_search import Direction, find_least
+from rubhpc.knocks import least_knock
 from rubhpc.simulate import simulate
 from rubhpc.study.study import read_study
 
@@ -96,11 +98,58 @@ def test_a_machine_without_a_contact_free_motion_and_its_figure(tmp_path):
     assert drawing.save(tmp_path / "curve.png").exists()
 
 
+def test_results_are_kept_and_a_torn_line_is_none(tmp_path):
+    path = tmp_path / "progress"
+    one, two = LeastKnock(least_impulse=0.1 + 1e-17, knocks=7, has_contact_free_motion=True), LeastKnock()
+    Progress(path).enter("a", one)
+    Progress(path).enter("b", two)
+    with path.open("a") as file:
+        file.write('{"key": "c", "least_imp')
+    again = Progress(path)
+    assert list(again.found) == ["a", "b"]
+    assert repr(again.found["a"]) == repr(one)
+    assert math.isnan(again.found["b"].least_impulse)
+    again.enter("c", one)
+    assert list(Progress(path).found) == ["a", "b", "c"]
+
+
+def test_an_interrupted_search_goes_on(tmp_path):
+    """Cases that are done are not computed again, and the result is that of one go."""
+    study = study_of(tmp_path, "[1.0, 1.05, 1.1]", "")  # without contact-free motion: one knock each
+    options = {"angles": 1, "tolerance": 0.2}
+    done: list[int] = []
+
+    def stop_after_one(n_done, _):
+        done.append(n_done)
+        if n_done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        least_knock(study, **options, progress=tmp_path / "kept", report=stop_after_one)
+    done.clear()
+    found = least_knock(study, **options, progress=tmp_path / "kept", report=lambda n, _: done.append(n))
+    assert done == [1, 2, 3]
+    assert found.identical(least_knock(study, **options))
+    least_knock(
+        study, angles=2, tolerance=0.2, progress=tmp_path / "kept", report=lambda n, _: done.append(n)
+    )
+    assert done[3:] == [0, 1, 2, 3]  # another search
+
+
+def test_processes_change_nothing(tmp_path):
+    study = study_of(tmp_path, "[1.05, 1.1]")
+    alone = least_knock(study, angles=1)
+    assert least_knock(study, angles=1, workers=2, progress=tmp_path / "kept").identical(alone)
+    assert len(Progress(tmp_path / "kept").found) == 2
+
+
 def test_what_cannot_be_is_refused(tmp_path):
     study = study_of(tmp_path, rest='"initial.impulse" = [0.0, 0.1]')
     with pytest.raises(InputError, match="the knock itself is searched for"):
         least_knock(study)
     with pytest.raises(InputError, match="99 does not move sideways"):
         least_knock(study_of(tmp_path), nodes=[99])
+    with pytest.raises(InputError, match="workers 0"):
+        least_knock(study_of(tmp_path), workers=0)
     with pytest.raises(InputError, match="give numbers above 0"):
         least_knock(study_of(tmp_path), angles=0)

@@ -1,0 +1,215 @@
+"""Least knocks of the cases of a study: one by one, on several processes, and resumed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.response import check_response_node, first_lateral_frequency
+from rubhpc.integrate.case import compile_kernels, run_case
+from rubhpc.integrate.setup import prepare
+from rubhpc.knock_search import Direction, find_least
+from rubhpc.schema import DONE, REGIME
+from rubhpc.study.cases import CaseGrid
+from rubhpc.study.initial import CONTACT_FREE, Initial
+from rubhpc.threads import on_one_thread
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from rubhpc.study.cases import Case
+    from rubhpc.study.study import Study
+
+    Index = tuple[int, ...]
+
+_LOW, _HIGH = 0.02, 10.0  # first and last impulse tried, over mass x first frequency x clearance
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeastKnock:
+    """What is found of one case, SI units; NaN and node 0 (the output node) where no knock leads to rub."""
+
+    least_impulse: float = math.nan
+    harmless_impulse: float = math.nan
+    worst_angle: float = math.nan
+    worst_node: int = 0
+    knocks: int = 0
+    has_contact_free_motion: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """How the cases of a study are searched; see `rubhpc.knocks.least_knock`."""
+
+    study: Study
+    angles: int
+    nodes: tuple[int, ...]
+    most: float | None
+    tolerance: float
+
+    @cached_property
+    def grid(self) -> CaseGrid:
+        """The cases, whose own starts are left out."""
+        return CaseGrid(replace(self.study, initial=Initial(), refine=None))
+
+    def key(self, index: Index) -> str:
+        """What identifies the result of a case: the case, and how it is searched."""
+        how = (self.grid.case(index).id, self.angles, self.nodes, self.most, self.tolerance)
+        return hashlib.sha256(repr(how).encode()).hexdigest()[:32]
+
+    def of_case(self, index: Index) -> LeastKnock:
+        """Search one case."""
+        knocks = _Knocks(self.study, self.grid.case(index), self.nodes)
+        if not knocks.has_contact_free_motion():
+            return LeastKnock()
+        directions = [
+            Direction(2 * math.pi * i / self.angles, node)
+            for node in (self.nodes or (None,))
+            for i in range(self.angles)
+        ]
+        high = self.most if self.most is not None else _HIGH * knocks.scale
+        found = find_least(knocks, directions, min(_LOW * knocks.scale, high), high, self.tolerance)
+        worst = found.direction
+        return LeastKnock(
+            least_impulse=found.impulse,
+            harmless_impulse=found.harmless,
+            worst_angle=math.nan if worst is None else worst.angle,
+            worst_node=0 if worst is None else worst.node or 0,
+            knocks=found.n_tried,
+            has_contact_free_motion=True,
+        )
+
+    def compile(self) -> None:
+        """Compile what the search calls: processes that do so at the same time disturb one another."""
+        _Knocks(self.study, self.grid.case((0,) * len(self.grid.shape)), self.nodes).compile()
+
+
+class Progress:
+    """Results of cases as lines of a file, from which an interrupted search goes on.
+
+    Parameters
+    ----------
+    path : Path or None
+        None keeps nothing.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        self.found: dict[str, LeastKnock] = {}
+        if path is None or not path.exists():
+            return
+        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+            try:  # the last line of a search that was killed may be a part of one
+                entry = json.loads(line)
+                key = entry.pop("key")
+                self.found[key] = LeastKnock(**entry)
+            except (ValueError, TypeError, KeyError, AttributeError):
+                continue
+
+    def enter(self, key: str, found: LeastKnock) -> None:
+        """Keep a result."""
+        self.found[key] = found
+        if self._path is None:
+            return
+        try:
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(f"\n{json.dumps({'key': key} | asdict(found))}\n")
+        except OSError as error:
+            raise InputError(
+                f"{self._path}: cannot be written ({error.strerror}); choose another place"
+            ) from None
+
+
+def search_cases(
+    search: Search, indices: Sequence[Index], workers: int
+) -> Iterator[tuple[Index, LeastKnock]]:
+    """Yield the result of each case, on as many processes, in the order in which they end."""
+    if workers == 1 or len(indices) < 2:
+        for index in indices:
+            yield index, search.of_case(index)
+        return
+    search.compile()
+    spawn = multiprocessing.get_context("spawn")
+    sent = replace(search)  # without its grid, which every process makes for itself
+    with ProcessPoolExecutor(min(workers, len(indices)), spawn, _take, (sent,)) as pool:
+        try:
+            under_way = {pool.submit(_of_case, index): index for index in indices}
+            for ended in as_completed(under_way):
+                yield under_way[ended], ended.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+_taken: list[Search] = []  # of a worker process
+
+
+def _take(search: Search) -> None:
+    _taken[:] = [search]
+
+
+@on_one_thread
+def _of_case(index: Index) -> LeastKnock:
+    return _taken[0].of_case(index)
+
+
+class _Knocks:
+    """Knocks on one case; as a function of impulse and direction, whether one leads to rub."""
+
+    def __init__(self, study: Study, case: Case, nodes: Sequence[int]) -> None:
+        self._study, self._case = study, case
+        model = assemble(case.rig)
+        for node in nodes:
+            check_response_node(model, node, "node")
+        self._setup = prepare(
+            case.rig,
+            case.speed,
+            contact=case.contact,
+            integrator=study.integrator,
+            samples_per_revolution=study.recording.samples_per_revolution,
+            model=model,
+        )
+        is_vertical = np.array([name == "v" for _, name in model.rotor.degrees])
+        mass = float(model.rotor.mass[np.ix_(is_vertical, is_vertical)].sum())
+        self.scale = mass * first_lateral_frequency(model) * case.clearance
+
+    def compile(self) -> None:
+        """Compile what a knock calls."""
+        compile_kernels(
+            self._setup,
+            clearance=self._case.clearance,
+            friction=self._case.friction,
+            recording=replace(self._study.recording, keep=()),
+        )
+
+    def has_contact_free_motion(self) -> bool:
+        """Whether the case stays free of contact without a knock."""
+        return not self(0.0, Direction(0.0, None))
+
+    def __call__(self, impulse: float, direction: Direction) -> bool:
+        """Whether a knock leads to rub: contact in the recorded revolutions."""
+        initial = Initial(
+            from_=CONTACT_FREE,
+            impulse=impulse,
+            impulse_angle=direction.angle,
+            impulse_node=direction.node,
+        )
+        record = run_case(
+            self._setup,
+            clearance=self._case.clearance,
+            friction=self._case.friction,
+            recording=replace(self._study.recording, keep=()),
+            initial=initial,
+        )
+        return record.status != DONE or record.measures["regime"] != REGIME.index("no_contact")
