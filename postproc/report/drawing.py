@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from html import escape
 
 LEAST = 2.5  # px: a thing that is thinner would not be seen
+SPRING = 16.0  # px: length of a spring
+BAND = 7.0  # px: thickness of a carrier, whose shape nobody knows
 FOOT = 40.0  # px below a drawing, for its bar
 
 
@@ -33,6 +35,13 @@ def wall(left: float, right: float, y: float, side: int) -> str:
         f"M{x:.1f},{y:.1f}l5,{side * 6}" for x in (left + i * (right - left - 5) / 4 for i in range(5))
     )
     return f'<path class="wall" d="M{left:.1f},{y:.1f}H{right:.1f}{ticks}"/>'
+
+
+def spring(x: float, y: float, side: int) -> str:
+    """Return a spring to a wall; `side` is -1 where the wall lies above."""
+    turns = "".join(f"l{8 * (-1) ** i},{side * 3}" for i in range(3))
+    path = f"M{x:.1f},{y:.1f}v{side * 2}l-4,{side * 1.5:.1f}{turns}l-4,{side * 1.5:.1f}v{side * 2}"
+    return f'<path class="spring" d="{path}"/>' + wall(x - 12, x + 12, y + side * SPRING, side)
 
 
 def scale_bar(frame: Frame, left: float, y: float) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from postproc.report.drawing import FOOT, LEAST, Frame, line, scale_bar, svg, wall
+from postproc.report.drawing import BAND, FOOT, LEAST, SPRING, Frame, line, scale_bar, spring, svg, wall
 from rubhpc.rig.rotors import Rotor
 from rubhpc.rig.stators import LumpedStator, Stator
 
@@ -31,8 +31,9 @@ def end_view(rig: Rig) -> str:
     left, right = min(z for z, _ in corners), max(z for z, _ in corners)
     low, high = min(y for _, y in corners), max(y for _, y in corners)
     scale = min((_WIDTH - 2 * _MARGIN) / (right - left), (_HEIGHT - 30) / (high - low))
-    frame = Frame(scale, (_WIDTH - scale * (right + left)) / 2, 23 + scale * high)
-    bottom = frame.y(low) + 14
+    room = BAND + SPRING if rig.carrier else 0.0
+    frame = Frame(scale, (_WIDTH - scale * (right + left)) / 2, 23 + room + scale * high)
+    bottom = frame.y(low) + 14 + room
     parts = [
         f'<circle class="disc" cx="{frame.x0:.1f}" cy="{frame.y0:.1f}" r="{scale * rim:.1f}"/>',
         line(frame.x(-rim) - 10, frame.y0, frame.x(rim) + 10, frame.y0, "axis"),
@@ -41,11 +42,20 @@ def end_view(rig: Rig) -> str:
     if isinstance(rig.rotor, Rotor):
         shaft = max(scale * max(s.outer_diameter for s in rig.rotor.shaft) / 2, 2)
         parts.append(f'<circle class="shaft" cx="{frame.x0:.1f}" cy="{frame.y0:.1f}" r="{shaft:.1f}"/>')
+    for carrier in rig.carrier:
+        carried = [
+            (s.angle, math.hypot(*far))
+            for s, (_, far) in zip(around, places, strict=True)
+            if s.carrier == carrier.name
+        ]
+        parts += _carrier(frame, carried)
     parts += [_stator(frame, s, *place) for s, place in zip(around, places, strict=True)]
     parts.append(_spin(frame, 0.55 * scale * rim))
     parts.append(scale_bar(frame, frame.x(left), bottom + 18))
     angles = ", ".join(f"{math.degrees(s.angle):.4g}°" for s in around)
     title = f"Along the shaft, to scale: stators at {angles} from straight up; positive spin is clockwise"
+    if rig.carrier:
+        title += f"; carriers, not to scale: {', '.join(carrier.name for carrier in rig.carrier)}"
     return svg(_WIDTH, bottom + FOOT, parts, title)
 
 
@@ -69,9 +79,37 @@ def _stator(frame: Frame, stator: AnyStator, tip: Point, root: Point) -> str:
     is_wall = isinstance(stator, LumpedStator) and stator.rigid
     kind = "stator" if height else "stator lumped"
     box = f'<rect class="{kind}" x="{-half:.1f}" y="{-deep:.1f}" width="{2 * half:.1f}" height="{deep:.1f}"/>'
-    body = wall(-12, 12, 0.0, -1) if is_wall else box + wall(-12, 12, -deep, -1)
+    foot = wall(-12, 12, -deep, -1) if stator.carrier is None else ""
+    body = wall(-12, 12, 0.0, -1) if is_wall else box + foot
     place = f"translate({frame.x(tip[0]):.1f} {frame.y(tip[1]):.1f}) rotate({math.degrees(stator.angle):.2f})"
     return f'<g transform="{place}">{body}</g>'
+
+
+def _carrier(frame: Frame, carried: list[tuple[float, float]]) -> list[str]:
+    """Return a band behind stators, of which angle and distance of the root (m) are given, and its spring.
+
+    It runs around the shaft but for the widest gap between two of them, above a third of a turn.
+    """
+    if not carried:
+        return []
+    angles = sorted(angle % math.tau for angle, _ in carried)
+    radius = frame.scale * max(far for _, far in carried) + BAND / 2
+    gaps = [(b - a, b) for a, b in zip(angles, [*angles[1:], angles[0] + math.tau], strict=True)]
+    gap, first = max(gaps)
+    if gap <= math.tau / 3:
+        at = math.pi
+        band = f'<circle class="carrier" cx="{frame.x0:.1f}" cy="{frame.y0:.1f}" r="{radius:.1f}"/>'
+    else:
+        ends = first - 0.15, first + math.tau - gap + 0.15
+        at = sum(ends) / 2
+        (x1, y1), (x2, y2) = [
+            (frame.x0 + radius * math.sin(a), frame.y0 - radius * math.cos(a)) for a in ends
+        ]
+        is_long = int(ends[1] - ends[0] > math.pi)
+        arc = f"M{x1:.1f},{y1:.1f}A{radius:.1f},{radius:.1f} 0 {is_long} 1 {x2:.1f},{y2:.1f}"
+        band = f'<path class="carrier" d="{arc}"/>'
+    place = f"translate({frame.x0:.1f} {frame.y0:.1f}) rotate({math.degrees(at):.2f})"
+    return [band, f'<g class="support" transform="{place}">{spring(0.0, -radius - BAND / 2, -1)}</g>']
 
 
 def _spin(frame: Frame, radius: float) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from postproc.report.drawing import FOOT, LEAST, Frame, line, rect, scale_bar, svg, wall
+from postproc.report.drawing import BAND, FOOT, LEAST, SPRING, Frame, line, rect, scale_bar, spring, svg, wall
 from postproc.report.end_view import depth, tip_and_root
 from rubhpc.rig.rotors import Rotor
 from rubhpc.rig.stators import Stator
@@ -27,11 +27,13 @@ def side_view(rig: Rig) -> str:
     length = sum(s.length for s in rotor.shaft)
     above, below = _reach(rig, rotor)
     scale = min((_WIDTH - 2 * _MARGIN) / length, (_HEIGHT - 30) / (above + below))
-    frame = Frame(scale, (_WIDTH - scale * length) / 2, 15 + max(scale * above, 22))
-    bottom = frame.y0 + max(scale * below, 34)
+    room = BAND + SPRING if rig.carrier else 0.0
+    frame = Frame(scale, (_WIDTH - scale * length) / 2, 15 + room + max(scale * above, 22))
+    bottom = frame.y0 + max(scale * below, 34) + room
     nodes = _node_positions(rotor)
     parts = [line(frame.x(0) - 16, frame.y0, frame.x(length) + 16, frame.y0, "axis")]
     parts += [_stator(frame, nodes[s.node], s, rig.contact_radius(s) or 0.0) for s in rig.stator]
+    parts += _carriers(frame, nodes, rig)
     parts += _sections(frame, rotor)
     parts += [_disc(frame, nodes[d.node], d) for d in rotor.disc]
     parts += [_bearing(frame, nodes[b.node], rotor) for b in rotor.bearing]
@@ -50,6 +52,8 @@ def description(rig: Rig) -> str:
     diameters = sorted({s.outer_diameter * 1e3 for s in shaft})
     across = " to ".join(f"{d:.4g}" for d in (diameters[0], diameters[-1])[: len(diameters)])
     counts = [_counted(len(rig.rotor.disc), "disc"), _counted(len(rig.rotor.bearing), "bearing"), stators]
+    if rig.carrier:
+        counts.append(_counted(len(rig.carrier), "carrier"))
     return f"shaft of {length * 1e3:.4g} mm, {across} mm across, {', '.join(counts)}"
 
 
@@ -120,7 +124,25 @@ def _stator(frame: Frame, at: float, stator: AnyStator, radius: float) -> str:
         return rect(frame.x(at) - width / 2, (top + bottom - high) / 2, width, high, f"{kind} hidden")
     part = rect(frame.x(at) - width / 2, top, width, bottom - top, kind)
     side = -1 if depth(stator, radius) * math.cos(stator.angle) > 0 else 1
+    if stator.carrier is not None:
+        return part
     return part + wall(frame.x(at) - 12, frame.x(at) + 12, frame.y(root), side)
+
+
+def _carriers(frame: Frame, nodes: list[float], rig: Rig) -> list[str]:
+    """Return pieces of the carriers on springs, above and below the shaft, where stators reach farthest."""
+    farthest: dict[tuple[str, int, int], float] = {}  # carrier, node and side -> height, m
+    for stator in rig.stator:
+        _, (_, root) = tip_and_root(stator, rig.contact_radius(stator) or 0.0)
+        if stator.carrier is not None and abs(root) > 1e-3 * (depth(stator, 1.0) or 1.0):
+            place = stator.carrier, stator.node, -1 if root > 0 else 1
+            farthest[place] = max(farthest.get(place, root), root, key=abs)
+    parts = []
+    for (_, node, side), root in farthest.items():
+        x, y = frame.x(nodes[node]), frame.y(root)
+        parts.append(rect(x - 16, y if side > 0 else y - BAND, 32, BAND, "carrier"))
+        parts.append(spring(x, y + side * BAND, side))
+    return parts
 
 
 def _bearing(frame: Frame, at: float, rotor: Rotor) -> str:

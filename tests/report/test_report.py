@@ -6,6 +6,7 @@ import base64
 import html
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from typing import TYPE_CHECKING
 
@@ -239,6 +240,25 @@ def test_every_kind_of_stator_is_drawn(kind: str) -> None:
     n_drawn = end_view(rig).count("rotate(") - 1  # the arrow of the spin is turned too
     assert n_drawn == (5 if kind == "several" else 1)
     assert "1 disc, 2 bearings" in side_view(rig)
+
+
+@pytest.mark.parametrize(("count", "kind"), [(8, "circle"), (1, "path")])
+def test_a_carrier_is_drawn_on_its_springs(count: int, kind: str) -> None:
+    """In place of the walls behind its stators; around the shaft where they are."""
+    from postproc.report.end_view import end_view
+    from postproc.report.side_view import side_view
+    from rubhpc.rig.carriers import Carrier
+
+    rig = read_rig("mokhtar2017")
+    casing = Carrier(name="casing", mass=5.0, stiffness=2e6)
+    stator = replace(rig.stator[0], carrier="casing", count=count)
+    rig = Rig(name="ring", rotor=rig.rotor, stator=(stator,), carrier=(casing,))
+    view = end_view(rig)
+    assert view.count('class="carrier"') == view.count('class="spring"') == view.count('class="wall"') == 1
+    assert f'<{kind} class="carrier"' in view
+    assert "not to scale: casing" in view
+    assert "1 carrier" in side_view(rig)
+    assert side_view(rig).count('class="spring"') == (2 if count == 8 else 1)
 
 
 def test_a_rotor_of_matrices_is_told_in_words() -> None:
