@@ -1,7 +1,8 @@
-"""The bent stator against a geometrically exact beam: the elastica, extensible, by collocation in its arc."""
+"""The bent stator against geometrically exact beams: the elastica at rest, and Reissner's beam in motion."""
 
 import numpy as np
 import pytest
+from exact_beam import Beam, Rim, exact, second_order
 from scipy.integrate import solve_bvp
 from trial_rig import trial_rig
 
@@ -58,6 +59,49 @@ def test_tip_is_where_the_elastica_has_it(ratio, friction):
     assert compressed + shortened == pytest.approx(back, rel=4e-3 + 4 * ratio**2)
     assert back > 5 * compressed  # which is all that a linear beam has
     assert shortened == pytest.approx(0.6 * lateral**2 / LENGTH, rel=0.05)
+
+
+def touch(depth, elements):
+    """Peak force of the exact beam, and what the others miss of it, until the rim would have to pull.
+
+    Largest deflection over length; peak force, largest error of the force and of the deflection, by second
+    order; peak force of the linear beam. All but the first are shares of the exact ones.
+    """
+    beam, rim = Beam(), Rim(depth=depth, time=4e-3, friction=0.3)
+    size = {"length": beam.length, "width": beam.width, "height": beam.height}
+    (stator,) = assemble(trial_rig(1, **size, elements=6, geometry="second_order")).stators
+    known = exact(beam, rim, elements=elements)
+    found = second_order(stator, beam, rim)
+    linear = second_order(stator, beam, rim, is_bent=False)
+    held = slice(0, 1 + int(np.argmax(known.force[1:] < 0.0)) or None)
+    peak, most = known.force[held].max(), abs(known.lateral[held]).max()
+    return (
+        most / beam.length,
+        found.force[held].max() / peak,
+        abs(found.force - known.force)[held].max() / peak,
+        abs(found.lateral - known.lateral)[held].max() / most,
+        linear.force[held].max() / peak,
+    )
+
+
+def test_force_of_a_touch_is_that_of_an_exact_beam():
+    deflection, peak, force, lateral, linear = touch(10e-6, elements=2)
+    assert 0.01 < deflection < 0.03
+    assert peak == pytest.approx(1.0, abs=0.02)
+    assert force < 0.03
+    assert lateral < 0.01
+    assert linear > 1.5
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("depth", [2e-6, 10e-6, 50e-6, 200e-6, 800e-6])
+def test_force_of_any_touch_is_that_of_an_exact_beam(depth):
+    deflection, peak, force, lateral, linear = touch(depth, elements=6)
+    print(f"{1e6 * depth:g} um: {deflection:.3f} {peak:.4f} {force:.4f} {lateral:.4f} {linear:.2f}")
+    assert peak == pytest.approx(1.0, abs=0.01)
+    assert force < 0.02
+    assert lateral < 0.005
+    assert linear > 1.3
 
 
 @pytest.mark.parametrize(
