@@ -30,6 +30,7 @@ from postproc.report.packing import as_text
 from postproc.report.side_view import description, side_view
 from postproc.store.axes import source
 from postproc.store.rig_of_case import natural_frequencies, rig_axes, rig_of, stator_places
+from postproc.store.run_ups import is_run_up, measures_alone
 from rubhpc.errors import RubError
 from rubhpc.version import __version__
 
@@ -46,6 +47,8 @@ class Page:
     """A page on the current state of a store; `measures` and `cases` are what it shows."""
 
     def __init__(self, store: xr.Dataset) -> None:
+        if is_run_up(store):  # measures are shown, revolutions by the figures of run-ups
+            store = measures_alone(store)
         self._store = store
         self.measures = Measures(store)
         self.cases = Cases(store)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from postproc.signals.spectra import check_signal, samples_per_revolution
 from postproc.signals.velocity import VELOCITIES, section_velocity
+from postproc.store.run_ups import is_run_up, steady_view
 from postproc.store.select import narrow
 from postproc.store.variables import require_variables
 from rubhpc.schema import SECTION_NAMES
@@ -35,7 +36,7 @@ def section_of(store: xr.Dataset, signal: str) -> xr.DataArray:
         return store[f"section_{signal}"]
     if signal not in store:
         require_variables(store, [f"section_{signal}" if signal in SECTION_NAMES else signal])
-    waveform = store[signal]
+    waveform = (steady_view(store, [signal]) if is_run_up(store) else store)[signal]
     points = waveform.isel(sample=slice(None, None, samples_per_revolution(waveform)))
     points = points.rename(sample="section").drop_vars("revolution", errors="ignore")
     points.name = f"section_{signal}"

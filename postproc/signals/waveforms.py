@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.signals.spectra import check_signal, last_revolutions
 from postproc.store.axes import find_axis, source
+from postproc.store.run_ups import is_run_up
 from postproc.store.select import narrow
 from postproc.store.variables import probe_of
 from rubhpc.errors import InputError
@@ -46,11 +47,12 @@ def waveform_data(
     """
     for signal in signals:
         check_signal(signal)
-    data = narrow(store, [*dict.fromkeys(signals), "spin_speed"], [find_axis(store, over)] if over else [])
+    names = [*dict.fromkeys(signals), *(() if is_run_up(store) else ("spin_speed",))]
+    data = narrow(store, names, [find_axis(store, over)] if over else [])
     if revolutions is not None:
         kept = last_revolutions(data[signals[0]], revolutions)
         data = data.isel(sample=slice(-kept.sizes["sample"], None))
-    spin = np.unique(data["spin_speed"].values)
+    spin = np.unique(data["spin_speed"].values) if "spin_speed" in data else np.zeros(0)
     if spin.size == 1 and spin[0] > 0:
         time = (data["revolution"] - data["revolution"][0]) * (2 * math.pi / float(spin[0]))
         data = data.assign_coords(time=time.assign_attrs(units="s", long_name="time"))

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from postproc.store.axes import source
+from rubhpc.errors import InputError
+from rubhpc.schema import TURNED
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
 
+_CONTACT = ("peak_contact_force", "contact_force")  # by which the most loaded stator is chosen
 _NAMES = {"revolution_speed": "speed", "revolution_time": "time"}
 
 
@@ -20,3 +27,31 @@ def as_run_ups(store: xr.Dataset) -> xr.Dataset:
     opened = store.isel(speed=0, drop=True).rename(_NAMES)
     opened.encoding.update(store.encoding)
     return opened
+
+
+def steady_view(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
+    """Return a store of run-ups for figures of variables `names`: signals have their coordinate `revolution`.
+
+    Raises
+    ------
+    InputError
+        The figure needs one speed.
+    """
+    if "spin_speed" in names or any(name.startswith("spectrum_") for name in names):
+        fix = "draw it with rubhpc waterfall or rubhpc bode"
+        raise InputError(f"{source(store)}: the speed changes, which this figure holds for steady; {fix}")
+    if any("revolution" in store[name].dims for name in names if name in store):
+        return store
+    status = ["status"] if "status" in store else []
+    kept = store[[name for name in [*names, *status, *_CONTACT] if name in store]]
+    kept = kept.drop_vars("revolution", errors="ignore")
+    seen = kept.rename({TURNED: "revolution"}) if TURNED in kept.coords else kept
+    seen.encoding.update(store.encoding)
+    return seen
+
+
+def measures_alone(store: xr.Dataset) -> xr.Dataset:
+    """Return a store of run-ups without its signals and revolutions."""
+    kept = store.drop_dims(["sample", "revolution", "order"], errors="ignore")
+    kept.encoding.update(store.encoding)
+    return kept

@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.branch_points import is_of_points
+from postproc.store.run_ups import is_run_up, steady_view
 from postproc.store.units import meanings, scale_of, typed
 from postproc.store.variables import require_variables
 from postproc.store.worst import at_most_loaded_stator
@@ -78,6 +79,8 @@ def narrow(store: xr.Dataset, names: Iterable[str], spread: Iterable[str] = ()) 
         A variable is not kept, or axes of several values are left: one line says which values there are.
     """
     names = list(names)
+    if is_run_up(store):
+        store = steady_view(store, names)
     require_variables(store, names)
     spread = set(spread)
     data = store[names]

@@ -7,6 +7,11 @@ import pytest
 
 import rubhpc
 from postproc.figures.bode import bode
+from postproc.figures.orbit import orbit
+from postproc.figures.spectrum import spectrum
+from postproc.report.page import Page
+from postproc.signals.sections import section_of
+from postproc.signals.waveforms import waveform_data
 from rubhpc.errors import InputError
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
@@ -104,6 +109,22 @@ def test_bode_plots_lay_cases_over_one_another(folder):
     amplitude, phase = bode(store, "probe_left", over="clearance").show()
     assert len(amplitude.lines) == len(phase.lines) == 2
     assert amplitude.get_xlim() == pytest.approx((1530, 1778), abs=20)
+
+
+def test_figures_of_one_case_see_its_signals(folder):
+    store = rubhpc.open(folder / "run_ups.zarr").isel(run_up_time=1, clearance=0)
+    waves = waveform_data(store, ["probe_left", "contact_force"], None)
+    assert waves["revolution"].values[[0, 32]] == pytest.approx([0.0, 1.0])
+    assert section_of(store, "vertical").sizes["section"] == 13
+    assert len(orbit(store).show().lines) > 0
+    for signal in ("torsion", "probe_left"):
+        with pytest.raises(InputError, match="the speed changes, which this figure holds for steady"):
+            spectrum(store, signal)
+
+
+def test_a_report_shows_the_measures(folder):
+    page = Page(rubhpc.open(folder / "run_ups.zarr"))
+    assert "peak_contact_force" in page.html()
 
 
 @pytest.mark.parametrize(
