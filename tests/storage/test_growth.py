@@ -194,7 +194,7 @@ def grow_and_kill(grids: list[dict[str, list[float]]], block: int, kills: list[i
 @pytest.mark.parametrize("apart", [11, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("layout", [nullcontext, shards])
 def test_a_kill_at_any_step_of_a_growth_loses_nothing(tmp_path, layout, apart):
-    """Without draws: the process ends before the first, the twelfth, ... change of the disk, or before each."""
+    """Without draws: the process ends before the first, the twelfth, ... change of the disk, or each one."""
     with layout():
         kill_at_steps(tmp_path, apart)
 
