@@ -66,12 +66,16 @@ def least_knock(
     Raises
     ------
     InputError
-        The study has axes of starts, a node does not move sideways, or a number is out of range.
+        The study has axes of starts, [branch] or [run_up], a node does not move sideways, or a number is out
+        of range.
     """
     import xarray as xr
 
     if starts := [axis.name for axis in study.axes if axis.is_initial_key]:
         raise InputError(f"[grid] {starts[0]}: the knock itself is searched for; remove this axis")
+    for table, is_there in (("branch", study.branch is not None), ("run_up", study.run_up is not None)):
+        if is_there:
+            raise InputError(f"[{table}]: knocks are searched for at a constant speed; remove this table")
     if workers < 1:
         raise InputError(f"workers {workers}: give 1 or more")
     if angles < 1 or not 0.0 < tolerance < 1.0 or (most is not None and not most > 0.0):

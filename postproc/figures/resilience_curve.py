@@ -21,7 +21,7 @@ _MOST_LINES = 6
 
 
 def resilience(knocks: xr.Dataset) -> Drawing:
-    """Return the curve of `rubhpc.knocks.least_knock`: impulse above, direction below.
+    """Return the curve of `rubhpc.knocks.least_knock`: impulse above, direction below if it varies.
 
     Parameters
     ----------
@@ -47,8 +47,11 @@ def resilience(knocks: xr.Dataset) -> Drawing:
             f"{len(lines)} curves are more than {_MOST_LINES}; leave some values of {others[0]} out"
         )
 
+    angles = np.unique(shown["worst_angle"].values)
+    is_one = np.isfinite(angles).sum() <= 1  # direction, which a line of text names
+
     def draw(axes: list[Axes]) -> list[Axes]:
-        above, below = axes
+        above, below = axes[0], axes[-1]
         x, x_label = displayed(shown[along])
         scale = scale_of(shown["least_impulse"])
         for i, line in enumerate(lines):
@@ -59,15 +62,18 @@ def resilience(knocks: xr.Dataset) -> Drawing:
             above.fill_between(
                 x, 0.0, line["harmless_impulse"].values * scale.factor, color=f"C{i}", alpha=0.08
             )
-            below.plot(x, np.degrees(line["worst_angle"].values), linestyle="", **style)
+            if not is_one:
+                below.plot(x, np.degrees(line["worst_angle"].values), linestyle="", **style)
         _mark(above, x, lines)
         largest = [
             float(np.nanmax(v)) for line in lines if np.isfinite(v := line["least_impulse"].values).any()
         ]
         top = 1.25 * scale.factor * max(largest) if largest else None
         above.set(ylabel=f"Least impulse ({scale.unit})", ylim=(0.0, top))
-        below.set(xlabel=x_label, ylabel="Direction (\N{DEGREE SIGN})", ylim=(-15.0, 375.0))
-        below.set_yticks(range(0, 361, 90))
+        below.set_xlabel(x_label)
+        if not is_one:
+            below.set(ylabel="Direction (\N{DEGREE SIGN})", ylim=(-15.0, 375.0))
+            below.set_yticks(range(0, 361, 90))
         for ax in axes:
             ax.set_xlim(*cell_edges(x)[[0, -1]])
             if is_geometric(x):
@@ -77,7 +83,11 @@ def resilience(knocks: xr.Dataset) -> Drawing:
         return axes
 
     return Drawing(
-        shown=shown, draw=draw, panels=(2, 1), height=80.0, lines=tuple(_in_words(lines, along, others))
+        shown=shown,
+        draw=draw,
+        panels=(1 if is_one else 2, 1),
+        height=50.0 if is_one else 80.0,
+        lines=tuple(_in_words(lines, along, others)),
     )
 
 

@@ -94,6 +94,7 @@ def test_a_machine_without_a_contact_free_motion_and_its_figure(tmp_path):
     assert found.has_contact_free_motion.values.ravel().tolist() == [False, True]
     assert np.isnan(found.least_impulse.values.ravel()[0])
     drawing = resilience(found)
+    assert drawing.panels == (1, 1)  # one direction needs no panel
     assert "at speed_ratio=1.25, 0 degrees" in drawing.lines[0]
     assert drawing.save(tmp_path / "curve.png").exists()
 
@@ -147,6 +148,9 @@ def test_what_cannot_be_is_refused(tmp_path):
     study = study_of(tmp_path, rest='"initial.impulse" = [0.0, 0.1]')
     with pytest.raises(InputError, match="the knock itself is searched for"):
         least_knock(study)
+    followed = study_of(tmp_path, "{ start = 1.2, stop = 1.3 }", '[branch]\nalong = "speed_ratio"')
+    with pytest.raises(InputError, match=r"\[branch\]: knocks are searched for at a constant speed"):
+        least_knock(followed)
     with pytest.raises(InputError, match="99 does not move sideways"):
         least_knock(study_of(tmp_path), nodes=[99])
     with pytest.raises(InputError, match="workers 0"):
