@@ -170,3 +170,24 @@ def test_ring_of_springs_over_its_speed():
     assert max(folds) == pytest.approx(1.343, rel=6e-3)  # eight springs, not a ring: 1.337
     assert whole.events()[-1][0] == "grazing"
     assert whole.events()[-1][1] == pytest.approx(1.195, abs=1e-3)
+
+
+def test_overhung_disc_on_three_bearings_grazes_at_its_contact_free_amplitude():
+    """Before, the motion with one impact a revolution doubles its period."""
+    rig = read_rig("mokhtar2017")
+    first, last = rig.rotor.bearing
+    rotor = replace(
+        rig.rotor,
+        bearing=(first, replace(last, node=6), replace(last, node=11)),
+        disc=(replace(rig.rotor.disc[0], node=15),),
+        unbalance=(replace(rig.rotor.unbalance[0], node=15),),
+    )
+    overhung = replace(rig, rotor=rotor, stator=(replace(rig.stator[0], node=15),))
+    (found,) = rubhpc.branch(
+        overhung, along="clearance_ratio", start=0.9, stop=1.05, speed_ratio=0.8, friction=0.2, doublings=0,
+        keep=(),
+    )  # fmt: skip
+    names = [name for name, _ in found.events()]
+    assert names == ["period_doubling", "grazing"]
+    assert found.events()[1][1] == pytest.approx(1.0, rel=1e-5)  # that of the full model
+    assert [found.is_stable[0], found.is_stable[-1]] == [False, True]
