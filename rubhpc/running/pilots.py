@@ -110,7 +110,7 @@ def time_pilots(
     pilots = _Pilots(grid)
     few = _FEW_PILOTS if grid.study.branch is None else _FEW_BRANCHED
     for k, (index, steps) in enumerate(_picked(blocks, missing)):
-        if k >= few and time.process_time() - began - pilots.loading > _ENOUGH:
+        if k >= few and time.process_time() - began - pilots.loading - pilots.compiling > _ENOUGH:
             break
         try:
             paces.append(pilots.pace(index, steps))
@@ -169,8 +169,8 @@ class _Pilots:
     ----------
     was_cut : bool
         The last one took longer than is waited for.
-    loading : float
-        Processor seconds in which kernels were loaded or compiled.
+    loading, compiling : float
+        Processor seconds in which kernels were loaded, and in which such were compiled that no cache held.
     record : Record or None
         Of the latest case that was run.
     """
@@ -180,7 +180,7 @@ class _Pilots:
         self._compiled: set[Contact] = set()
         self._paces: list[float] = []  # of the cases so far, seconds a predicted step
         self.was_cut = False
-        self.loading = 0.0
+        self.loading = self.compiling = 0.0
         self.record: Record | None = None
 
     def pace(self, index: tuple[int, ...], steps: float) -> Pace:
@@ -209,7 +209,7 @@ class _Pilots:
     def _prepared(self, case: Case) -> tuple[float, float, Setup]:
         """Times of assembling the rig and of preparing the speed, and the set-up, its kernels compiled."""
         if case.contact not in self._compiled:
-            began = time.process_time()
+            compiled, began = seconds_compiling(), time.process_time()
             compile_kernels(
                 set_up(self._study, case),
                 clearance=case.clearance,
@@ -217,7 +217,10 @@ class _Pilots:
                 recording=self._study.recording,
             )
             self._compiled.add(case.contact)
-            self.loading += time.process_time() - began
+            if seconds_compiling() == compiled:
+                self.loading += time.process_time() - began
+            else:
+                self.compiling += time.process_time() - began
         began = time.process_time()
         setup = set_up(self._study, case)
         middle = time.process_time()
@@ -277,7 +280,7 @@ class _Pilots:
             taken = time.process_time() - began
             if seconds_compiling() == compiled:
                 return taken
-            self.loading += taken
+            self.compiling += taken
 
     def _run(self, case: Case, setup: Setup, recording: Recording) -> float:
         """Processor time of a case, s; it is run once more where kernels were compiled meanwhile."""
@@ -293,7 +296,7 @@ class _Pilots:
             taken = time.process_time() - began
             if seconds_compiling() == compiled:
                 return max(taken, 1e-6)
-            self.loading += taken
+            self.compiling += taken
 
 
 def _shortened(whole: Recording, share: float) -> Recording:

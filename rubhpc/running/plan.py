@@ -103,11 +103,11 @@ class Plan:
         timing = self.timing
         if not timing.n_pilot:
             return []
-        within = (
-            f"; they differ, so the core-hours are good to {200.0 * timing.spread:.0f} %, about"
-            if math.isfinite(timing.spread)
-            else ""
-        )
+        within = ""
+        if timing.n_pilot == self.counts[MISSING]:
+            within = ", all that are missing"
+        elif math.isfinite(timing.spread):
+            within = f"; they differ, so the core-hours are good to {200.0 * timing.spread:.0f} %, about"
         return [f"timed       {timing.n_pilot} case{'s' * (timing.n_pilot > 1)}{within}"]
 
     @property
