@@ -134,7 +134,8 @@ def _draw_grid(ax: Axes, reach: float, angle: float, free: float) -> None:
         x, y = np.sin(at), np.cos(at)
         ax.plot([0.0, reach * x], [0.0, reach * y], **grid)
         text = f"{lag}\N{DEGREE SIGN} lag" if lag == 0 else f"{lag}\N{DEGREE SIGN}"
-        ax.text(1.09 * reach * x, 1.09 * reach * y, text, ha="center", va="center", fontsize=6)
+        away = (1.14 if lag == 0 else 1.09) * reach  # clear of the probe's mark
+        ax.text(away * x, away * y, text, ha="center", va="center", fontsize=6)
     ax.plot(1.0 * reach * np.sin(angle), 1.0 * reach * np.cos(angle), marker="s", color="0.3", markersize=4)
     ax.set(xlim=(-1.2 * reach, 1.2 * reach), ylim=(-1.2 * reach, 1.2 * reach), aspect="equal")
     ax.axis("off")
