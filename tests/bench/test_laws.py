@@ -1,0 +1,74 @@
+"""What a case takes under each law of contact, over the same case with steady sliding."""
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rubhpc import read_rig
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.setup import prepare
+from rubhpc.rig.reading import with_keys
+from rubhpc.study.study import Contact, Integrator, Recording
+
+pytestmark = pytest.mark.bench
+ONE = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": 3e10})
+FREQUENCY = 2 * math.pi * 31.5596  # rad/s
+SAMPLES = 256
+RECORDING = Recording(transient=60, revolutions=33, samples_per_revolution=SAMPLES, keep=())
+FIRST = Recording(transient=2, revolutions=2, samples_per_revolution=SAMPLES, keep=())  # solves contact modes
+GRID = [(ratio, micron * 1e-6) for ratio in np.linspace(0.6, 6.0, 13) for micron in (40, 60, 80, 100)]
+RUBS = [(0.75, 84e-6), (1.5, 90e-6)]
+COULOMB = {"friction_law": "coulomb"}
+ROWS = [  # rig, friction, cases (speed ratio, clearance), law, the ratio asked
+    ("one stator, 52 cases", 1, 0.5, GRID, "Coulomb", COULOMB, 3.0),
+    ("one stator, 52 cases", 1, 0.5, GRID, "penalty", {"law": "penalty", "stiffness": 1e7}, 3.0),
+    ("one stator, 52 cases", 1, 0.5, GRID, "restitution 0.5", {"restitution": 0.5}, 3.0),
+    ("one stator, 52 cases", 1, 0.5, GRID, "Coulomb, restitution 0.5", COULOMB | {"restitution": 0.5}, 3.0),
+    ("ring of 16, 2 cases", 16, 0.1, RUBS, "Coulomb", COULOMB, 5.0),
+]
+
+
+def ring(count):
+    stator = ONE.stator[0]
+    return replace(ONE, stator=tuple(replace(stator, angle=2 * math.pi * i / count) for i in range(count)))
+
+
+def seconds_of(rig, cases, friction, law):
+    """Processor time of a case of 93 revolutions, s, mean of `cases`; set-up and contact modes are shared."""
+    total = 0.0
+    for ratio, clearance in cases:
+        setup = prepare(
+            rig,
+            ratio * FREQUENCY,
+            contact=Contact(**law),
+            integrator=Integrator(),
+            samples_per_revolution=SAMPLES,
+        )
+        run_case(setup, clearance=clearance, friction=friction, recording=FIRST)
+        began = time.process_time()
+        run_case(setup, clearance=clearance, friction=friction, recording=RECORDING)
+        total += time.process_time() - began
+    return total / len(cases)
+
+
+def test_laws_take_little_more_than_steady_sliding(capsys):
+    sliding, lines, ratios = {}, [], []
+    for name, count, friction, cases, law_name, law, asked in ROWS:
+        for compiled in (law, {}):
+            seconds_of(ring(count), cases[:1], friction, compiled)  # compiles
+        if name not in sliding:
+            sliding[name] = seconds_of(ring(count), cases, friction, {})
+            lines.append(f"{name:22} {'steady sliding':26} {1e3 * sliding[name]:8.1f} ms")
+        took = seconds_of(ring(count), cases, friction, law)
+        ratios.append((took / sliding[name], asked))
+        lines.append(
+            f"{name:22} {law_name:26} {1e3 * took:8.1f} ms  ratio {ratios[-1][0]:.2f} of {asked:.0f}"
+        )
+    whip = min(seconds_of(ring(3), [(0.98, 20e-6)], 0.3, COULOMB) for _ in range(2))  # the first compiles
+    lines.append(f"{'three stators, whip':22} {'Coulomb':26} {1e3 * whip:8.1f} ms")
+    with capsys.disabled():
+        print("\n" + "\n".join(lines))
+    assert all(ratio < asked for ratio, asked in ratios)
