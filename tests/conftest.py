@@ -37,9 +37,7 @@ SLOW = (
     "integrate/test_event_driven_march.py::test_endless_events_are_left_to_short_steps",
     "integrate/test_event_driven_march.py::test_shorter_kernel_calls_change_nothing_but_rounding",
     "integrate/test_initial_state.py",
-    "integrate/test_knocks.py::test_a_machine_without_a_contact_free_motion_and_its_figure",
-    "integrate/test_knocks.py::test_processes_change_nothing",
-    "integrate/test_knocks.py::test_every_smaller_knock_of_a_grid_is_harmless",
+    "integrate/test_knocks.py",
     "integrate/test_periodic.py::test_failure_says_why",
     "integrate/test_periodic.py::test_motion_beside_it_draws_near_by_the_largest_multiplier",
     "integrate/test_regimes_lyapunov.py",
@@ -72,6 +70,7 @@ SLOW = (
     "study/test_sampling.py::test_a_store_tells_its_sample",
     "study/test_sampling.py::test_another_sample_is_refused_and_told",
     "study/test_sampling.py::test_points_that_a_library_draws_otherwise",
+    "study/test_stored_state.py",
     "study/test_warnings.py::test_unstable_speeds_are_named_once_and_have_no_amplitude",
     "validation/",
 )
