@@ -92,8 +92,9 @@ def draw_bode(
             top.plot(rpm, height.values * scale.factor, label=label, **style)
             bottom.plot(rpm, -np.degrees(lead.values), **style)
             n_curve += 1
-    first = signal_name(data[f"amplitude_{signals[0]}"]) if len(signals) == 1 else "Amplitude"
-    top.set(ylabel=scale.label(f"{first}, {written_order(order)}"), xlim=ends)
+    shown = [signal_name(data[f"amplitude_{signals[0]}"])] if len(signals) == 1 else []
+    top.set_title(", ".join([*shown, written_order(order)]), fontsize=8)
+    top.set(ylabel=scale.label("Amplitude"), xlim=ends)
     top.set_ylim(bottom=0.0)
     if n_curve > 1:
         top.legend(loc="best", fontsize=6)
