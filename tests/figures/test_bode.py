@@ -51,7 +51,7 @@ def test_a_diverged_case_leaves_the_phases_of_the_others():
 def test_cases_lie_over_one_another():
     axes = bode(study(), over="friction").show()
     assert [len(ax.lines) for ax in axes] == [2, 2]
-    assert axes[0].get_title() == "Vertical displacement, 1X"
+    assert axes[0].get_title(loc="left") == "Vertical displacement, 1X"
     assert axes[0].get_ylabel() == "Amplitude (µm)"
     assert axes[1].get_xlabel() == "Spin speed (rpm)"
 
