@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from rubhpc.errors import InputError
+from rubhpc.integrate.repeated_exponents import real_ones, separate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
     Solved = dict[bytes, tuple[Complexes, Complexes, Complexes]]  # parts, by the bytes of their matrices
 
-WORST_CONDITION = 1e11  # of the eigenvectors; beyond it modes coincide and their sum loses its digits
+WORST_CONDITION = 1e11  # of the eigenvectors; beyond it their sum loses its digits, and they are set apart
 
 
 class KeptParts(dict[bytes, "tuple[Complexes, Complexes, Complexes]"]):
@@ -183,7 +184,11 @@ def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Co
 def solve_part(part: Floats) -> tuple[Complexes, Complexes, Complexes]:
     """Exponents, shapes and inverse shapes of a part of a system that nothing couples to the rest."""
     exponent, shape = np.linalg.eig(part)
-    if np.linalg.cond(shape) > WORST_CONDITION:
+    if np.linalg.cond(shape) <= WORST_CONDITION:
+        inverse = np.linalg.inv(shape)
+    elif (separated := separate(part)) is not None:
+        exponent, shape, inverse = separated
+    else:
         raise InputError(
             "[integrator] method: modal cannot separate the modes of this rig, some of which coincide (a "
             'free body, critical damping); take method = "central-difference"'
@@ -193,7 +198,7 @@ def solve_part(part: Floats) -> tuple[Complexes, Complexes, Complexes]:
     return (
         exponent[keep].astype(np.complex128),
         (shape * weight)[:, keep].astype(np.complex128),
-        np.linalg.inv(shape)[keep].astype(np.complex128),
+        inverse[keep].astype(np.complex128),
     )
 
 
@@ -211,5 +216,5 @@ def _parts(system: Floats) -> list[NDArray[np.int64]]:
 
 def _kept(exponent: Complexes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which exponents of an uncoupled part are real, and which are kept: one of each conjugate pair."""
-    is_real = np.abs(exponent.imag) <= 1e-12 * np.abs(exponent).max()
+    is_real = real_ones(exponent)
     return is_real, is_real | (exponent.imag > 0.0)
