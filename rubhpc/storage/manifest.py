@@ -27,6 +27,7 @@ from rubhpc.schema import (
 )
 from rubhpc.storage.disk import read_regular, write_whole
 from rubhpc.storage.journal import Header
+from rubhpc.storage.manifest_content import check_content, check_fit
 from rubhpc.storage.measures import from_json, to_json, unlisted_measures
 from rubhpc.study.axes import FROM_REST, coordinate_of, written
 from rubhpc.study.continuation import CaseIds, continuation_of
@@ -290,12 +291,15 @@ class Manifest:
 
     @classmethod
     def _of_json(cls, content: dict[str, Any]) -> Self:
+        check_content(content)
         axes = (AxisRecord(**{**axis, "values": tuple(axis["values"])}) for axis in content["axes"])
         tuples = {
             name: tuple(content.get(name, ())) for name in ("chunk", "shard", "keep", "added", "accepted")
         }
         measures = from_json(content["measures"]) if "measures" in content else unlisted_measures()
-        return cls(**{**content, **tuples, "axes": tuple(axes), "measures": measures})
+        manifest = cls(**{**content, **tuples, "axes": tuple(axes), "measures": measures})
+        check_fit(manifest)
+        return manifest
 
     def damaged_copies(self, store: Path) -> list[str]:
         """Names of the files of this manifest that are gone or damaged."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zarr
@@ -143,7 +143,7 @@ def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:
     never = ~ledger.is_known
     packed = _read(store, "status")
     lost = set(ledger.damaged_cases)
-    if packed is not None:
+    if packed is not None and packed.size == len(never):
         lost |= set(np.flatnonzero(~np.isin(packed.ravel(), (MISSING, INFERRED)) & never).tolist())
     return {flat: "its line in the journal is damaged or gone" for flat in lost if never[flat]}
 
@@ -166,13 +166,23 @@ def _damaged_packed(store: Store, ledger: Ledger) -> tuple[str, ...]:
     damaged = []
     for name, values in store.packed_values(ledger).items():
         stored = _read(store, name)
-        if stored is None or stored.tobytes() != values.tobytes():
+        if stored is None or stored.tobytes() != values.tobytes() or not _is_whole(store, name):
             damaged.append(name)
     return tuple(damaged)
 
 
+def _is_whole(store: Store, name: str) -> bool:
+    """Whether all chunks of an array are there; one that is gone reads as missing values."""
+    array = _open(store, name)
+    return array.nchunks_initialized == array.nchunks
+
+
+def _open(store: Store, name: str) -> zarr.Array[Any]:
+    return zarr.open_array(RegularFiles(store.path / name), mode="r")
+
+
 def _read(store: Store, name: str) -> NDArray[np.generic] | None:
     try:
-        return np.ascontiguousarray(zarr.open_array(RegularFiles(store.path / name), mode="r")[...])
+        return np.ascontiguousarray(_open(store, name)[...])
     except Exception:  # whatever zarr and its codecs raise on damaged bytes
         return None

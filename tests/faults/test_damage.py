@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,23 @@ def test_what_is_no_case_is_written_anew_without_computing(store, finished, name
     assert damage.arrays == (name,)
     assert damage.cases == {}
     assert mended_by_run(store, finished) == 0
+
+
+def test_a_chunk_of_missing_values_is_deleted(store, finished):
+    """Readers see the same numbers without it; it is named and written anew."""
+    chunk = store / "lyapunov_exponent" / "c" / "0" / "0" / "0"
+    assert np.isnan(Store(store).arrays["lyapunov_exponent"][...]).all()
+    chunk.unlink()
+    assert verify(store).arrays == ("lyapunov_exponent",)
+    assert mended_by_run(store, finished) == 0
+
+
+def test_axes_that_no_journal_has(store):
+    """A manifest of another program: what is stored fits none of its cases, and verify says so."""
+    manifest = Store(store).manifest
+    first, *rest = manifest.axes
+    replace(manifest, axes=(replace(first, values=first.values[:1]), *rest)).write(store)
+    assert "status" in verify(store).arrays
 
 
 def test_a_partial_file_is_no_damage(store, finished):
