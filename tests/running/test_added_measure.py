@@ -15,7 +15,7 @@ from running import write_study
 
 from postproc.store.live import open_live
 from rubhpc import schema
-from rubhpc.running import recompute, worker
+from rubhpc.running import worker
 from rubhpc.running.driver import run
 from rubhpc.running.recompute import reproduce
 from rubhpc.schema import Variable
@@ -57,8 +57,7 @@ def toys(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for variable in TOYS:
         monkeypatch.setitem(schema.VARIABLES, variable.name, variable)
-    for module in (worker, recompute):
-        monkeypatch.setattr(module, "run_case", with_toys)
+    monkeypatch.setattr(worker, "run_case", with_toys)
 
 
 def longer(study: Study) -> Study:
