@@ -1,4 +1,4 @@
-"""A branch study is killed on its way, again and again: its bytes do not change."""
+"""Studies of branches and of run-ups are killed on their way, again and again: their bytes do not change."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from running import run, start, stored_bytes
 
 from rubhpc.storage.verify import verify
 
-STUDY = """
+BRANCHES = """
 rig = "mokhtar2017"
 [grid]
 clearance = { start = "112 um", stop = "124 um" }
@@ -26,15 +26,33 @@ points = 60
 transient = 40
 samples_per_revolution = 64
 """
+RUN_UPS = """
+rig = "mokhtar2017"
+[run_up]
+start = "1800 rpm"
+stop = "1500 rpm"
+[grid]
+"run_up.time" = ["0.3 s", "0.5 s", "1.5 s"]
+clearance = ["100 um", "120 um", "5 mm"]
+friction = [0.1, 0.2]
+[record]
+samples_per_revolution = 32
+[[record.probe]]
+name = "left"
+node = 1
+[run]
+block = 2
+"""
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("how", [{"options": ("--workers", "2")}, {"ranks": 2}], ids=["workers", "ranks"])
-def test_kills_leave_the_same_bytes(tmp_path, how):
+@pytest.mark.parametrize("text", [BRANCHES, RUN_UPS], ids=["branches", "run_ups"])
+def test_kills_leave_the_same_bytes(tmp_path, text, how):
     options, under = how.get("options", ()), {"ranks": how.get("ranks", 0)}
     whole, study, store = (tmp_path / name for name in ("whole.toml", "killed.toml", "killed.zarr"))
     for path in (whole, study):
-        path.write_text(f'title = "branches"\noutput = "{path.with_suffix(".zarr")}"\n{STUDY}')
+        path.write_text(f'title = "killed"\noutput = "{path.with_suffix(".zarr")}"\n{text}')
     assert run(whole).returncode == 0
     moments = random.Random(3)
     n_killed = 0
