@@ -36,6 +36,7 @@ _WIDTH = 180  # mm: two columns, since an axis has hundreds of values
 _MOST_DRAWN = 200_000  # points in a pdf or svg; of more, they become a picture in it
 _SIZES = 0.6, 3.5  # of the points, pt
 _LEAST_RANGE = 0.02  # of the largest value: points of one motion differ by rounding over all cases
+_UNDER = "0.6", "0.35"  # simulated points under branches: greys of up, or both, and of down
 _WAYS = (("^", "#E69F00", 2.4), ("v", "#0072B2", 1.2))  # up and down: marker, colour, size
 
 
@@ -98,24 +99,37 @@ def _of_branches(cases: xr.Dataset, signal: str, over: str | None) -> Drawing:
         axis = find_axis(store, along)
         held = [name for name in axes_of(store) if name != axis and name in cases.coords]
         store = select(store, {name: float(cases[name]) for name in held})
-        store, more = first_of_rest(store, [axis], f"section_{signal}")
-        simulated, notes = sections_along(store, signal, axis), [*notes, *more]
+        ways = DIRECTION if store.sizes.get(DIRECTION, 1) > 1 else None
+        kept = [axis] if ways is None else [axis, ways]
+        store, more = first_of_rest(store, kept, f"section_{signal}")
+        simulated, notes = sections_along(store, signal, axis, ways), [*notes, *more]
 
     def draw(axes: list[Axes]) -> None:
         ax = axes[0]
         if simulated is not None:
-            draw_bifurcation(simulated, signal, ax, None)
-            for line in ax.lines:
-                line.set(color="0.65", zorder=1)
+            draw_simulated(simulated, signal, ax)
         draw_branches(cases, f"section_{signal}", along, ax)
         scale = scale_of(cases[f"section_{signal}"])
         ax.set(
             xlabel=displayed(cases[along])[1],
             ylabel=scale.label(f"{short_name(cases[f'section_{signal}'])},\nonce a revolution"),
         )
-        ax.figure.legend(loc="outside upper right", ncols=8, handletextpad=0.4, columnspacing=1.0)
+        ax.figure.legend(
+            loc="outside upper right", ncols=9, handlelength=1.2, handletextpad=0.3, columnspacing=0.5
+        )
 
     return Drawing(shown=cases, draw=draw, height=90, width=_WIDTH, lines=tuple(notes))
+
+
+def draw_simulated(data: xr.Dataset, signal: str, ax: Axes) -> Axes:
+    """Draw the points of `sections_along` in grey, under branches; by their markers where swept both ways."""
+    has_ways = DIRECTION in data.dims
+    draw_bifurcation(data, signal, ax, DIRECTION if has_ways else None, has_legend=False)
+    for line, shade in zip(ax.lines, _UNDER, strict=False):
+        line.set(color=shade, zorder=1)
+        if has_ways:
+            line.set_markersize(max(1.2, 0.6 * line.get_markersize()))
+    return ax
 
 
 def default_axis(store: xr.Dataset, along: str | None = None) -> str:
@@ -149,7 +163,9 @@ def default_coloring(store: xr.Dataset, color: str | None = None) -> str:
     return color or (DIRECTION if ways > 1 else "regime")
 
 
-def draw_bifurcation(data: xr.Dataset, signal: str, ax: Axes, color: str | None = "regime") -> Axes:
+def draw_bifurcation(
+    data: xr.Dataset, signal: str, ax: Axes, color: str | None = "regime", *, has_legend: bool = True
+) -> Axes:
     """Draw the points of `sections_along` over its axis, by regime, period, direction or in one colour."""
     section = data[f"section_{signal}"].load()
     require_results(section, data)
@@ -167,7 +183,7 @@ def draw_bifurcation(data: xr.Dataset, signal: str, ax: Axes, color: str | None 
             rasterized=section.size > _MOST_DRAWN,
             **style,
         )
-    if color is not None:
+    if color is not None and has_legend:
         ax.figure.legend(
             loc="outside upper right", ncols=16, markerscale=4.0 / size, handletextpad=0.2, columnspacing=1.0
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from rubhpc.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
     from postproc.figures.options import Count
 
@@ -26,8 +27,9 @@ _LARGEST = 1.5  # modulus that is shown, unless all are smaller
 def multipliers(cases: xr.Dataset, *, branch: Count | None = None) -> Drawing:
     """Floquet multipliers of branches: where they cross the unit circle.
 
-    On the left the complex plane with the unit circle, on the right the largest modulus over the axis that
-    the branches follow, full where the motion is stable and dashed where it is not, with all events.
+    On the left the complex plane with the unit circle; multipliers beyond it are arrows at its edge. On the
+    right the largest modulus over the axis that the branches follow, full where the motion is stable and
+    dashed where it is not, with all events.
 
     Parameters
     ----------
@@ -57,19 +59,55 @@ def multipliers(cases: xr.Dataset, *, branch: Count | None = None) -> Drawing:
 
 
 def draw_plane(data: xr.Dataset, ax: Axes) -> Axes:
-    """Draw all multipliers in the complex plane, coloured by the period of their motion."""
+    """Draw all multipliers in the complex plane, coloured by the period of their motion.
+
+    Those beyond the plane are arrows at its edge, in their direction; the largest modulus is written.
+    """
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     ax.plot(np.cos(turn), np.sin(turn), color="0.6", linewidth=0.8)
+    values = data["multiplier_real"].values + 1j * data["multiplier_imag"].values
+    largest = float(np.nanmax(abs(values)))
+    limit = 1.06 * max(1.0, min(_LARGEST, largest))
     periods = data["period"].values
     for code, (_, shade) in categories("period", periods).items():
-        of_period = periods == code
-        re, im = (data[f"multiplier_{part}"].values[of_period].ravel() for part in ("real", "imag"))
-        ax.plot(re, im, linestyle="", marker="o", markersize=1.8, markeredgewidth=0.0, color=shade)
-    size = np.hypot(data["multiplier_real"].values, data["multiplier_imag"].values)
-    limit = 1.06 * max(1.0, min(_LARGEST, float(np.nanmax(size))))
+        of_period = values[periods == code].ravel()
+        inside, edges = at_edges(of_period, limit)
+        style: dict[str, Any] = {"linestyle": "", "markeredgewidth": 0.0, "color": shade}
+        ax.plot(inside.real, inside.imag, marker="o", markersize=1.8, **style)
+        for marker, places in edges.items():
+            ax.plot(places.real, places.imag, marker=marker, markersize=4.5, clip_on=False, zorder=5, **style)
+    if largest > limit:
+        text = f"arrows: beyond, up to a modulus of {largest:.3g}"
+        ax.text(0.02, 0.98, text, transform=ax.transAxes, va="top", fontsize=6.5)
     ax.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
     ax.set(xlabel="Real part of the multiplier", ylabel="Imaginary part")
     return ax
+
+
+def at_edges(values: NDArray[Any], limit: float) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
+    """Return the complex values in a square, and those beyond it by the arrow of the edge they are drawn at.
+
+    Parameters
+    ----------
+    values : (n,), complex
+        NaN is passed over.
+    limit : float
+        Half the side of the square around zero.
+
+    Returns
+    -------
+    inside : (m,), complex
+    edges : dict
+        By the marker ">", "^", "<" or "v": the places on that edge, complex, on the ray from zero.
+    """
+    values = values[np.isfinite(values)]
+    reach = np.maximum(abs(values.real), abs(values.imag))
+    far = values[reach > limit]
+    on_edge = far * limit / reach[reach > limit]
+    quarter = np.round(np.angle(far) / (0.5 * np.pi)).astype(int) % 4
+    return values[reach <= limit], {
+        marker: on_edge[quarter == k] for k, marker in enumerate(">^<v") if (quarter == k).any()
+    }
 
 
 def draw_moduli(data: xr.Dataset, along: str, ax: Axes) -> Axes:
@@ -89,5 +127,8 @@ def draw_moduli(data: xr.Dataset, along: str, ax: Axes) -> Axes:
         named.add(label)
     mark_events(data, x, size[:, None], ax)
     top = float(np.nanmax(size))
-    ax.set(xlabel=x_label, ylabel="Largest modulus", ylim=(0.0, 1.06 * max(1.0, min(2.0 * _LARGEST, top))))
+    highest = 1.06 * max(1.0, min(2.0 * _LARGEST, top))
+    if top > highest:
+        ax.text(0.02, 0.98, f"up to {top:.3g}", transform=ax.transAxes, va="top", fontsize=6.5)
+    ax.set(xlabel=x_label, ylabel="Largest modulus", ylim=(0.0, highest))
     return ax

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from postproc.store.axes import source
+from rubhpc.errors import InputError
 from rubhpc.schema import BRANCH_EVENT, POINT
 
 NAMES = ("unstable", "stable")  # meanings of `stability`
@@ -35,7 +37,14 @@ def one_case(points: xr.Dataset) -> tuple[xr.Dataset, str, list[str]]:
     """Return the points at the first value of every axis, the axis followed, and a line on each such axis.
 
     Axes of one value become coordinates without a dimension, as captions have them.
+
+    Raises
+    ------
+    InputError
+        There is no point.
     """
+    if not points.sizes["point"]:
+        raise InputError(f"{source(points)}: holds no point of a branch; run or resume its study")
     notes = []
     for name in other_axes(points):
         values = np.unique(points[name].values)

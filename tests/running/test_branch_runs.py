@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 import rubhpc
 from postproc.figures.bifurcation import bifurcation
 from postproc.figures.branch_lines import events_at, mark_over_map, runs
-from postproc.figures.multipliers import multipliers
+from postproc.figures.multipliers import at_edges, multipliers
 from postproc.report.page import Page
 from postproc.store.live import open_live
 from postproc.store.open import open_store
@@ -90,13 +90,13 @@ def test_report_has_the_branches_of_each_case(store):
 
 def test_branches_are_drawn_over_simulated_cases(store, tmp_path):
     simulated = STUDY.partition("[branch]")[0] + "[record]\ntransient = 20\nrevolutions = 2\n"
-    simulated = simulated.replace('stop = "124 um" }', 'stop = "124 um", num = 3 }')
+    simulated = simulated.replace('stop = "124 um" }', 'stop = "124 um", num = 3, sweep = "both" }')
     (tmp_path / "study.toml").write_text(simulated)
     rubhpc.run(read_study(tmp_path / "study.toml", tmp_path / "simulated.zarr"), quiet=True)
     points = rubhpc.open(store / "branches.zarr")
     ax = bifurcation(points, over=str(tmp_path / "simulated.zarr")).show()
     names = {line.get_label() for line in ax.lines}
-    assert {"P1, stable", "P1, unstable", "grazing", "period doubling"} <= names
+    assert {"P1, stable", "P1, unstable", "grazing", "period doubling", "up", "down"} <= names
     dashed = [line for line in ax.lines if line.get_linestyle() == "--"]
     assert dashed
     assert all("unstable" in str(line.get_label()) or line.get_label().startswith("_") for line in dashed)
@@ -160,3 +160,22 @@ def test_another_range_is_another_study(store, tmp_path):
     (tmp_path / "study.toml").write_text(STUDY.replace("124 um", "125 um"))
     with pytest.raises(rubhpc.StoreError, match=r"branch\.stop was 0\.000124, is 0\.000125"):
         rubhpc.run(read_study(tmp_path / "study.toml", tmp_path / "branches.zarr"), quiet=True)
+
+
+def test_multipliers_beyond_the_plane_are_at_its_edge_in_their_direction():
+    values = np.array([0.5, 3.0, -4.0 + 1j, 0.1 + 2j, -2j, complex(np.nan, np.nan)])
+    inside, edges = at_edges(values, 1.5)
+    assert inside.tolist() == [0.5]
+    assert {marker: places.tolist() for marker, places in edges.items()} == {
+        ">": [1.5],
+        "<": [-1.5 + 0.375j],
+        "^": [pytest.approx(0.075 + 1.5j)],
+        "v": [-1.5j],
+    }
+
+
+def test_store_without_points_is_refused(store):
+    empty = rubhpc.open(store / "branches.zarr").isel(point=slice(0))
+    for figure in (bifurcation, multipliers):
+        with pytest.raises(InputError, match="holds no point of a branch"):
+            figure(empty)
