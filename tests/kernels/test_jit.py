@@ -72,6 +72,7 @@ def test_what_only_kernels_call_lies_in_no_cache(probe, tmp_path):
     assert {path.name.split("-")[0] for path in tmp_path.rglob("*.nb?")} == {"caller.twice"}
 
 
+@pytest.mark.long
 def test_versions_that_take_turns_keep_their_caches(probe, tmp_path):
     """As installations of two versions in one environment do; of many, the latest four are kept."""
     assert end(probe(3)) == ["6", "0", "twice"]

@@ -10,7 +10,7 @@ import pytest
 from running import write_study
 
 from rubhpc.errors import InputError, RubError, StoreError
-from rubhpc.running import recompute as only
+from rubhpc.running import worker
 from rubhpc.running.driver import run
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
@@ -78,6 +78,6 @@ def test_a_case_that_fails_tells_why(finished, monkeypatch):
     def burst(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by\nzero")
 
-    monkeypatch.setattr(only, "run_case", burst)
+    monkeypatch.setattr(worker, "run_case", burst)
     with pytest.raises(RubError, match=r"friction=0.1: ZeroDivisionError: by zero"):
         reproduce(finished, Store(finished.output).manifest.case_id(0))

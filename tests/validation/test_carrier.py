@@ -93,7 +93,7 @@ def test_a_stiff_carrier_is_the_ground():
         {"friction_law": "coulomb"},
         {"restitution": 0.5},
         {"law": "penalty", "stiffness": 1e7},
-        {"normal": "updated"},
+        pytest.param({"normal": "updated"}, marks=pytest.mark.long),
     ],
     ids=str,
 )

@@ -152,7 +152,7 @@ def check_contacts(record, known):
 # With several stators and turning normals these take most of the time: `make validation` has them.
 SLOWEST = {
     *((name, "updated", "central-difference") for name in ("stepped shaft", *list(CASES)[2:4], RING)),
-    (RING, "updated", "usual"),
+    *((RING, "updated", method) for method in ("usual", "modal")),
 }
 
 
