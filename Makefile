@@ -34,7 +34,7 @@ PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder --durations=15 --ignore=
 ALONE := tests/faults tests/mpi tests/integrate
 ORDINARY := not bench and not long
 
-check: $(VENV)/.ready ## the inner loop, under a minute: style, and the fast tests with the layers of imports
+check: $(VENV)/.ready ## the inner loop, about a minute: style, and the fast tests with the layers of imports
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/python -m pytest $(PARALLEL) -m "$(ORDINARY) and not slow and not serial"
