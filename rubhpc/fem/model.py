@@ -261,8 +261,16 @@ class Model:
 
     @property
     def n_place(self) -> int:
-        """Places whose motion is recorded besides the output node's: tips of stators, then carriers."""
-        return len(self.stators) + len(self.carriers)
+        """Places whose motion is recorded besides the output node's.
+
+        Tips of stators, then carriers, then the rotations of those that turn, as lateral motion.
+        """
+        return len(self.stators) + len(self.carriers) + len(self.turning_carriers)
+
+    @property
+    def turning_carriers(self) -> tuple[CarrierModel, ...]:
+        """Carriers that are not held in rotation about the shaft's axis."""
+        return tuple(carrier for carrier in self.carriers if carrier.body.index(1, "thx") >= 0)
 
     @property
     def n_probe(self) -> int:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.integrate.carried import carrier_displacement, tip_deflection
 from rubhpc.integrate.central_difference_march import CentralDifferenceMarch
 from rubhpc.integrate.closed_form import closed_form_march
 from rubhpc.integrate.compilation import seconds_compiling
@@ -24,7 +25,6 @@ from rubhpc.integrate.lyapunov_spectrum import spectrum_of
 from rubhpc.integrate.measures import (
     add_sag,
     by_name,
-    carrier_displacement,
     diverged_record,
     empty_samples,
     measures_of,
@@ -202,6 +202,7 @@ def _integrate(
             measures=measures_of(
                 accumulator,
                 signals,
+                deflection=tip_deflection(samples, accumulator, setup.model),
                 energy=(energy_before, march.energy()),
                 stators=setup.model.stators,
                 spin=setup.spin,

@@ -47,7 +47,7 @@ def empty_samples(n_place: int, n_sample: int, n_probe: int = 0) -> Samples:
     """Room for the samples of a record: one array, so that their spectra are taken together.
 
     Places (`Model.n_place`) are the stators, then the carriers, whose vertical motion stands for the axial
-    one, and whose horizontal motion for the lateral one.
+    one, and whose horizontal motion for the lateral one, then their rotations, as lateral motion.
     """
     first_probe = 4 + 3 * n_place
     whole = np.zeros((first_probe + n_probe, n_sample))
@@ -105,14 +105,6 @@ def samples_within(samples: Samples, n_taken: int, limit: float) -> int:
     return int(beyond[0]) if beyond.size else lateral.shape[1]
 
 
-def carrier_displacement(samples: Samples, model: Model) -> Floats:
-    """Largest displacement at a sample, m, of what each stator stands on: a carrier, or the ground (0)."""
-    peak, q = np.zeros(len(model.stators)), len(model.stators)
-    for i, carrier in enumerate(model.carriers, start=q):
-        peak[np.array(carrier.stators) - 1] = np.hypot(samples.axial[i], samples.lateral[i]).max()
-    return peak
-
-
 def by_name(whole: Floats, model: Model) -> dict[str, Floats]:
     """Rows of `Samples.whole`, or their spectra, by their names in the schema: (n,) or (n_stator, n)."""
     first_probe, n = 4 + 3 * model.n_place, whole.shape[1]
@@ -142,6 +134,7 @@ def measures_of(
     accumulator: Accumulator,
     signals: dict[str, Floats],
     *,
+    deflection: Floats,
     energy: tuple[float, float],
     stators: tuple[StatorModel, ...],
     spin: float,
@@ -154,6 +147,8 @@ def measures_of(
 
     Parameters
     ----------
+    deflection : (n_stator,), m
+        Largest lateral deflection of each tip (`carried.tip_deflection`).
     energy : (float, float), J
         Mechanical energy at the beginning and at the end of the record.
     spin : float, rad/s
@@ -206,10 +201,9 @@ def measures_of(
         "friction_work": accumulator.friction_work / n_revolution,
         "minimum_slip_speed": np.where(np.isfinite(accumulator.least_slip), accumulator.least_slip, np.nan),
         "force_over_euler_load": accumulator.peak_force / [stator.euler_load for stator in stators],
-        "tip_deflection_ratio": accumulator.peak_lateral[: len(stators)]
-        / [stator.length for stator in stators],
+        "tip_deflection_ratio": deflection / [stator.length for stator in stators],
         "foreshortening_ratio": foreshortening_ratio(
-            stators, accumulator.peak_lateral[: len(stators)], accumulator.peak_force, is_round=is_round
+            stators, deflection, accumulator.peak_force, is_round=is_round
         ),
         "peak_torsion": float(max(accumulator.highest[TWIST], -accumulator.lowest[TWIST])),
         "peak_to_peak_vertical": float(accumulator.highest[VERTICAL] - accumulator.lowest[VERTICAL]),

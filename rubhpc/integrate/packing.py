@@ -81,8 +81,9 @@ def pack(model: Model, spin: float, step: float) -> Packed:
     mass, stiffness, damping, force = mass[pick], stiffness[pick], damping[pick], force[:, order]
     inverse = _inverses(mass + 0.5 * step * damping, start)
     degree_row = np.where(degree >= 0, row[degree], -1)
-    carriers = np.full((len(model.carriers), N_DEGREE), -1)
-    carriers[:, [AXIAL, LATERAL]] = np.where((at := carrier_degrees(model)) >= 0, row[at], -1)
+    at = carrier_degrees(model)
+    carriers = np.full((len(at), N_DEGREE), -1)
+    carriers[:, [AXIAL, LATERAL]] = np.where(at >= 0, row[at], -1)
     degree_block = np.where(degree >= 0, block[component[degree]], -1)
     return Packed(
         linear=_linear(inverse, stiffness, damping, force, start),
@@ -128,12 +129,17 @@ def degrees_of(model: Model) -> Ints:
 
 
 def carrier_degrees(model: Model) -> Ints:
-    """Rows of the vertical and horizontal displacement of each carrier (n_carrier, 2); -1 where held."""
+    """Rows of each carrier's vertical and horizontal displacement, (n, 2); -1 where held.
+
+    Those that turn follow once more, with none and their rotation.
+    """
     start = model.stator_start
+    wanted = [(carrier, ("v", "w")) for carrier in model.carriers]
+    wanted += [(carrier, ("", "thx")) for carrier in model.turning_carriers]
     rows = [
         [start[carrier.stators[0] - 1] + row if row >= 0 else -1 for row in at]
-        for carrier in model.carriers
-        for at in [[carrier.body.index(1, name) for name in ("v", "w")]]
+        for carrier, names in wanted
+        for at in [[carrier.body.index(1, name) for name in names]]
     ]
     return np.array(rows, dtype=np.int64).reshape(-1, 2)
 

@@ -49,8 +49,8 @@ class ReducedModel:
         Each pair's degrees (v, w, torsion, axial, lateral); zero where held.
     output : (3, n)
         Vertical, horizontal and torsional displacement of the output node.
-    carrier : (n_carrier, 2, n)
-        Vertical and horizontal displacement of each carrier.
+    carrier : (n_place, 2, n)
+        Vertical and horizontal displacement of each carrier, then zero and the rotation of those that turn.
     probe : (3, n_probe, n)
         What each probe sees of displacements, velocities and accelerations.
     """

@@ -16,9 +16,10 @@ from hypothesis import strategies as st
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
+from rubhpc.rig.carriers import Carrier
 from rubhpc.rig.reading import read_rig, with_key, with_keys
 from rubhpc.study.cases import CaseGrid
-from rubhpc.study.identity import MODAL_PHYSICS, PHYSICS, RING_PHYSICS, physics_of
+from rubhpc.study.identity import CARRIER_PHYSICS, MODAL_PHYSICS, PHYSICS, RING_PHYSICS, physics_of
 from rubhpc.study.study import Contact, Integrator, Recording, Run, Study, make_axis
 
 RIG = read_rig("mokhtar2017")
@@ -140,6 +141,10 @@ def test_versions_of_the_physics_hold_for_what_they_change():
     central = Integrator(method="central-difference")
     assert physics_of(study(integrator=central)) == PHYSICS
     assert physics_of(study(rig=ring, integrator=central)) == RING_PHYSICS
+    casing = Carrier(name="casing", mass=5.0, stiffness=2e6)
+    carried = replace(RIG, stator=(replace(RIG.stator[0], carrier="casing"),), carrier=(casing,))
+    for integrator in (central, Integrator()):
+        assert physics_of(study(rig=carried, integrator=integrator)) == CARRIER_PHYSICS
 
 
 def test_ids_do_not_depend_on_the_machine():

@@ -23,6 +23,8 @@ from rubhpc import (
 from rubhpc.errors import InputError
 from rubhpc.fem.annular import annular_rub
 from rubhpc.fem.modes import modes
+from rubhpc.integrate.carried import tip_deflection
+from rubhpc.integrate.measures import empty_samples, new_accumulator
 from rubhpc.rig.reading import rig_from_dict
 
 BASE = read_rig("mokhtar2017")
@@ -109,6 +111,37 @@ def test_the_modal_scheme_agrees_with_the_central_difference(law):
     np.testing.assert_allclose(stepped.vertical, modal.vertical, atol=5e-5 * scale)
     np.testing.assert_allclose(stepped.horizontal, modal.horizontal, atol=5e-5 * scale)
     np.testing.assert_allclose(stepped.carrier_displacement, modal.carrier_displacement, rtol=1e-4)
+    largest = modal.tip_deflection_ratio.max()
+    np.testing.assert_allclose(
+        stepped.tip_deflection_ratio, modal.tip_deflection_ratio, rtol=0, atol=1e-3 * largest
+    )
+
+
+@pytest.mark.parametrize("method", ["modal", "central-difference"])
+def test_a_stator_that_its_carrier_moves_is_not_bent(method):
+    """A casing of 20 g on soft springs shifts and turns under a rub much more than its stators bend."""
+    soft = {"mass": 0.02, "stiffness": 2e3, "inertia": 1e-4, "torsional_stiffness": 10.0, "damping": 5.0}
+    stiff = replace(BASE.stator[0], count=4, carrier="casing", youngs_modulus=2e11)
+    rig = replace(ring(**soft), stator=(stiff,))
+    record = simulate(rig, **(CASE | {"revolutions": 1}), method=method)
+    moved, bent = abs(record.stator_lateral).max(axis=1), stiff.length * record.tip_deflection_ratio
+    assert moved.min() > 1e-5
+    assert bent.max() < 0.05 * moved.min()
+
+
+def test_deflection_is_what_is_left_of_the_carrier_s_motion():
+    """Any motion of the carrier, carried to the tips without strain, and a known one of each tip."""
+    model = assemble(ring())
+    carrier, q = model.carriers[0], len(model.stators)
+    rng = np.random.default_rng(1)
+    motion, own = rng.normal(size=(3, 5)), rng.normal(size=(q, 5))
+    samples = empty_samples(model.n_place, 5)
+    samples.axial[q], samples.lateral[q], samples.lateral[q + 1] = motion
+    still = np.linalg.solve(carrier.body.stiffness[3:, 3:], -carrier.body.stiffness[3:, :3])  # unstrained
+    for i, stator in enumerate(model.stators):
+        samples.lateral[i] = own[i] + still[stator.lateral - 3] @ motion
+    accumulator = new_accumulator(q, model.n_place)
+    np.testing.assert_allclose(tip_deflection(samples, accumulator, model), abs(own).max(axis=1), rtol=1e-9)
 
 
 def test_a_ring_of_masses_agrees_with_equations_written_in_the_plane():
