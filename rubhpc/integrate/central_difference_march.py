@@ -42,7 +42,7 @@ class CentralDifferenceMarch(March):
         check: Callable[[], None] | None,
     ) -> None:
         """Start from `initial`, in a first kernel call of some 20 000 steps."""
-        super().__init__(check, FIRST_STEPS // setup.steps_per_sample, setup.model.n_place)
+        super().__init__(check, FIRST_STEPS // setup.steps_per_sample, setup.model)
         self._setup = setup
         self._pairs = pairs_of(
             setup.model,

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rubhpc.fem.model import Model
     from rubhpc.integrate.record import State
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
@@ -23,9 +24,10 @@ NO_FORCES = "no contact forces that obey the laws were found"  # why a case ends
 class March(ABC):
     """A case under way; sample 0 is the first recorded one, the transient lies before it."""
 
-    def __init__(self, check: Callable[[], None] | None, first_stride: int, n_place: int) -> None:
-        """Take what is called between kernel calls, the samples of the first call, and `Model.n_place`."""
-        self.n_place = n_place
+    def __init__(self, check: Callable[[], None] | None, first_stride: int, model: Model) -> None:
+        """Take what is called between kernel calls, the samples of the first call, and what moves."""
+        self.n_place = model.n_place
+        self.n_body = model.n_place - len(model.turning_carriers)  # tips and carriers, their rotations aside
         self.n_step = 0
         self.n_left = 0  # times that closed-form motion was left for short steps
         self.sample = 0

@@ -55,7 +55,7 @@ class ModalMarch(March):
         check: Callable[[], None] | None,
     ) -> None:
         """Take the case and its reduced initial motion; it is put into a contact mode by `_start`."""
-        super().__init__(check, ALL_SAMPLES, setup.model.n_place)
+        super().__init__(check, ALL_SAMPLES, setup.model)
         self._setup = setup
         offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
         self._clearance = clearance + offsets - sag_at_stators(setup.model)[0]

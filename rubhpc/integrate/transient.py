@@ -44,6 +44,7 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
         return pass_revolutions(march, recording, recording.longest_transient), recording.longest_transient
 
     n_place, done, limit = march.n_place, 0, recording.longest_transient
+    tips = 4 + np.arange(march.n_body)  # rotations of carriers show in the tips that they move
     samples, accumulator = (
         empty_samples(n_place, recording.samples_per_revolution),
         new_accumulator(march.touching().size, n_place),
@@ -63,7 +64,7 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
         if reason is not None:
             return reason, done
         done += 1
-        latest = samples.whole[[VERTICAL, HORIZONTAL, TWIST, *range(4, 4 + 2 * n_place)]]
+        latest = samples.whole[[VERTICAL, HORIZONTAL, TWIST, *tips, *tips + n_place]]
         reached = np.abs(latest).max(axis=1)
         largest = reached if largest is None else np.maximum(largest, reached)
         if reference is not None and has_settled(
