@@ -122,22 +122,22 @@ class Worker:
         data, damaged = self._kept(block, flat, wanted)
         wanted |= damaged
         entries: list[Entry] = []
+        places = np.flatnonzero(wanted).tolist()
         try:
-            cases = self.grid.cases(block)
+            cases = self.grid.cases(block, places)
         except Exception as error:
             cases, reason = [], _reason(error)
             ids = self.grid.case_ids(block)
-            entries = [Entry(int(flat[i]), ids[i], FAILED, reason=reason) for i in np.flatnonzero(wanted)]
+            entries = [Entry(int(flat[i]), ids[i], FAILED, reason=reason) for i in places]
             self.report(Totals(failed=len(entries), cost=round(cost * len(entries))))
-        for i_case in self.grid.in_turn(cases):
-            if not wanted[i_case]:
-                continue
+        for number in self.grid.in_turn(cases):
+            case, i_case = cases[number], places[number]
             if self.stopping.look() or not self.stopping.fits(cost * self._pace):
                 break
             began = time.perf_counter() - seconds_compiling()
             try:
-                start = self._initial_states.start_of(cases[i_case], flat, data, entries)
-                entry = self._enter(cases[i_case], int(flat[i_case]), data, i_case, start)
+                start = self._initial_states.start_of(case, flat, data, entries)
+                entry = self._enter(case, int(flat[i_case]), data, i_case, start)
             except Stopped:
                 break
             self._seconds += time.perf_counter() - seconds_compiling() - began

@@ -159,7 +159,7 @@ class Manifest:
     def _ids(self) -> CaseIds:
         return CaseIds(self.identity, self.points.values, self.continuation)
 
-    @property
+    @cached_property
     def variables(self) -> tuple[Variable, ...]:
         """The arrays stored for every case and written block by block, in the order of their checksum."""
         probed = _probed(self.parts)

@@ -181,10 +181,10 @@ class CaseGrid:
             for n, c in zip(order.tolist(), steps[order].tolist(), strict=True)
         ]
 
-    def cases(self, block: Block) -> list[Case]:
-        """Return the cases of a block, the last axis running fastest."""
-        box = boxed(block.start, block.shape)
-        return [self._case(index, name) for index, name in zip(box, self.case_ids(block), strict=True)]
+    def cases(self, block: Block, places: Sequence[int] | None = None) -> list[Case]:
+        """Return the cases of a block, the last axis running fastest, or those at some places in it."""
+        indices = list(boxed(block.start, block.shape))
+        return [self.case(indices[i]) for i in (range(len(indices)) if places is None else places)]
 
     def case(self, index: Sequence[int]) -> Case:
         """Return the case at an index of the grid."""
