@@ -11,8 +11,9 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.fem.stability import instability_message
-from rubhpc.input.fields import nearest, parse_field
-from rubhpc.input.quantity import brief, parse_quantity
+from rubhpc.input.fields import parse_field
+from rubhpc.input.messages import brief, nearest
+from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare

@@ -26,7 +26,7 @@ def export(store: str, selection: tuple[str, ...], names: tuple[str, ...], outpu
     """
     from postproc.store.case_table import TABLES, case_table, write_table
     from postproc.store.export import HDF5, check_folder, write_hdf5
-    from rubhpc.input.fields import nearest
+    from rubhpc.input.messages import nearest
 
     cases = open_cases(store, selection)
     for name in names:

@@ -6,7 +6,8 @@ import dataclasses
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rubhpc.errors import InputError
-from rubhpc.input.fields import FieldError, nearest, parse_field
+from rubhpc.input.fields import FieldError, parse_field
+from rubhpc.input.messages import nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

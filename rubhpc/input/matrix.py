@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.input.quantity import brief
+from rubhpc.input.messages import brief
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,8 @@ from decimal import Decimal
 from functools import cache
 from typing import Any
 
-from rubhpc.errors import InputError, printable
+from rubhpc.errors import InputError
+from rubhpc.input.messages import brief
 
 LEAST, GREATEST = 1e-30, 1e30  # size of a quantity: beyond, sums of products of a few leave the floats
 # One number, then a product of units. Nothing else reaches pint, whose grammar also takes sums and towers of
@@ -81,19 +82,6 @@ def out_of_range(number: float) -> str:
     if number and not LEAST <= abs(number) <= GREATEST:
         return f"is out of range; its size must be 0, or from {LEAST:g} to {GREATEST:g} in SI units"
     return ""
-
-
-def brief(value: object) -> str:
-    """Return a value shortened for a one-line message."""
-    text = (
-        f'"{value}"'
-        if isinstance(value, str)
-        else str(value).lower()
-        if isinstance(value, bool)
-        else str(value)
-    )
-    text = printable(text)
-    return text if len(text) <= 60 else f"{text[:56]} ..."
 
 
 def _parse_text(text: str, unit: str, where: str) -> float:

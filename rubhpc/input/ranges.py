@@ -8,8 +8,8 @@ from decimal import Decimal
 from typing import TYPE_CHECKING
 
 from rubhpc.errors import InputError
-from rubhpc.input.fields import nearest
-from rubhpc.input.quantity import brief, parse_quantity
+from rubhpc.input.messages import brief, nearest
+from rubhpc.input.quantity import parse_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -11,9 +11,9 @@ import tomllib
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
 from rubhpc.errors import InputError, printable
-from rubhpc.input.fields import FieldError, check_value, key_of, nearest, parse_field, place
-from rubhpc.input.matrix import encode_matrix
-from rubhpc.input.quantity import brief, parse_quantity
+from rubhpc.input.fields import FieldError, check_value, key_of, parse_field
+from rubhpc.input.kinds import KINDS
+from rubhpc.input.messages import brief, nearest, place
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -108,30 +108,19 @@ def plain(value: Any) -> Any:
         return [plain(v) for v in value] if isinstance(value, tuple) else value
     result: dict[str, Any] = {}
     for declared in dataclasses.fields(value):
-        entry, kind = getattr(value, declared.name), declared.metadata.get("kind")
-        if declared.metadata.get("derived"):
+        limits, entry = declared.metadata, getattr(value, declared.name)
+        if entry is None or limits.get("derived") or (limits.get("added") and entry == declared.default):
             continue
-        if kind == "matrix":
-            result[key_of(declared)] = encode_matrix(entry)
-        elif kind == "degrees":
-            result[key_of(declared)] = [list(degree) for degree in entry]
-        elif kind == "selection":
-            result |= {key_of(declared): dict(entry)} if entry else {}
-        elif kind == "pairs":
-            result[key_of(declared)] = {repr(float(key)): float(number) for key, number in entry}
-        elif entry is not None and not (declared.metadata.get("added") and entry == declared.default):
-            result[key_of(declared)] = float(entry) if kind == "quantity" else plain(entry)
+        kind = limits.get("kind")
+        result[key_of(declared)] = KINDS[kind].encode(entry) if kind else plain(entry)
     return result
 
 
 def _parse(declared: dataclasses.Field[Any], hint: Any, value: object, file: str, name: str) -> Any:
     where = place(file, name, key_of(declared))
-    kind = declared.metadata.get("kind")
     inner = f"{name}.{declared.name}" if name else declared.name
-    if kind == "pairs":
-        return _parse_pairs(value, declared.metadata["units"], file, inner)
-    if kind:
-        return parse_field(declared, value, where)
+    if kind := declared.metadata.get("kind"):
+        return parse_field(declared, value, place(file, inner) if kind == "pairs" else where)
     if get_origin(hint) is not tuple:
         return build(_kind_of(hint, value), value, file, inner)
     if not isinstance(value, list):
@@ -145,33 +134,6 @@ def _kind_of(hint: Any, table: object) -> Any:
     kinds = get_args(hint) or (hint,)
     keys = set(table) if isinstance(table, dict) else set()
     return max(kinds, key=lambda kind: len(keys & {f.name for f in dataclasses.fields(kind)}))
-
-
-def _parse_pairs(table: object, units: tuple[str, str], file: str, name: str) -> Any:
-    """Pairs from a table of numbers; to TOML a bare `31.56` is the table 31 with the key 56."""
-    key_unit, unit = units
-    if isinstance(table, list) and all(isinstance(pair, list) and len(pair) == 2 for pair in table):
-        where = place(file, name)
-        return tuple((parse_quantity(a, key_unit, where), parse_quantity(b, unit, where)) for a, b in table)
-    if not isinstance(table, dict):
-        raise InputError(f"{place(file, name)}: {brief(table)} is not a table; write {{ 31.56 = 0.09 }}")
-    flat: dict[str, object] = {}
-    for key, value in table.items():
-        inner = value.items() if isinstance(value, dict) else [(None, value)]
-        flat.update({key if tail is None else f"{key}.{tail}": v for tail, v in inner})
-    return tuple(
-        (parse_quantity(_spelled(key), key_unit, where), parse_quantity(value, unit, where))
-        for key, value in flat.items()
-        for where in [place(file, name, key)]
-    )
-
-
-def _spelled(text: str) -> object:
-    """Return the number that a key spells, or the key itself if it has a unit."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def _missing(declared: dataclasses.Field[Any], hint: Any, name: str) -> str:

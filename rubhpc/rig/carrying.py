@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rubhpc.input.fields import FieldError, nearest
+from rubhpc.input.fields import FieldError
+from rubhpc.input.messages import nearest
 from rubhpc.rig.stators import LumpedStator, Stator
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import traceback
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError, RubError
-from rubhpc.input.fields import place
+from rubhpc.input.messages import place
 
 if TYPE_CHECKING:
     from pathlib import Path

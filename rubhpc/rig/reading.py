@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
 from rubhpc.input.dotted import replace_keys
-from rubhpc.input.fields import nearest, place
+from rubhpc.input.messages import nearest, place
 from rubhpc.input.reading import build, read_toml
 from rubhpc.rig.python_rig import call_rig_function, python_function
 from rubhpc.rig.rig import Rig

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import NDArray  # noqa: TC002 - annotations are read when a rig is built
 
-from rubhpc.input.fields import FieldError, check_fields, count, degrees, matrix, nearest, quantity, table
+from rubhpc.input.fields import FieldError, check_fields, count, degrees, matrix, quantity, table
 from rubhpc.input.matrix import is_symmetric
+from rubhpc.input.messages import nearest
 from rubhpc.rig.bearing_table import AnyBearing, BearingTable  # noqa: TC001 - likewise
 from rubhpc.rig.forces import RotorForces
 from rubhpc.rig.matrix_body import check_body, checked_matrices

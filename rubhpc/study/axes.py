@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
 from rubhpc.input.dotted import find_key
-from rubhpc.input.fields import check_value, nearest, parse_field, place, quantity
-from rubhpc.input.quantity import brief
+from rubhpc.input.fields import check_value, parse_field, quantity
+from rubhpc.input.messages import brief, nearest, place
 from rubhpc.input.ranges import MOST_VALUES, RANGE_KEYS, Range, read_ends, read_range
 from rubhpc.study import contact_axes, initial
 from rubhpc.study.contact_axes import choices_of, contact_field

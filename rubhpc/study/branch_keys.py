@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
-from rubhpc.input.fields import FieldError, check_fields, count, place, quantity, series, text
+from rubhpc.input.fields import FieldError, check_fields, count, quantity, series, text
+from rubhpc.input.messages import place
 from rubhpc.study.axes import FROM_REST, Axis, make_range
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.model import state_size
-from rubhpc.input.fields import place
+from rubhpc.input.messages import place
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import STATE
 from rubhpc.study.axes import FROM_REST, RUN_UP_TIME

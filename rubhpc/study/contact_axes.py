@@ -10,7 +10,7 @@ from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rubhpc.errors import InputError
-from rubhpc.input.fields import nearest
+from rubhpc.input.messages import nearest
 from rubhpc.study.tables import NEEDS_LAW, Contact, ContactKeys
 
 if TYPE_CHECKING:

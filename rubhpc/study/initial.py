@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
-from rubhpc.input.fields import FieldError, check_fields, count, nearest, quantity, selection, text
+from rubhpc.input.fields import FieldError, check_fields, count, quantity, selection, text
+from rubhpc.input.messages import nearest
 from rubhpc.study.stored_state import StoredState  # noqa: TC001 - annotations are read when a table is built
 
 if TYPE_CHECKING:

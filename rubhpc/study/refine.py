@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
-from rubhpc.input.fields import FieldError, check_fields, count, criteria, nearest, words
+from rubhpc.input.fields import FieldError, check_fields, count, criteria, words
+from rubhpc.input.messages import nearest
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import FROM_REST, coordinate_of
 from rubhpc.study.levels import Levels

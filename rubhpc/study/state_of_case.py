@@ -11,7 +11,8 @@ import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
-from rubhpc.input.quantity import brief, parse_quantity
+from rubhpc.input.messages import brief
+from rubhpc.input.quantity import parse_quantity
 from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.schema import DONE, FINAL_STATE, STATUS
 from rubhpc.study.axes import coordinate_of, is_of_table

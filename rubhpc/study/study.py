@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
-from rubhpc.input.fields import place
-from rubhpc.input.quantity import brief, parse_quantity
+from rubhpc.input.messages import brief, place
+from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build, plain, read_toml, refuse_unknown
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.stators import has_bent_stator
