@@ -21,7 +21,7 @@ from rubhpc.integrate.record import State
 from rubhpc.integrate.shooting import NotConverged
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
-from rubhpc.study.axes import unit_of
+from rubhpc.study.axis_reading import unit_of
 from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
 

@@ -24,10 +24,11 @@ from rubhpc.rig.rig import Rig
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import OwnAxes
 from rubhpc.study.branch_keys import BranchKeys
+from rubhpc.study.contact_keys import Contact
 from rubhpc.study.initial import Initial
 from rubhpc.study.refine import Refine
 from rubhpc.study.run_up_keys import RunUpKeys
-from rubhpc.study.tables import Contact, Integrator, Recording, Run, Sample
+from rubhpc.study.tables import Integrator, Recording, Run, Sample
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

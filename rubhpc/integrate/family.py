@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.piecewise_motion import Revolution
     from rubhpc.rig.rig import Rig
-    from rubhpc.study.tables import Contact, Integrator
+    from rubhpc.study.contact_keys import Contact
+    from rubhpc.study.tables import Integrator
 
     Floats = NDArray[np.float64]
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from rubhpc.running.preparations import Preparations
     from rubhpc.storage.manifest import Manifest
     from rubhpc.study.cases import Block, Case, CaseGrid
+    from rubhpc.study.contact_keys import Contact
     from rubhpc.study.study import Recording
-    from rubhpc.study.tables import Contact
 
 _MOST_PILOTS, _FEW_PILOTS, _FEW_BRANCHED = 64, 6, 2  # cases; timed even if slow, and of a branch study
 _ENOUGH = 3.0  # processor seconds after which no more than the few are begun

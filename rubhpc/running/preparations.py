@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from rubhpc.rig.rig import Rig
     from rubhpc.study.cases import Block, CaseGrid
-    from rubhpc.study.tables import Contact
+    from rubhpc.study.contact_keys import Contact
 
 _STRETCHES, _MOST_COUNTED = 10, 2_000  # parts of a run, and cases in all, in which preparations are counted
 

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from rubhpc.storage.ledger import Ledger
     from rubhpc.storage.store import Store
     from rubhpc.study.cases import Block, Case, CaseGrid
+    from rubhpc.study.contact_keys import Contact
     from rubhpc.study.initial import Initial
     from rubhpc.study.study import Study
-    from rubhpc.study.tables import Contact
 
     Arrays = dict[str, NDArray[Any]]
 

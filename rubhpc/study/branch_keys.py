@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any
 from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, check_fields, count, quantity, series, text
 from rubhpc.input.messages import place
-from rubhpc.study.axes import FROM_REST, Axis, make_range
+from rubhpc.study.axes import FROM_REST, Axis
+from rubhpc.study.axis_reading import make_range
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rubhpc.rig.rig import Rig
-    from rubhpc.study.tables import ContactKeys, Integrator, Recording
+    from rubhpc.study.contact_keys import ContactKeys
+    from rubhpc.study.tables import Integrator, Recording
 
 LONGEST_PERIOD = 64  # revolutions
 

@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.rig.rig import Rig
+    from rubhpc.study.contact_keys import Contact
     from rubhpc.study.initial import Initial
     from rubhpc.study.speed_law import SpeedLaw
     from rubhpc.study.study import Study
-    from rubhpc.study.tables import Contact
 
 MOST_CASES = 10_000_000  # a larger grid is taken for a mistake: it would fill the memory
 _BLOCK = 16  # cases of a block by default, at most

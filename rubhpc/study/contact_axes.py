@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from rubhpc.errors import InputError
 from rubhpc.input.messages import nearest
-from rubhpc.study.tables import NEEDS_LAW, Contact, ContactKeys
+from rubhpc.study.contact_keys import NEEDS_LAW, Contact, ContactKeys
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

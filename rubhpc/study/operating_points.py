@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.rig.rig import Rig
+    from rubhpc.study.contact_keys import Contact
     from rubhpc.study.initial import Initial
     from rubhpc.study.points import Index, Values
     from rubhpc.study.speed_law import SpeedLaw
     from rubhpc.study.study import Study
-    from rubhpc.study.tables import Contact
 
 _EVENT_STEPS = 60  # that the modal scheme takes a revolution, samples apart
 _TOUCHING = 0.15  # share of the time in contact, where it takes short steps there

@@ -13,27 +13,18 @@ from rubhpc.input.reading import build, plain, read_toml, refuse_unknown
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.stators import has_bent_stator
 from rubhpc.study import contact_axes
-from rubhpc.study.axes import (
-    BOTH,
-    DIRECTION,
-    FROM_REST,
-    SPEED_AXES,
-    Axis,
-    direction_axis,
-    flatten,
-    make_axis,
-    make_range,
-    unit_of,
-)
+from rubhpc.study.axes import BOTH, DIRECTION, FROM_REST, SPEED_AXES, Axis, direction_axis
+from rubhpc.study.axis_reading import flatten, make_axis, make_range, unit_of
 from rubhpc.study.branch_keys import BranchKeys, branch_axis, check_branch
 from rubhpc.study.checks import check_axes, check_rigs
 from rubhpc.study.contact_axes import check_contacts
+from rubhpc.study.contact_keys import Contact, ContactKeys
 from rubhpc.study.initial import CONTACT_FREE, Initial, check_initials
 from rubhpc.study.refine import Refine
 from rubhpc.study.run_up_keys import RunUpKeys, check_run_up, refuse_speeds, speed_axis
 from rubhpc.study.sampling import draw
 from rubhpc.study.state_of_case import with_state
-from rubhpc.study.tables import Contact, ContactKeys, Integrator, Recording, Run, Sample, check_bent
+from rubhpc.study.tables import Integrator, Recording, Run, Sample, check_bent
 
 if TYPE_CHECKING:
     from os import PathLike

@@ -1,16 +1,18 @@
-"""How a study is computed: its tables [contact], [integrator], [record] and [run]."""
+"""How a study is computed: its tables [integrator], [record], [sample] and [run]."""
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
-from rubhpc.input.fields import FieldError, check_fields, choice, choices, count, quantity, series, table
+from rubhpc.input.fields import FieldError, check_fields, choice, choices, count, quantity, table
 from rubhpc.input.reading import plain
 from rubhpc.rig.probes import Probe  # noqa: TC001 - annotations are read when a table is built
 from rubhpc.schema import KEEPABLE, KEPT
+
+if TYPE_CHECKING:
+    from rubhpc.study.contact_keys import Contact
 
 AUTO, DIRECT = "auto", "direct"  # transient until the motion has settled, or is solved for
 LONGEST_TRANSIENT, SETTLED_WITHIN = 240, 1e-4  # then
@@ -19,138 +21,6 @@ SAFE_SHARE = 0.9  # of the stability limit
 SEARCH_STEP = 1e-6  # s, of the modal scheme with the fixed normal
 SALTELLI, FEWEST_POINTS = "sobol", 8  # the design that Sobol' indices need
 TURNING_STEP = 0.25e-6  # s, where it takes short steps of contact
-
-ClosedForm = Literal["always", "never"]
-CLOSED_FORM: dict[str, ClosedForm] = {  # of friction laws
-    "sliding": "always",
-    "coulomb": "always",
-    "stribeck": "never",
-    "table": "never",
-}
-# Keys of [contact] that belong to some laws only, and what their absence means there: None needs them.
-NEEDS_LAW: dict[str, tuple[str, tuple[str, ...], str]] = {
-    "stiffness": ("law", ("penalty",), "a multiplier has none"),
-    "damping": ("law", ("penalty",), "a multiplier has none"),
-    "restitution": ("law", ("lagrange",), "a penalty's rebound comes from its spring and damper"),
-    "static_friction_ratio": ("friction_law", ("coulomb", "stribeck"), "this law has no such ratio"),
-    "stribeck_speed": ("friction_law", ("stribeck",), "other laws have no such speed"),
-    "slip_speed": ("friction_law", ("table",), "other laws have no table"),
-    "friction_ratio": ("friction_law", ("table",), "other laws have no table"),
-}
-_EXAMPLES = {
-    ("law", "penalty"): {"stiffness": "1e8"},
-    ("friction_law", "stribeck"): {"static_friction_ratio": "1.3", "stribeck_speed": '"0.1 m/s"'},
-    ("friction_law", "table"): {"slip_speed": "[0, 0.1, 1.0]", "friction_ratio": "[1.3, 1.1, 1.0]"},
-}
-
-
-@dataclass(frozen=True, kw_only=True)
-class ContactKeys:
-    """What [contact] gives, each key for itself; axes of the grid may give the rest."""
-
-    law: str = choice(
-        doc="Contact law: multipliers that close gaps exactly, or a spring and damper (penalty).",
-        example='"penalty"',
-        of=("lagrange", "penalty"),
-        default="lagrange",
-    )
-    stiffness: float | None = quantity(
-        "N/m", doc="Stiffness of the penalty.", example='"1e8 N/m"', default=None, above=0
-    )
-    damping: float | None = quantity(
-        "N*s/m", doc="Damping of the penalty.", example='"100 N*s/m"', default=None, at_least=0
-    )
-    restitution: float | None = quantity(
-        "",
-        doc="Normal velocity after an impact over that before it, 0 to 1; by default none.",
-        example="0.7",
-        default=None,
-        at_least=0,
-    )
-    friction_law: str = choice(
-        doc="Friction law: steady sliding in the sense of the spin; or, with stick, Coulomb's law, "
-        "Stribeck's, whose coefficient decays with the slip speed, or a table over the slip speed.",
-        example='"coulomb"',
-        of=tuple(CLOSED_FORM),
-        default="sliding",
-    )
-    static_friction_ratio: float | None = quantity(
-        "",
-        doc="Coefficient of friction at rest over that in sliding; by default 1 (Coulomb's law).",
-        example="1.2",
-        default=None,
-        at_least=1,
-    )
-    stribeck_speed: float | None = quantity(
-        "m/s",
-        doc="Slip speed at which the excess of Stribeck's friction at rest has decayed to 1/e.",
-        example='"0.1 m/s"',
-        default=None,
-        above=0,
-    )
-    slip_speed: tuple[float, ...] | None = series(
-        "m/s",
-        doc="Slip speeds of a friction table, rising from 0.",
-        example="[0, 0.1, 1.0]",
-        default=None,
-        at_least=0,
-    )
-    friction_ratio: tuple[float, ...] | None = series(
-        "",
-        doc="Coefficients there over the friction of the case; linear between, constant beyond.",
-        example="[1.3, 1.1, 1.0]",
-        default=None,
-        at_least=0,
-    )
-    normal: str = choice(
-        doc="Contact normal: along the axis of the stator, or along the line of centres.",
-        example='"updated"',
-        of=("fixed", "updated"),
-        default="fixed",
-    )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-    @property
-    def is_smooth(self) -> bool:
-        """Whether forces follow from closed gaps alone: multipliers under steady sliding."""
-        return self.law == "lagrange" and self.friction_law == "sliding"
-
-    @property
-    def closed_form(self) -> ClosedForm:
-        """When the modal scheme has a closed form of contact; elsewhere it takes short steps."""
-        if self.normal == "updated" or (self.law == "penalty" and self.friction_law != "sliding"):
-            return "never"
-        return CLOSED_FORM[self.friction_law]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Contact(ContactKeys):
-    """Laws of contact and friction, and the direction of the normal: keys that agree."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for key, (kind, laws, reason) in NEEDS_LAW.items():
-            if getattr(self, key) is not None and getattr(self, kind) not in laws:
-                raise FieldError(key, f'{reason}; take {kind} = "{laws[0]}", or leave it out')
-        for (kind, law), needed in _EXAMPLES.items():
-            for key, example in needed.items():
-                if getattr(self, kind) == law and getattr(self, key) is None:
-                    raise FieldError(key, f'missing; {kind} = "{law}" needs one, such as {key} = {example}')
-        if self.restitution is not None and self.restitution > 1:
-            raise FieldError("restitution", f"{self.restitution:g} is out of range; it must be at most 1")
-        if self.slip_speed is not None and self.friction_ratio is not None:
-            _check_table(self.slip_speed, self.friction_ratio)
-
-
-def _check_table(speed: tuple[float, ...], ratio: tuple[float, ...]) -> None:
-    """Refuse a friction table that is none."""
-    if speed[0] != 0.0 or any(a >= b for a, b in itertools.pairwise(speed)):
-        raise FieldError("slip_speed", "does not rise from 0; write [0, 0.1, 1.0]")
-    if len(ratio) != len(speed):
-        problem = f"{len(ratio)} values for {len(speed)} slip speeds; give one for each"
-        raise FieldError("friction_ratio", problem)
 
 
 @dataclass(frozen=True, kw_only=True)

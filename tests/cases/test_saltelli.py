@@ -19,7 +19,7 @@ from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import read_rig
 from rubhpc.schema import DIVERGED, DONE, MISSING
-from rubhpc.study.axes import make_range
+from rubhpc.study.axis_reading import make_range
 from rubhpc.study.sampling import draw
 from rubhpc.study.tables import Sample
 

@@ -18,7 +18,7 @@ from postproc.store.rig_of_case import natural_frequencies, stator_places
 from postproc.store.select import select
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import read_rig
-from rubhpc.study.axes import make_axis
+from rubhpc.study.axis_reading import make_axis
 from rubhpc.study.study import Study
 
 CHOICE = {"clearance": 100e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}

@@ -9,7 +9,8 @@ from rubhpc.integrate.branch_point import Branching
 from rubhpc.integrate.family import Family, Operation, flow
 from rubhpc.integrate.initial_state import fit_to_gaps
 from rubhpc.integrate.piecewise_motion import PiecewiseMotion
-from rubhpc.study.tables import Contact, Integrator
+from rubhpc.study.contact_keys import Contact
+from rubhpc.study.tables import Integrator
 
 CASE = {"speed_ratio": 0.75, "friction": 0.3}
 ALONG = {"along": "clearance", "start": "100 um", "stop": "124 um", "largest_step": "4 um", "keep": ()}

@@ -14,8 +14,9 @@ from rubhpc.fem.response import contact_free_amplitude
 from rubhpc.integrate.initial_state import gaps
 from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.start import start_of
+from rubhpc.study.contact_keys import Contact
 from rubhpc.study.initial import Initial
-from rubhpc.study.tables import Contact, Integrator
+from rubhpc.study.tables import Integrator
 
 SPIN = 220.0  # rad/s
 METHODS = {"modal": Integrator(), "central": Integrator(method="central-difference", step=1e-6)}

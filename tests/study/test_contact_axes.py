@@ -12,10 +12,11 @@ from rubhpc.running.driver import run
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
-from rubhpc.study.axes import Axis, make_axis
+from rubhpc.study.axes import Axis
+from rubhpc.study.axis_reading import make_axis
 from rubhpc.study.cases import CaseGrid
+from rubhpc.study.contact_keys import Contact
 from rubhpc.study.study import read_study
-from rubhpc.study.tables import Contact
 
 BASE = """
 rig = "mokhtar2017"

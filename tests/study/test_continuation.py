@@ -9,7 +9,8 @@ import pytest
 
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import read_rig
-from rubhpc.study.axes import BOTH, DIRECTION, DOWN, FROM_REST, UP, Axis, make_axis
+from rubhpc.study.axes import BOTH, DIRECTION, DOWN, FROM_REST, UP, Axis
+from rubhpc.study.axis_reading import make_axis
 from rubhpc.study.continuation import CaseIds, Continuation, continuation_of
 
 RIG = read_rig("mokhtar2017")

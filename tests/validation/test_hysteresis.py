@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 
 from rubhpc import LumpedStator, State, assemble, periodic, read_rig, run
 from rubhpc.fem.response import first_lateral_frequency, steady_response
-from rubhpc.study.axes import make_axis
+from rubhpc.study.axis_reading import make_axis
 from rubhpc.study.study import Study
 from rubhpc.study.tables import Recording
 

@@ -9,7 +9,7 @@ from test_coulomb import PRESSED, pressed_onto_a_rim
 
 from rubhpc import simulate
 from rubhpc.errors import InputError
-from rubhpc.study.tables import Contact
+from rubhpc.study.contact_keys import Contact
 
 RIM, FRICTION, DURATION = 0.5, 0.2, 1.2  # m/s, 1, s
 STRIBECK = Contact(friction_law="stribeck", static_friction_ratio=2.0, stribeck_speed=0.2)
