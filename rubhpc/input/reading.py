@@ -130,10 +130,18 @@ def _parse(declared: dataclasses.Field[Any], hint: Any, value: object, file: str
 
 
 def _kind_of(hint: Any, table: object) -> Any:
-    """Return the dataclass of a union that a table describes: the first of those with most of its keys."""
-    kinds = get_args(hint) or (hint,)
+    """Return the dataclass of a union that a table describes.
+
+    The one with most of its keys; of several the one that lacks the fewest required ones, or the first.
+    """
     keys = set(table) if isinstance(table, dict) else set()
-    return max(kinds, key=lambda kind: len(keys & {f.name for f in dataclasses.fields(kind)}))
+
+    def likeness(kind: Any) -> tuple[int, int]:
+        declared = dataclasses.fields(kind)
+        required = {key_of(f) for f in declared if f.default is dataclasses.MISSING}
+        return len(keys & {key_of(f) for f in declared}), -len(required - keys)
+
+    return max(get_args(hint) or (hint,), key=likeness)
 
 
 def _missing(declared: dataclasses.Field[Any], hint: Any, name: str) -> str:
