@@ -114,7 +114,9 @@ SERIAL = (
     "faults/test_kill_storm.py",
     "faults/test_stops.py",
     "integrate/test_event_driven_march.py::test_signals_are_answered_however_long_a_revolution_lasts",
-    "mpi/",
+    "mpi/test_carried_chains.py",
+    "mpi/test_ranks.py",
+    "mpi/test_survivors.py",
 )
 
 for library in ("OMP", "OPENBLAS", "MKL", "BLIS"):
