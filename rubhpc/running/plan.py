@@ -14,8 +14,8 @@ from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
 from rubhpc.storage.duration import duration
 from rubhpc.storage.growth import origins
 from rubhpc.storage.ledger import count
-from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.measures import blank_records, converted
+from rubhpc.storage.new_manifest import manifest_of
 from rubhpc.storage.parts import Shares
 from rubhpc.storage.refined import Refinement, status_of
 from rubhpc.storage.resume import cases_without_files, grid_for, is_store, missing_share
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.storage.manifest import Manifest
     from rubhpc.study.study import Study
 
 _LINE = 400  # bytes of a case in a journal, about, for one stator
@@ -173,7 +174,7 @@ def make_plan(study: Study, part: str | None = None) -> Plan:
     """
     chosen = None if part is None else Part.parse(part)
     grid = grid_for(study)
-    manifest = Manifest.of(grid)
+    manifest = manifest_of(grid)
     blocks = grid.blocks()
     shares = None
     status = np.zeros(grid.n_case, np.int8)

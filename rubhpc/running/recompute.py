@@ -12,8 +12,8 @@ from rubhpc.integrate.record import Record, State
 from rubhpc.running.initial_states import is_intact
 from rubhpc.running.worker import integrate, packed_measures, put_any, set_up
 from rubhpc.schema import DONE, FINAL_STATE, MISSING, STATUS
-from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.measures import blank_records
+from rubhpc.storage.new_manifest import manifest_of
 from rubhpc.storage.resume import grid_for, is_store
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.study.points import Points
@@ -76,7 +76,7 @@ def reproduce(study: Study, name: str) -> Reproduction:
         The case fails; the text is its reason.
     """
     grid = grid_for(study)
-    manifest = Manifest.of(grid)
+    manifest = manifest_of(grid)
     flat = _find(grid, name.lower())
     case = grid.case([int(i) for i in np.unravel_index(flat, grid.shape)])
     at = manifest.name_case(flat)
@@ -150,7 +150,7 @@ def _find(grid: CaseGrid, name: str) -> int:
     """Flat index of the one case whose id begins so."""
     if len(name) < SHORTEST:
         raise InputError(f"--only {name}: too short; give {SHORTEST} characters of an id at least")
-    manifest = Manifest.of(grid)
+    manifest = manifest_of(grid)
     found = [flat for flat in range(grid.n_case) if manifest.case_id(flat).startswith(name)]
     if len(found) != 1:
         what = f"{len(found)} cases have such an id; give more of it" if found else "no case has such an id"

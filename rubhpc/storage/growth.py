@@ -23,6 +23,7 @@ from rubhpc.storage.disk import disk_errors, flush_to_disk, remove, write_whole
 from rubhpc.storage.journal import Entry, Journal, next_run
 from rubhpc.storage.manifest import BLOCKS, GROWTH, PRIVATE, Manifest, manifests
 from rubhpc.storage.measures import added_measures, converted
+from rubhpc.storage.new_manifest import manifest_of
 from rubhpc.storage.store import Store, case_checksum
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ def _put_together(draft: Path, store: Store, grid: CaseGrid) -> None:
         accepted = (*accepted, before.parts["physics"])
     added = added_measures(before.measures)
     after = replace(
-        Manifest.of(grid),
+        manifest_of(grid),
         measures=(*before.measures, *added),
         added=(*before.added, *(variable.name for variable in added)),
         accepted=accepted,

@@ -21,6 +21,7 @@ from zarr.storage import MemoryStore
 from rubhpc.schema import ORDERS, TURNED, VARIABLES
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.manifest import PRIVATE, Manifest
+from rubhpc.storage.new_manifest import manifest_of
 from rubhpc.study.axes import meanings_of
 from rubhpc.version import __version__
 
@@ -77,7 +78,7 @@ def skeleton(grid: CaseGrid, manifest: Manifest) -> dict[str, bytes]:
 
 def build(path: Path, grid: CaseGrid) -> None:
     """Make all of a store in the empty directory `path`."""
-    manifest = Manifest.of(grid)
+    manifest = manifest_of(grid)
     files = skeleton(grid, manifest)
     for name, data in files.items():
         write_whole(path / name, data, is_synced=False)
@@ -170,7 +171,7 @@ def _packed_chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 def _static(grid: CaseGrid) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]]:
     """Coordinates and settings: name -> (dimensions, values, attributes)."""
-    sizes = Manifest.of(grid).sizes
+    sizes = manifest_of(grid).sizes
     recording = grid.study.recording
     own: dict[str, tuple[NDArray[Any], str]] = {
         "stator": (np.arange(1, sizes["stator"] + 1), "number of the stator, as in the rig"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -12,16 +11,8 @@ from zlib import crc32
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import (
-    BRANCH,
-    MULTIPLIERS,
-    ORDERS,
-    RUN_UP,
-    STATE,
     VARIABLES,
-    WAVEFORM,
     branch_variables,
-    case_measures,
-    lyapunov_variables,
     probe_variables,
     run_up_variables,
 )
@@ -32,19 +23,15 @@ from rubhpc.storage.measures import from_json, to_json, unlisted_measures
 from rubhpc.study.axes import FROM_REST, coordinate_of, written
 from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.points import Points
-from rubhpc.study.refine import table_of
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from rubhpc.schema import Variable
-    from rubhpc.study.cases import CaseGrid
     from rubhpc.study.continuation import Continuation
 
 _FORMAT, _SHARDED = 4, 5  # a store without shards can be read by versions that know none
 _READABLE = (3, _FORMAT, _SHARDED)  # format 3 does not list its measures
-_MOST_BLOCKS = 256  # of more blocks, one file each would be too many for file systems with a quota of files
-_SHARDS = 48  # of an array, at most, when the store is made: with some 17 arrays, under 1000 files
 PRIVATE = ".rubhpc"  # the directory of a store that zarr does not look into
 BLOCKS = "blocks"  # in it: blocks that have not been packed into shards yet
 PARTS = "parts"  # in it: locks and shares of parts that are computed apart
@@ -190,57 +177,6 @@ class Manifest:
         )
         return ", ".join([*numbers, *values])
 
-    @classmethod
-    def of(cls, grid: CaseGrid) -> Self:
-        """The manifest of a new store for `grid`, without its files."""
-        study = grid.study
-        recording = study.recording
-        n_sample = recording.revolutions * recording.samples_per_revolution
-        return cls(
-            title=study.title,
-            identity=grid.identity,
-            parts=json.loads(json.dumps(grid.identity_parts)),  # tuples become lists, as in a file
-            axes=tuple(
-                AxisRecord(**{f.name: getattr(axis, f.name) for f in fields(AxisRecord)})
-                for axis in study.axes
-            ),
-            chunk=tuple(grid.chunk),
-            shard=shard_of(grid.shape, grid.chunk),
-            sizes={
-                "stator": grid.n_stator,
-                "sample": n_sample,
-                "order": n_sample // 2 + 1,
-                "section": recording.revolutions,
-                **(
-                    {
-                        "sample": grid.most_revolutions * recording.samples_per_revolution,
-                        "revolution": grid.most_revolutions,
-                        "order": len(ORDERS),
-                    }
-                    if study.run_up
-                    else {}
-                ),
-                **({"degree": grid.n_degree} if grid.n_degree else {}),
-                **(
-                    {
-                        "point": study.branch.points,
-                        "multiplier": MULTIPLIERS,
-                        "point_section": study.branch.longest,
-                    }
-                    if study.branch
-                    else {}
-                ),
-            },
-            keep=_kept(grid),
-            files={},
-            measures=(
-                *case_measures(),
-                *(v for v in probe_variables(recording.probed).values() if v.role == "measure"),
-                *lyapunov_variables(recording.lyapunov).values(),
-            ),
-            refine=None if study.refine is None else table_of(study.refine, study.axes),
-        )
-
     def write(self, store: Path) -> None:
         """Put the manifest into a store, twice."""
         content = {f.name: getattr(self, f.name) for f in fields(self)}
@@ -312,33 +248,9 @@ class Manifest:
         return names
 
 
-def _kept(grid: CaseGrid) -> tuple[str, ...]:
-    """Roles of the arrays that are stored for every case."""
-    study = grid.study
-    if study.branch is not None:
-        return (BRANCH,)
-    if study.run_up is not None:
-        return (RUN_UP, *(role for role in study.recording.keep if role == WAVEFORM))
-    return tuple(sorted({*study.recording.keep, *([STATE] if grid.continuation else [])}))
-
-
 def _probed(parts: dict[str, Any]) -> list[tuple[str, str]]:
     """Name and quantity of the probes of a study, from the parts of its identity."""
     return [(probe["name"], probe["quantity"]) for probe in parts["record"].get("probe", [])]
-
-
-def shard_of(shape: tuple[int, ...], chunk: tuple[int, ...]) -> tuple[int, ...]:
-    """Cases of a shard along each dimension: whole blocks, along the last dimensions first; () without."""
-    n_block = [-(-n // c) for n, c in zip(shape, chunk, strict=True)]
-    if math.prod(n_block) <= _MOST_BLOCKS:
-        return ()
-    ratio = [1] * len(shape)
-    for i in reversed(range(len(shape))):
-        before = math.prod(n_block[:i])  # shards that are left if this dimension is spanned whole
-        ratio[i] = n_block[i] if before >= _SHARDS else -(-n_block[i] // (_SHARDS // before))
-        if before < _SHARDS:
-            break
-    return tuple(r * c for r, c in zip(ratio, chunk, strict=True))
 
 
 class _OtherFormat(Exception):  # noqa: N818 - becomes the text of a StoreError

@@ -14,6 +14,7 @@ from rubhpc.storage.differences import differences, is_other_version
 from rubhpc.storage.growth import finish_growth, grow
 from rubhpc.storage.manifest import Manifest, manifests
 from rubhpc.storage.measures import added_measures
+from rubhpc.storage.new_manifest import manifest_of
 from rubhpc.storage.store import Store, remove_drafts
 from rubhpc.storage.tidy import tidy
 from rubhpc.study.cases import CaseGrid
@@ -47,7 +48,7 @@ def grid_for(study: Study, *, accept_version: bool = False) -> CaseGrid:
     if not is_store(study.output):
         return grid
     manifest = Manifest.read(study.output)
-    _refuse_other(manifest, Manifest.of(grid), study.output, accept_version=accept_version)
+    _refuse_other(manifest, manifest_of(grid), study.output, accept_version=accept_version)
     return grid if grid.chunk == manifest.chunk else CaseGrid(study, chunk=manifest.chunk)
 
 
@@ -93,7 +94,7 @@ def bring_up_to_date(store: Store, grid: CaseGrid, *, accept_version: bool = Fal
     note = _note_on(added, store) if added else ""
     if must_grow:
         grow(store, grid)
-    store.refine(Manifest.of(grid).refine)
+    store.refine(manifest_of(grid).refine)
     store.repair_files(grid)
     return note
 
@@ -106,7 +107,7 @@ def must_be_grown(store: Store, grid: CaseGrid, *, accept_version: bool) -> bool
     StoreError
         It is of another study.
     """
-    mine, wanted = store.manifest, Manifest.of(grid)
+    mine, wanted = store.manifest, manifest_of(grid)
     _refuse_other(mine, wanted, store.path, accept_version=accept_version)
     is_same = mine.axes == wanted.axes and mine.identity == wanted.identity
     return not is_same or bool(added_measures(mine.measures))

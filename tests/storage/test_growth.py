@@ -20,7 +20,7 @@ from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
 from rubhpc.storage.growth import origins
 from rubhpc.storage.journal import Entry, next_run
-from rubhpc.storage.manifest import Manifest
+from rubhpc.storage.new_manifest import manifest_of
 from rubhpc.storage.regular_files import RegularFiles
 from rubhpc.storage.resume import bring_up_to_date, grid_for, open_store
 from rubhpc.storage.store import Store, case_checksum
@@ -294,7 +294,7 @@ def test_another_version_of_the_physics_is_refused_unless_it_is_accepted(tmp_pat
 def test_origins_tell_where_each_case_was(tmp_path):
     grid = {"speed_ratio": [0.9, 2.0], "clearance_ratio": [0.7], "friction": [0.1, 0.3]}
     before, after = (
-        Manifest.of(grid_for(make_study(tmp_path, g)))
+        manifest_of(grid_for(make_study(tmp_path, g)))
         for g in (grid, {**grid, "speed_ratio": [2.0, 1.0, 0.9], "friction": [0.2, 0.3, 0.1]})
     )
     assert origins(before, after).tolist() == [-1, 3, 2, -1, -1, -1, -1, 1, 0]

@@ -19,7 +19,7 @@ from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
 from rubhpc.running.stopping import Stopping
 from rubhpc.schema import STATE, VARIABLES
-from rubhpc.storage.manifest import shard_of
+from rubhpc.storage.new_manifest import shard_of
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
 from rubhpc.study.study import read_study

@@ -18,7 +18,7 @@ from rubhpc.running.driver import run as run_here
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.differences import differences
-from rubhpc.storage.manifest import Manifest
+from rubhpc.storage.new_manifest import manifest_of
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
@@ -218,7 +218,7 @@ def test_a_longer_sequence_keeps_its_cases(tmp_path, method):
 
 def test_a_latin_hypercube_cannot_grow(tmp_path):
     short, long = (
-        Manifest.of(CaseGrid(read_study(write_sample(tmp_path, run=f'[sample]\nn = {n}\nmethod = "lhs"'))))
+        manifest_of(CaseGrid(read_study(write_sample(tmp_path, run=f'[sample]\nn = {n}\nmethod = "lhs"'))))
         for n in (8, 16)
     )
     assert differences(short, long) == [

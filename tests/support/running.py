@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
-from rubhpc.storage import manifest
+from rubhpc.storage import new_manifest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -84,8 +84,8 @@ def write_sample(
 def shards(most_blocks: int = 1, most_shards: int = 3) -> Iterator[None]:
     """Have stores that are made within this context packed into shards, however small they are."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(manifest, "_MOST_BLOCKS", most_blocks)
-        patch.setattr(manifest, "_SHARDS", most_shards)
+        patch.setattr(new_manifest, "_MOST_BLOCKS", most_blocks)
+        patch.setattr(new_manifest, "_SHARDS", most_shards)
         yield
 
 
