@@ -6,6 +6,8 @@ RANKS ?= 2
 STORE := quickstart.zarr
 FIGURES := figures
 PAPER := paper
+# Hundreds of processes start in the tests: a fifth of each start compiles sources whose bytecode is not kept.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help demo docs paper check test faults validation kernels lint bench bench-scale clean
 .DEFAULT_GOAL := help
