@@ -12,6 +12,7 @@ import numpy as np
 from rubhpc.running.job import next_level
 from rubhpc.running.pool import Totals
 from rubhpc.running.progress import Progress
+from rubhpc.running.slabs import find_slabs, work_through
 from rubhpc.running.watchdog import Watchdog
 from rubhpc.running.worker import Worker
 from rubhpc.schema import MISSING
@@ -27,10 +28,14 @@ if TYPE_CHECKING:
 
     from rubhpc.running.job import Job, RunRequest
     from rubhpc.running.pool import Pool
+    from rubhpc.running.slabs import Slab
     from rubhpc.storage.journal import Entry
+    from rubhpc.storage.refined import Refinement
     from rubhpc.study.cases import Block
 
 _PACKING_GAP = 600.0  # s between packings while a run is on; one takes 5 s for a million cases
+_PATIENCE = 2.0  # s of work on a slab that a kill may cost: its blocks get more cases on the next level
+_SLABS = 2  # of a refined map, to a rank: with fewer they are computed together, level by level
 
 
 class Computing:
@@ -51,7 +56,34 @@ class Computing:
         self._store = Store(job.study.output)
         self._entered: list[Entry] = []  # on this level
         self._n_claim = 0
+        self._sums = Totals()  # of all ranks, as this one last saw them
         self._unsynced: list[Path] = []
+        self._next_packing = time.monotonic() + _PACKING_GAP
+        self._slabs = self._find_slabs()
+
+    @property
+    def has_slabs(self) -> bool:
+        """Whether a refined map has enough slabs for all ranks."""
+        return bool(self._slabs)
+
+    def compute_slabs(self) -> None:
+        """Compute slabs of a refined map through all their levels, until one rank finds none left.
+
+        The others then store what they have; what is left of their slabs is computed together, by levels.
+        """
+        job, n_slab = self._job, len(self._slabs)
+        assert job.refinement is not None
+        progress = self._progress_of_slabs(job.refinement)
+        job.missing[:] = False
+        with progress, self._worker("rank", progress) as worker:
+            worker.patience = _PATIENCE
+            worker.is_wanted_elsewhere = lambda: self._sums.claimed > n_slab or self._is_over(self._sums)
+            for number in self._numbers(n_slab):
+                work_through(self._slabs[number], job.refinement, worker)
+                worker.store_held()
+                self._pack_for_readers()
+        if self._stopping.reason:
+            self._pool.add(Totals(stop=1))
 
     def compute(self) -> None:
         """Compute blocks until there are none left."""
@@ -61,13 +93,10 @@ class Computing:
         # Journals of a later level count after those of an earlier one.
         kind = f"rank_{job.level:02d}_" if job.level else "rank"
         with self._progress(sequences, quiet=quiet) as progress, self._worker(kind, progress) as worker:
-            next_packing = time.monotonic() + _PACKING_GAP
             for block in self._claimed(sequences):
                 worker.work(block)
                 worker.attend()
-                if pool.rank == 0 and job.part is None and time.monotonic() > next_packing:
-                    self._store.pack(self._store.replay())  # for readers who look on
-                    next_packing = time.monotonic() + _PACKING_GAP
+                self._pack_for_readers()
         if self._stopping.reason:
             pool.add(Totals(stop=1))
 
@@ -90,7 +119,8 @@ class Computing:
         """Go on to the next level of a refined map, together with all ranks; whether there is one."""
         if self._job.refinement is None:
             return False
-        found = self._pool.gather((self._entered, self._n_claim, bool(self._stopping.look())))
+        is_over = bool(self._stopping.look()) or self._is_over(self._pool.totals())
+        found = self._pool.gather((self._entered, self._n_claim, is_over))
         entries = [entry for entered, _, _ in found for entry in entered]
         following = next_level(self._job, self._grid, self._sequences, entries, sum(n for _, n, _ in found))
         if following is None or any(is_over for _, _, is_over in found):
@@ -107,25 +137,50 @@ class Computing:
 
     def _claimed(self, sequences: list[list[Block]]) -> Iterator[Block]:
         """The blocks this rank is to compute, one sequence after another, until none is left or it stops."""
-        pool, stopping = self._pool, self._stopping
-        most_failures = self._job.study.run.max_failures
         missing = self._job.missing.reshape(self._grid.shape)
-
-        def is_over(sums: Totals) -> bool:
-            has_failed = most_failures is not None and sums.failed > most_failures
-            return bool(stopping.look() or sums.stop or has_failed)
-
-        while not stopping.look():
-            sums = pool.claim()
-            self._n_claim += 1
-            number = sums.claimed - self._job.n_claimed
-            if number >= len(sequences) or is_over(sums):
-                return
+        for number in self._numbers(len(sequences)):
             for i, block in enumerate(sequences[number]):
-                if i and is_over(pool.totals()):
+                if i and self._is_over(self._pool.totals()):
                     return
                 if missing_share(block, missing):
                     yield block
+
+    def _numbers(self, n: int) -> Iterator[int]:
+        """The numbers below n that this rank claims, until none is left or it stops."""
+        while not self._stopping.look():
+            sums = self._sums = self._pool.claim()
+            self._n_claim += 1
+            number = sums.claimed - self._job.n_claimed
+            if number >= n or self._is_over(sums):
+                return
+            yield number
+
+    def _is_over(self, sums: Totals) -> bool:
+        """Whether all ranks are to end."""
+        most_failures = self._job.study.run.max_failures
+        has_failed = most_failures is not None and sums.failed > most_failures
+        return bool(self._stopping.look() or sums.stop or has_failed)
+
+    def _pack_for_readers(self) -> None:
+        """Have the first rank pack the journals now and then, for readers who look on."""
+        is_due = time.monotonic() > self._next_packing
+        if is_due and self._pool.rank == 0 and self._job.part is None:
+            self._store.pack(self._store.replay())
+            self._next_packing = time.monotonic() + _PACKING_GAP
+
+    def _report(self, increment: Totals) -> None:
+        self._sums = self._pool.add(increment)
+
+    def _find_slabs(self) -> list[Slab]:
+        """Slabs that are not complete; none where ranks would soon find none, or cases have killed ranks."""
+        job, refinement = self._job, self._job.refinement
+        if refinement is None or job.suspect:
+            return []
+        blocks = [block for sequence in self._sequences for block in sequence]
+        slabs = find_slabs(blocks, self._grid.shape, refinement.refined)
+        if len(slabs) < _SLABS * self._pool.size:
+            return []
+        return [slab for slab in slabs if refinement.within(slab.window).missing().any()]
 
     @contextmanager
     def _worker(self, kind: str, progress: Progress | None = None) -> Iterator[Worker]:
@@ -149,7 +204,15 @@ class Computing:
             store.journal(job.run, writer) as journal,
         ):
             worker = Worker(
-                self._grid, store, job.ledger, job.missing, journal, watch, self._stopping, pool.add, attend
+                self._grid,
+                store,
+                job.ledger,
+                job.missing,
+                journal,
+                watch,
+                self._stopping,
+                self._report,
+                attend,
             )
             worker.entered = self._entered
             yield worker
@@ -159,20 +222,35 @@ class Computing:
                 self._unsynced += worker.take_unsynced()
 
     def _progress(self, sequences: list[list[Block]], *, quiet: bool) -> Progress:
-        job, pool = self._job, self._pool
+        job = self._job
         is_missing = job.missing.reshape(self._grid.shape)
         n_missing = int(job.missing.sum())
         is_refined = job.refinement is not None
         n_known = int((job.ledger.status != MISSING).sum())
         n_case = n_missing + n_known if is_refined else int(job.share.sum())
+        cost = sum(
+            block.cost * missing_share(block, is_missing) for sequence in sequences for block in sequence
+        )
+        return self._shown(n_case, cost, n_case - n_missing, quiet=quiet, is_level=is_refined)
+
+    def _progress_of_slabs(self, refinement: Refinement) -> Progress:
+        """That of all levels, whose cases are known roughly."""
+        job = self._job
+        n_known = int((job.ledger.status != MISSING).sum())
+        n_case = max(refinement.asked().n_expected, n_known + int(job.missing.sum()))
+        all_cost = sum(block.cost for sequence in self._sequences for block in sequence)
+        cost = all_cost * (n_case - n_known) / self._grid.n_case
+        return self._shown(n_case, cost, n_known, quiet=self._request.quiet or self._pool.rank > 0)
+
+    def _shown(
+        self, n_case: int, cost: float, n_done: int, *, quiet: bool, is_level: bool = False
+    ) -> Progress:
         return Progress(
             n_case,
-            sum(
-                block.cost * missing_share(block, is_missing) for sequence in sequences for block in sequence
-            ),
-            n_done=n_case - n_missing,
+            cost,
+            n_done=n_done,
             quiet=quiet,
-            has_bar=not pool.is_launched,
-            level=job.level + 1 if is_refined else None,
-            before=pool.totals(),
+            has_bar=not self._pool.is_launched,
+            level=self._job.level + 1 if is_level else None,
+            before=self._pool.totals(),
         )

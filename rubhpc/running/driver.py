@@ -201,12 +201,15 @@ def _round(request: RunRequest, pool: Pool, began: float) -> Summary:
     if job.part is None:
         _together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=False))
     computing = Computing(job, pool, request)
-    while True:
+    is_left = True
+    if computing.has_slabs:
+        _together(pool, computing.compute_slabs)
+        is_left = computing.advance()
+    while is_left:
         _together(pool, computing.compute)
         if job.suspect and not request.stopping.look():
             _together(pool, computing.try_suspects)
-        if not computing.advance():
-            break
+        is_left = computing.advance()
     _together(pool, computing.sync)
     reason = next((reason for reason in pool.gather(request.stopping.verdict) if reason), "")
     if not reason and job.part is None:

@@ -64,8 +64,8 @@ class Pool(Protocol):
     def claim(self) -> Totals:
         """Claim the next block, whose position is `claimed` in the sums as they were before."""
 
-    def add(self, increment: Totals) -> None:
-        """Add to the sums."""
+    def add(self, increment: Totals) -> Totals:
+        """Add to the sums; returns them as they were before."""
 
     def totals(self) -> Totals:
         """The current sums; cheap on the first rank, which holds them."""
@@ -106,9 +106,11 @@ class Alone:
         self._sums[0] += 1
         return before
 
-    def add(self, increment: Totals) -> None:
+    def add(self, increment: Totals) -> Totals:
         """See Pool."""
+        before = self.totals()
         self._sums += increment
+        return before
 
     def totals(self) -> Totals:
         """See Pool."""
@@ -179,9 +181,9 @@ class Ranks:
         """See Pool."""
         return self._accumulate(Totals(claimed=1))
 
-    def add(self, increment: Totals) -> None:
+    def add(self, increment: Totals) -> Totals:
         """See Pool."""
-        self._accumulate(increment)
+        return self._accumulate(increment)
 
     def totals(self) -> Totals:
         """See Pool."""

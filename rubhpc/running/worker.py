@@ -83,6 +83,10 @@ class Worker:
         Called several times a second while a case is computed.
     entered : list of Entry
         Of a refined map, what this rank has journalled.
+    is_wanted_elsewhere : callable
+        Asked after every case whether to store what there is of the block and leave the rest of it.
+    patience : float
+        Seconds for which finished blocks may be held back, since more of their cases may come.
     """
 
     grid: CaseGrid
@@ -100,6 +104,10 @@ class Worker:
         self._setups: OrderedDict[tuple[int, float, Contact], tuple[Rig, Setup]] = OrderedDict()
         self._initial_states = InitialStates(self.grid, self.store, self.ledger, self._repair)
         self.entered: list[Entry] = []
+        self.is_wanted_elsewhere: Callable[[], bool] = lambda: False
+        self.patience = 0.0
+        self._held: dict[tuple[int, ...], tuple[Arrays, list[Entry]]] = {}
+        self._stored = time.monotonic()
         self._unsynced: list[Path] = []
         self._next_sync = time.monotonic() + _SYNC_GAP
         self._seconds, self._cost = 0.0, 0.0
@@ -151,21 +159,33 @@ class Worker:
                     cost=round(cost),
                 )
             )
+            if self.is_wanted_elsewhere():
+                break
         if entries:
             lost = set(flat[damaged].tolist()) - {entry.flat for entry in entries}
             entries += [Entry(i, self.store.manifest.case_id(i), MISSING) for i in lost]
-            self.store.write_block(block.start, data)
-            with disk_errors(self.store.path):
-                self.journal.write(entries)
             if self.grid.study.refine is not None:
                 self.entered += entries
             for entry in entries:
                 self.ledger.status[entry.flat] = entry.status
                 self.ledger.checksum[entry.flat] = entry.checksum
             self._initial_states.remember(flat, data)
-            self._unsynced += self.store.chunk_files(block.start)
-            if time.monotonic() > self._next_sync:
-                self.sync()
+            held = self._held.get(block.start)
+            self._held[block.start] = data, entries if held is None else held[1] + entries
+            if time.monotonic() - self._stored >= self.patience:
+                self.store_held()
+
+    def store_held(self) -> None:
+        """Store and journal the blocks that are held back."""
+        for start, (data, entries) in self._held.items():
+            self.store.write_block(start, data)
+            with disk_errors(self.store.path):
+                self.journal.write(entries)
+            self._unsynced += self.store.chunk_files(start)
+        self._held.clear()
+        self._stored = time.monotonic()
+        if self._stored > self._next_sync:
+            self.sync()
 
     def sync(self) -> None:
         """Return once what has been stored would survive a power failure, the arrays before their lines.
@@ -196,8 +216,10 @@ class Worker:
         self, block: Block, flat: NDArray[np.int64], wanted: NDArray[np.bool_]
     ) -> tuple[Arrays, NDArray[np.bool_]]:
         """Arrays of the block with the cases that are there already, and which of those are damaged."""
-        data = self.store.empty_block(block.start)
         damaged = np.zeros_like(wanted)
+        if block.start in self._held:
+            return self._held[block.start][0], damaged
+        data = self.store.empty_block(block.start)
         status = self.ledger.status[flat]
         kept = np.flatnonzero(~wanted & ((status == DONE) | (status == DIVERGED)))
         if not len(kept):

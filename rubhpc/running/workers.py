@@ -76,9 +76,9 @@ class _Shared:
         """See Pool."""
         return self._sums.add(Totals(claimed=1))
 
-    def add(self, increment: Totals) -> None:
+    def add(self, increment: Totals) -> Totals:
         """See Pool."""
-        self._sums.add(increment)
+        return self._sums.add(increment)
 
     def totals(self) -> Totals:
         """See Pool."""

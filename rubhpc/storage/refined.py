@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import copy
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from rubhpc.schema import FAILED, INFERRED, MISSING
-from rubhpc.study.levels import Results
+from rubhpc.study.levels import Levels, Results
 from rubhpc.study.refine import levels_of
 
 if TYPE_CHECKING:
@@ -51,16 +52,39 @@ class Refinement:
             self._is_known &= self._status != FAILED
         self._kind = records.dtype
         self._held = {name: records[name].copy() for name, _ in self._by}
+        self._flat: NDArray[np.int64] | None = None  # cases of a box, by their number in the grid
+
+    @property
+    def refined(self) -> tuple[int, ...]:
+        """Dimensions of the grid that are refined."""
+        return self._levels.refined
+
+    def within(self, window: tuple[slice, ...]) -> Self:
+        """Return the refinement of a box alone, as long as the map along the refined axes.
+
+        What lies beyond such a box decides nothing in it. Entries are those of its cases.
+        """
+        shape = self._levels.shape
+        places = np.ix_(*(np.arange(n)[s] for s, n in zip(window, shape, strict=True)))
+        flat = np.ravel_multi_index(places, shape)
+        part = copy.copy(self)
+        part._levels = Levels(flat.shape, self._levels.refined, self._levels.coarse)
+        part._flat = flat.ravel()
+        part._status, part._is_known = self._status[part._flat], self._is_known[part._flat]
+        part._held = {name: held[part._flat] for name, held in self._held.items()}
+        return part
 
     def enter(self, entries: Sequence[Entry]) -> None:
         """Add what has been computed since."""
-        for entry in entries:
-            self._status[entry.flat] = entry.status
-            self._is_known[entry.flat] = entry.status != MISSING
+        flat = np.array([entry.flat for entry in entries], np.int64)
+        places = flat if self._flat is None else np.searchsorted(self._flat, flat)
+        for entry, place in zip(entries, places.tolist(), strict=True):
+            self._status[place] = entry.status
+            self._is_known[place] = entry.status != MISSING
             if entry.measures:
                 record = np.frombuffer(entry.measures, self._kind)[0]
                 for name, _ in self._by:
-                    self._held[name][entry.flat] = record[name]
+                    self._held[name][place] = record[name]
 
     def asked(self) -> Asked:
         """Return the cases that are asked for, as far as results decide."""
@@ -81,7 +105,7 @@ class Refinement:
         return self._levels.asked(results)
 
     def missing(self) -> NDArray[np.bool_]:
-        """Return the cases that are asked for and not known, (n_case,)."""
+        """Return the cases that are asked for and not known, (n_case,), or those of the box."""
         missing: NDArray[np.bool_] = self.asked().cases.ravel() & ~self._is_known
         return missing
 

@@ -21,12 +21,15 @@ GRID = {
 }
 
 
-def killed_and_completed(folder, **how):
+SLABS = GRID | {"run": '[refine]\ncoarse = 4\naxes = ["friction"]'}
+
+
+def killed_and_completed(folder, grid=GRID, **how):
     """Run a map at once, and another with kills; whether both are the same, and what is inferred."""
-    whole = write_study(folder, "whole.toml", output=folder / "whole.zarr", **GRID)
+    whole = write_study(folder, "whole.toml", output=folder / "whole.zarr", **grid)
     assert run(whole).returncode == 0
     store = folder / "tiny.zarr"
-    study = write_study(folder, output=store, **GRID)
+    study = write_study(folder, output=store, **grid)
     moments = random.Random(3)
     for _ in range(2):
         job = start(study, *how.get("options", ()), ranks=how.get("ranks", 0), **how.get("under", {}))
@@ -46,6 +49,11 @@ def killed_and_completed(folder, **how):
 
 def test_kills_of_workers(tmp_path):
     killed_and_completed(tmp_path, options=("--workers", "2"))
+
+
+@pytest.mark.long
+def test_kills_of_workers_within_slabs(tmp_path):
+    killed_and_completed(tmp_path, SLABS, options=("--workers", "2"))
 
 
 @pytest.mark.long

@@ -13,9 +13,10 @@ from stub_physics import Physics, record
 from postproc.store.live import open_live
 from postproc.store.open import open_store
 from rubhpc.errors import InputError, StoppedEarly
-from rubhpc.running import job, worker
+from rubhpc.running import computing, driver, job, worker
 from rubhpc.running.driver import run
 from rubhpc.running.plan import make_plan
+from rubhpc.running.pool import Alone
 from rubhpc.running.stopping import Stopping
 from rubhpc.schema import DONE, FAILED, INFERRED, MISSING, REGIME
 from rubhpc.storage.status import read_status
@@ -233,3 +234,108 @@ def test_the_plan_has_a_bound_and_an_estimate(tmp_path, physics):
     assert after.n_expected == physics.n_case
     assert after.steps == 0
     assert after.counts[INFERRED] + after.counts[DONE] == 17 * 2 * 17
+
+
+def slabs_of(folder, name="slabs"):
+    """Ten slabs: five speeds and two clearances, of which only the friction is refined."""
+    made = write_study(
+        folder,
+        f"{name}.toml",
+        output=folder / f"{name}.zarr",
+        speed_ratio="{ start = 1.0, stop = 2.0, num = 5 }",
+        friction="{ start = 0.0, stop = 0.8, num = 33 }",
+        run='[refine]\naxes = ["friction"]\ncoarse = 8',
+        keep='["section"]',
+        block=11,
+    )
+    return read_study(made)
+
+
+@pytest.fixture
+def by_levels(tmp_path, physics, monkeypatch):
+    """The map of `slabs_of` as it is computed level by level, and its cases."""
+    with monkeypatch.context() as patch:
+        patch.setattr(computing, "_SLABS", 10**9)
+        study = slabs_of(tmp_path, "levels")
+        run(study, quiet=True)
+    n_case, physics.n_case = physics.n_case, 0
+    physics.speeds.clear()
+    return stored_bytes(study.output), n_case
+
+
+def test_a_slab_is_computed_with_one_set_up_and_as_by_levels(tmp_path, physics, by_levels):
+    study = slabs_of(tmp_path)
+    run(study, quiet=True)
+    assert len(physics.speeds) == 5
+    assert physics.n_case < 0.6 * 5 * 2 * 33
+    assert (stored_bytes(study.output), physics.n_case) == by_levels
+
+
+@pytest.mark.parametrize("n_alone", [1, 40])
+def test_slabs_are_left_to_all_when_another_rank_finds_none(
+    tmp_path, physics, monkeypatch, by_levels, n_alone
+):
+    claims = []
+
+    class WithAnother(Alone):
+        """As if another rank claimed all slabs that are left, and one more."""
+
+        n_other = 0
+
+        def claim(self):
+            claims.append(physics.n_case)
+            return super().claim()
+
+        def add(self, increment):
+            if physics.n_case == n_alone and not self.n_other:
+                self.n_other = 11 - int(self._sums[0])
+                self._sums[0] += self.n_other
+            return super().add(increment)
+
+        def gather(self, value):
+            if not isinstance(value, tuple):
+                return [value]
+            n_other, self.n_other = self.n_other, 0
+            return [value, ([], n_other, False)]
+
+    monkeypatch.setattr(driver, "connect", WithAnother)
+    study = slabs_of(tmp_path)
+    run(study, quiet=True)
+    assert n_alone in claims  # no further case was computed before
+    assert (stored_bytes(study.output), physics.n_case) == by_levels
+
+
+@pytest.mark.parametrize("moments", [(1,), (60, 20, 9)])
+def test_kills_within_slabs_change_nothing(tmp_path, physics, by_levels, moments):
+    study = slabs_of(tmp_path)
+
+    def count_down():
+        if physics.n_case == end:
+            raise Killed
+
+    physics.on_case = count_down
+    for n_case in moments:
+        end = physics.n_case + n_case
+        with pytest.raises(Killed):
+            run(study, quiet=True)
+    end = -1
+    run(study, quiet=True)
+    assert stored_bytes(study.output) == by_levels[0]
+
+
+def test_blocks_of_a_slab_are_written_once_where_cases_are_short(tmp_path, physics, monkeypatch):
+    written = []
+    write = Store.write_block
+
+    def note(store, start, data):
+        written.append(start)
+        write(store, start, data)
+
+    monkeypatch.setattr(Store, "write_block", note)
+    monkeypatch.setattr(computing, "_PATIENCE", 1e9)
+    run(slabs_of(tmp_path), quiet=True)
+    assert len(written) == len(set(written)) > 10
+    written.clear()
+    monkeypatch.setattr(computing, "_PATIENCE", 0.0)
+    run(slabs_of(tmp_path, "at_once"), quiet=True)
+    assert len(written) > len(set(written))
