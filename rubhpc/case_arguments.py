@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from rubhpc.integrate.setup import Setup
+    from rubhpc.study.drive_law import DriveLaw
 
 T = TypeVar("T")
 
@@ -90,8 +91,9 @@ def case_of(
     samples_per_revolution: int,
     initial: object,
     probes: Sequence[Probe] = (),
+    drive: DriveLaw | None = None,
 ) -> Case:
-    """Check the arguments of `caller` and assemble its case.
+    """Check the arguments of `caller` and assemble its case; `drive` turns it where its speed is free.
 
     Raises
     ------
@@ -145,6 +147,7 @@ def case_of(
         samples_per_revolution=samples_per_revolution,
         model=model,
         probes=probes,
+        drive=drive,
     )
     return Case(
         rig=rig,

@@ -66,15 +66,16 @@ def least_knock(
     Raises
     ------
     InputError
-        The study has axes of starts, [branch] or [run_up], a node does not move sideways, or a number is out
-        of range.
+        The study has axes of starts, [branch], [run_up] or [drive], a node does not move sideways, or a
+        number is out of range.
     """
     import xarray as xr
 
     if starts := [axis.name for axis in study.axes if axis.is_initial_key]:
         raise InputError(f"[grid] {starts[0]}: the knock itself is searched for; remove this axis")
-    for table, is_there in (("branch", study.branch is not None), ("run_up", study.run_up is not None)):
-        if is_there:
+    tables = {"branch": study.branch, "run_up": study.run_up, "drive": study.drive}
+    for table, found in tables.items():
+        if found is not None:
             raise InputError(f"[{table}]: knocks are searched for at a constant speed; remove this table")
     if workers < 1:
         raise InputError(f"workers {workers}: give 1 or more")

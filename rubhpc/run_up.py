@@ -8,13 +8,31 @@ import numpy as np
 
 from rubhpc.case_arguments import CaseArguments, case_of, read_probes
 from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.free_spin import release
+from rubhpc.input.fields import FieldError
 from rubhpc.input.quantity import parse_quantity
-from rubhpc.input.reading import plain
+from rubhpc.input.reading import build, plain
+from rubhpc.integrate.driven import DrivenRun, integrate_driven
 from rubhpc.integrate.measures import by_name
 from rubhpc.integrate.run_up import integrate_run_up
 from rubhpc.integrate.run_up_case import by_revolution
 from rubhpc.integrate.setup import ModalSetup
-from rubhpc.schema import AMPLITUDE, ORDERS, PHASE, TURNED, VARIABLES, probe_variables, run_up_variables
+from rubhpc.rig.reading import read_rig, with_keys
+from rubhpc.rig.rig import Rig
+from rubhpc.schema import (
+    AMPLITUDE,
+    ORDERS,
+    PHASE,
+    RECORD_END,
+    TURNED,
+    VARIABLES,
+    drive_variables,
+    probe_variables,
+    run_up_variables,
+)
+from rubhpc.study.drive_keys import DriveKeys
+from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.initial import CONTACT_FREE
 from rubhpc.study.speed_law import SpeedLaw
 from rubhpc.threads import on_one_thread
@@ -28,7 +46,6 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.record import State
     from rubhpc.rig.probes import Probe
-    from rubhpc.rig.rig import Rig
 
 
 @on_one_thread
@@ -39,6 +56,7 @@ def run_up(
     stop: float | str | None = None,
     time: float | str | None = None,
     speed_law: Sequence[tuple[float | str, float | str]] | None = None,
+    drive: Mapping[str, object] | None = None,
     pieces_per_revolution: int | None = None,
     initial: State | Mapping[str, float | str] | None = None,
     samples_per_revolution: int = 256,
@@ -57,6 +75,11 @@ def run_up(
         From start to stop, at constant angular acceleration.
     speed_law : sequence of (time, speed), optional
         In place of these three: speeds at some times, linear between them.
+    drive : dict, optional
+        In place of all of them, the keys of the table [drive] of a study: what turns a rotor whose speed is
+        free, as `{"torque": "2 N m", "start": "1200 rpm", "revolutions": 200}`. The result then has
+        `drive_work` (J) and `braking_torque` (N m) of each revolution, and the attributes `record_end` (why
+        it ends), `last_speed` (rad/s) and `energy_residual`.
     pieces_per_revolution : int, optional
         Pieces of constant speed into which every revolution is cut; the error of the changing speed falls
         with the square of their number. By default as few as the acceleration allows: the shaft departs from
@@ -90,13 +113,16 @@ def run_up(
     >>> round(float(passage.speed[passage.amplitude_vertical.sel(order=1).argmax()]) * 9.5493)
     2037
     """
-    law = _read_law(start, stop, time, speed_law)
+    given = start, stop, time, speed_law
+    if drive is not None and any(value is not None for value in given):
+        raise InputError("run_up: drive: takes the place of start, stop, time and speed_law; leave them out")
+    law = _read_law(*given) if drive is None else _read_drive(drive)
     for name in ("speed", "speed_ratio", "clearance_ratio"):
         if case.get(name) is not None:
             fix = "give clearance" if name == "clearance_ratio" else "give start, stop and time"
             raise InputError(f"run_up: {name}: the speed changes; {fix}")
     measured = read_probes("run_up", probes)
-    case["speed"] = max(law.speed)
+    case["speed"] = _highest(law, rig, case.get("overrides"))
     one = case_of(
         "run_up",
         rig,
@@ -104,16 +130,20 @@ def run_up(
         samples_per_revolution=samples_per_revolution,
         initial={"from": CONTACT_FREE} if initial is None else initial,
         probes=measured,
+        drive=law if isinstance(law, DriveLaw) else None,
     )
     if not isinstance(one.setup, ModalSetup):
         raise InputError(f'run_up: method: {case["method"]} holds the speed; take method = "modal"')
-    found = integrate_run_up(
-        one.setup,
-        law,
-        clearance=one.clearance,
-        friction=one.friction,
-        initial=one.initial,
-        pieces_per_revolution=pieces_per_revolution,
+    given_case: dict[str, Any] = {
+        "clearance": one.clearance,
+        "friction": one.friction,
+        "initial": one.initial,
+        "pieces_per_revolution": pieces_per_revolution,
+    }
+    found = (
+        integrate_driven(one.setup, law, **given_case)
+        if isinstance(law, DriveLaw)
+        else integrate_run_up(one.setup, law, **given_case)
     )
     signals = by_name(found.whole, one.setup.model)
     known = VARIABLES | probe_variables((probe.name, probe.quantity) for probe in measured)
@@ -121,17 +151,40 @@ def run_up(
         name: (known[name].dims, values, _about(known[name].unit, known[name].long_name))
         for name, values in signals.items()
     }
-    own = run_up_variables((probe.name, probe.quantity) for probe in measured)
+    own = drive_variables() | run_up_variables((probe.name, probe.quantity) for probe in measured)
     for name, values in by_revolution(found, signals, samples_per_revolution).items():
         short = name if name.startswith((AMPLITUDE, PHASE)) else name.removeprefix("revolution_")
         variables[short] = own[name].dims, values, _about(own[name].unit, own[name].long_name)
-    attributes = {
+    attributes: dict[str, Any] = {
         "reason": found.reason,
         "note": one.note,
         "rig": one.rig.as_dict(),
         "study": {"record": {"probe": [plain(probe) for probe in measured]}},
     }
+    if isinstance(found, DrivenRun):
+        attributes |= {
+            "record_end": RECORD_END[found.end],
+            "last_speed": found.last_speed,
+            "energy_residual": found.energy_residual,
+        }
     return _dataset(variables, len(found.speed), samples_per_revolution, attributes)
+
+
+def _read_drive(drive: Mapping[str, object]) -> DriveLaw:
+    """The drive from the keys of its table."""
+    try:
+        return build(DriveKeys, drive, "run_up", "drive").law_at({})
+    except FieldError as error:
+        raise InputError(f"run_up: drive: {error}") from None
+
+
+def _highest(law: SpeedLaw | DriveLaw, rig: Rig | str | PathLike[str], overrides: Any) -> float:
+    """Highest speed of a law, rad/s; that which a driven rotor cannot pass."""
+    if isinstance(law, SpeedLaw):
+        return max(law.speed)
+    model = assemble(with_keys(rig if isinstance(rig, Rig) else read_rig(rig), overrides or {}))
+    highest = law.fastest(release(model, law.inertia)[1].inertia)
+    return min([highest, *model.rotor.tabulated_speeds[-1:]])
 
 
 def _read_law(

@@ -276,6 +276,11 @@ _OF_REVOLUTIONS = (
     ("revolution_friction_work", ("stator",), "J", "work of friction in the revolution"),
 )
 AMPLITUDE, PHASE = "amplitude_", "phase_"
+_OF_DRIVES = (
+    ("revolution_drive_work", "J", "work of the drive in the revolution"),
+    ("revolution_braking_torque", "N m", "mean torque by which rub and whirl brake the spin"),
+)
+RECORD_END = ("all_revolutions", "lowest_speed", "highest_speed")  # why the record of a driven rotor ends
 
 
 def run_up_variables(probes: Iterable[tuple[str, str]] = ()) -> dict[str, Variable]:
@@ -291,6 +296,24 @@ def run_up_variables(probes: Iterable[tuple[str, str]] = ()) -> dict[str, Variab
             long_name = f"{what} of the {text}"
             own.append(Variable(name=prefix + name, role=RUN_UP, dims=dims, unit=unit, long_name=long_name))
     return {v.name: v for v in own}
+
+
+def drive_variables() -> dict[str, Variable]:
+    """Return what a driven rotor stores of every revolution besides `run_up_variables`."""
+    return {
+        name: Variable(name=name, role=RUN_UP, dims=("revolution",), unit=unit, long_name=text)
+        for name, unit, text in _OF_DRIVES
+    }
+
+
+def drive_measures() -> tuple[Variable, ...]:
+    """Return the measures of a driven rotor besides those of any case."""
+    return (
+        _measure("revolutions_turned", "1", "whole revolutions in the record", dtype="int64"),
+        _measure("record_end", "1", "why the record ends", dtype="int8", flags=RECORD_END),
+        _measure("last_speed", "rad s-1", "spin speed at the end of the record"),
+        _measure("drive_work", "J", "work of the drive"),
+    )
 
 
 def role_of(name: str) -> str:

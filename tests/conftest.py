@@ -43,6 +43,7 @@ SLOW = (
     "integrate/test_periodic.py::test_motion_beside_it_draws_near_by_the_largest_multiplier",
     "integrate/test_regimes_lyapunov.py",
     "integrate/test_retuned_modes.py",
+    "integrate/test_driven.py",
     "integrate/test_run_up.py",
     "integrate/test_transient.py::test_laws_without_closed_form_settle_as_with_auto",
     "kernels/test_accumulators.py",

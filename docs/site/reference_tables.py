@@ -25,6 +25,7 @@ from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import OwnAxes
 from rubhpc.study.branch_keys import BranchKeys
 from rubhpc.study.contact_keys import Contact
+from rubhpc.study.drive_keys import DriveKeys
 from rubhpc.study.initial import Initial
 from rubhpc.study.refine import Refine
 from rubhpc.study.run_up_keys import RunUpKeys
@@ -44,6 +45,7 @@ STUDY_TABLES = {
     "[refine]": Refine,
     "[branch]": BranchKeys,
     "[run_up]": RunUpKeys,
+    "[drive]": DriveKeys,
     "[run]": Run,
 }
 ROOMS = ("store", "signals", "cases", "figures")  # of postproc, whose functions the reference shows

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.fem.assemble import model_at
+from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.statics import sag_under
 from rubhpc.integrate.contact_mode import KeptParts
 from rubhpc.integrate.held_matrices import held_range
@@ -38,6 +39,7 @@ class HeldMatrices:
         self, model: Model, reduced: ReducedModel, phasor: Complexes, reach: float, acceleration: float
     ) -> None:
         self.model, self.reduced = model, reduced
+        self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
         self.kept = KeptParts()
         self._phasor, self._reach, self._acceleration = phasor, reach, acceleration
         self._libraries: dict[tuple[float, int, int], RetunedLibrary] = {}
@@ -46,6 +48,11 @@ class HeldMatrices:
         """Whether a piece may use them."""
         is_near = abs(speed - self.reduced.spin) <= self._reach
         return is_near and abs(acceleration - self._acceleration) <= ACCELERATION_STEP * speed**2
+
+    def driven(self, torque: float, acceleration: float) -> Model:
+        """The model with the sag under a drive's torque, N m, at an acceleration, rad/s^2."""
+        moved = torque * self.twist + acceleration * self.lean
+        return _sagging(self.model, self.model.sag + moved)
 
     def tuned(self, piece: PieceSetup, friction: float) -> RetunedLibrary:
         """Contact modes of a friction, tuned to a piece."""
@@ -97,7 +104,11 @@ class PieceSetup(ModalSetup):
 
 
 class Pieces:
-    """The set-ups of the pieces of a run-up, from that at its highest speed, which keeps the most modes."""
+    """The set-ups of the pieces of a run-up, from that at its highest speed, which keeps the most modes.
+
+    Where the spin is free (`ModalSetup.free_spin`), the drive's torque twists the shaft, not its
+    acceleration, and `phi'' G u / 2` takes the place of `phi'' G u`, as Lagrange's equations have it.
+    """
 
     def __init__(self, fastest: ModalSetup) -> None:
         self._fastest = fastest
@@ -105,16 +116,21 @@ class Pieces:
         self._held: HeldMatrices | None = None
         model = fastest.model
         rotor = model.rotor
-        self._inertia = rotor.mass @ np.array([float(name == "thx") for _, name in rotor.degrees])
+        self._inertia = rotor.mass @ unit_rotation(rotor)
         n, n_all = rotor.n_dof, model.body_start[-1]
         momentum = np.zeros((n_all, n_all))
-        momentum[:n, :n] = rotor.gyroscopic
+        momentum[:n, :n] = rotor.gyroscopic if fastest.free_spin is None else 0.5 * rotor.gyroscopic
         self._momentum = self._basis.T @ momentum @ self._basis
         phasor = (model.unbalance_cosine - 1j * model.unbalance_sine) @ self._basis[:n]
         self._phasor = phasor.astype(np.complex128)
 
-    def setup(self, speed: float, acceleration: float, angle: float, duration: float) -> PieceSetup:
-        """The set-up of a piece: mean speed (rad/s), acceleration (rad/s^2), first angle, duration (s)."""
+    def setup(
+        self, speed: float, acceleration: float, angle: float, duration: float, torque: float = 0.0
+    ) -> PieceSetup:
+        """The set-up of a piece: mean speed (rad/s), acceleration (rad/s^2), first angle, duration (s).
+
+        `torque` (N m) is that of the drive of a free spin.
+        """
         held, fastest = self._held, self._fastest
         if held is None or not held.serve(speed, acceleration):
             held = self._held = self._hold(speed, acceleration)
@@ -123,7 +139,7 @@ class Pieces:
         phasor = self._phasor * factor
         return PieceSetup(
             scheme=fastest.scheme,
-            model=held.model,
+            model=held.model if fastest.free_spin is None else held.driven(torque, acceleration),
             reduced=replace(held.reduced, spin=speed, force=np.stack([phasor.real, -phasor.imag])),
             spin=speed,
             step=fastest.step,
@@ -138,18 +154,22 @@ class Pieces:
         )
 
     def _hold(self, speed: float, acceleration: float) -> HeldMatrices:
-        """Matrices for a speed at the near end of the range over which they may be held."""
-        _, damping, stiffness = self._matrices(speed, acceleration)
+        """Matrices for a speed at the near end of the range over which they may be held.
+
+        That of a free spin, which may turn back, is in the middle of the range.
+        """
+        free = self._fastest.free_spin
+        model, damping, stiffness = self._matrices(speed, acceleration)
         _, next_damping, next_stiffness = self._matrices(speed * (1.0 + SPEED_STEP), acceleration)
         step = SPEED_STEP * speed
         drift = (next_stiffness - stiffness) / step, (next_damping - damping) / step
         reach = held_range(stiffness, damping, drift, speed, acceleration)
-        speed += np.sign(acceleration) * reach
-        model, damping, stiffness = self._matrices(speed, acceleration)
-        sag = sag_under(model.rotor, model.load - acceleration * self._inertia)
-        if model.probe is not None:
-            constant = model.probe_rows[0][:, : sag.size] @ sag
-            model = replace(model, probe=replace(model.probe, constant=constant))
+        if free is None:
+            speed += np.sign(acceleration) * reach
+            model, damping, stiffness = self._matrices(speed, acceleration)
+            model = _sagging(model, sag_under(model.rotor, model.load - acceleration * self._inertia))
+        else:
+            model = _sagging(model, sag_under(model.rotor, model.load))
         phasor = self._phasor * speed**2
         reduced = replace(
             self._fastest.reduced,
@@ -159,7 +179,11 @@ class Pieces:
             force=np.stack([phasor.real, -phasor.imag]),
         )
         near_end = reach * (1.0 + 1e-9)  # rounding apart
-        return HeldMatrices(replace(model, sag=sag), reduced, self._phasor, near_end, acceleration)
+        held = HeldMatrices(model, reduced, self._phasor, near_end, acceleration)
+        if free is not None:
+            held.twist = sag_under(model.rotor, -free.share)
+            held.lean = sag_under(model.rotor, -0.5 * model.rotor.gyroscopic @ model.sag)
+        return held
 
     def _matrices(self, speed: float, acceleration: float) -> tuple[Model, Floats, Floats]:
         """The model at a speed, within the tables of its bearings, its damping and its stiffness."""
@@ -169,3 +193,11 @@ class Pieces:
         _, damping, stiffness, _ = whole_system(model, speed)
         stiffness = self._basis.T @ stiffness @ self._basis + acceleration * self._momentum
         return model, self._basis.T @ damping @ self._basis, stiffness
+
+
+def _sagging(model: Model, sag: Floats) -> Model:
+    """A model about another sag of its rotor, (n_rotor_dof,)."""
+    if model.probe is not None:
+        constant = model.probe_rows[0][:, : sag.size] @ sag
+        model = replace(model, probe=replace(model.probe, constant=constant))
+    return replace(model, sag=sag)

@@ -14,11 +14,12 @@ from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees
 from rubhpc.integrate.standstill import Modes, at_standstill, parted, seen_degrees
 from rubhpc.integrate.truncation import kept_modes
 from rubhpc.kernels.contact_modes import Reduced
-from rubhpc.kernels.contact_pairs import N_DEGREE, V, W, rim_sense
+from rubhpc.kernels.contact_pairs import N_DEGREE, TORSION, V, W, rim_sense
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from rubhpc.fem.free_spin import FreeSpin
     from rubhpc.fem.model import Model
     from rubhpc.kernels.laws import Law
 
@@ -77,7 +78,9 @@ class ReducedModel:
         return self.basis.T @ self.mass
 
 
-def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
+def reduce_model(
+    model: Model, spin: float, accuracy: float, free_spin: FreeSpin | None = None
+) -> ReducedModel:
     """Reduce a model so that contact and outputs are met to the accuracy asked for.
 
     The basis of each uncoupled part holds its undamped modes at standstill that `truncation.kept_modes`
@@ -92,6 +95,8 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     accuracy : float
         Relative, of each signal and force (`truncation.modal_error`); on the packaged rig 1e-3 keeps
         waveforms to about 1e-4.
+    free_spin : FreeSpin, optional
+        Where a drive turns the rotor: contacts then see rotations about the mean of rotor and drive.
 
     Raises
     ------
@@ -114,6 +119,9 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
     stiffness, damping = basis.T @ stiffness @ basis, basis.T @ damping @ basis
     keep = np.flatnonzero(_visible(np.vstack([basis[seen], patterns.T @ basis]), stiffness, damping))
     basis, pick = basis[:, keep], np.ix_(keep, keep)
+    at_contacts = np.where((degree >= 0)[:, :, None], basis[np.maximum(degree, 0)], 0.0)
+    if free_spin is not None:
+        at_contacts[:, TORSION] -= free_spin.share @ basis[: free_spin.share.size]
     return ReducedModel(
         spin=spin,
         basis=basis,
@@ -121,7 +129,7 @@ def reduce_model(model: Model, spin: float, accuracy: float) -> ReducedModel:
         stiffness=stiffness[pick],
         damping=damping[pick],
         force=force @ basis,
-        degree=np.where((degree >= 0)[:, :, None], basis[np.maximum(degree, 0)], 0.0),
+        degree=at_contacts,
         output=np.where((output >= 0)[:, None], basis[np.maximum(output, 0)], 0.0),
         carrier=np.where((carrier >= 0)[:, :, None], basis[np.maximum(carrier, 0)], 0.0),
         probe=model.probe_rows @ basis,

@@ -112,7 +112,7 @@ def integrate_run_up(
         setup = pieces.setup((angles[i + 1] - angles[i]) / duration, accelerations[i], angles[i], duration)
         if state is None:
             state = start_of(initial, setup, clearance) if isinstance(initial, Initial) else initial
-        passed = _pass(setup, last - first, clearance, friction, state, check)
+        passed = pass_piece(setup, last - first, clearance, friction, state, check)
         state = passed.final
         n_step += passed.n_step
         whole[:, first:last] = passed.whole
@@ -139,24 +139,25 @@ def integrate_run_up(
     )
 
 
-class _Passed(NamedTuple):
+class Passed(NamedTuple):
     """What a piece has yielded."""
 
     whole: Floats  # (n_row, n_sample)
     accumulators: list[Accumulator]  # of each revolution in it, or of the part of one that it is
     n_step: int
     final: State
+    gained: float  # mechanical energy, J
     reason: str  # why it could not go on, or ""
 
 
-def _pass(
+def pass_piece(
     setup: PieceSetup,
     n_sample: int,
     clearance: float,
     friction: float,
     state: State,
     check: Callable[[], None] | None,
-) -> _Passed:
+) -> Passed:
     """Take one piece."""
     model = setup.model
     stride = min(n_sample, setup.samples_per_revolution)
@@ -165,6 +166,7 @@ def _pass(
         accumulators, reason = [], None
         try:
             march = kind(setup, clearance, friction, state, check)
+            before = march.energy()
             for first in range(0, n_sample, stride):
                 accumulator = new_accumulator(len(model.stators), model.n_place)
                 accumulator.is_touching[:] = march.touching()
@@ -176,5 +178,6 @@ def _pass(
         except NoClosedForm:  # contacts that chatter: short steps need no events
             continue
         add_sag(samples, accumulators[0], model)
-        return _Passed(samples.whole, accumulators, march.n_step, march.final(), reason or "")
+        gained = march.energy() - before
+        return Passed(samples.whole, accumulators, march.n_step, march.final(), gained, reason or "")
     raise AssertionError  # short steps always go on

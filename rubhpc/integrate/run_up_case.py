@@ -1,4 +1,4 @@
-"""One case of a study that runs up: signals, what is known of every revolution, and measures of the whole."""
+"""One case whose speed changes: signals, what is known of every revolution, and measures of the whole."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.compilation import seconds_compiling
+from rubhpc.integrate.driven import DrivenRun, integrate_driven
 from rubhpc.integrate.measures import by_name, probe_extents
 from rubhpc.integrate.run_up import integrate_run_up
 from rubhpc.integrate.setup import ModalSetup
 from rubhpc.schema import AMPLITUDE, DIVERGED, DONE, ORDERS, PHASE, PROBE, TRACKED
 from rubhpc.spectra import track_order
+from rubhpc.study.drive_law import DriveLaw
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -56,7 +58,7 @@ class RunUpRecord:
 
 def record_run_up(
     setup: Setup,
-    law: SpeedLaw,
+    law: SpeedLaw | DriveLaw,
     *,
     clearance: float,
     friction: float,
@@ -64,14 +66,19 @@ def record_run_up(
     initial: State | Initial,
     check: Callable[[], None] | None = None,
 ) -> RunUpRecord:
-    """Integrate a case whose speed changes; arguments as of `integrate_run_up`.
+    """Integrate a case whose speed changes; arguments as of `integrate_run_up` or `integrate_driven`.
 
     A case that ends early is a diverged one, and has its revolutions up to there.
     """
     if not isinstance(setup, ModalSetup):
         raise InputError('[integrator] method: it holds the speed; take method = "modal"')
     began = time.perf_counter() - seconds_compiling()
-    found = integrate_run_up(setup, law, clearance=clearance, friction=friction, initial=initial, check=check)
+    case: dict[str, Any] = {"clearance": clearance, "friction": friction, "initial": initial, "check": check}
+    found = (
+        integrate_driven(setup, law, **case)
+        if isinstance(law, DriveLaw)
+        else integrate_run_up(setup, law, **case)
+    )
     signals = by_name(found.whole, setup.model)
     turns = found.speed.size
     none = np.full(len(setup.model.stators), math.nan)
@@ -90,7 +97,7 @@ def record_run_up(
             "peak_to_peak_vertical": float(np.ptp(signals["vertical"])),
             "peak_to_peak_horizontal": float(np.ptp(signals["horizontal"])),
             **probe_extents(signals),
-        }
+        } | driven_measures(found)
     measures |= {
         "modal_error": setup.modal_error,
         "steps": found.n_step,
@@ -106,6 +113,19 @@ def record_run_up(
     )
 
 
+def driven_measures(found: RunUp) -> dict[str, float]:
+    """Measures of a driven rotor; none of a run-up."""
+    if not isinstance(found, DrivenRun):
+        return {}
+    return {
+        "energy_residual": found.energy_residual,
+        "revolutions_turned": found.speed.size,
+        "record_end": found.end,
+        "last_speed": found.last_speed,
+        "drive_work": float(found.drive_work.sum()),
+    }
+
+
 def by_revolution(found: RunUp, signals: dict[str, Floats], per_revolution: int) -> dict[str, Floats]:
     """What is known of every revolution, by the names of `schema.run_up_variables`.
 
@@ -119,6 +139,11 @@ def by_revolution(found: RunUp, signals: dict[str, Floats], per_revolution: int)
         "revolution_peak_contact_force": found.peak_contact_force,
         "revolution_friction_work": found.friction_work,
     }
+    if isinstance(found, DrivenRun):
+        known |= {
+            "revolution_drive_work": found.drive_work,
+            "revolution_braking_torque": found.braking_torque,
+        }
     for name in (*TRACKED, *(name for name in signals if name.startswith(PROBE))):
         lines = np.stack(
             [track_order(signals[name], per_revolution, order, WINDOW) for order in ORDERS], axis=-1

@@ -12,6 +12,7 @@ import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
+from rubhpc.fem.free_spin import release
 from rubhpc.fem.probes import with_probes
 from rubhpc.fem.response import step_limit
 from rubhpc.integrate.contact_mode import ContactMode, confine, solve_contact_mode, solve_parts
@@ -37,12 +38,14 @@ from rubhpc.study.tables import SEARCH_STEP, check_bent
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rubhpc.fem.free_spin import FreeSpin
     from rubhpc.fem.model import Model
     from rubhpc.integrate.contact_mode import Solved
     from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.laws import Law
     from rubhpc.rig.probes import Probe
     from rubhpc.rig.rig import Rig
+    from rubhpc.study.drive_law import DriveLaw
     from rubhpc.study.study import Contact, Integrator
 
 L = TypeVar("L", bound=ModeLibrary)
@@ -117,6 +120,7 @@ class ModalSetup:
     displacement_limit: float  # m
     law: Law = MULTIPLIER
     accuracy: float = 1e-3  # relative, of the modes kept, and of loads where gaps are curved
+    free_spin: FreeSpin | None = None  # where a drive turns it
     _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
     _curved_libraries: dict[float, CurvedLibrary] = field(default_factory=dict)
     _friction_libraries: dict[float, FrictionLibrary] = field(default_factory=dict)
@@ -292,12 +296,13 @@ def prepare(
     samples_per_revolution: int,
     model: Model | None = None,
     probes: Sequence[Probe] = (),
+    drive: DriveLaw | None = None,
 ) -> Setup:
     """Assemble, check the step and factorise: once per rig and speed.
 
-    `model` is that of the rig, where it has been assembled already, `probes` what is measured of it. The step
-    is shortened so that a whole
-    number of steps fills a sample's interval.
+    `model` is that of the rig, where it has been assembled already, `probes` what is measured of it, `drive`
+    what turns it where its speed is free. The step is shortened so that a whole number of steps fills a
+    sample's interval.
 
     Raises
     ------
@@ -309,14 +314,18 @@ def prepare(
         raise InputError(f"rig {rig.name}: [[stator]]: none; a rub case needs at least one")
     if speed == 0.0 or not math.isfinite(speed):
         raise InputError(f"speed: {speed} rad/s; sampling is locked to the shaft, so it has to turn")
-    model = with_probes(model_at(model or assemble(rig), speed), rig, probes, speed)
+    model, free_spin = model or assemble(rig), None
+    if drive is not None:
+        model, free_spin = release(model, drive.inertia)
+    model = with_probes(model_at(model, speed), rig, probes, speed)
     is_bent = any(stator.squared_slope is not None for stator in model.stators)
     scheme = scheme_of(contact, integrator, is_bent=is_bent)
     if integrator.method == "modal":
         return ModalSetup(
             scheme=scheme,
             model=model,
-            reduced=reduce_model(model, speed, integrator.accuracy),
+            reduced=reduce_model(model, speed, integrator.accuracy, free_spin),
+            free_spin=free_spin,
             spin=speed,
             step=SEARCH_STEP if integrator.step is None else integrator.step,
             contact_step=integrator.contact_step(contact),

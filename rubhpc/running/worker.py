@@ -24,6 +24,7 @@ from rubhpc.storage.disk import disk_errors, flush_to_disk
 from rubhpc.storage.journal import Entry
 from rubhpc.storage.measures import missing_value
 from rubhpc.storage.store import case_checksum
+from rubhpc.study.drive_law import DriveLaw
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,14 +55,16 @@ MOST_SETUPS = 4  # prepared setups a rank keeps; a block shares one, and neighbo
 
 def set_up(study: Study, case: Case, model: Model | None = None) -> Setup:
     """What the cases of this rig, speed and contact share; `model` is the rig's, if it is assembled."""
+    drive = case.speed_law if isinstance(case.speed_law, DriveLaw) else None
     return prepare(
         case.rig,
         case.speed,
         contact=case.contact,
         integrator=study.integrator,
         samples_per_revolution=study.recording.samples_per_revolution,
-        model=model,
+        model=model if drive is None else None,  # its driven end is not free
         probes=study.recording.probe,
+        drive=drive,
     )
 
 
@@ -101,7 +104,7 @@ class Worker:
 
     def __post_init__(self) -> None:
         self._record_type = self.store.manifest.header.record_type
-        self._setups: OrderedDict[tuple[int, float, Contact], tuple[Rig, Setup]] = OrderedDict()
+        self._setups: OrderedDict[tuple[int, float, Contact, float], tuple[Rig, Setup]] = OrderedDict()
         self._initial_states = InitialStates(self.grid, self.store, self.ledger, self._repair)
         self.entered: list[Entry] = []
         self.is_wanted_elsewhere: Callable[[], bool] = lambda: False
@@ -275,6 +278,7 @@ class Worker:
             id(case.rig),
             case.speed,
             case.contact,
+            case.speed_law.inertia or 0.0 if isinstance(case.speed_law, DriveLaw) else 0.0,
         )  # a rig that is kept here keeps its id; hashing it takes as long as a block
         if key in self._setups:
             setup = self._setups[key][1]

@@ -233,7 +233,7 @@ def _attributes(grid: CaseGrid, *, accepted: tuple[int, ...]) -> dict[str, Any]:
         },
         # also where no array over the samples is kept
         "coordinates": " ".join(
-            (TURNED if study.run_up else "revolution", *(name for name, *_ in _PLACES), *_drawn(study))
+            (TURNED if study.changes_speed else "revolution", *(name for name, *_ in _PLACES), *_drawn(study))
         ),
         **({"accepted_physics": list(accepted)} if accepted else {}),
     }

@@ -13,6 +13,7 @@ from rubhpc.errors import StoreError
 from rubhpc.schema import (
     VARIABLES,
     branch_variables,
+    drive_variables,
     probe_variables,
     run_up_variables,
 )
@@ -151,6 +152,8 @@ class Manifest:
         """The arrays stored for every case and written block by block, in the order of their checksum."""
         probed = _probed(self.parts)
         known = VARIABLES | probe_variables(probed) | branch_variables() | run_up_variables(probed)
+        if "drive" in self.parts:
+            known |= drive_variables()
         return tuple(v for v in known.values() if v.role in self.keep)
 
     @property

@@ -15,6 +15,7 @@ from rubhpc.schema import (
     STATE,
     WAVEFORM,
     case_measures,
+    drive_measures,
     lyapunov_variables,
     probe_variables,
 )
@@ -48,6 +49,7 @@ def manifest_of(grid: CaseGrid) -> Manifest:
             *case_measures(),
             *(v for v in probe_variables(recording.probed).values() if v.role == "measure"),
             *lyapunov_variables(recording.lyapunov).values(),
+            *(drive_measures() if study.drive else ()),
         ),
         refine=None if study.refine is None else table_of(study.refine, study.axes),
     )
@@ -63,7 +65,7 @@ def _sizes(grid: CaseGrid) -> dict[str, int]:
         "order": n_sample // 2 + 1,
         "section": recording.revolutions,
     }
-    if study.run_up:
+    if study.changes_speed:
         sizes["sample"] = grid.most_revolutions * recording.samples_per_revolution
         sizes["revolution"] = grid.most_revolutions
         sizes["order"] = len(ORDERS)
@@ -81,7 +83,7 @@ def _kept(grid: CaseGrid) -> tuple[str, ...]:
     study = grid.study
     if study.branch is not None:
         return (BRANCH,)
-    if study.run_up is not None:
+    if study.changes_speed:
         return (RUN_UP, *(role for role in study.recording.keep if role == WAVEFORM))
     return tuple(sorted({*study.recording.keep, *([STATE] if grid.continuation else [])}))
 

@@ -43,9 +43,26 @@ class RunUpAxes:
     time: float = quantity("s", doc="Duration of the run-up.", example='["5 s", "20 s"]', above=0)
 
 
+@dataclass(frozen=True, kw_only=True)
+class DriveAxes:
+    """The axes that are keys of [drive]."""
+
+    torque: float = quantity("N*m", doc="Torque of the drive.", example='["1 N m", "2 N m"]')
+    start: float = quantity(
+        "rad/s", doc="Spin speed at the beginning.", example='["1200 rpm", "2400 rpm"]', above=0
+    )
+    inertia: float = quantity(
+        "kg*m^2", doc="Polar inertia of the drive.", example='["0.01 kg m^2", "0.1 kg m^2"]', above=0
+    )
+
+
 RUN_UP_PREFIX, RUN_UP_TIME = "run_up.", "run_up.time"
+DRIVE_PREFIX = "drive."
+DRIVE_AXES = tuple(DRIVE_PREFIX + declared.name for declared in fields(DriveAxes))
 OWN = {declared.name: declared for declared in fields(OwnAxes)} | {
-    RUN_UP_PREFIX + declared.name: declared for declared in fields(RunUpAxes)
+    prefix + declared.name: declared
+    for prefix, owner in ((RUN_UP_PREFIX, RunUpAxes), (DRIVE_PREFIX, DriveAxes))
+    for declared in fields(owner)
 }
 SPEED_AXES = ("speed_ratio", "speed")
 CLEARANCE_AXES = ("clearance_ratio", "clearance")
@@ -140,8 +157,8 @@ def direction_axis() -> Axis:
 
 
 def is_of_table(name: str) -> bool:
-    """Whether an axis sets a key of [contact], [initial] or [run_up]."""
-    return name.startswith((contact_axes.PREFIX, initial.PREFIX, RUN_UP_PREFIX))
+    """Whether an axis sets a key of [contact], [initial], [run_up] or [drive]."""
+    return name.startswith((contact_axes.PREFIX, initial.PREFIX, RUN_UP_PREFIX, DRIVE_PREFIX))
 
 
 def coordinate_of(name: str) -> str:

@@ -13,9 +13,11 @@ from rubhpc.input.messages import brief, nearest, place
 from rubhpc.input.ranges import MOST_VALUES, RANGE_KEYS, read_ends, read_range
 from rubhpc.study import contact_axes
 from rubhpc.study.axes import (
+    DRIVE_PREFIX,
     FROM_REST,
     NO_NEIGHBOURS,
     OWN,
+    RUN_UP_PREFIX,
     SPEED_AXES,
     SWEEPS,
     Axis,
@@ -43,7 +45,8 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
     ----------
     name : str
         A dotted key of the rig, "contact." and a key of [contact], "initial." and one of [initial],
-        "run_up.time", or one of speed_ratio, speed, clearance_ratio, clearance, friction.
+        "run_up.time", "drive." and torque, start or inertia, or one of speed_ratio, speed, clearance_ratio,
+        clearance, friction.
     values : list, dict or single value
         A dict is a range, stop included: `{start, stop, step}`, or `{start, stop, num}` with the `scale`
         "lin" or "log"; or it holds `values`. Either may say how the axis is swept: `{values, sweep}`.
@@ -141,6 +144,9 @@ def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]
 def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
     if name in OWN:
         return OWN[name]
+    if name.startswith((RUN_UP_PREFIX, DRIVE_PREFIX)):
+        known = [axis for axis in OWN if axis.startswith((RUN_UP_PREFIX, DRIVE_PREFIX))]
+        raise InputError(f"{where}: unknown axis; {nearest(name, known)}")
     if is_of_table(name):
         try:
             return contact_field(name) if name.startswith(contact_axes.PREFIX) else initial_field(name)

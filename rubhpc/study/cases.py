@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.rig.rig import Rig
     from rubhpc.study.contact_keys import Contact
+    from rubhpc.study.drive_law import DriveLaw
     from rubhpc.study.initial import Initial
     from rubhpc.study.speed_law import SpeedLaw
     from rubhpc.study.study import Study
@@ -57,7 +58,7 @@ class Case:
     contact: Contact
     initial: Initial
     contact_free_amplitude: float  # m
-    speed_law: SpeedLaw | None = None  # of a run-up, whose highest speed is `speed`
+    speed_law: SpeedLaw | DriveLaw | None = None  # of a changing speed, of which the highest is `speed`
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -219,27 +220,28 @@ class CaseGrid:
 
     @property
     def most_revolutions(self) -> int:
-        """Revolutions of the longest case, of a study that runs up."""
+        """Revolutions of the longest case, of a study whose speed changes."""
         axes = [axis for axis in self.study.axes if axis.name == RUN_UP_TIME]
         run_up = self.study.run_up
         if run_up is None:
-            return 0
+            return 0 if self.study.drive is None else self.study.drive.revolutions
         times = axes[0].values if axes else (None,)
         return max(run_up.law_at(time).n_revolution for time in times)
 
     def _case(self, index: tuple[int, ...], name: str) -> Case:
         speed, amplitude = self._operating_points.response(index)
+        law = self._operating_points.speed_law(index) if self.study.changes_speed else None
         return Case(
             index=index,
             id=name,
             rig=self._operating_points.rig(index),
-            speed=speed,
+            speed=self._operating_points.fastest(index) if self.study.drive else speed,
             clearance=self._operating_points.clearance(index),
             friction=self._operating_points.friction(index),
             contact=self._operating_points.contact(index),
             initial=self._operating_points.initial(index),
             contact_free_amplitude=amplitude,
-            speed_law=None if self.study.run_up is None else self._operating_points.speed_law(index),
+            speed_law=law,
         )
 
     def _default_chunk(self) -> tuple[int, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rubhpc.input.reading import plain
 from rubhpc.rig.reading import with_keys
 from rubhpc.study import contact_axes, initial
-from rubhpc.study.axes import FROM_REST, RUN_UP_PREFIX, RUN_UP_TIME
+from rubhpc.study.axes import DRIVE_AXES, DRIVE_PREFIX, FROM_REST, RUN_UP_PREFIX, RUN_UP_TIME
 
 if TYPE_CHECKING:
     from rubhpc.study.study import Study
@@ -77,6 +77,9 @@ def identity_parts(study: Study) -> dict[str, Any]:
     if study.run_up is not None:
         varied = [axis.name for axis in study.axes if axis.name == RUN_UP_TIME]
         parts["run_up"] = asdict(study.run_up) | {n.removeprefix(RUN_UP_PREFIX): _AXIS for n in varied}
+    if study.drive is not None:
+        varied = [axis.name for axis in study.axes if axis.name in DRIVE_AXES]
+        parts["drive"] = asdict(study.drive) | {n.removeprefix(DRIVE_PREFIX): _AXIS for n in varied}
     if study.sample is not None:
         ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
         parts["sample"] = {

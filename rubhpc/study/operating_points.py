@@ -12,6 +12,7 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.constraints import find_rigid_body_mode
+from rubhpc.fem.free_spin import release
 from rubhpc.fem.response import (
     check_response_node,
     contact_free_amplitude,
@@ -21,7 +22,7 @@ from rubhpc.fem.response import (
 from rubhpc.fem.stability import instability_message, is_passive
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.axes import CLEARANCE_AXES, RUN_UP_TIME, SPEED_AXES
+from rubhpc.study.axes import CLEARANCE_AXES, DRIVE_AXES, DRIVE_PREFIX, RUN_UP_TIME, SPEED_AXES
 from rubhpc.study.contact_axes import choices_of, contact_at
 from rubhpc.study.initial import CONTACT_FREE, KNOCKED, initial_at
 from rubhpc.study.points import Points
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.rig.rig import Rig
     from rubhpc.study.contact_keys import Contact
+    from rubhpc.study.drive_law import DriveLaw
     from rubhpc.study.initial import Initial
     from rubhpc.study.points import Index, Values
     from rubhpc.study.speed_law import SpeedLaw
@@ -82,6 +84,7 @@ class OperatingPoints:
         self._initial_axes = [i for i, axis in enumerate(study.axes) if axis.is_initial_key]
         self._rig_axes = [i for i, axis in enumerate(study.axes) if axis.is_rig_key]
         self._run_up_axes = [i for i, name in enumerate(names) if name == RUN_UP_TIME]
+        self._drive_axes = [i for i, name in enumerate(names) if name in DRIVE_AXES]
         rotor_axes = [i for i in self._rig_axes if names[i].startswith("rotor.")]
         # The contact-free response depends on the rotor, and on the stator's node, at which it is evaluated.
         node_axes = [
@@ -97,6 +100,7 @@ class OperatingPoints:
         self._model_at = lru_cache(maxsize=4)(self._make_model)
         self._is_passive_at = lru_cache(maxsize=65536)(self._make_is_passive)
         self._unit_speed_at = lru_cache(maxsize=65536)(self._make_unit_speed)
+        self._fastest_at = lru_cache(maxsize=65536)(self._make_fastest)
         self._response_at = lru_cache(maxsize=65536)(self._make_response)
         self._limit_at = lru_cache(maxsize=4096)(self._make_limit)
         if study.integrator.step is not None and study.integrator.method == "central-difference":
@@ -140,10 +144,16 @@ class OperatingPoints:
         """Contact of a case."""
         return self._contact_at(self._on(self._contact_axes, index))
 
-    def speed_law(self, index: Index) -> SpeedLaw:
-        """Speed over the time of a case that runs up."""
+    def speed_law(self, index: Index) -> SpeedLaw | DriveLaw:
+        """Speed over the time of a case that runs up, or what drives it."""
+        if self.study.drive is not None:
+            return self._drive_law(self._on(self._drive_axes, index))
         assert self.study.run_up is not None
         return self.study.run_up.law_at(next(iter(self._on(self._run_up_axes, index)), None))
+
+    def fastest(self, index: Index) -> float:
+        """Speed, rad/s, that a driven case does not pass."""
+        return self._fastest_at(self._on(self._response_axes, index), self._on(self._drive_axes, index))
 
     def initial(self, index: Index) -> Initial:
         """Where a case starts."""
@@ -203,7 +213,7 @@ class OperatingPoints:
 
         def predict(index: Index) -> float:
             contact = self.contact(index)
-            if self.study.run_up is not None:
+            if self.study.changes_speed:
                 return float(self.speed_law(index).n_revolution * per_revolution)
             if is_modal and (contact.closed_form == "always" or contact.is_smooth):
                 return float(modal_steps)
@@ -270,6 +280,17 @@ class OperatingPoints:
         """Model with these values on the response axes, and the first ones on the other rig axes."""
         chosen = dict(zip(self._response_axes, values, strict=True))
         return assemble(self._rig_at(tuple([chosen.get(i, self._values[i][0]) for i in self._rig_axes])))
+
+    def _drive_law(self, values: Values) -> DriveLaw:
+        """Drive with these values on the drive axes."""
+        assert self.study.drive is not None
+        keys = (self.study.axes[i].name.removeprefix(DRIVE_PREFIX) for i in self._drive_axes)
+        return self.study.drive.law_at(dict(zip(keys, values, strict=True)))
+
+    def _make_fastest(self, response: Values, drive: Values) -> float:
+        law, model = self._drive_law(drive), self._model_at(response)
+        highest = law.fastest(release(model, law.inertia)[1].inertia)
+        return min([highest, *model.rotor.tabulated_speeds[-1:]])
 
     def _make_unit_speed(self, values: Values) -> float:
         """Speed, rad/s, of 1 on the speed axis."""

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, check_fields, pairs, quantity
-from rubhpc.schema import STATE
-from rubhpc.study.axes import FROM_REST, RUN_UP_TIME, SPEED_AXES, Axis
+from rubhpc.study.axes import RUN_UP_TIME
+from rubhpc.study.changing_speed import check_changing
 from rubhpc.study.speed_law import SpeedLaw
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rubhpc.study.axes import Axis
     from rubhpc.study.tables import Integrator, Recording
 
 
@@ -77,17 +78,6 @@ class RunUpKeys:
         )
 
 
-def speed_axis(keys: RunUpKeys) -> Axis:
-    """The axis that a study needs, of the highest speed alone."""
-    return Axis(
-        name="speed",
-        dimension="speed",
-        unit="rad s-1",
-        values=(keys.highest,),
-        long_name="highest spin speed",
-    )
-
-
 def check_run_up(
     keys: RunUpKeys | None, axes: Sequence[Axis], integrator: Integrator, recording: Recording, others: str
 ) -> None:
@@ -103,18 +93,7 @@ def check_run_up(
         if RUN_UP_TIME in names:
             raise InputError(f"[grid] {RUN_UP_TIME}: no speed changes; add the table [run_up]")
         return
-    if others:
-        raise InputError(f"[run_up]: run-ups are not combined with [{others}]; remove one of them")
-    if integrator.method != "modal":
-        problem = f"{integrator.method} holds the speed"
-        raise InputError(f'[integrator] method: {problem}; take method = "modal", or remove [run_up]')
-    for axis in axes:
-        if axis.sweep != FROM_REST:
-            raise InputError(f"[grid] {axis.name}: sweep: a run-up begins at its first speed; remove sweep")
-    if "clearance_ratio" in names:
-        raise InputError("[grid] clearance_ratio: the speed changes; give clearance instead")
-    if STATE in recording.keep:
-        raise InputError(f'[record] keep: the state of a run-up is not stored; remove "{STATE}"')
+    check_changing("run_up", axes, integrator, recording, others)
     if RUN_UP_TIME not in names:
         if not keys.law and keys.time is None:
             raise InputError(f"[run_up] time: missing; give one, or the axis {RUN_UP_TIME}")
@@ -127,10 +106,3 @@ def check_run_up(
             keys.law_at(time)
         except InputError as error:
             raise InputError(f"[grid] {RUN_UP_TIME}: {time:g} s: {error}") from None
-
-
-def refuse_speeds(names: Sequence[str]) -> None:
-    """Refuse an axis of speeds, whose place a run-up takes."""
-    for name in names:
-        if name in SPEED_AXES:
-            raise InputError(f"[grid] {name}: conflicts with [run_up], which changes the speed; remove one")

@@ -16,12 +16,14 @@ from rubhpc.study import contact_axes
 from rubhpc.study.axes import BOTH, DIRECTION, FROM_REST, SPEED_AXES, Axis, direction_axis
 from rubhpc.study.axis_reading import flatten, make_axis, make_range, unit_of
 from rubhpc.study.branch_keys import BranchKeys, branch_axis, check_branch
+from rubhpc.study.changing_speed import refuse_speeds, speed_axis
 from rubhpc.study.checks import check_axes, check_rigs
 from rubhpc.study.contact_axes import check_contacts
 from rubhpc.study.contact_keys import Contact, ContactKeys
+from rubhpc.study.drive_keys import DriveKeys, check_drive, first_speed
 from rubhpc.study.initial import CONTACT_FREE, Initial, check_initials
 from rubhpc.study.refine import Refine
-from rubhpc.study.run_up_keys import RunUpKeys, check_run_up, refuse_speeds, speed_axis
+from rubhpc.study.run_up_keys import RunUpKeys, check_run_up
 from rubhpc.study.sampling import draw
 from rubhpc.study.state_of_case import with_state
 from rubhpc.study.tables import Integrator, Recording, Run, Sample, check_bent
@@ -47,7 +49,7 @@ __all__ = [
 ]
 
 _TABLES = (
-    *("title", "rig", "output", "grid", "sample", "refine", "branch", "run_up", "override"),
+    *("title", "rig", "output", "grid", "sample", "refine", "branch", "run_up", "drive", "override"),
     *("contact", "initial", "integrator", "record", "run"),
 )
 _MOST_AXES = 32  # arrays have 64 dimensions at most
@@ -83,6 +85,8 @@ class Study:
         Along which axis periodic motions are followed; that axis has one case, and `drawn_from` is its range.
     run_up : RunUpKeys or None
         How the spin speed changes within every case; the axis of speeds then holds the highest one alone.
+    drive : DriveKeys or None
+        What turns the rotor where its speed is free; the axis of speeds then holds the first one alone.
     contact : ContactKeys
         A `Contact`; of a grid with contact axes what they leave open, as far as it applies to a case's law.
     initial : Initial
@@ -105,6 +109,7 @@ class Study:
     refine: Refine | None = None
     branch: BranchKeys | None = None
     run_up: RunUpKeys | None = None
+    drive: DriveKeys | None = None
     contact: ContactKeys = DEFAULT_CONTACT
     initial: Initial = DEFAULT_INITIAL
     integrator: Integrator = DEFAULT_INTEGRATOR
@@ -124,6 +129,8 @@ class Study:
         tables = {"refine": self.refine, "branch": self.branch}
         others = next((name for name, table in tables.items() if table is not None), "")
         check_run_up(self.run_up, self.axes, self.integrator, self.recording, others)
+        others = others or ("run_up" if self.run_up is not None else "")
+        check_drive(self.drive, self.axes, self.integrator, self.recording, others)
         check_axes(self.axes)
         if self.refine is not None:
             self.refine.refined(self.axes)
@@ -143,6 +150,11 @@ class Study:
             for contact in contacts:
                 check_bent(contact, self.integrator)
 
+    @property
+    def changes_speed(self) -> bool:
+        """Whether the speed changes within a case."""
+        return self.run_up is not None or self.drive is not None
+
     def axis(self, *names: str) -> Axis:
         """Return the first axis that has one of these names."""
         return next(axis for axis in self.axes if axis.name in names)
@@ -160,11 +172,12 @@ class Study:
                 | (asdict(axis.drawn_from) if axis.drawn_from else {"values": [*(axis.words or axis.values)]})
                 | ({"sweep": axis.sweep} if axis.sweep != FROM_REST else {})
                 for axis in self.axes
-                if axis.name != DIRECTION and not (self.run_up and axis.name in SPEED_AXES)
+                if axis.name != DIRECTION and not (self.changes_speed and axis.name in SPEED_AXES)
             },
             **({"sample": asdict(self.sample)} if self.sample else {}),
             **({"branch": asdict(self.branch)} if self.branch else {}),
             **({"run_up": asdict(self.run_up)} if self.run_up else {}),
+            **({"drive": asdict(self.drive)} if self.drive else {}),
             "contact": {
                 key: value
                 for key, value in asdict(self.contact).items()
@@ -221,12 +234,18 @@ def read_study(
         )
     run_up = build(RunUpKeys, table["run_up"], file, "run_up") if "run_up" in table else None
     axes = _read_axes(grid, rig, sample, file, branch.along if branch else "")
-    if run_up is not None:
+    drive = build(DriveKeys, table["drive"], file, "drive") if "drive" in table else None
+    if run_up is not None or drive is not None:
         try:
-            refuse_speeds([axis.name for axis in axes])
+            refuse_speeds("run_up" if run_up else "drive", [axis.name for axis in axes])
+            changed = []
+            if run_up is not None:
+                changed.append(speed_axis(run_up.highest, "highest spin speed"))
+            elif drive is not None:
+                changed.append(speed_axis(first_speed(drive, axes), "first spin speed"))
         except InputError as error:
             raise InputError(f"{place(file)}: {error}") from None
-        axes = (*axes, speed_axis(run_up))
+        axes = (*axes, *changed)
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
         raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
     for name in ("contact", "initial"):
@@ -235,7 +254,7 @@ def read_study(
                 raise InputError(f"{place(file, name, key)}: is an axis of the grid too; leave one out")
     is_varied = any(axis.is_contact_key for axis in axes)
     contact = build(ContactKeys if is_varied else Contact, table.get("contact", {}), file, "contact")
-    starts = {"from": CONTACT_FREE} if run_up is not None else {}
+    starts = {"from": CONTACT_FREE} if run_up is not None or drive is not None else {}
     initial = build(Initial, starts | _table(table, "initial", file), file, "initial")
     integrator = build(Integrator, table.get("integrator", {}), file, "integrator")
     recording = build(Recording, table.get("record", {}), file, "record")
@@ -249,6 +268,7 @@ def read_study(
             refine=refine,
             branch=branch,
             run_up=run_up,
+            drive=drive,
             contact=contact,
             initial=initial,
             integrator=integrator,

@@ -1,0 +1,165 @@
+"""Studies with [drive]: what is stored and opened, resumption, one case again, and what is refused."""
+
+import math
+import shutil
+
+import numpy as np
+import pytest
+
+import rubhpc
+from postproc.figures.bode import bode
+from rubhpc.errors import InputError
+from rubhpc.running.recompute import reproduce
+from rubhpc.storage.store import Store
+from rubhpc.study.cases import CaseGrid
+from rubhpc.study.study import read_study
+
+STUDY = """
+rig = "mokhtar2017"
+[drive]
+start = "1800 rpm"
+revolutions = 10
+lowest = "1500 rpm"
+inertia = "0.002 kg m^2"
+[grid]
+"drive.torque" = ["-5 N m", "1 N m"]
+clearance = ["100 um", "5 mm"]
+friction = 0.2
+[record]
+samples_per_revolution = 32
+[run]
+block = 1
+"""
+
+
+def study_of(folder, text=STUDY):
+    (folder / "study.toml").write_text(text)
+    return read_study(folder / "study.toml", folder / "driven.zarr")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("driven")
+    rubhpc.run(study_of(folder), quiet=True)
+    return folder
+
+
+def test_cases_are_those_of_the_function(folder):
+    store = rubhpc.open(folder / "driven.zarr")
+    assert store.speed.dims == ("drive_torque", "clearance", "friction", "revolution")
+    case = store.sel(drive_torque=1.0, clearance=1e-4, friction=0.2)
+    drive = {
+        "torque": "1 N m",
+        "start": "1800 rpm",
+        "revolutions": 10,
+        "lowest": "1500 rpm",
+        "inertia": 0.002,
+    }
+    keys = {"clearance": "100 um", "friction": 0.2, "samples_per_revolution": 32}
+    alone = rubhpc.run_up("mokhtar2017", drive=drive, **keys)
+    assert alone.contact_fraction.max() > 0.0
+    for name in ("speed", "time", "amplitude_vertical"):
+        assert np.array_equal(case[name].values, alone[name].values), name
+    for name in ("drive_work", "braking_torque"):
+        assert np.array_equal(case[f"revolution_{name}"].values, alone[name].values), name
+    assert case.drive_work.values == pytest.approx(20.0 * math.pi)
+    assert float(case.last_speed) == alone.last_speed
+    assert float(case.energy_residual) == alone.energy_residual < 1e-5
+
+
+def test_a_record_ends_where_the_spin_is_too_slow(folder):
+    store = rubhpc.open(folder / "driven.zarr").isel(friction=0)
+    ended = store.record_end.values
+    assert ended.tolist() == [[1, 1], [0, 0]]
+    turned = store.revolutions_turned.values
+    assert (turned[0] < 10).all()
+    assert np.isnan(store.speed.values[0, 1, turned[0, 1] :]).all()
+    assert (store.last_speed.values[0] <= 50.0 * math.pi).all()
+    assert (store.status.values == 1).all()
+
+
+def test_a_resumed_study_has_the_same_bytes(folder, tmp_path):
+    shutil.copytree(folder / "driven.zarr", tmp_path / "driven.zarr")
+    lost = tmp_path / "driven.zarr" / "revolution_braking_torque" / "c"
+    first = sorted(path for path in lost.rglob("*") if path.is_file())[0]
+    content = first.read_bytes()
+    first.unlink()
+    rubhpc.run(study_of(tmp_path), quiet=True)
+    assert first.read_bytes() == content
+
+
+def test_one_case_is_computed_again(folder):
+    name = Store(folder / "driven.zarr").manifest.case_id(3)
+    assert "holds the same, bit for bit" in reproduce(study_of(folder), name).verdict
+
+
+def test_a_case_does_not_depend_on_the_others_of_its_study(folder, tmp_path):
+    other = study_of(tmp_path, STUDY.replace('"-5 N m", "1 N m"', '"1 N m", "9 N m"'))
+    ids = {CaseGrid(each).case((i, 0, 0, 0)).id for each, i in ((study_of(folder), 1), (other, 0))}
+    speeds = {CaseGrid(each).case((i, 0, 0, 0)).speed for each, i in ((study_of(folder), 1), (other, 0))}
+    assert len(ids) == len(speeds) == 1
+
+
+def test_a_plan_counts_the_revolutions(tmp_path):
+    first, second = (
+        sum(block.cost for block in CaseGrid(study_of(tmp_path, STUDY.replace("= 10", f"= {n}"))).blocks())
+        for n in (10, 20)
+    )
+    assert second == 2 * first
+
+
+def test_a_sample_draws_torques(tmp_path):
+    text = STUDY.replace('["-5 N m", "1 N m"]', '{ start = "0.5 N m", stop = "2 N m" }')
+    study = study_of(tmp_path, text + '[sample]\nmethod = "lhs"\nn = 5\n')
+    grid = CaseGrid(study)
+    torques = {case.speed_law.torque for block in grid.blocks() for case in grid.cases(block)}
+    assert len(torques) == 5
+    assert all(0.5 <= torque <= 2.0 for (torque,) in torques)
+
+
+def test_figures_of_run_ups_show_driven_rotors(folder):
+    store = rubhpc.open(folder / "driven.zarr")
+    amplitude, _ = bode(store.isel(drive_torque=1), over="clearance").show()
+    assert len([line for line in amplitude.lines if "$g$" in line.get_label()]) == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('start = "1800 rpm"', "", "[drive] start: missing; give one, or the axis drive.start"),
+        ('"drive.torque" = ["-5 N m", "1 N m"]', "", "[drive] torque: missing; give one, or the axis"),
+        ("revolutions = 10", "", "[drive] revolutions: missing"),
+        ("revolutions = 10", "revolutions = 10\ntorque = 1.0", "[drive] torque: is an axis of the grid too"),
+        ("revolutions = 10", "revolutions = 10\nspeed = [1, 2]", "speed: goes with a table of torques"),
+        ('lowest = "1500 rpm"', 'lowest = "1900 rpm"', "[drive] lowest: 1900 rpm is not below the start"),
+        ('lowest = "1500 rpm"', 'highest = "1700 rpm"', "[drive] highest: 1700 rpm is not above the start"),
+        ("friction = 0.2", "friction = 0.2\nspeed = 100.0", "[grid] speed: conflicts with [drive]"),
+        ('"drive.torque"', '"drive.torqe"', "unknown axis; did you mean drive.torque?"),
+        ('clearance = ["100 um", "5 mm"]', "clearance_ratio = 0.7", "clearance_ratio: the speed changes"),
+        ("[record]", '[integrator]\nmethod = "central-difference"\n[record]', "holds the speed"),
+        ("[record]", "[refine]\n[record]", "[drive]: run-ups are not combined with [refine]"),
+        ("[record]", "[run_up]\nstart = 9\nstop = 8\ntime = 9\n[record]", "not combined with [run_up]"),
+        ("friction = 0.2", 'friction = { values = [0.1, 0.2], sweep = "up" }', "remove sweep"),
+    ],
+)
+def test_what_drives_nothing_is_refused(tmp_path, old, new, says):
+    assert old in STUDY
+    with pytest.raises(InputError) as error:
+        study_of(tmp_path, STUDY.replace(old, new, 1))
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_torque_without_a_drive_is_refused(tmp_path):
+    text = STUDY[: STUDY.index("[drive]")] + STUDY[STUDY.index("[grid]") :]
+    with pytest.raises(InputError, match=r"drive.torque: nothing drives the rotor; add the table \[drive\]"):
+        study_of(tmp_path, text.replace("friction = 0.2", "friction = 0.2\nspeed = 100.0"))
+
+
+def test_a_table_of_torques_is_read(tmp_path):
+    text = STUDY.replace('"drive.torque" = ["-5 N m", "1 N m"]', '"drive.start" = ["1600 rpm", "1800 rpm"]')
+    text = text.replace('start = "1800 rpm"\n', 'torque = ["2 N m", 0]\nspeed = ["0 rpm", "3000 rpm"]\n')
+    study = study_of(tmp_path, text)
+    laws = [CaseGrid(study).case((i, 0, 0, 0)).speed_law for i in (0, 1)]
+    assert laws[0].at(50.0 * math.pi) == pytest.approx(1.0)
+    assert [law.start for law in laws] == pytest.approx([160.0 * math.pi / 3.0, 60.0 * math.pi])
