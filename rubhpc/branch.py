@@ -112,7 +112,7 @@ def branch(
     ...     "mokhtar2017", along="clearance", start="100 um", stop="130 um", speed_ratio=0.75, period=2
     ... )
     >>> [name for name, _ in found[0].events()]
-    ['grazing', 'grazing', 'grazing']
+    ['grazing', 'grazing', 'period_doubling']
     """
     if not 1 <= period <= 64:
         raise InputError(f"branch: period: {period} is out of range; it must be from 1 to 64")

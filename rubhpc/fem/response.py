@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Body, Model
+
+SMALL = 256  # degrees of a rotor whose frequencies are kept for other speeds and stators: 1 MB
 
 
 def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
@@ -90,13 +93,26 @@ def first_lateral_frequency(model: Model) -> float:
     stiffness = undamped.stiffness[np.ix_(rows, rows)]
     is_alone = all(undamped.degrees[row][1] in KINDS["lateral"] for row in rows)
     if is_alone and np.array_equal(stiffness, stiffness.T):
-        square, _ = undamped_modes(undamped.mass[np.ix_(rows, rows)], stiffness)
-        found = np.sqrt(square)
+        mass = undamped.mass[np.ix_(rows, rows)]
+        is_small = len(rows) <= SMALL
+        found = (
+            _frequencies(mass.tobytes(), stiffness.tobytes())
+            if is_small
+            else np.sqrt(undamped_modes(mass, stiffness)[0])
+        )
     else:
         found = 2 * math.pi * np.array([m.frequency for m in modes(undamped) if m.kind == "lateral"])
     if not (found > 0.0).any():
         raise InputError("speed_ratio: the rotor has no lateral natural frequency; give the speed instead")
     return float(found[found > 0.0].min())
+
+
+@lru_cache(maxsize=4)
+def _frequencies(mass: bytes, stiffness: bytes) -> NDArray[np.float64]:
+    """Undamped natural frequencies, rad/s, of matrices (n, n): once for all speeds and stators of a rotor."""
+    n = math.isqrt(len(mass) // 8)
+    square, _ = undamped_modes(*(np.frombuffer(matrix).reshape(n, n) for matrix in (mass, stiffness)))
+    return np.sqrt(square)
 
 
 def step_limit(model: Model) -> float:

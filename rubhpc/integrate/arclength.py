@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.integrate.branch_events import Event, crossings, grazing, grazing_between, half_change, halving
+from rubhpc.integrate.branch_events import Event, half_change, halving
+from rubhpc.integrate.branch_grazing import grazing, passed
 from rubhpc.integrate.branch_point import away_from_events
 from rubhpc.integrate.piecewise_motion import Unfollowed
 from rubhpc.integrate.shooting import SAME, NotConverged
@@ -24,6 +25,8 @@ FIRST, LEAST, LONGEST = 0.1, 1e-4, 1.0  # lengths of a step
 GOOD, POOR = 0.03, 0.15  # distance from a prediction over the step's length: go on with more, with less
 STRAIGHT = 0.75  # cosine of the angle between two steps, at least
 SHORT = 0.02  # length of the step in which a branch may pass a motion of half its period
+FEWEST = 6  # points of a branch that is closed
+SHORTEST = 1e-3  # length of a step in which several contacts may come and go at once
 BEYOND = (0.02, 0.1, 0.5)  # steps past a grazing at which the branch is sought again
 
 
@@ -31,13 +34,15 @@ BEYOND = (0.02, 0.1, 0.5)  # steps past a grazing at which the branch is sought 
 class Track:
     """Points of a branch in order, with what happens at each, and why it ends.
 
-    `is_halved` says that it ends at a motion of half its period, `doublings` how many have led to it.
+    `is_halved` says that it ends at a motion of half its period, `is_closed` that it ends where it began,
+    `doublings` how many have led to it.
     """
 
     points: list[Point]
     events: list[Event]
     end: str
     is_halved: bool = False
+    is_closed: bool = False
     doublings: int = 0
 
 
@@ -62,8 +67,10 @@ def follow(
         Points, at most.
     """
     points, events = list(start), [Event.NONE] * len(start)
-    history, length, end = list(start), FIRST, f"{most} points"
-    is_halved = False
+    history, end = list(start), f"{most} points"
+    length = FIRST if len(start) == 1 else float(np.linalg.norm(branching.difference(*start)))
+    length = min(FIRST, length)
+    is_halved = is_closed = False
     heading, has_turned = None, False  # where it goes from a single point; whether its contacts are new
 
     def add(event: Event, point: Point) -> None:
@@ -80,7 +87,7 @@ def follow(
                 if len(history) > 1:
                     toward = branching.difference(*history[-2:])
                 heading, history, has_turned = branching.tangent(base, toward), [base], False
-            edge, found, guess = 0.0, None, None
+            edge, found, guess, happened = 0.0, None, None, []
             while length >= LEAST:
                 if heading is not None:
                     guess, along = length * heading, heading
@@ -97,10 +104,13 @@ def follow(
                 except NotConverged:
                     length *= 0.5
                     continue
-                is_back = trial.sequence == base.sequence and _is_back(trial, base)
-                if _is_near(branching, history, guess, trial) and not (is_back and length > SHORT):
-                    found = trial
-                    break
+                is_back = _is_half(trial) or (trial.sequence == base.sequence and _is_back(trial, base))
+                is_last = length <= SHORTEST
+                if _is_near(branching, history, guess, trial) and (length <= SHORT or not is_back):
+                    events_between = passed(branching, base, trial, is_last=is_last)
+                    if events_between is not None or is_last:
+                        found, happened = trial, events_between or []
+                        break
                 length *= 0.5
             if found is None:
                 point = grazing(branching, history, predict)
@@ -116,44 +126,32 @@ def follow(
                 history, length, has_turned = [point, follower], FIRST, True
                 continue
             is_same = found.sequence == base.sequence
-            if is_same:
-                for event, point in crossings(branching, base, found):
-                    add(event, point)
-            elif graze := grazing_between(branching, base, found):
-                sides = [graze.point, graze.beyond]
-                if graze.point.sequence != base.sequence:
-                    sides.reverse()
-                for event, point in crossings(branching, base, sides[0]):
-                    add(event, point)
-                add(Event.GRAZING, graze.point)
-                for event, point in crossings(branching, sides[1], found):
-                    add(event, point)
-            if is_same and _is_back(found, base):
+            for event, point in happened:
+                add(event, point)
+            if _is_half(found) or (is_same and _is_back(found, base)):
                 if point := halving(branching, base, found):
                     add(Event.PERIOD_DOUBLING, point)
-                    is_halved = True
-                end = "it meets a motion of half the period"
-                break
-            if _is_half(found):
                 end, is_halved = "it meets a motion of half the period", True
+                break
+            if closing := _closing(branching, points, base, found):
+                add(Event.END, closing)
+                end, is_closed = "the branch is closed", True
                 break
             is_at_edge = found.value in (low, high)
             add(Event.END if is_at_edge else Event.NONE, found)
             if is_at_edge:
                 end = "the range ends"
                 break
-            if _has_closed(branching, points, history, found):
-                end = "the branch is closed"
-                break
             assert guess is not None
             miss = _miss(branching, base, guess, found) / length
-            history, heading, has_turned = [*history[-2:], found], None, not is_same
+            corner = [point for event, point in happened if event is Event.GRAZING][-1:]
+            history, heading, has_turned = [*(corner or history[-2:]), found], None, not is_same
             length = min(LONGEST, 1.5 * length) if miss < GOOD else (0.6 * length if miss > POOR else length)
     except (Unfollowed, InputError, NotConverged, np.linalg.LinAlgError) as problem:
         end = str(problem)
     if events[-1] is Event.NONE and len(points) < most:
         events[-1] = Event.END
-    return Track(points=points, events=events, end=end, is_halved=is_halved)
+    return Track(points=points, events=events, end=end, is_halved=is_halved, is_closed=is_closed)
 
 
 def predict(branching: Branching, history: list[Point], length: float) -> tuple[Floats, Floats]:
@@ -221,11 +219,19 @@ def _is_half(point: Point) -> bool:
     return bool(point.case.size(half_change(point)) < SAME * point.case.size(point.motion))
 
 
-def _has_closed(branching: Branching, points: list[Point], history: list[Point], found: Point) -> bool:
-    """Whether a branch has come back to where it began."""
-    first = points[0]
-    if len(points) < 10 or first.phase != found.phase or first.motion.size != found.motion.size:
-        return False
-    change = branching.difference(first, found)
-    step = branching.difference(history[-1], found)
-    return bool(np.linalg.norm(change) < np.linalg.norm(step) and abs(change @ step) > 0.0)
+def _closing(branching: Branching, points: list[Point], base: Point, found: Point) -> Point | None:
+    """The motion with which a branch began, where it comes by once more between two points, in one sense."""
+    first, step = points[0], found.value - base.value
+    if len(points) < FEWEST or step * (points[1].value - first.value) <= 0.0:
+        return None
+    share = (first.value - base.value) / step
+    if not 0.0 <= share <= 1.0 or found.motion.size != first.motion.size:
+        return None
+    change = branching.difference(base, found)
+    held = np.zeros(change.size)
+    held[-1] = 1.0
+    try:
+        there = branching.correct(base, share * change, held)
+    except NotConverged:
+        return None
+    return there if branching.is_same(there, first) else None

@@ -27,9 +27,12 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 MOST_ITERATIONS = 7
+SOON = 1e-4  # residual from which an iteration that is late may go on
 FAST = 0.02  # ratio of two residuals below which a derivative serves once more
 TURN = 0.2  # change of the motion, over its size, that counts as one step
 STEEP = 0.4  # share of the parameter in a step below which it is an unknown
+SAME_MOTION = 1e-6  # of its size
+NEAR_FOLD = 0.03  # distance of a multiplier from 1 within which the parameter is not held
 CENTRAL = 0.2  # share of an event-free piece at either end in which no section is placed
 
 
@@ -71,6 +74,11 @@ class Point:
         """Its eigenvalues, largest first, (2 n,)."""
         found = np.linalg.eigvals(self.monodromy).astype(np.complex128)
         return found[np.lexsort((-found.imag, -np.abs(found)))]
+
+    @property
+    def is_near_fold(self) -> bool:
+        """Whether the motion hardly closes less well next to it, with the parameter held."""
+        return bool(np.abs(self.multipliers - 1.0).min() < NEAR_FOLD)
 
     @property
     def n_unstable(self) -> int:
@@ -160,10 +168,25 @@ class Branching:
         scaled = np.append(self._scale(point) * change, 0.0)
         return np.asarray(scaled / np.linalg.norm(scaled))
 
+    def length_of(self, point: Point, change: Floats) -> float:
+        """Length, in steps, of a change (2 n,) of a motion."""
+        return float(np.linalg.norm(self._scale(point) * change))
+
     def difference(self, a: Point, b: Point) -> Floats:
         """From one point to another in steps: (2 n + 1,), the parameter last."""
         motion = self.family.carry(a.motion, a.case, b.case)
         return np.append(self._scale(b) * (b.motion - motion), (b.value - a.value) / self.step)
+
+    def is_same(self, a: Point, b: Point) -> bool:
+        """Whether two motions of a case are one, but for a shift by revolutions."""
+        if a.motion.size != b.motion.size or a.period != b.period:
+            return False
+        limit = SAME_MOTION * a.case.size(a.motion)
+        for k in range(b.period):
+            moved = self.moved(b, (a.phase - b.phase) % 1.0 + k)
+            if a.case.size(moved.motion - a.motion) <= limit:
+                return True
+        return False
 
     def _scale(self, point: Point) -> Floats:
         """Steps (2 n,) for a unit of each coordinate."""
@@ -181,7 +204,14 @@ class Branching:
         return along if along @ toward >= 0.0 else -along
 
     def correct(
-        self, base: Point, guess: Floats, along: Floats, *, period: int = 0, most: int = MOST_ITERATIONS
+        self,
+        base: Point,
+        guess: Floats,
+        along: Floats,
+        *,
+        period: int = 0,
+        most: int = MOST_ITERATIONS,
+        is_free: bool = False,
     ) -> Point:
         """Find the motion in the plane through a guess across a direction.
 
@@ -191,27 +221,46 @@ class Branching:
             In whose scale and section guess and direction are.
         guess, along : (2 n + 1,)
             From the base, in steps; the direction of length 1. Where it runs along the parameter mainly,
-            that is kept.
+            that is held, which costs less; not near a fold, where a motion may not be found so, or badly.
         period : int
             Revolutions; by default that of the base.
+        most : int
+            Iterations; up to twice as many where the end is near.
+        is_free : bool
+            The parameter is never held: between two points around a fold several motions have one parameter.
 
         Raises
         ------
         NotConverged
             Newton's method finds none.
         """
+        period = period or base.period
+        is_asked = not np.any(along[:-1])
+        if is_asked or (abs(along[-1]) > STEEP and not is_free and not base.is_near_fold):
+            try:
+                found = self._corrected(base, guess, along, period, most, is_held=True)
+                if is_asked or not found.is_near_fold:
+                    return found
+            except NotConverged:
+                if is_asked:
+                    raise
+        return self._corrected(base, guess, along, period, most, is_held=False)
+
+    def _corrected(
+        self, base: Point, guess: Floats, along: Floats, period: int, most: int, *, is_held: bool
+    ) -> Point:
+        """Newton's method, with the parameter held or an unknown."""
         if self._check is not None:
             self._check()
         family, phase, states = self.family, base.phase, base.states
-        scale, period = self._scale(base), period or base.period
-        is_held = abs(along[-1]) > STEEP
+        scale = self._scale(base)
         value = base.value + guess[-1] * self.step
         before = base.motion + guess[:-1] / scale
         origin, rate, derivative, last = base.case, None, None, math.inf
         try:
             case = family.at(value)
             motion = family.carry(before, origin, case)
-            for _ in range(most):
+            for iteration in range(2 * most):
                 revolutions = flow(case, motion, states, period, phase)
                 defect = revolutions[-1].end - motion
                 residual = case.size(defect) / max(case.size(motion), np.finfo(float).tiny)
@@ -221,7 +270,8 @@ class Branching:
                         case=case,
                     )  # fmt: skip
                 states = revolutions[-1].states
-                if residual > 2.0 * last or not math.isfinite(residual):
+                is_late = iteration >= most and residual > SOON
+                if residual > 2.0 * last or is_late or not math.isfinite(residual):
                     break
                 if derivative is None or residual > FAST * last:
                     derivative = monodromy(case, revolutions) - np.eye(motion.size)

@@ -9,6 +9,8 @@ import numpy as np
 
 from rubhpc.integrate.arclength import Track, follow
 from rubhpc.integrate.branch_events import Event, half_change
+from rubhpc.integrate.branch_point import SAME_MOTION
+from rubhpc.integrate.branch_refining import refined
 from rubhpc.integrate.piecewise_motion import Unfollowed
 from rubhpc.integrate.shooting import NotConverged
 
@@ -21,8 +23,10 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-ASIDE = (0.3, 0.1, 0.03, 0.01)  # steps from a doubling at which the motion of twice the period is sought
-SAME_MOTION = 1e-6  # of its size
+# Steps from a doubling at which the motion of twice the period is sought: the range in which it exists, or
+# has the same contacts, may be narrow.
+ASIDE = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)
+ASTRAY = 0.5  # of that length, by which a motion may lie off the direction of the multiplier -1
 SAME_VALUE = 1e-6  # of the range, between two doublings that are one
 
 
@@ -48,21 +52,21 @@ def search(
             continue
         found = [_both_ways(branching, start, low, high, most)]
         while found:
-            track = found.pop(0)
+            track = refined(branching, found.pop(0), most)
             tracks.append(track)
-            if (half := _halved(branching, track)) and not any(
-                lies_on(branching, other, half) for other in tracks + found
-            ):
-                found.append(_both_ways(branching, half, low, high, most))
+            for half in _halved(branching, track):
+                if not any(lies_on(branching, other, half) for other in tracks + found):
+                    found.append(_both_ways(branching, half, low, high, most))
             if track.doublings >= doublings:
                 continue
             for point in _doublings(track):
-                if _is_known(branching, tracks, point):
+                if _is_known(branching, tracks + found, point):
                     continue
                 pair = _aside(branching, point)
-                if pair is not None:
+                if pair and not any(lies_on(branching, other, pair[1]) for other in tracks + found):
                     follower = follow(branching, pair, 1.0, low=low, high=high, most=most)
-                    found.append(replace(follower, doublings=track.doublings + 1))
+                    events = [Event.PERIOD_DOUBLING, *follower.events[1:]]
+                    found.append(replace(follower, events=events, doublings=track.doublings + 1))
     return tracks
 
 
@@ -80,32 +84,21 @@ def lies_on(branching: Branching, track: Track, point: Point) -> bool:
         guess[-1] = (point.value - near.value) / branching.step
         try:
             there = branching.correct(near, guess, held)
-            if _is_same(branching, there, point):
+            if branching.is_same(there, point):
                 return True
         except (NotConverged, Unfollowed):
             continue
     return False
 
 
-def _is_same(branching: Branching, there: Point, point: Point) -> bool:
-    """Whether two motions of a case are one, but for a shift by revolutions."""
-    if there.motion.size != point.motion.size:
-        return False
-    limit = SAME_MOTION * there.case.size(there.motion)
-    for k in range(point.period):
-        moved = branching.moved(point, (there.phase - point.phase) % 1.0 + k)
-        if there.case.size(moved.motion - there.motion) <= limit:
-            return True
-    return False
-
-
 def _both_ways(branching: Branching, start: Point, low: float, high: float, most: int) -> Track:
     """The branch through a motion, from its end in one sense to that in the other."""
-    tracks = [
-        follow(branching, [start], sense, low=low, high=high, most=most)
-        for sense, limit in ((-1.0, low), (1.0, high))
-        if start.value != limit
-    ]
+    tracks: list[Track] = []
+    for sense, limit in ((-1.0, low), (1.0, high)):
+        if start.value != limit:
+            tracks.append(follow(branching, [start], sense, low=low, high=high, most=most))
+            if tracks[-1].is_closed:
+                return tracks[-1]
     if len(tracks) == 1:
         return tracks[0]
     back, on = tracks
@@ -118,27 +111,31 @@ def _both_ways(branching: Branching, start: Point, low: float, high: float, most
 
 
 def _doublings(track: Track) -> Iterator[Point]:
-    """Where the period doubles, but for the end at which it halves."""
+    """Where the period doubles, but for the ends at which it halves."""
     for point, event in zip(track.points, track.events, strict=True):
-        is_own = float(np.linalg.norm(half_change(point))) if point.period % 2 == 0 else 1.0
-        if event is Event.PERIOD_DOUBLING and is_own > SAME_MOTION * point.case.size(point.motion):
+        if event is Event.PERIOD_DOUBLING and not _has_halved(point):
             yield point
 
 
-def _halved(branching: Branching, track: Track) -> Point | None:
-    """The motion of half the period at which a track ends."""
-    for k in (0, -1):
+def _has_halved(point: Point) -> bool:
+    """Whether a motion has half the period that it is followed with."""
+    if point.period % 2:
+        return False
+    return bool(np.linalg.norm(half_change(point)) <= SAME_MOTION * point.case.size(point.motion))
+
+
+def _halved(branching: Branching, track: Track) -> Iterator[Point]:
+    """The motions of half the period at which a track ends, but for that from which it was switched."""
+    for k in (-1,) if track.doublings else (0, -1):
         point = track.points[k]
-        at_end = track.events[k] in (Event.PERIOD_DOUBLING, Event.GRAZING)
-        if track.is_halved and at_end and point.period % 2 == 0:
+        if track.events[k] in (Event.PERIOD_DOUBLING, Event.GRAZING) and _has_halved(point):
             half = replace(point, revolutions=point.revolutions[: point.period // 2])
+            held = np.zeros(point.motion.size + 1)
+            held[-1] = 1.0
             try:
-                held = np.zeros(point.motion.size + 1)
-                held[-1] = 1.0
-                return branching.correct(half, 0.0 * held, held)
+                yield branching.correct(half, 0.0 * held, held)
             except NotConverged:
-                return None
-    return None
+                continue
 
 
 def _is_known(branching: Branching, tracks: list[Track], point: Point) -> bool:
@@ -155,17 +152,24 @@ def _is_known(branching: Branching, tracks: list[Track], point: Point) -> bool:
 
 
 def _aside(branching: Branching, point: Point) -> list[Point] | None:
-    """A motion of twice the period at its doubling, and one next to it on the branch that leaves."""
+    """A motion of twice the period at its doubling, and one next to it on the branch that leaves.
+
+    It is to have the same contacts, lest an event be passed over; where there is none, the farthest is taken.
+    """
     base = branching.repeated(point, 2)
     values, vectors = np.linalg.eig(point.monodromy)
     direction = vectors[:, np.argmin(np.abs(values + 1.0))].real
     along = branching.direction(base, direction)
+    other: Point | None = None
     for length in ASIDE:
         try:
             found = branching.correct(base, length * along, along)
         except NotConverged:
             continue
+        if branching.length_of(found, half_change(found)) < length:
+            continue  # the motion that has not doubled
         moved = branching.difference(base, found)
-        if np.linalg.norm(moved - length * along) < 0.5 * length:
+        if found.sequence == base.sequence and np.linalg.norm(moved - length * along) < ASTRAY * length:
             return [base, found]
-    return None
+        other = other or found
+    return None if other is None else [base, other]

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import block_diag, null_space
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
+from scipy.linalg import null_space
 
 from rubhpc.errors import InputError
+from rubhpc.integrate.coupling import coupled_rows
 from rubhpc.integrate.repeated_exponents import real_ones, separate
 
 if TYPE_CHECKING:
@@ -97,7 +96,8 @@ def solve_contact_mode(
         for rows in parts:
             if np.any(loads[rows] != 0.0):
                 constant[np.ix_(closed, rows)] = -np.linalg.solve(system[np.ix_(rows, rows)], loads[rows]).T
-    expand = block_diag(tangent, tangent)
+    expand = np.zeros((2 * n, 2 * n_free))
+    expand[:n, :n_free] = expand[n:, n_free:] = tangent
     still = constant @ expand.T + np.hstack([offset, np.zeros((q, n))])  # (q, 2 n)
     motion = np.hstack([expand @ shape, (expand @ response)[:, None], still.T])
     clear = np.hstack([np.zeros((q, exponent.size + 1)), np.eye(q)])
@@ -210,8 +210,7 @@ def solve_parts(system: Floats) -> Solved:
 
 def _parts(system: Floats) -> list[NDArray[np.int64]]:
     """Rows of each part of a system that nothing couples to the rest."""
-    _, part = connected_components(csr_array(system != 0.0), directed=False)
-    return [np.flatnonzero(part == number) for number in np.unique(part)]
+    return coupled_rows(system != 0.0)
 
 
 def _kept(exponent: Complexes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from rubhpc.integrate.contact_mode import ContactMode, confine, modes_of
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK
@@ -91,7 +90,8 @@ def solve_friction_mode(
     phasor = reduced.force[0] - 1j * reduced.force[1]
     lower = np.concatenate([np.zeros(n_free), project @ phasor])
     response = np.linalg.solve(1j * reduced.spin * np.eye(2 * n_free) - system, lower)
-    expand = block_diag(tangent, tangent)
+    expand = np.zeros((2 * n, 2 * n_free))
+    expand[:n, :n_free] = expand[n:, n_free:] = tangent
     end = m + 2 + 2 * q
     clear, one, ahead = m + 1 + closed, m + 1 + q, m + 2 + q + stuck
     growth = np.zeros(end)

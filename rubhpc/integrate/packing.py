@@ -7,7 +7,6 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import block_diag
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
@@ -107,10 +106,15 @@ def whole_system(model: Model, spin: float) -> tuple[Floats, Floats, Floats, Flo
     The force's rows go with the cosine and the sine of the shaft's angle; spin in rad/s.
     """
     bodies = model.bodies
-    mass = block_diag(*(body.mass for body in bodies))
-    stiffness = block_diag(*(body.stiffness for body in bodies))
-    damping = block_diag(*(body.damping + spin * body.gyroscopic for body in bodies))
-    force = np.zeros((2, mass.shape[0]))
+    n_all = sum(body.n_dof for body in bodies)
+    mass, stiffness, damping = np.zeros((3, n_all, n_all))
+    first = 0
+    for body in bodies:
+        rows = slice(first, first + body.n_dof)
+        mass[rows, rows], stiffness[rows, rows] = body.mass, body.stiffness
+        damping[rows, rows] = body.damping + spin * body.gyroscopic
+        first += body.n_dof
+    force = np.zeros((2, n_all))
     force[0, : model.rotor.n_dof] = spin**2 * model.unbalance_cosine
     force[1, : model.rotor.n_dof] = spin**2 * model.unbalance_sine
     return mass, damping, stiffness, force

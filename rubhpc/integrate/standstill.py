@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -26,6 +27,7 @@ Bools = NDArray[np.bool_]
 # power of the frequency ratio.
 CUTOFF_RATIO = 10.0
 FEWEST_MODES = 2  # kept of every part, whatever their frequency
+SMALL = 256  # degrees of a body whose modes are kept for other rigs with the same body: 1.5 MB
 FREE = 1e-12  # square of a frequency over the greatest, below which a mode is free motion
 
 
@@ -72,7 +74,11 @@ def at_standstill(model: Model) -> Standstill:
         rows = np.flatnonzero(number == i_part)
         if not is_felt[whole[rows[0]]]:
             continue
-        square, shape = eigh(symmetric[np.ix_(rows, rows)], mass[np.ix_(rows, rows)])
+        pick = np.ix_(rows, rows)
+        if rows.size <= SMALL:
+            square, shape = _eigenmodes(symmetric[pick].tobytes(), mass[pick].tobytes())
+        else:
+            square, shape = eigh(symmetric[pick], mass[pick])
         if square[0] <= FREE * square[-1]:
             raise InputError(
                 "[integrator] method: modal needs bodies that are held, and here one is free to move or to "
@@ -83,6 +89,14 @@ def at_standstill(model: Model) -> Standstill:
         n_seen = is_seen[rows].sum() + looked_at[rows].any(axis=0).sum()
         parts.append(Part(int(n_seen), mode, np.sqrt(square)))
     return Standstill(symmetric, parts, _contact_frequency(parts, degrees_of(model), model))
+
+
+@lru_cache(maxsize=16)
+def _eigenmodes(stiffness: bytes, mass: bytes) -> tuple[Floats, Floats]:
+    """Squares of frequencies and modes of matrices (n, n): a body that rigs share is solved once."""
+    n = math.isqrt(len(mass) // 8)
+    square, shape = eigh(*(np.frombuffer(matrix).reshape(n, n) for matrix in (stiffness, mass)))
+    return square, shape
 
 
 def seen_degrees(model: Model) -> Ints:

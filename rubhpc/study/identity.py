@@ -17,7 +17,8 @@ PHYSICS = 4  # version of the physics: raised whenever a study gives other resul
 RING_PHYSICS = 8  # that of several stators by the central difference
 AUTO_PHYSICS = 10  # that of transients that end where the motion has settled, by the central difference
 MODAL_PHYSICS = 12  # that of the modal scheme
-CARRIER_PHYSICS = 13  # that of rigs with a carrier; the next version of all is 14
+CARRIER_PHYSICS = 13  # that of rigs with a carrier
+BRANCH_PHYSICS = 14  # that of branches; the next version of all is 15
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
@@ -26,6 +27,8 @@ _AXIS = "axis"  # in place of a value that every case sets
 
 def physics_of(study: Study) -> int:
     """Version of the physics with which a study is computed."""
+    if study.branch is not None:
+        return max(PHYSICS, BRANCH_PHYSICS)
     if study.rig.carrier:
         return CARRIER_PHYSICS
     if study.integrator.method == "modal":
