@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import json
 import math
@@ -25,7 +26,7 @@ from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     from rubhpc.study.cases import Case
@@ -68,6 +69,10 @@ class Search:
         how = (self.grid.case(index).id, self.angles, self.nodes, self.most, self.tolerance)
         return hashlib.sha256(repr(how).encode()).hexdigest()[:32]
 
+    def left(self, found: Mapping[str, LeastKnock]) -> list[Index]:
+        """Indices of the cases of which no result is there."""
+        return [index for index in np.ndindex(self.grid.shape) if self.key(index) not in found]
+
     def of_case(self, index: Index) -> LeastKnock:
         """Search one case."""
         knocks = _Knocks(self.study, self.grid.case(index), self.nodes)
@@ -102,12 +107,19 @@ class Progress:
     ----------
     path : Path or None
         None keeps nothing.
+    rank : int
+        Each rank has a file of its own; all are read.
     """
 
-    def __init__(self, path: Path | None) -> None:
-        self._path = path
+    def __init__(self, path: Path | None, rank: int = 0) -> None:
+        self._files = [] if path is None else [path, *sorted(path.parent.glob(f"{glob.escape(path.name)}.*"))]
+        self._path = path if path is None or rank == 0 else path.with_name(f"{path.name}.{rank}")
         self.found: dict[str, LeastKnock] = {}
-        if path is None or not path.exists():
+        for file in self._files:
+            self._read(file)
+
+    def _read(self, path: Path) -> None:
+        if not path.exists():
             return
         for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
             try:  # the last line of a search that was killed may be a part of one
@@ -116,6 +128,11 @@ class Progress:
                 self.found[key] = LeastKnock(**entry)
             except (ValueError, TypeError, KeyError, AttributeError):
                 continue
+
+    def forget(self) -> None:
+        """Remove the files."""
+        for file in self._files:
+            file.unlink(missing_ok=True)
 
     def enter(self, key: str, found: LeastKnock) -> None:
         """Keep a result."""

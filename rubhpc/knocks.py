@@ -11,7 +11,7 @@ from rubhpc.knock_cases import LeastKnock, Progress, Search, search_cases
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     import xarray as xr
@@ -69,28 +69,47 @@ def least_knock(
         The study has axes of starts, [branch], [run_up] or [drive], a node does not move sideways, or a
         number is out of range.
     """
-    import xarray as xr
+    search = search_of(study, angles=angles, nodes=nodes, most=most, tolerance=tolerance)
+    if workers < 1:
+        raise InputError(f"workers {workers}: give 1 or more")
+    kept, n_case = Progress(progress), search.grid.n_case
+    left = search.left(kept.found)
+    report(n_case - len(left), n_case)
+    for done, (index, one) in enumerate(search_cases(search, left, workers), n_case - len(left) + 1):
+        kept.enter(search.key(index), one)
+        report(done, n_case)
+    return dataset_of(search, kept.found)
 
+
+def search_of(
+    study: Study, *, angles: int, nodes: Sequence[int], most: float | None, tolerance: float
+) -> Search:
+    """Return the search of a study's cases; see `least_knock`.
+
+    Raises
+    ------
+    InputError
+        As there.
+    """
     if starts := [axis.name for axis in study.axes if axis.is_initial_key]:
         raise InputError(f"[grid] {starts[0]}: the knock itself is searched for; remove this axis")
     tables = {"branch": study.branch, "run_up": study.run_up, "drive": study.drive}
     for table, found in tables.items():
         if found is not None:
             raise InputError(f"[{table}]: knocks are searched for at a constant speed; remove this table")
-    if workers < 1:
-        raise InputError(f"workers {workers}: give 1 or more")
     if angles < 1 or not 0.0 < tolerance < 1.0 or (most is not None and not most > 0.0):
         raise InputError(f"angles {angles}, tolerance {tolerance:g}, most {most}: give numbers above 0")
-    search = Search(study=study, angles=angles, nodes=tuple(nodes), most=most, tolerance=tolerance)
-    grid, kept = search.grid, Progress(progress)
-    keys = {index: search.key(index) for index in np.ndindex(grid.shape)}
-    left = [index for index, key in keys.items() if key not in kept.found]
-    report(grid.n_case - len(left), grid.n_case)
-    for done, (index, one) in enumerate(search_cases(search, left, workers), grid.n_case - len(left) + 1):
-        kept.enter(keys[index], one)
-        report(done, grid.n_case)
+    return Search(study=study, angles=angles, nodes=tuple(nodes), most=most, tolerance=tolerance)
+
+
+def dataset_of(search: Search, found: Mapping[str, LeastKnock]) -> xr.Dataset:
+    """Return the results of all cases, by their keys, over the axes of the study; see `least_knock`."""
+    import xarray as xr
+
+    study, grid = search.study, search.grid
+    keys = [search.key(index) for index in np.ndindex(grid.shape)]
     columns = {
-        name: np.array([getattr(kept.found[key], name) for key in keys.values()]).reshape(grid.shape)
+        name: np.array([getattr(found[key], name) for key in keys]).reshape(grid.shape)
         for name in LeastKnock.__annotations__
     }
     about = {

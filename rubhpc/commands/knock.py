@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import click
 
 from rubhpc.commands.quantity import quantity
+from rubhpc.errors import InputError
+from rubhpc.running.launch import launch
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -53,34 +55,57 @@ def knock(
 
     For every case of STUDY.toml: the smallest impulse over all directions and nodes tried. A figure shows it
     over the speed, the resilience curve of the machine. No store is made; cases that are done are kept in
-    a file beside the figure until it is drawn, so that the same command resumes an interrupted search.
+    files beside the figure until it is drawn, so that the same command resumes an interrupted search. With
+    --workers, or under mpirun, several processes share the cases.
     """
     from postproc.figures.resilience_curve import resilience
     from postproc.figures.style import check_figure_path
     from postproc.store.export import check_data_path, write_data
+    from rubhpc.knock_cases import Progress
     from rubhpc.knocks import least_knock
+    from rubhpc.running.knocks_on_ranks import least_knock_on
+    from rubhpc.running.pool import connect
     from rubhpc.study.study import read_study
 
     path = check_figure_path(figure or f"{study.stem}_knock.png")
     progress = path.with_name(f".{path.stem}.progress")
     data_path = check_data_path(data) if data else None
-    found = least_knock(
-        read_study(study, trust_rig=trust_rig),
-        angles=angles,
-        nodes=nodes,
-        most=None if most is None else quantity(most, "N*s", "--most"),
-        tolerance=tolerance,
-        workers=workers,
-        progress=progress,
-        report=_report(),
-    )
+    largest = None if most is None else quantity(most, "N*s", "--most")
+    if launch().size > 1:
+        if workers > 1:
+            raise InputError(
+                "--workers: mpirun has started several processes already; leave one of the two out"
+            )
+        found = least_knock_on(
+            connect(),
+            lambda: read_study(study, trust_rig=trust_rig),
+            angles=angles,
+            nodes=nodes,
+            most=largest,
+            tolerance=tolerance,
+            progress=progress,
+            report=_report(),
+        )
+    else:
+        found = least_knock(
+            read_study(study, trust_rig=trust_rig),
+            angles=angles,
+            nodes=nodes,
+            most=largest,
+            tolerance=tolerance,
+            workers=workers,
+            progress=progress,
+            report=_report(),
+        )
+    if launch().rank > 0:
+        return 0
     drawing = resilience(found)
     for line in drawing.lines:
         click.echo(line)
     click.echo(str(drawing.save(path)))
     if data_path is not None:
         click.echo(str(write_data(drawing.shown, data_path)))
-    progress.unlink(missing_ok=True)
+    Progress(progress).forget()
     return 0
 
 
