@@ -10,6 +10,7 @@ from postproc.figures.bode import bode
 from postproc.figures.centreline import centreline
 from postproc.figures.polar import polar
 from postproc.figures.run_up_marks import critical_speeds
+from postproc.figures.speed import speed
 from postproc.figures.waterfall import waterfall
 from postproc.signals.run_up_spectra import mean_positions, run_up_spectra
 from rubhpc import LumpedStator, Rig, Unbalance
@@ -126,3 +127,23 @@ def test_what_has_no_run_up_is_refused():
         waterfall(steady)
     with pytest.raises(InputError, match="no such signal"):
         waterfall(run_up(), "vertcal")
+
+
+def test_the_speed_is_drawn_over_the_time_with_the_torques_of_a_drive():
+    case = run_up()
+    begins = np.concatenate([[0.0], np.cumsum(2 * math.pi / case.speed.values)])[:-1]
+    case["time"] = "revolution", begins, {"units": "s"}
+    (ax,) = speed(case).show()
+    assert ax.lines[0].get_ydata()[[0, -1]] == pytest.approx([1500 / math.pi, 4500 / math.pi])
+    assert ax.lines[0].get_xdata()[0] == pytest.approx(math.pi / 50.0)
+    case["drive_work"] = "revolution", np.full(TURNS, 4 * math.pi), {"units": "J"}
+    case["braking_torque"] = "revolution", np.linspace(0.0, 1.5, TURNS), {"units": "N m"}
+    _, torques = speed(case).show()
+    brake, drive = torques.lines[:2]
+    assert brake.get_ydata()[-1] == pytest.approx(1.5)
+    assert drive.get_ydata() == pytest.approx(np.full(TURNS, 2.0))
+
+
+def test_a_steady_speed_is_not_drawn_over_the_time():
+    with pytest.raises(InputError, match=r"no speed changes in it; give a store with \[run_up\]"):
+        speed(xr.Dataset({"vertical": ("sample", np.zeros(8))}))

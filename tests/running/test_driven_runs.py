@@ -8,6 +8,7 @@ import pytest
 
 import rubhpc
 from postproc.figures.bode import bode
+from postproc.figures.speed import speed
 from rubhpc.errors import InputError
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
@@ -163,3 +164,23 @@ def test_a_table_of_torques_is_read(tmp_path):
     laws = [CaseGrid(study).case((i, 0, 0, 0)).speed_law for i in (0, 1)]
     assert laws[0].at(50.0 * math.pi) == pytest.approx(1.0)
     assert [law.start for law in laws] == pytest.approx([160.0 * math.pi / 3.0, 60.0 * math.pi])
+
+
+def test_speeds_of_several_torques_are_laid_over_one_another(folder):
+    store = rubhpc.open(folder / "driven.zarr").isel(clearance=0)
+    top, bottom = speed(store, over="drive_torque").show()
+    assert len([line for line in top.lines if "drive torque" in line.get_label()]) == 2
+    assert bottom.lines[1].get_ydata()[0] == pytest.approx(-5.0)
+
+
+@pytest.mark.serial
+def test_workers_write_the_same_bytes(folder, tmp_path):
+    rubhpc.run(study_of(tmp_path), quiet=True, workers=2)
+    chunks = [
+        path.relative_to(folder)
+        for path in (folder / "driven.zarr").rglob("*")
+        if path.is_file() and "c" in path.parts and "wall_time" not in path.parts
+    ]
+    assert len(chunks) > 100
+    for chunk in chunks:
+        assert (tmp_path / chunk).read_bytes() == (folder / chunk).read_bytes(), chunk

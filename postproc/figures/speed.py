@@ -1,0 +1,98 @@
+"""The speed over the time: of run-ups, and of driven rotors with the torques that drive and brake them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postproc.figures.drawing import Drawing
+from postproc.figures.overlay import overlaid
+from postproc.figures.run_up_marks import RPM, critical_speeds
+from postproc.signals.spin import spin_over_time
+from postproc.store.units import scale_for
+from postproc.store.variables import require_results
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from postproc.figures.options import Axis
+
+
+def speed(cases: xr.Dataset, *, over: Axis | None = None) -> Drawing:
+    """Spin speed over the time, with the torques of a driven rotor.
+
+    Parameters
+    ----------
+    cases
+        A study with [run_up] or [drive], all axes but `over` of one value, or selected.
+    over
+        Draw the cases along AXIS over one another.
+    """
+    shown = spin_over_time(cases, over)
+    require_results(shown["speed"], cases)
+    speeds = shown["speed"].values
+    critical = critical_speeds(cases, float(np.nanmin(speeds)), float(np.nanmax(speeds)))
+    is_driven = "driving_torque" in shown
+
+    def draw(axes: list[Axes]) -> None:
+        draw_speed(shown, axes, critical)
+
+    return Drawing(
+        shown=shown, draw=draw, panels=(2, 1) if is_driven else (1, 1), height=90 if is_driven else 60
+    )
+
+
+def draw_speed(data: xr.Dataset, axes: list[Axes], critical: Sequence[float] = ()) -> None:
+    """Draw the speed, with critical speeds (rad/s), and below it the torques, where there are any."""
+    top, bottom = axes[0], axes[-1]
+    times = [case.values for _, case in overlaid(data["time"], "revolution")]
+    for time, (name, speeds) in zip(times, overlaid(data["speed"], "revolution"), strict=True):
+        top.plot(time, RPM * speeds.values, label=name)
+    top.set(ylabel="Spin speed (rpm)", xlim=(0.0, float(np.nanmax(data["time"].values))))
+    top.ticklabel_format(axis="y", style="plain", useOffset=False)
+    if len(times) > 1:
+        top.legend(loc="best", fontsize=6)
+    for value in critical:
+        top.axhline(RPM * value, color="0.6", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0.5)
+        top.annotate(
+            f"critical, {RPM * value:.0f}",
+            (1.0, RPM * value),
+            xycoords=("axes fraction", "data"),
+            xytext=(-2, 1),
+            textcoords="offset points",
+            ha="right",
+            va="bottom",
+            fontsize=6,
+            color="0.35",
+        )
+    if "driving_torque" in data:
+        _draw_torques(data, times, bottom)
+    bottom.set_xlabel("Time (s)")
+    top.figure.align_ylabels(axes)
+
+
+def _draw_torques(data: xr.Dataset, times: Sequence[NDArray[np.float64]], ax: Axes) -> None:
+    """Draw what brakes the spin, and dashed what drives it."""
+    from matplotlib.lines import Line2D
+
+    sizes = [float(np.nanmax(np.abs(data[name].values))) for name in ("driving_torque", "braking_torque")]
+    scale = scale_for("N m", max(sizes))
+    curves = zip(
+        times,
+        overlaid(data["driving_torque"], "revolution"),
+        overlaid(data["braking_torque"], "revolution"),
+        strict=True,
+    )
+    for i, (time, (_, drive), (_, brake)) in enumerate(curves):
+        ax.plot(time, brake.values * scale.factor, color=f"C{i}", linewidth=0.8)
+        ax.plot(time, drive.values * scale.factor, color=f"C{i}", linewidth=0.8, linestyle=(0, (4, 2)))
+    ax.set_ylabel(scale.label("Torque"))
+    ax.axhline(0.0, color="0.6", linewidth=0.6, zorder=0.5)
+    black: dict[str, Any] = {"color": "k", "linewidth": 0.8}
+    lines = [Line2D([], [], linestyle=(0, (4, 2)), **black), Line2D([], [], **black)]
+    ax.legend(lines, ["drive", "rub and whirl"], loc="best", fontsize=6)
