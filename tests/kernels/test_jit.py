@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+from numba.core.codegen import JITCodeLibrary
 from running import ROOT, environment
 
 from rubhpc.kernels import _jit
@@ -89,6 +90,28 @@ def test_processes_that_need_a_kernel_at_once_compile_it_once(probe):
     shown = [end(process) for process in [probe(3) for _ in range(4)]]
     assert sorted(words[1] for words in shown) == ["0", "1", "1", "1"]
     assert {words[0] for words in shown} == {"6"}
+
+
+@_jit.jit
+def doubled(x):
+    return 2.0 * x
+
+
+@_jit.jit
+def quadrupled(x):
+    return doubled(doubled(x))
+
+
+def test_what_only_kernels_call_gets_no_machine_code(monkeypatch):
+    monkeypatch.setattr(quadrupled._cache, "load_overload", lambda *_: None)
+    made = []
+    make = JITCodeLibrary._finalize_specific
+    monkeypatch.setattr(
+        JITCodeLibrary, "_finalize_specific", lambda self: (made.append(self.name), make(self))
+    )
+    assert quadrupled(1.5) == 6.0
+    assert "quadrupled" in made
+    assert "doubled" not in made
 
 
 @_jit.jit
