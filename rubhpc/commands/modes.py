@@ -11,6 +11,7 @@ from rubhpc.commands.quantity import quantity
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from rubhpc.fem.model import CarrierModel, Model
@@ -165,13 +166,16 @@ def _print_tables(
 
     tables = [(f"Rotor at {spin * 30 / math.pi:g} rpm ({spin:.6g} rad/s)", rotor) for spin, rotor in found]
     for carrier, listed in carriers:
-        numbers = ", ".join(map(str, carrier.stators))
-        tables.append((f"Carrier {carrier.name} with stators {numbers}", listed))
+        tables.append((f"Carrier {carrier.name} with {_named(carrier.stators)}", listed))
     on = {number: carrier.name for carrier, _ in carriers for number in carrier.stators}
-    tables += [
-        (f"Stator {number}" + (f", while carrier {on[number]} is held" if number in on else ""), stator)
-        for number, stator in enumerate(stators, start=1)
-    ]
+    alike: dict[tuple[object, ...], list[int]] = {}  # a ring has one table
+    for number, stator in enumerate(stators, start=1):
+        values = ((mode.frequency, mode.damping_ratio, mode.kind) for mode in stator)
+        alike.setdefault((on.get(number), *values), []).append(number)
+    for (carrier_name, *_), among in alike.items():
+        title = _named(among).capitalize() + (", each" if len(among) > 1 else "")
+        held = f", while carrier {carrier_name} is held" if carrier_name else ""
+        tables.append((title + held, stators[among[0] - 1]))
     click.echo("Natural and damped frequency in Hz, damping as a fraction of critical.")
     for title, listed in tables:
         if not listed:
@@ -183,6 +187,18 @@ def _print_tables(
             click.echo(f"{numbers}  {mode.kind:<10} {mode.whirl}")
         if len(listed) > count:
             click.echo(f"({len(listed) - count} more; --count {len(listed)} shows all)")
+
+
+def _named(stators: Sequence[int]) -> str:
+    """Stators by their numbers, runs of them by their ends: "stators 1 to 8, 11"."""
+    runs: list[list[int]] = []
+    for number in stators:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    listed = [f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs]
+    return f"stator{'s' * (len(stators) > 1)} {', '.join(listed)}"
 
 
 def _draw(model: Model, top_speed: float, count: int | None, path: Path) -> None:

@@ -58,6 +58,18 @@ def test_table_says_how_many_modes_it_leaves_out():
     assert "more;" not in run("mokhtar2017", "--count", "88")
 
 
+def test_equal_stators_have_one_table(tmp_path):
+    """Of a ring of 8 and one that is longer."""
+    rig = (PACKAGED / "mokhtar2017.toml").read_text()
+    begin = rig.index("[[stator]]")
+    ring = rig[begin:].replace("node = 8", "node = 8\ncount = 8", 1)
+    longer = rig[begin:].replace('"40 mm"', '"50 mm"').replace("angle = 0.0", "angle = 0.1")
+    (tmp_path / "ring.toml").write_text(rig[:begin] + ring + "\n" + longer)
+    lines = run(str(tmp_path / "ring.toml"), "--count", "3").splitlines()
+    titles = [line for line in lines if line.startswith(("Stator", "Carrier"))]
+    assert titles == ["Stators 1 to 8, each", "Stator 9"]
+
+
 def test_a_wall_has_no_table(tmp_path):
     rig = (PACKAGED / "mokhtar2017.toml").read_text()
     (tmp_path / "walled.toml").write_text(rig + "\n[[stator]]\nnode = 8\nangle = 3.0\nrigid = true\n")
