@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _MOST_LINES = 6
+_MARKERS = "oxs+D^"  # of directions, which are often the same for several lines
 
 
 def resilience(knocks: xr.Dataset) -> Drawing:
@@ -59,11 +60,15 @@ def resilience(knocks: xr.Dataset) -> Drawing:
             impulse = line["least_impulse"].values * scale.factor
             style: dict[str, Any] = {"color": f"C{i}", "marker": "o", "markersize": 2.5}
             above.plot(x, impulse, linewidth=1.0, label=name or None, **style)
-            above.fill_between(
-                x, 0.0, line["harmless_impulse"].values * scale.factor, color=f"C{i}", alpha=0.08
-            )
+            found = np.isfinite(impulse)
+            harmless = np.where(found, line["harmless_impulse"].values * scale.factor, np.nan)
+            above.fill_between(x, 0.0, harmless, color=f"C{i}", alpha=0.12, linewidth=0.0)
+            is_safe = line["has_contact_free_motion"].values & ~found
+            if is_safe.any():
+                _point_up(above, x[is_safe], f"C{i}", i, _tried(line))
             if not is_one:
-                below.plot(x, np.degrees(line["worst_angle"].values), linestyle="", **style)
+                turned = (np.degrees(line["worst_angle"].values) + 180.0) % 360.0 - 180.0
+                below.plot(x, turned, linestyle="", **{**style, "marker": _MARKERS[i]})
         _mark(above, x, lines)
         largest = [
             float(np.nanmax(v)) for line in lines if np.isfinite(v := line["least_impulse"].values).any()
@@ -72,8 +77,10 @@ def resilience(knocks: xr.Dataset) -> Drawing:
         above.set(ylabel=f"Least impulse ({scale.unit})", ylim=(0.0, top))
         below.set_xlabel(x_label)
         if not is_one:
-            below.set(ylabel="Direction (\N{DEGREE SIGN})", ylim=(-15.0, 375.0))
-            below.set_yticks(range(0, 361, 90))
+            below.set(ylabel="Direction (\N{DEGREE SIGN})", ylim=(-200.0, 200.0))
+            below.set_yticks(range(-180, 181, 90))
+            if (place := below.get_subplotspec()) is not None:
+                place.get_gridspec().set_height_ratios([2.5, 1.0])
         for ax in axes:
             ax.set_xlim(*cell_edges(x)[[0, -1]])
             if is_geometric(x):
@@ -88,6 +95,28 @@ def resilience(knocks: xr.Dataset) -> Drawing:
         panels=(1 if is_one else 2, 1),
         height=50.0 if is_one else 80.0,
         lines=tuple(_in_words(lines, along, others)),
+    )
+
+
+def _tried(line: xr.Dataset) -> str:
+    """The largest knock that was tried in vain, in words."""
+    tried = line["harmless_impulse"].where(line["has_contact_free_motion"] & line["least_impulse"].isnull())
+    scale = scale_of(tried)
+    low, high = (f"{float(end) * scale.factor:.2g}" for end in (tried.min(), tried.max()))
+    return f"none up to {high if low == high else f'{low} to {high}'} {scale.unit}"
+
+
+def _point_up(ax: Axes, x: NDArray[np.float64], color: str, number: int, label: str) -> None:
+    """Mark at the upper edge where the least knock is beyond all that were tried."""
+    ax.plot(
+        x,
+        np.full(x.size, 0.97 - 0.05 * number),
+        linestyle="",
+        marker="^",
+        markersize=3.0,
+        color=color,
+        transform=ax.get_xaxis_transform(),
+        label=label,
     )
 
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _TITLE_WIDTH = 90  # characters of the titles of a row of panels
 _BAR_WIDTH = 40  # characters beside a scale of colours
+_DISTINCT = 5  # names of a scale that are always written: periods up to 4 have colours of their own
+_MOST_NAMES = 16  # that fit beside a scale
 _LEGEND_WIDTH = 64  # characters that fit a column of a page, 6 of them taken by each handle
 
 
@@ -30,8 +32,10 @@ def color_bar(axes: Sequence[Axes], mesh: Any, paint: Paint) -> Colorbar:
     name, comma, rest = paint.label.rpartition(", ")
     bar.set_label(f"{name},\n{rest}" if comma and len(paint.label) > _BAR_WIDTH else paint.label)
     if paint.names:
-        bar.ax.set_yticklabels(paint.names)
+        bar.ax.set_yticklabels(color_names(paint.names))
         bar.ax.tick_params(which="both", length=0)
+        if len(paint.names) > _MOST_NAMES:
+            bar.ax.tick_params(labelsize=5.5)
     return bar
 
 
@@ -61,8 +65,19 @@ def name_facets(
 def legend_below(ax: Axes, handles: list[Artist]) -> None:
     """Name what is marked, below all panels, in as many columns as fit."""
     if handles:
-        n_column = _columns([len(str(handle.get_label())) for handle in handles])
-        ax.figure.legend(handles=handles, loc="outside lower center", ncols=n_column, fontsize=6.5)
+        labels = [textwrap.fill(str(handle.get_label()), _LEGEND_WIDTH - 6) for handle in handles]
+        n_column = _columns([max(map(len, label.splitlines())) for label in labels])
+        ax.figure.legend(handles, labels, loc="outside lower center", ncols=n_column, fontsize=6.5)
+
+
+def color_names(names: Sequence[str]) -> list[str]:
+    """Return the names beside a scale of colours: of many, the first five, and some of the others."""
+    step = -(-len(names) // _MOST_NAMES)
+    last = len(names) - 1
+    return [
+        name if i < _DISTINCT or ((last - i) % step == 0 and i >= _DISTINCT + step - 1) else ""
+        for i, name in enumerate(names)
+    ]
 
 
 def _columns(lengths: list[int]) -> int:
