@@ -39,7 +39,6 @@ from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.setup import ModalSetup, Scheme
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
-from rubhpc.kernels.accumulators import IMPACT_STEPS
 from rubhpc.schema import DONE, SECTION_NAMES, lyapunov_variables
 from rubhpc.spectra import amplitude_spectrum
 from rubhpc.study.initial import Initial
@@ -173,7 +172,6 @@ def _integrate(
     else:
         energy_before = march.energy()
         accumulator.is_touching[:] = march.touching()  # a contact under way did not begin in the record
-        accumulator.age[accumulator.is_touching] = IMPACT_STEPS
         reason = march.advance(0, n_sample, samples, accumulator, is_recorded=True)
     if reason is not None:
         n_kept = samples_within(samples, march.sample, setup.displacement_limit)

@@ -38,6 +38,9 @@ class CurvedLibrary(ModeLibrary):
         tables: CurvedTables = self._curved.view()
         return tables
 
+    def _friction_of(self, mode: ContactMode) -> None:
+        """Not counted: its direction is that of the momentary normal."""
+
     def _tabulate(self, mode: ContactMode) -> None:
         super()._tabulate(mode)
         if self._curved is None:

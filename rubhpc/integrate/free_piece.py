@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rubhpc.integrate.measures import following_accumulator, new_accumulator
 from rubhpc.integrate.piece_setup import Pieces
 from rubhpc.integrate.run_up import Passed, pass_piece
 from rubhpc.integrate.start import start_of
@@ -70,6 +71,7 @@ class Spin:
         self.speed, self.time = drive.start, 0.0
         self._brake = 0.0  # N m, mean of the last piece
         self._begun: State | None = None
+        self._earlier = new_accumulator(len(model.stators), model.n_place)  # contact forces so far
 
     @property
     def state(self) -> State:
@@ -100,7 +102,10 @@ class Spin:
             if self._begun is None:
                 start = self._initial
                 self._begun = start_of(start, setup, self._clearance) if isinstance(start, Initial) else start
-            passed = pass_piece(setup, length, self._clearance, self._friction, self._begun, self._check)
+            begun = self._begun
+            passed = pass_piece(
+                setup, length, self._clearance, self._friction, begun, self._earlier, self._check
+            )
             if passed.reason:
                 return self._taken(passed, acceleration, length, per_revolution, torque, np.zeros(6))
             flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)
@@ -137,6 +142,7 @@ class Spin:
         self.time += duration
         self._brake = torque - inertia * change / duration
         self._begun = passed.final
+        self._earlier = following_accumulator(passed.accumulators[-1], duration)
         return found
 
     def _taken(

@@ -21,7 +21,7 @@ from rubhpc.kernels.case_progress import (
     shaft_angle,
 )
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, enter
-from rubhpc.kernels.friction_events import FrictionWork, change_states
+from rubhpc.kernels.friction_events import change_states, friction_work
 from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, MOST_PAIRS, OPEN, STUCK, FrictionBodies
 
@@ -83,9 +83,7 @@ class FrictionMarch(EventDrivenMarch):
         solver = empty_workspace(q)
         solver.matrix[:], solver.coupling[:] = gap_jacobian @ gap_jacobian.T, gap_jacobian @ along.T
         solver.tangential[:] = -along @ gap_jacobian.T, -along @ along.T
-        self._work = FrictionWork(
-            solver, np.zeros(q), np.zeros(q), np.zeros(self.bodies.stiffness.shape[0]), np.zeros(q)
-        )
+        self._work = friction_work(solver, q, self.bodies.stiffness.shape[0])
         return setup.friction_library(friction)
 
     def _first_mask(self, initial: State) -> int:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduction import ReducedModel
 
     Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,6 +44,18 @@ class FrictionMode(ContactMode):
     def drift(self) -> Floats:
         """How fast coordinates grow linearly, m/s."""
         return self.growth
+
+    def friction_forces(self, pairs: FrictionPairs) -> Complexes:
+        """Friction forces on the motion with each coordinate, (n, m + 2 + 2 q), N."""
+        traction = np.zeros((len(pairs.gap_jacobian), self.exponent.size), dtype=np.complex128)
+        for i, state in enumerate(states_of(self.mask, len(traction))):
+            first, second = self.switch[2 * i], self.switch[2 * i + 1]
+            if state == STUCK:
+                traction[i] = 0.5 * (second - first)
+            elif state != OPEN:
+                traction[i] = (-pairs.friction if state == BACKWARD else pairs.friction) * first
+        forces: Complexes = pairs.friction_direction.T @ traction
+        return forces
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -25,6 +25,7 @@ from rubhpc.kernels.accumulators import (
     Accumulator,
     Samples,
 )
+from rubhpc.kernels.force_average import LAST, MOST_PIECES
 from rubhpc.schema import DIVERGED, PROBE, VARIABLES, lyapunov_variables, probe_variables
 
 if TYPE_CHECKING:
@@ -68,7 +69,6 @@ def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
         highest=np.full(3, -np.inf),
         lowest=np.full(3, np.inf),
         is_touching=np.zeros(n_stator, dtype=np.bool_),
-        age=np.zeros(n_stator, dtype=np.int64),
         n_contact=np.zeros(n_stator, dtype=np.int64),
         contact_time=np.zeros(n_stator),
         impulse=np.zeros(n_stator),
@@ -78,10 +78,26 @@ def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
         friction_work=np.zeros(n_stator),
         least_slip=np.full(n_stator, np.inf),
         peak_force=np.zeros(n_stator),
+        force_piece=np.zeros((n_stator, LAST + 1, MOST_PIECES)),
+        force_held=np.zeros((n_stator, 2), dtype=np.int64),
+        origin=np.zeros(1),
         peak_lateral=np.zeros(n_stator if n_place is None else n_place),
         energy=np.zeros(5),
         pivots=np.zeros(1, dtype=np.int64),
         residual=np.zeros((3, 2)),
+    )
+
+
+def following_accumulator(before: Accumulator, passed: float) -> Accumulator:
+    """Sums of what follows in a march that counts its time anew, after `passed` (s) of the march before.
+
+    Means of the contact force reach back beyond it.
+    """
+    new = new_accumulator(before.impulse.size, before.peak_lateral.size)
+    return new._replace(
+        force_piece=before.force_piece.copy(),
+        force_held=before.force_held.copy(),
+        origin=before.origin + passed,
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.contact_mode import ContactMode, count_coordinates, solve_contact_mode
-from rubhpc.integrate.friction_mode import solve_friction_mode
+from rubhpc.integrate.friction_mode import FrictionMode, solve_friction_mode
 from rubhpc.integrate.mode_tables import MOST_MODES, TableStack, tabulate
 from rubhpc.integrate.penalty_mode import Penalty, solve_penalty_mode, stored_energy
 from rubhpc.integrate.reduction import ReducedModel, directions
@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.contact_mode import Solved
-    from rubhpc.integrate.friction_mode import FrictionMode, FrictionPairs
+    from rubhpc.integrate.friction_mode import FrictionPairs
     from rubhpc.kernels import contact_modes as kernel
 
     Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
 
 LANES = 8  # coordinates are padded to whole vectors
 # Coordinates that a set of several contacts may have beyond any single one. The width is settled before the
@@ -123,6 +124,12 @@ class ModeLibrary:
         """Slip speed with the motion of each pair that the switch functions do not hold."""
         return self.slip
 
+    def _friction_of(self, mode: ContactMode) -> Complexes | None:
+        """Friction forces on the motion with each coordinate of a mode (n, m), N; None: not counted."""
+        closed = [i for i in range(len(self.gap_jacobian)) if mode.mask >> i & 1]
+        friction: Complexes = (self.force_direction - self.gap_jacobian)[closed].T @ mode.switch[closed]
+        return friction
+
     def _tabulate(self, mode: ContactMode) -> None:
         n_blank = self.width - mode.exponent.size
         exponent = np.pad(np.stack([mode.exponent.real, mode.exponent.imag]), ((0, 0), (0, n_blank)))
@@ -135,6 +142,7 @@ class ModeLibrary:
             mode,
             reduced,
             self._slip_rows(),
+            friction=self._friction_of(mode),
             width=self.width,
             tick=self._tick,
             sample_level=self._sample_level,
@@ -225,6 +233,10 @@ class FrictionLibrary(ModeLibrary):
 
     def _slip_rows(self) -> Floats:
         return self.slip[:0]
+
+    def _friction_of(self, mode: ContactMode) -> Complexes | None:
+        assert isinstance(mode, FrictionMode)
+        return mode.friction_forces(self._pairs)
 
 
 def padded_width(widest: int, q: int) -> int:

@@ -74,6 +74,7 @@ def tabulate(
     reduced: ReducedModel,
     slip: Floats,
     *,
+    friction: Complexes | None = None,
     width: int,
     tick: float,
     sample_level: int,
@@ -85,6 +86,8 @@ def tabulate(
     ----------
     slip : (q, n)
         Slip speed of each pair with the motion; none where the switch functions hold it.
+    friction : (n, m), N, optional
+        Friction forces on the motion with each coordinate; what they take is counted with the damping.
     tick : float, s
     sample_level, n_level : int
         As in `mode_library.ModeLibrary`.
@@ -111,7 +114,10 @@ def tabulate(
             mode.n_eigenmode + 1 + len(mode.switch) // 2,
         )
         rate[:, growing.steady] += switch[:, growing.which] @ growing.speed
-    loss, work, steady_power = _energies(reduced, exponent, motion, mode.n_eigenmode, growing)
+    rubbing = np.zeros((n, m), dtype=complex)
+    if friction is not None:
+        rubbing[:, :end] = friction
+    loss, work, steady_power = _energies(reduced, exponent, motion, rubbing, mode.n_eigenmode, growing)
     halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q or more, 2, m)
     row = kernel.ModeTables(
         mask=np.array(mode.mask),
@@ -171,10 +177,17 @@ def _outputs(reduced: ReducedModel, exponent: Complexes, motion: Complexes, inte
 
 
 def _energies(
-    reduced: ReducedModel, exponent: Complexes, motion: Complexes, n_eigenmode: int, growing: Growth
+    reduced: ReducedModel,
+    exponent: Complexes,
+    motion: Complexes,
+    friction: Complexes,
+    n_eigenmode: int,
+    growing: Growth,
 ) -> tuple[Floats, Complexes, Floats]:
     """Primitives of the powers of damping and unbalance: (2 m, 2 m), (2, m) and steady (2,), W.
 
+    With the damping counts `friction` (n, m), whose power on the motion is what the drive gives for it less
+    what it turns into heat.
     Products of two coordinates go as exp((l_k + l_j) t) or exp((l_k + conj l_j) t). What has no primitive
     among them is steady: that of the unbalance response with itself. Undamped modes have none either,
     and nothing to lose.
@@ -182,7 +195,7 @@ def _energies(
     n = reduced.stiffness.shape[0]
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
     shape, rate = motion[:n], motion[n:]
-    resisting = reduced.damping @ rate + skew @ shape
+    resisting = reduced.damping @ rate + skew @ shape - friction
     phasor = reduced.force[0] - 1j * reduced.force[1]
     turning = np.full(exponent.shape, 1j * reduced.spin)
     forms = []

@@ -116,7 +116,8 @@ class RetunedLibrary(ModeLibrary):
             switch[closed] = solved @ np.hstack([reduced.stiffness, reduced.damping])
             reaction[closed] = solved @ self._phasor
         skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
-        resistance = np.hstack([skew, reduced.damping])
+        across = (self.force_direction - self.gap_jacobian)[closed].T
+        resistance = np.hstack([skew, reduced.damping]) - across @ switch[closed]
         motion = np.pad(mode.motion, ((0, 0), (0, width - mode.exponent.size)))
         exponent = np.pad(mode.exponent, (0, width - mode.exponent.size))
         position, velocity, acceleration = self._output
@@ -136,6 +137,7 @@ class RetunedLibrary(ModeLibrary):
             slip=np.ascontiguousarray(self.slip),
             resistance=resistance,
             rate=np.ascontiguousarray(motion[n:].T),
+            rubbed=across @ reaction[closed],
             resisting=np.ascontiguousarray((resistance @ motion).T),
             phasor=self._phasor,
             work=np.stack([self._phasor @ motion[n:], self._phasor.conj() @ motion[n:]]),

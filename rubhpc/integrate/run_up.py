@@ -19,11 +19,10 @@ import numpy as np
 from rubhpc.integrate.case import march_of
 from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
 from rubhpc.integrate.event_driven_march import NoClosedForm
-from rubhpc.integrate.measures import add_sag, empty_samples, new_accumulator
+from rubhpc.integrate.measures import add_sag, empty_samples, following_accumulator, new_accumulator
 from rubhpc.integrate.piece_setup import Pieces
 from rubhpc.integrate.record import State
 from rubhpc.integrate.start import start_of
-from rubhpc.kernels.accumulators import IMPACT_STEPS
 from rubhpc.study.initial import Initial
 from rubhpc.study.speed_law import cut
 
@@ -107,13 +106,14 @@ def integrate_run_up(
     pieces = Pieces(fastest)
     state = initial if isinstance(initial, State) else None
     n_step, reason, n_done = 0, "", n
+    earlier = new_accumulator(n_stator, model.n_place)
     for i, (first, last) in enumerate(itertools.pairwise(cuts)):
         duration = times[i + 1] - times[i]
         setup = pieces.setup((angles[i + 1] - angles[i]) / duration, accelerations[i], angles[i], duration)
         if state is None:
             state = start_of(initial, setup, clearance) if isinstance(initial, Initial) else initial
-        passed = pass_piece(setup, last - first, clearance, friction, state, check)
-        state = passed.final
+        passed = pass_piece(setup, last - first, clearance, friction, state, earlier, check)
+        state, earlier = passed.final, following_accumulator(passed.accumulators[-1], duration)
         n_step += passed.n_step
         whole[:, first:last] = passed.whole
         for turn, accumulator in enumerate(passed.accumulators, first // per_revolution):
@@ -156,21 +156,22 @@ def pass_piece(
     clearance: float,
     friction: float,
     state: State,
+    earlier: Accumulator,
     check: Callable[[], None] | None,
 ) -> Passed:
-    """Take one piece."""
+    """Take one piece; `earlier` holds the contact forces before it, its clock that of the piece."""
     model = setup.model
     stride = min(n_sample, setup.samples_per_revolution)
     for kind in (march_of(setup.scheme, setup), ContactSteppingMarch):
         samples = empty_samples(model.n_place, n_sample, model.n_probe)
-        accumulators, reason = [], None
+        accumulators: list[Accumulator] = []
+        reason = None
         try:
             march = kind(setup, clearance, friction, state, check)
             before = march.energy()
             for first in range(0, n_sample, stride):
-                accumulator = new_accumulator(len(model.stators), model.n_place)
+                accumulator = following_accumulator(accumulators[-1] if accumulators else earlier, 0.0)
                 accumulator.is_touching[:] = march.touching()
-                accumulator.age[accumulator.is_touching] = IMPACT_STEPS
                 accumulators.append(accumulator)
                 reason = march.advance(first, first + stride, samples, accumulator, is_recorded=True)
                 if reason is not None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.kernels.mode_change import AT_REST
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -95,8 +97,9 @@ def saltate(motion: PiecewiseMotion, piece: Piece, following: Piece, tangent: Fl
 class Impact:
     """Derivative of the velocities after an event by those before: `dv+ = dv- - F (R F)^-1 R dv-`.
 
-    The rows R are those of the gap velocities that impulses change, each times 1 + restitution, and of the
-    slips that they stop; F (n, r) are the directions of these impulses, friction in proportion included.
+    The rows R are those of the gap velocities that impulses change, each times 1 + restitution where the pair
+    parts, and of the slips that they stop; F (n, r) are the directions of these impulses, friction in
+    proportion included.
     """
 
     def __init__(self, motion: PiecewiseMotion, piece: Piece) -> None:
@@ -124,7 +127,8 @@ class Impact:
         else:
             direction, stopped = bodies.force_direction[hit], rows
         scale = np.ones(len(stopped))
-        scale[: hit.size] += bodies.restitution
+        has_parted = np.abs(normal[hit] @ piece.after[self._n :]) > AT_REST
+        scale[: hit.size] += np.where(has_parted, bodies.restitution, 0.0)
         self._direction = direction.T
         self._gain = np.linalg.solve(stopped @ direction.T, scale[:, None] * stopped)
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, Pairs, V, W, Workspace, rim_sense
+from rubhpc.kernels.force_average import add_force
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -34,7 +35,6 @@ class Accumulator(NamedTuple):
     highest: Floats  # (3,), of vertical, horizontal and torsional displacement
     lowest: Floats  # (3,)
     is_touching: NDArray[np.bool_]  # (q,), at the last step
-    age: Ints  # (q,), steps that the contact under way has lasted
     n_contact: Ints  # (q,), contacts begun
     contact_time: Floats  # (q,), s
     impulse: Floats  # (q,), N s
@@ -43,16 +43,15 @@ class Accumulator(NamedTuple):
     reversals: Ints  # (q,), changes of that sense
     friction_work: Floats  # (q,), J
     least_slip: Floats  # (q,), m/s
-    peak_force: Floats  # (q,), N
+    peak_force: Floats  # (q,), N, largest mean over the averaging time: see `force_average`
+    force_piece: Floats  # (q, 6, n), pieces of the force within that time
+    force_held: Ints  # (q, 2), which of them
+    origin: Floats  # (1,), s, by which their clock is ahead of the march's
     peak_lateral: Floats  # (q,), m
     energy: Floats  # (5,), J: see the indices below
     pivots: Ints  # (1,), most that one contact problem took
     residual: Floats  # (3, 2), largest distance from the laws, and what forces moved: see the indices below
 
-
-# A stepping scheme spreads the impulse of an impact, by which the tip's own mass takes the rim's velocity,
-# over its first two steps. As a force it grows without bound with smaller steps: no peak is taken of it.
-IMPACT_STEPS = 2
 
 UNBALANCE_WORK, DRIVE_WORK, DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS = range(5)
 
@@ -100,6 +99,7 @@ def observe_contact(
     pairs: Pairs,
     work: Workspace,
     spin: float,
+    begin: float,
     step: float,
     velocity: Floats,
     velocity_next: Floats,
@@ -107,15 +107,15 @@ def observe_contact(
 ) -> None:
     """Add one step's contact; velocities are half a step before and after the step's forces.
 
-    The slip speed is `r_d (spin + thx') + t . (vA - vB)`, signed so that steady sliding is positive. What the
-    normal force does not give back, `-N` times the rate of the gap, is the loss of the impacts.
+    The step begins at the time `begin` (s), and its force is taken for constant. The slip speed is
+    `r_d (spin + thx') + t . (vA - vB)`, signed so that steady sliding is positive. What the normal force does
+    not give back, `-N` times the rate of the gap, is the loss of the impacts.
     """
     sense = rim_sense(spin)
     for i in range(pairs.radius.size):
         force = work.force[i]
         if not force > 0.0:
             accumulator.is_touching[i] = False
-            accumulator.age[i] = 0
             continue
         rate_v, rate_w = (
             centred(pairs.row[i, V], velocity, velocity_next),
@@ -143,12 +143,29 @@ def observe_contact(
         accumulator.impulse[i] += force * step
         accumulator.friction_work[i] += friction_force * slip * step
         accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
-        accumulator.age[i] += 1
-        if accumulator.age[i] > IMPACT_STEPS:
-            accumulator.peak_force[i] = max(accumulator.peak_force[i], force)
+        observe_force(i, begin, step, force * step, force, force, accumulator)
         accumulator.energy[DRIVE_WORK] += friction_force * pairs.radius[i] * abs(spin) * step
         accumulator.energy[FRICTION_LOSS] += friction_force * slip * step
         accumulator.energy[IMPACT_LOSS] -= force * opening * step
+
+
+@jit_inline
+def observe_force(
+    i: int, begin: float, step: float, impulse: float, first: float, last: float, accumulator: Accumulator
+) -> None:
+    """Add a piece of the force of pair i to its mean (`force_average.add_force`)."""
+    add_force(
+        i,
+        begin,
+        step,
+        impulse,
+        first,
+        last,
+        accumulator.origin,
+        accumulator.force_piece,
+        accumulator.force_held,
+        accumulator.peak_force,
+    )
 
 
 @jit_inline

@@ -196,7 +196,8 @@ def advance(
             if is_recorded:
                 observe_motion(displacement, output_row, row, highest, lowest, peak_lateral)
                 if is_touching or was_touching:
-                    observe_contact(pairs, work, spin, step, velocity, velocity_next, accumulator)
+                    begin = (i_sample * steps_per_sample + i_step) * step
+                    observe_contact(pairs, work, spin, begin, step, velocity, velocity_next, accumulator)
                     for i in range(q):
                         samples.force[i, i_sample] += contact_force[i] / steps_per_sample
                 loss = circulatory_power(linear, displacement, velocity)

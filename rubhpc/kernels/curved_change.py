@@ -11,11 +11,9 @@ from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_active, 
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.curved_contact import CurvedPairs, CurvedWork, is_closed
 from rubhpc.kernels.curved_forces import fill_geometry
-from rubhpc.kernels.mode_change import OPENING, observe_impact, product
+from rubhpc.kernels.mode_change import AT_REST, OPENING, observe_impact, product
 
 Floats = NDArray[np.float64]
-
-AT_REST = 1e-12  # m/s, of gaps that stay closed
 
 
 @jit_lean_sum

@@ -216,7 +216,15 @@ def advance_curved(
                 )
                 i_sample = progress.tick >> clock.sample_level
                 observe_curved_step(
-                    reduced, closed, step, i_sample, 1.0 / interval, work, samples, accumulator
+                    reduced,
+                    closed,
+                    progress.tick * clock.tick,
+                    step,
+                    i_sample,
+                    1.0 / interval,
+                    work,
+                    samples,
+                    accumulator,
                 )
             go_on(closed, step, work)
         for k in range(z_re.size):

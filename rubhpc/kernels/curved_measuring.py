@@ -17,6 +17,7 @@ from rubhpc.kernels.accumulators import (
     VERTICAL,
     Accumulator,
     Samples,
+    observe_force,
     observe_sense,
 )
 from rubhpc.kernels.case_progress import Clock, Progress, shaft_angle
@@ -187,6 +188,7 @@ def observe_energies(
 def observe_curved_step(
     reduced: Reduced,
     mask: int,
+    begin: float,
     step: float,
     i_sample: int,
     share: float,
@@ -194,7 +196,7 @@ def observe_curved_step(
     samples: Samples,
     accumulator: Accumulator,
 ) -> None:
-    """Add a step (s) of the closed pairs by Simpson's rule; `share` (1/s) as in `measuring.observe_step`."""
+    """Add a step (s) of the closed pairs by Simpson's rule; the rest as in `measuring.observe_step`."""
     for i in range(reduced.radius.size):
         if not is_closed(mask, i):
             continue
@@ -207,7 +209,7 @@ def observe_curved_step(
         accumulator.contact_time[i] += step
         accumulator.impulse[i] += impulse
         accumulator.friction_work[i] += friction_work
-        accumulator.peak_force[i] = max(accumulator.peak_force[i], first, last, highest(first, middle, last))
+        observe_force(i, begin, step, impulse, first, last, accumulator)
         for node in range(N_NODE):
             slip = work.slip[node, i]
             accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
@@ -215,15 +217,6 @@ def observe_curved_step(
                 observe_sense(i, 1 if slip > 0.0 else -1, accumulator)
         accumulator.energy[FRICTION_LOSS] += friction_work
         accumulator.energy[DRIVE_WORK] += reduced.friction[i] * reduced.rim_speed[i] * impulse
-
-
-@jit_lean_sum
-def highest(first: float, middle: float, last: float) -> float:
-    """Largest value of the parabola through the beginning, middle and end of a step, within it."""
-    slope, bend = 4.0 * middle - 3.0 * first - last, 2.0 * (first - 2.0 * middle + last)
-    if bend < 0.0 and 0.0 < slope < -2.0 * bend:
-        return first - 0.25 * slope * slope / bend
-    return max(first, middle, last)
 
 
 @jit_lean_sum

@@ -182,6 +182,7 @@ def advance(
                 reduced,
                 mode,
                 clock.spin,
+                progress.tick * clock.tick,
                 (1 << level) * clock.tick,
                 z_re,
                 z_im,

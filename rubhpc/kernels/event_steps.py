@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels.accumulators import observe_force
 from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_angle
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
@@ -199,10 +200,12 @@ def end_mode(
 def record_event(
     clock: Clock, progress: Progress, before: Floats, i: int, samples: Samples, accumulator: Accumulator
 ) -> None:
-    """Add what pair i got by an event to the mean force of its sample; `before` (q,) are impulses, N s."""
+    """Add what pair i got by an event to the means of its force; `before` (q,) are impulses, N s."""
     interval = clock.tick * (1 << clock.sample_level)
     gained = accumulator.impulse[i] - before[i]
     samples.force[i, progress.tick >> clock.sample_level] += gained / interval
+    if gained != 0.0:
+        observe_force(i, progress.tick * clock.tick, 0.0, gained, 0.0, 0.0, accumulator)
 
 
 @jit_inline_sum

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_sum
 from rubhpc.kernels.case_progress import NONE
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, bounded, dot, floor_log2, propagate
-from rubhpc.kernels.measuring import turning_value
+from rubhpc.kernels.cubics import turning_value
 
 Floats = NDArray[np.float64]
 

@@ -18,12 +18,12 @@ from rubhpc.kernels.accumulators import (
     observe_sense,
     observe_solution,
 )
-from rubhpc.kernels.complementarity import UNSOLVED, natural_residual
+from rubhpc.kernels.complementarity import UNSOLVED, natural_residual, solve_active
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - likewise
 from rubhpc.kernels.coulomb_friction import ROUNDING, UNNOTICED, friction_residual, solve_cones
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
-from rubhpc.kernels.mode_change import OPENING, product
+from rubhpc.kernels.mode_change import AT_REST, OPENING, product
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +36,27 @@ class FrictionWork(NamedTuple):
     slip: Floats  # (q,), m/s
     acceleration: Floats  # (n,), without contact forces
     impulse: Floats  # (q,), accumulated before the event, N s
+    rest: Floats  # (2 q, 2 q), rates of the gaps, then slips, by impulses along them, 1/kg
+    rest_speed: Floats  # (2 q,), m/s
+    rest_impulse: Floats  # (2 q,), N s
+    is_at_rest: NDArray[np.bool_]  # (2 q,)
+    elimination: Floats  # (2 q, 2 q + 1)
+
+
+def friction_work(solver: Workspace, q: int, n: int) -> FrictionWork:
+    """Work space of the events of q pairs of n reduced degrees, with that of their laws."""
+    return FrictionWork(
+        solver=solver,
+        rate=np.zeros(q),
+        slip=np.zeros(q),
+        acceleration=np.zeros(n),
+        impulse=np.zeros(q),
+        rest=np.zeros((2 * q, 2 * q)),
+        rest_speed=np.zeros(2 * q),
+        rest_impulse=np.zeros(2 * q),
+        is_at_rest=np.zeros(2 * q, dtype=np.bool_),
+        elimination=np.zeros((2 * q, 2 * q + 1)),
+    )
 
 
 @jit_lean
@@ -197,7 +218,59 @@ def change_states(
         elif is_recorded and reduced.restitution > 0.0:
             has_bounced = state_of(states, i) == OPEN and (crossing >> (2 * i)) & 1 == 1
             accumulator.n_contact[i] += 1 if has_bounced else 0
+    bring_to_rest(reduced, bodies, remaining, velocity, is_recorded, work, accumulator)
     return remaining
+
+
+@jit_lean_sum
+def bring_to_rest(
+    reduced: Reduced,
+    bodies: FrictionBodies,
+    states: int,
+    velocity: Floats,
+    is_recorded: bool,
+    work: FrictionWork,
+    accumulator: Accumulator,
+) -> None:
+    """Stop what the states that go on hold still, gaps and slips, in a velocity (n,).
+
+    A pair that parts for a moment lacks as much of its impulse as presses it together again. One that sticks
+    has been slipping at the tick before its slip vanishes.
+    """
+    q, n = reduced.gap_jacobian.shape
+    solver, moves = work.solver, False
+    for i in range(q):
+        state = state_of(states, i)
+        work.rate[i] = product(reduced.gap_jacobian[i], velocity)
+        work.slip[i] = bodies.rim_speed[i] + product(reduced.slip[i], velocity)
+        work.rest_speed[i], work.rest_speed[q + i] = work.rate[i], work.slip[i]
+        work.is_at_rest[i], work.is_at_rest[q + i] = state != OPEN, state == STUCK
+        moves = moves or (state != OPEN and abs(work.rate[i]) > AT_REST)
+        moves = moves or (state == STUCK and abs(work.slip[i]) > AT_REST)
+    if not moves:
+        return
+    for i in range(q):
+        for j in range(q):
+            state = state_of(states, j)
+            rubs = 0.0
+            if state in (FORWARD, BACKWARD):
+                rubs = bodies.sliding[j] if state == FORWARD else -bodies.sliding[j]
+            work.rest[i, j] = solver.matrix[i, j] + rubs * solver.coupling[i, j]
+            work.rest[q + i, j] = solver.tangential[0, i, j] + rubs * solver.tangential[1, i, j]
+            work.rest[i, q + j], work.rest[q + i, q + j] = solver.coupling[i, j], solver.tangential[1, i, j]
+    if not solve_active(work.rest, work.rest_speed, work.is_at_rest, work.rest_impulse, work.elimination):
+        return
+    for i in range(q):
+        state = state_of(states, i)
+        solver.force[i], solver.traction[i] = work.rest_impulse[i], work.rest_impulse[q + i]
+        if state in (FORWARD, BACKWARD):
+            sense = 1.0 if state == FORWARD else -1.0
+            solver.traction[i] = sense * bodies.sliding[i] * solver.force[i]
+        for k in range(n):
+            velocity[k] += solver.force[i] * reduced.gap_jacobian[i, k]
+            velocity[k] -= solver.traction[i] * reduced.slip[i, k]
+    if is_recorded:
+        observe_impacts(bodies, work, accumulator)
 
 
 @jit_lean
@@ -205,13 +278,15 @@ def observe_impacts(bodies: FrictionBodies, work: FrictionWork, accumulator: Acc
     """Add impulses and their work, which is that of the mean of the velocities before and after."""
     solver = work.solver
     for i in range(solver.force.size):
-        if solver.force[i] > 0.0:
+        if solver.force[i] != 0.0 or solver.traction[i] != 0.0:
             change = slip_change(solver, i)
             slip = work.slip[i] + 0.5 * change
             friction_work = solver.traction[i] * slip
             accumulator.impulse[i] += solver.force[i]
             accumulator.friction_work[i] += friction_work
-            accumulator.least_slip[i] = min(accumulator.least_slip[i], work.slip[i], work.slip[i] + change)
+            after = work.slip[i] + change
+            after = after if abs(after) > AT_REST else 0.0
+            accumulator.least_slip[i] = min(accumulator.least_slip[i], work.slip[i], after)
             accumulator.energy[FRICTION_LOSS] += friction_work
             accumulator.energy[DRIVE_WORK] += solver.traction[i] * bodies.rim_speed[i]
             accumulator.energy[IMPACT_LOSS] -= solver.force[i] * (work.rate[i] + 0.5 * gap_change(solver, i))

@@ -179,6 +179,7 @@ def advance_with_friction(
                 tables,
                 bodies,
                 mode,
+                progress.tick * clock.tick,
                 step,
                 z_re,
                 z_im,

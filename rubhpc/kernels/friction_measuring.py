@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
-from rubhpc.kernels.accumulators import DRIVE_WORK, FRICTION_LOSS
+from rubhpc.kernels.accumulators import DAMPING_LOSS, DRIVE_WORK, FRICTION_LOSS, observe_force
 from rubhpc.kernels.contact_modes import DYING, ModeTables, dot, resolved_time
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, FrictionBodies, state_of
 from rubhpc.kernels.measuring import (
@@ -89,6 +89,7 @@ def observe_friction(
     tables: ModeTables,
     bodies: FrictionBodies,
     mode: int,
+    begin: float,
     step: float,
     z_re: Floats,
     z_im: Floats,
@@ -100,7 +101,7 @@ def observe_friction(
 ) -> None:
     """Add a step (s) of the closed pairs: forces and slip as cubics, Simpson's rule for friction.
 
-    `z` are the coordinates at its end; `share` (1/s) takes an impulse to the mean force of sample `i_sample`.
+    Times, shares and energies as in `measuring.observe_step`.
     """
     for i in range(bodies.rim_speed.size):
         state = state_of(tables.mask[mode], i)
@@ -113,11 +114,11 @@ def observe_friction(
         )
         recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = after, rate_after
         recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = across_after, across_rate_after
-        impulse, middle, peak = force_in_step(before, rate_before, after, rate_after, step)
+        impulse, middle = force_in_step(before, rate_before, after, rate_after, step)
         samples.force[i, i_sample] += impulse * share
         accumulator.contact_time[i] += step
         accumulator.impulse[i] += impulse
-        accumulator.peak_force[i] = max(accumulator.peak_force[i], peak)
+        observe_force(i, begin, step, impulse, before, after, accumulator)
         across_bend = step * (across_rate_before - across_rate_after)
         if state == STUCK:
             rubbed = step * (0.5 * (across_before + across_after) + across_bend / 12.0)
@@ -131,5 +132,7 @@ def observe_friction(
             friction_work = sense * bodies.sliding[i] * work * step / 6.0
             accumulator.friction_work[i] += friction_work
             accumulator.energy[FRICTION_LOSS] += friction_work
+            accumulator.energy[DAMPING_LOSS] -= friction_work
             accumulator.least_slip[i] = min(accumulator.least_slip[i], across_before, across_after)
         accumulator.energy[DRIVE_WORK] += bodies.rim_speed[i] * rubbed
+        accumulator.energy[DAMPING_LOSS] += bodies.rim_speed[i] * rubbed

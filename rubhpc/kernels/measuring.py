@@ -19,6 +19,7 @@ from rubhpc.kernels.accumulators import (
     VERTICAL,
     Accumulator,
     Samples,
+    observe_force,
     observe_sense,
 )
 from rubhpc.kernels.case_progress import NONE, Clock, Progress
@@ -34,6 +35,7 @@ from rubhpc.kernels.contact_modes import (
     dot,
     resolved_time,
 )
+from rubhpc.kernels.cubics import turning_value
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -80,18 +82,6 @@ def read_outputs(output: Floats, mode: int, z_re: Floats, z_im: Floats, n_value:
                     + output[mode, j + 2, r] * c
                     + output[mode, j + 3, r] * d
                 )
-
-
-@jit_inline_sum
-def turning_value(before: float, rate_before: float, after: float, rate_after: float, step: float) -> float:
-    """Extremum of Hermite's cubic through values and rates of opposite sign at a step's ends (step in s)."""
-    a, b = rate_before * step, rate_after * step
-    rise = after - before
-    quadratic, cubic = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
-    # The slope a + 2 quadratic s + 3 cubic s^2 has one root inside; this form of it does not cancel.
-    below = np.copysign(np.sqrt(quadratic * quadratic - 3.0 * cubic * a), a) - quadratic
-    s = a / below if below != 0.0 else 0.0  # zero only by underflow
-    return before + s * (a + s * (quadratic + s * cubic))
 
 
 @jit_inline_sum
@@ -241,14 +231,11 @@ def leave_out_dying(pace: Floats, z: Floats, calm: Floats) -> None:
 @jit_inline_sum
 def force_in_step(
     before: float, rate_before: float, after: float, rate_after: float, step: float
-) -> tuple[float, float, float]:
-    """Impulse (N s), value in the middle (N) and peak (N) of a force over a step (s), as Hermite's cubic."""
+) -> tuple[float, float]:
+    """Impulse (N s) and value in the middle (N) of a force over a step (s), as Hermite's cubic."""
     bend = step * (rate_before - rate_after)
     impulse = step * (0.5 * (before + after) + bend / 12.0)
-    peak = max(before, after)
-    if rate_before * rate_after < 0.0:
-        peak = max(peak, turning_value(before, rate_before, after, rate_after, step))
-    return impulse, 0.5 * (before + after) + 0.125 * bend, peak
+    return impulse, 0.5 * (before + after) + 0.125 * bend
 
 
 @jit_inline_sum
@@ -273,6 +260,7 @@ def observe_step(
     reduced: Reduced,
     mode: int,
     spin: float,
+    begin: float,
     step: float,
     z_re: Floats,
     z_im: Floats,
@@ -284,7 +272,9 @@ def observe_step(
 ) -> None:
     """Add a step (s) of the closed pairs: force and slip as cubics, Simpson's rule for friction.
 
-    `z` are the coordinates at its end; `share` (1/s) takes an impulse to the mean force of sample `i_sample`.
+    It begins at the time `begin` (s), and `z` are the coordinates at its end; `share` (1/s) takes an impulse
+    to the mean force of sample `i_sample`. Of drive and friction together `end_span` knows the work exactly,
+    in closed form, and counts it with the damping: what is added to them here is taken off there.
     """
     for i in range(reduced.radius.size):
         if not (tables.mask[mode] >> i) & 1:
@@ -294,7 +284,7 @@ def observe_step(
         after, rate_after, slip_after, slip_rate_after = read_contact(tables, reduced, mode, i, z_re, z_im)
         recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = after, rate_after
         recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip_after, slip_rate_after
-        impulse, middle, peak = force_in_step(before, rate_before, after, rate_after, step)
+        impulse, middle = force_in_step(before, rate_before, after, rate_after, step)
         slip_middle = 0.5 * (slip_before + slip_after) + 0.125 * step * (slip_rate_before - slip_rate_after)
         work = before * slip_before + 4.0 * middle * slip_middle + after * slip_after
         friction_work = reduced.friction[i] * work * step / 6.0
@@ -305,9 +295,11 @@ def observe_step(
         accumulator.least_slip[i] = min(accumulator.least_slip[i], slip_before, slip_after)
         if slip_after != 0.0:
             observe_sense(i, 1 if slip_after > 0.0 else -1, accumulator)
-        accumulator.peak_force[i] = max(accumulator.peak_force[i], peak)
+        observe_force(i, begin, step, impulse, before, after, accumulator)
+        drive = reduced.friction[i] * reduced.radius[i] * abs(spin) * impulse
         accumulator.energy[FRICTION_LOSS] += friction_work
-        accumulator.energy[DRIVE_WORK] += reduced.friction[i] * reduced.radius[i] * abs(spin) * impulse
+        accumulator.energy[DRIVE_WORK] += drive
+        accumulator.energy[DAMPING_LOSS] += drive - friction_work
 
 
 @jit_lean_sum
@@ -349,7 +341,10 @@ def end_span(
     recorder: Recorder,
     accumulator: Accumulator,
 ) -> None:
-    """Add what damping took and the unbalance gave since the span began, in one contact mode all along."""
+    """Add what damping took and the unbalance gave since the span began, in one contact mode all along.
+
+    The tables count what friction took with the damping, less what the drive gave for it.
+    """
     if progress.energy_from < 0:
         return
     mode = progress.mode

@@ -15,12 +15,13 @@ from rubhpc.kernels.accumulators import (
     Accumulator,
     observe_solution,
 )
-from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_complementarity
+from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_active, solve_complementarity
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
 
 Floats = NDArray[np.float64]
 
 OPENING = 1e-9  # m/s, above which a pair parts
+AT_REST = 1e-12  # m/s, of gaps that stay closed
 
 
 @jit_inline_sum
@@ -97,11 +98,24 @@ def change_contacts(
         residual, moved = residual_of(reduced.delassus, speed, force)
         observe_solution(PRESSING, pivots, residual, moved, accumulator)
     remaining = 0
+    parts = 0.0
     for i in range(q):
-        if force[i] > 0.0:
+        active[i] = force[i] > 0.0
+        if active[i]:
             remaining |= 1 << i
+            speed[i] = product(reduced.gap_jacobian[i], velocity)
+            parts = max(parts, speed[i])
         elif is_recorded and reduced.restitution > 0.0 and (crossing & ~closed) >> i & 1:
             accumulator.n_contact[i] += 1  # it has bounced off
+    if parts > AT_REST:  # what parts for a moment lacks as much of its impulse as presses it together again
+        if not solve_active(reduced.delassus, speed, active, force, elimination):
+            return -1
+        for i in range(q):
+            if active[i]:
+                if is_recorded:
+                    observe_impact(reduced, i, spin, force[i], velocity, accumulator)
+                for k in range(n):
+                    velocity[k] += reduced.force_direction[i, k] * force[i]
     return remaining
 
 

@@ -41,7 +41,8 @@ class HeldMode(NamedTuple):
     switch: Floats  # (q, 2 n), gap or force with the motion
     reaction: Complexes  # (q,), force of closed pairs by the unbalance at unit speed
     slip: Floats  # (q, n)
-    resistance: Floats  # (n, 2 n), [skew part of the stiffness, damping]
+    resistance: Floats  # (n, 2 n), [skew part of the stiffness, damping], less the friction of closed pairs
+    rubbed: Complexes  # (n,), what the unbalance at unit speed gives of that friction
     rate: Complexes  # (width, n), velocities
     resisting: Complexes  # (width, n), resisting forces
     phasor: Complexes  # (n,), unbalance at unit speed, kg m
@@ -148,6 +149,7 @@ def _retune_energies(tables: ModeTables, mode: int, held: HeldMode, x: Complexes
         greatest = max(greatest, abs(exponent[k]))
     least = 2.0 * STEADY * greatest
     for a in range(n):
+        own[a] = factor * held.rubbed[a]
         for b in range(2 * n):
             own[a] += held.resistance[a, b] * x[b]
         held.rate[m, a], held.resisting[m, a] = x[n + a], own[a]

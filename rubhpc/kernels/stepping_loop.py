@@ -263,7 +263,7 @@ def advance_by_steps(
         if is_recorded and (is_touching or was_touching):
             for a in range(n_degree):
                 rate[a] = 0.5 * (after[a] - before[a]) / step
-            observe_contact(pairs, work, clock.spin, step, rate, rate, accumulator)
+            observe_contact(pairs, work, clock.spin, t * clock.tick, step, rate, rate, accumulator)
             for i in range(q):
                 samples.force[i, t >> clock.sample_level] += work.force[i] * step / interval
         was_touching = is_touching

@@ -13,31 +13,11 @@ from rubhpc.study.axes import DRIVE_AXES, DRIVE_PREFIX, FROM_REST, RUN_UP_PREFIX
 if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
-PHYSICS = 4  # version of the physics: raised whenever a study gives other results than before
-RING_PHYSICS = 8  # that of several stators by the central difference
-AUTO_PHYSICS = 10  # that of transients that end where the motion has settled, by the central difference
-MODAL_PHYSICS = 12  # that of the modal scheme
-CARRIER_PHYSICS = 13  # that of rigs with a carrier
-BRANCH_PHYSICS = 14  # that of branches; the next version of all is 15
+PHYSICS = 15  # version of the physics: raised whenever a study gives other results than before
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
 _AXIS = "axis"  # in place of a value that every case sets
-
-
-def physics_of(study: Study) -> int:
-    """Version of the physics with which a study is computed."""
-    if study.branch is not None:
-        return max(PHYSICS, BRANCH_PHYSICS)
-    if study.rig.carrier:
-        return CARRIER_PHYSICS
-    if study.integrator.method == "modal":
-        return max(PHYSICS, MODAL_PHYSICS)
-    if study.recording.is_transient_auto:
-        return max(PHYSICS, AUTO_PHYSICS)
-    if len(study.rig.stator) > 1:
-        return max(PHYSICS, RING_PHYSICS)
-    return PHYSICS
 
 
 def identity_parts(study: Study) -> dict[str, Any]:
@@ -59,7 +39,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
     }
     swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
     parts = {
-        "physics": physics_of(study),
+        "physics": PHYSICS,
         "axes": [axis.name for axis in study.axes],
         **({"sweep": swept} if swept else {}),  # absent in older stores
         "rig": rig,

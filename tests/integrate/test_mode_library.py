@@ -209,7 +209,10 @@ def forms(tables, p, z, entry):
 
 @pytest.mark.parametrize("mask", MASKS)
 def test_forms_grow_by_the_energy_lost_and_given(case, mask):
-    """Powers of damping (with cross-coupled bearings) and unbalance, by Gauss's rule along a motion."""
+    """Powers of damping (with cross-coupled bearings), friction and unbalance, by Gauss's rule on a motion.
+
+    Normal forces are those that keep the closed gaps from accelerating.
+    """
     rng = np.random.default_rng(400 + mask)
     tables, reduced = case.tables, case.reduced
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
@@ -226,9 +229,12 @@ def test_forms_grow_by_the_energy_lost_and_given(case, mask):
     x, v = np.split((joined(tables, "motion", p) @ (z[:, None] * np.exp(np.outer(exponent, time)))).real, 2)
     lost = weight @ np.einsum("it,it->t", v, reduced.damping @ v + skew @ x)
     turn = angle + case.spin * time
-    given = weight @ np.einsum(
-        "it,it->t", v, np.outer(reduced.force[0], np.cos(turn)) + np.outer(reduced.force[1], np.sin(turn))
-    )
+    load = np.outer(reduced.force[0], np.cos(turn)) + np.outer(reduced.force[1], np.sin(turn))
+    given = weight @ np.einsum("it,it->t", v, load)
+    closed = [i for i in range(len(case.library.gap_jacobian)) if mask >> i & 1]
+    rate, along = case.library.gap_jacobian[closed], case.library.force_direction[closed].T
+    force = np.linalg.solve(rate @ along, rate @ (reduced.stiffness @ x + reduced.damping @ v - load))
+    lost -= weight @ np.einsum("it,it->t", v, (along - rate.T) @ force)
     before, after = np.empty(2), np.empty(2)
     forms(tables, p, z, before)
     z = z * np.exp(exponent * duration)

@@ -40,7 +40,10 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, masks):
         library.add(mask)
         found, place = library.tables(), library.masks.index(mask)
         mode = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, mask)
-        expected = tabulate(mode, reduced, library.slip, width=library.width, tick=tick, **levels)
+        friction = library._friction_of(mode)
+        expected = tabulate(
+            mode, reduced, library.slip, friction=friction, width=library.width, tick=tick, **levels
+        )
         for name in expected._fields:
             values, anew = getattr(found, name)[place], getattr(expected, name)[0]
             assert values == pytest.approx(anew, rel=1e-9, abs=1e-9 * np.abs(anew).max()), name

@@ -65,9 +65,13 @@ def test_rigs_that_need_more_modes_get_them(rig, case, before, monkeypatch):
     assert found_error(simulate(rig, **case), exact) > before
 
 
-def test_peak_force_of_a_heavy_stator_is_that_of_all_modes():
-    record = simulate(lumped(0.92, 3.9e5), speed_ratio=1.9, clearance="70 um", transient=0, revolutions=10)
-    assert float(record.peak_contact_force[0]) == pytest.approx(42.1, rel=1e-2)
+def test_forces_of_a_heavy_stator_are_those_of_all_modes():
+    """Fewer modes gave 15.8 N where all give 42.1 N, apart from the impulses of its impacts."""
+    case = {"speed_ratio": 1.9, "clearance": "70 um", "transient": 0, "revolutions": 10}
+    record, exact = (simulate(lumped(0.92, 3.9e5), **case, **keys) for keys in ({}, {"accuracy": ALL_MODES}))
+    assert record.peak_contact_force == pytest.approx(exact.peak_contact_force, rel=1e-3)
+    assert found_error(record, exact) < 1e-3
+    assert exact.peak_contact_force[0] > exact.contact_force.max() > 1000.0  # impulses are part of both
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rubhpc.kernels.measuring import turning_value
+from rubhpc.kernels.cubics import turning_value
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -16,10 +16,8 @@ from hypothesis import strategies as st
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
-from rubhpc.rig.carriers import Carrier
 from rubhpc.rig.reading import read_rig, with_key, with_keys
 from rubhpc.study.cases import CaseGrid
-from rubhpc.study.identity import CARRIER_PHYSICS, MODAL_PHYSICS, PHYSICS, RING_PHYSICS, physics_of
 from rubhpc.study.study import Contact, Integrator, Recording, Run, Study, make_axis
 
 RIG = read_rig("mokhtar2017")
@@ -130,21 +128,6 @@ def test_what_the_rig_says_of_a_key_that_is_an_axis_leaves_the_identity(key, uni
     assert CaseGrid(study(SMALL | {key: [0.06 * unit, 0.07 * unit, 0.05 * unit]})).identity == identity
     assert CaseGrid(study(grid, with_key(RIG, "stator.width", 0.004))).identity != identity
     assert CaseGrid(study(SMALL)).identity != identity
-
-
-def test_versions_of_the_physics_hold_for_what_they_change():
-    """The modal scheme keeps other modes than before; of the central difference only rings have changed."""
-    ring = replace(RIG, stator=(*RIG.stator, replace(RIG.stator[0], angle=1.0)))
-    for contact in (Contact(), Contact(friction_law="coulomb"), Contact(normal="updated")):
-        assert physics_of(study(contact=contact)) == physics_of(study(rig=ring, contact=contact))
-        assert physics_of(study(contact=contact)) == MODAL_PHYSICS
-    central = Integrator(method="central-difference")
-    assert physics_of(study(integrator=central)) == PHYSICS
-    assert physics_of(study(rig=ring, integrator=central)) == RING_PHYSICS
-    casing = Carrier(name="casing", mass=5.0, stiffness=2e6)
-    carried = replace(RIG, stator=(replace(RIG.stator[0], carrier="casing"),), carrier=(casing,))
-    for integrator in (central, Integrator()):
-        assert physics_of(study(rig=carried, integrator=integrator)) == CARRIER_PHYSICS
 
 
 def test_ids_do_not_depend_on_the_machine():

@@ -1,0 +1,63 @@
+"""The energy balance of contact modes in closed form: nothing in it is integrated by a rule."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from trial_rig import trial_rig
+
+from rubhpc import read_rig, simulate
+from rubhpc.integrate.mode_library import ModeLibrary
+from rubhpc.rig.reading import with_keys
+
+STIFF = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": 3e10})
+COULOMB = {"friction_law": "coulomb"}
+LAWS = [
+    {},
+    COULOMB,
+    {"restitution": 0.3},
+    {"restitution": 0.8},
+    COULOMB | {"restitution": 0.8},
+    {"law": "penalty", "stiffness": 1e7, "damping": 100.0},
+]
+FEW = {"transient": 10, "revolutions": 6, "samples_per_revolution": 64, "keep": ()}
+
+
+def ring(count):
+    stator = STIFF.stator[0]
+    return replace(STIFF, stator=tuple(replace(stator, angle=2 * math.pi * i / count) for i in range(count)))
+
+
+@pytest.mark.parametrize("law", LAWS, ids=str)
+@pytest.mark.parametrize(
+    ("rig", "case"),
+    [
+        (STIFF, {"speed_ratio": 1.5, "clearance": "40 um", "friction": 0.5}),  # irregular
+        (ring(3), {"speed_ratio": 0.75, "clearance": "60 um", "friction": 0.15}),
+        (trial_rig(3, cross=5e4), {"speed": 240.0, "clearance": "60 um", "friction": 0.3}),
+    ],
+    ids=["one", "three", "cross-coupled"],
+)
+def test_energy_balances_under_every_law(rig, case, law):
+    record = simulate(rig, **case, **law, **FEW)
+    assert record.measures["scheme"] == 0  # from event to event
+    assert record.contact_impulse.max() > 0.0
+    assert record.energy_residual < 1e-8
+
+
+def test_energy_residual_shows_friction_that_does_not_act(monkeypatch):
+    case = {"speed_ratio": 1.5, "clearance": "40 um", "friction": 0.5}
+    monkeypatch.setattr(ModeLibrary, "_friction_of", lambda self, mode: None)
+    assert simulate(STIFF, **case, **FEW).energy_residual > 1e-3
+
+
+def test_peak_force_does_not_grow_with_the_mesh():
+    """On the shaft itself; the force of the tip's damper at touch grows in proportion to the elements."""
+    stator = replace(STIFF.stator[0], node=5, radius=0.01)
+    given = FEW | {"transient": 2, "revolutions": 4, "accuracy": 1e-9}
+    case = {"speed_ratio": 1.1, "clearance": "100 um"}
+    peaks = []
+    for n in (3, 12, 24):
+        rig = replace(STIFF, stator=(replace(stator, elements=n),))
+        peaks.append(float(simulate(rig, **case, **given).peak_contact_force[0]))
+    assert peaks == pytest.approx([219.27] * 3, rel=1e-4)
