@@ -23,6 +23,7 @@ _TITLE_WIDTH = 90  # characters of the titles of a row of panels
 _BAR_WIDTH = 40  # characters beside a scale of colours
 _DISTINCT = 5  # names of a scale that are always written: periods up to 4 have colours of their own
 _MOST_NAMES = 16  # that fit beside a scale
+_COLUMN = 3.46  # inches, width of a figure of one column
 _LEGEND_WIDTH = 64  # characters that fit a column of a page, 6 of them taken by each handle
 
 
@@ -65,8 +66,10 @@ def name_facets(
 def legend_below(ax: Axes, handles: list[Artist]) -> None:
     """Name what is marked, below all panels, in as many columns as fit."""
     if handles:
-        labels = [textwrap.fill(str(handle.get_label()), _LEGEND_WIDTH - 6) for handle in handles]
-        n_column = _columns([max(map(len, label.splitlines())) for label in labels])
+        box = ax.figure.bbox
+        width = int(_LEGEND_WIDTH * box.width / (_COLUMN * ax.figure.dpi))
+        labels = [textwrap.fill(str(handle.get_label()), width - 6) for handle in handles]
+        n_column = _columns([max(map(len, label.splitlines())) for label in labels], width)
         ax.figure.legend(handles, labels, loc="outside lower center", ncols=n_column, fontsize=6.5)
 
 
@@ -80,10 +83,10 @@ def color_names(names: Sequence[str]) -> list[str]:
     ]
 
 
-def _columns(lengths: list[int]) -> int:
+def _columns(lengths: list[int], width: int = _LEGEND_WIDTH) -> int:
     """Return the most columns in which a legend of labels of these lengths fits; it fills by column."""
     for n_column in range(len(lengths), 1, -1):
         columns = np.array_split(lengths, n_column)
-        if sum(6 + int(column.max()) for column in columns) <= _LEGEND_WIDTH:
+        if sum(6 + int(column.max()) for column in columns) <= width:
             return n_column
     return 1
