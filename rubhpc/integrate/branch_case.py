@@ -56,6 +56,7 @@ def record_branches(
     span: Range,
     recording: Recording,
     check: Callable[[], None] | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> BranchRecord:
     """Find the branches of a case and measure every point.
 
@@ -67,16 +68,18 @@ def record_branches(
         Its transient is that of the simulations that lead to first motions.
     check : callable, optional
         Called several times a second; what it raises ends the case.
+    say : callable, optional
+        Called with how far it has come, in words.
     """
     began = time.perf_counter() - seconds_compiling()
     low, high = sorted((span.start, span.stop))
     step = (high - low) / STEPS if keys.step is None else keys.step
-    branching = Branching(Family(operation, keys.along, high - low), step, check)
+    branching = Branching(Family(operation, keys.along, high - low), step, check, say)
     values = np.linspace(low, high, keys.sweeps).tolist() if keys.sweeps > 1 else [0.5 * (low + high)]
     found = starts(branching, values, [int(period) for period in keys.periods], recording)
     tracks = search(branching, found, low=low, high=high, most=keys.points, doublings=keys.doublings)
     branches = [branch_of(branching, track, recording) for track in tracks]
-    arrays, n_point = _arrays(branches, keys, check)
+    arrays, n_point = _arrays(branches, keys, check, say)
     remark = "" if n_point else "no periodic motion was found"
     if n_point > keys.points:
         remark = f"{n_point} points, of which {keys.points} are stored; give more points in [branch]"
@@ -85,7 +88,10 @@ def record_branches(
 
 
 def _arrays(
-    branches: list[Branch], keys: BranchKeys, check: Callable[[], None] | None
+    branches: list[Branch],
+    keys: BranchKeys,
+    check: Callable[[], None] | None,
+    say: Callable[[str], None] | None,
 ) -> tuple[dict[str, Floats], int]:
     """All points, branch after branch, and how many there are."""
     rows: dict[str, list[Any]] = {name: [] for name in branch_variables()}
@@ -93,6 +99,8 @@ def _arrays(
         for i_point, point in enumerate(branch.points):
             if len(rows[f"{POINT}value"]) >= keys.points:
                 break
+            if say is not None:
+                say(f"{len(rows[f'{POINT}value'])} points of {len(branches)} branches recorded")
             if check is not None:
                 check()
             record = branch.record(i_point)

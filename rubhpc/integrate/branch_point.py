@@ -111,11 +111,20 @@ class Branching:
         Change of the parameter that counts as one step.
     check : callable, optional
         Called before every search for a motion; what it raises ends the search for branches.
+    say : callable, optional
+        Called then with how many motions have been found, and where the next is sought.
     """
 
-    def __init__(self, family: Family, step: float, check: Callable[[], None] | None = None) -> None:
+    def __init__(
+        self,
+        family: Family,
+        step: float,
+        check: Callable[[], None] | None = None,
+        say: Callable[[str], None] | None = None,
+    ) -> None:
         """Take the cases."""
-        self.family, self.step, self._check = family, step, check
+        self.family, self.step, self._check, self._say = family, step, check, say
+        self._n_found = 0
 
     def begin(self, value: float, motion: Floats, states: int, period: int) -> Point:
         """Shoot at a value of the parameter from a motion at the angle 0; the section is then moved.
@@ -250,9 +259,11 @@ class Branching:
         self, base: Point, guess: Floats, along: Floats, period: int, most: int, *, is_held: bool
     ) -> Point:
         """Newton's method, with the parameter held or an unknown."""
+        family, phase, states = self.family, base.phase, base.states
+        if self._say is not None:
+            self._say(f"{self._n_found} motions of branches found, now at {family.along} {base.value:.4g}")
         if self._check is not None:
             self._check()
-        family, phase, states = self.family, base.phase, base.states
         scale = self._scale(base)
         value = base.value + guess[-1] * self.step
         before = base.motion + guess[:-1] / scale
@@ -265,6 +276,7 @@ class Branching:
                 defect = revolutions[-1].end - motion
                 residual = case.size(defect) / max(case.size(motion), np.finfo(float).tiny)
                 if residual <= CONVERGED and revolutions[-1].states == states:
+                    self._n_found += 1
                     return Point(
                         value=value, phase=phase, motion=motion, states=states, revolutions=revolutions,
                         case=case,

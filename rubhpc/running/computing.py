@@ -215,6 +215,8 @@ class Computing:
                 attend,
             )
             worker.entered = self._entered
+            if progress is not None:
+                worker.say = progress.say
             yield worker
             if job.refinement is None:
                 worker.sync()

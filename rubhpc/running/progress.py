@@ -59,6 +59,7 @@ class Progress:
         self._began = self._shown - seconds_compiling()
         self._gap = _FIRST_LINE
         self._bar: Bar | None = None
+        self._doing = ""
 
     def __enter__(self) -> Self:
         if self._quiet:
@@ -99,10 +100,16 @@ class Progress:
         else:
             self._bar.update(self._bar.task_ids[0], completed=n_ended, rest=self._rest(sums))
 
+    def say(self, doing: str) -> None:
+        """Take what the case that is computed here has come to, of a case that takes long; "" at its end."""
+        self._doing = doing
+
     def _rest(self, sums: Totals) -> str:
         """Rate, time left (by predicted steps, for cases differ) and what went wrong."""
         seconds = max(time.monotonic() - seconds_compiling() - self._began, 1e-9)
-        texts = [f"{sums.n_case / seconds:.3g} a second"]
+        texts = [self._doing] if self._doing else []
+        if sums.n_case or not texts:
+            texts.append(f"{sums.n_case / seconds:.3g} a second")
         if sums.cost:
             left = seconds * (self._cost - sums.cost) / sums.cost
             texts.append(f"{duration(max(left, 0.0))} left")

@@ -86,6 +86,8 @@ class Worker:
         Called several times a second while a case is computed.
     entered : list of Entry
         Of a refined map, what this rank has journalled.
+    say : callable
+        Called with what a case that takes long has come to.
     is_wanted_elsewhere : callable
         Asked after every case whether to store what there is of the block and leave the rest of it.
     patience : float
@@ -107,6 +109,7 @@ class Worker:
         self._setups: OrderedDict[tuple[int, float, Contact, float], tuple[Rig, Setup]] = OrderedDict()
         self._initial_states = InitialStates(self.grid, self.store, self.ledger, self._repair)
         self.entered: list[Entry] = []
+        self.say: Callable[[str], None] = lambda _: None
         self.is_wanted_elsewhere: Callable[[], bool] = lambda: False
         self.patience = 0.0
         self._held: dict[tuple[int, ...], tuple[Arrays, list[Entry]]] = {}
@@ -273,7 +276,11 @@ class Worker:
         if study.branch is not None:
             span = study.axis(study.branch.along).drawn_from
             assert span is not None
-            return record_branches(operation_of(self.grid, case), study.branch, span, study.recording, check)
+            operation = operation_of(self.grid, case)
+            try:
+                return record_branches(operation, study.branch, span, study.recording, check, self.say)
+            finally:
+                self.say("")
         key = (
             id(case.rig),
             case.speed,

@@ -15,6 +15,7 @@ from postproc.report.page import Page
 from postproc.store.live import open_live
 from postproc.store.open import open_store
 from rubhpc.errors import InputError
+from rubhpc.running.progress import Progress
 from rubhpc.study.study import read_study
 
 STUDY = """
@@ -68,6 +69,18 @@ def test_stability_changes_at_events_alone(store):
     assert changes.size
     assert ((events[changes] != 0) | (events[changes + 1] != 0)).all()
     assert sum(rows.size for rows in runs(points)) >= points.sizes["point"]
+
+
+def test_a_case_says_how_far_it_has_come(store, monkeypatch):
+    said = []
+    monkeypatch.setattr(Progress, "say", lambda self, doing: said.append(doing))
+    shutil.copytree(store, store / "again")
+    path = store / "again" / "branches.zarr"
+    next(file for file in sorted((path / "point_value" / "c").rglob("*")) if file.is_file()).unlink()
+    rubhpc.run(read_study(store / "again" / "study.toml", path), quiet=True)
+    assert said[-1] == ""
+    assert any(text.startswith("20 motions of branches found, now at clearance 0.0001") for text in said)
+    assert any(text.endswith("branches recorded") for text in said)
 
 
 def test_what_is_lost_is_computed_anew_to_the_same_bytes(store):

@@ -48,6 +48,20 @@ def test_lines_come_now_and_then_with_the_time_left_by_predicted_steps(clock, ca
     ]
 
 
+def test_a_case_that_takes_long_says_where_it_is(clock, capsys):
+    with Progress(1, 1, n_done=0, quiet=False, has_bar=False) as shown:
+        shown.say("207 motions of branches found, now at clearance 0.0001")
+        clock.time += 20
+        shown.update(Totals())
+        shown.say("")
+        clock.time += 400
+        shown.update(Totals(done=1, cost=1))
+    assert capsys.readouterr().out.splitlines()[1:] == [
+        "0/1 cases; 207 motions of branches found, now at clearance 0.0001",
+        "1/1 cases; 0.00238 a second, 0 s left",
+    ]
+
+
 def test_lines_grow_rarer(clock, capsys):
     with Progress(10**6, 10**6, n_done=0, quiet=False, has_bar=False) as shown:
         for _ in range(3600):
