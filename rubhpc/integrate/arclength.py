@@ -126,11 +126,13 @@ def follow(
                 history, length, has_turned = [point, follower], FIRST, True
                 continue
             is_same = found.sequence == base.sequence
+            has_halved = _is_half(found) or (is_same and _is_back(found, base))
             for event, point in happened:
-                add(event, point)
-            if _is_half(found) or (is_same and _is_back(found, base)):
-                if point := halving(branching, base, found):
-                    add(Event.PERIOD_DOUBLING, point)
+                if not has_halved or event not in (Event.FOLD, Event.BRANCH_POINT):
+                    add(event, point)  # where the period halves a multiplier of 1 is no other event
+            if has_halved:
+                if half := halving(branching, base, found):
+                    add(Event.PERIOD_DOUBLING, half)
                 end, is_halved = "it meets a motion of half the period", True
                 break
             if closing := _closing(branching, points, base, found):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.integrate.branch_point import SAME_MOTION
 from rubhpc.integrate.shooting import NotConverged
 
 if TYPE_CHECKING:
@@ -136,3 +137,10 @@ def _above_minus_one(point: Point) -> float:
 def half_change(point: Point) -> Floats:
     """What half its period changes in a motion (2 n,)."""
     return np.asarray(point.revolutions[point.period // 2 - 1].end - point.motion)
+
+
+def has_halved(point: Point) -> bool:
+    """Whether a motion has half the period that it is followed with."""
+    if point.period % 2:
+        return False
+    return bool(np.linalg.norm(half_change(point)) <= SAME_MOTION * point.case.size(point.motion))

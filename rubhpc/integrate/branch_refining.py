@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.branch_events import LEFT, REAL, Event, kind_of
+from rubhpc.integrate.branch_events import LEFT, REAL, Event, has_halved, kind_of
 from rubhpc.integrate.branch_grazing import distances, passed
 from rubhpc.integrate.shooting import NotConverged
 
@@ -69,6 +69,8 @@ def refined(branching: Branching, track: Track, most: int) -> Track:
 
 def _event_at(before: Point, point: Point, behind: Point) -> Event:
     """What happens at a point, where a multiplier on the unit circle leaves it there."""
+    if has_halved(before) or has_halved(behind):
+        return Event.NONE  # all but there, and the multiplier is that of the doubling
     (on,) = np.nonzero(np.abs(np.abs(point.multipliers) - 1.0) <= LEFT)
     if on.size and before.n_unstable != behind.n_unstable:
         return kind_of(point, int(on[0]), before, behind)
@@ -86,8 +88,8 @@ def _aligned(branching: Branching, a: Point, b: Point) -> Point:
 def _may_hide(branching: Branching, points: list[Point], k: int) -> bool:
     """Whether a pair of events may lie between two points."""
     a, b = points[k], points[k + 1]
-    if a.sequence != b.sequence or a.value == b.value:
-        return False
+    if a.sequence != b.sequence or a.value == b.value or has_halved(a) or has_halved(b):
+        return False  # next to a motion of half the period, points are less certain than the step is long
     common = _outside(a) & _outside(b)
     if not common:
         return True  # one event is known, and there is another

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.arclength import Track, follow
-from rubhpc.integrate.branch_events import Event, half_change
-from rubhpc.integrate.branch_point import SAME_MOTION
+from rubhpc.integrate.branch_events import Event, half_change, has_halved
 from rubhpc.integrate.branch_refining import refined
 from rubhpc.integrate.piecewise_motion import Unfollowed
 from rubhpc.integrate.shooting import NotConverged
@@ -26,8 +25,8 @@ if TYPE_CHECKING:
 # Steps from a doubling at which the motion of twice the period is sought: the range in which it exists, or
 # has the same contacts, may be narrow.
 ASIDE = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)
-ASTRAY = 0.5  # of that length, by which a motion may lie off the direction of the multiplier -1
 SAME_VALUE = 1e-6  # of the range, between two doublings that are one
+ASTRAY = 0.5  # of that length, by which a motion may lie off the direction of the multiplier -1
 
 
 def search(
@@ -113,22 +112,15 @@ def _both_ways(branching: Branching, start: Point, low: float, high: float, most
 def _doublings(track: Track) -> Iterator[Point]:
     """Where the period doubles, but for the ends at which it halves."""
     for point, event in zip(track.points, track.events, strict=True):
-        if event is Event.PERIOD_DOUBLING and not _has_halved(point):
+        if event is Event.PERIOD_DOUBLING and not has_halved(point):
             yield point
-
-
-def _has_halved(point: Point) -> bool:
-    """Whether a motion has half the period that it is followed with."""
-    if point.period % 2:
-        return False
-    return bool(np.linalg.norm(half_change(point)) <= SAME_MOTION * point.case.size(point.motion))
 
 
 def _halved(branching: Branching, track: Track) -> Iterator[Point]:
     """The motions of half the period at which a track ends, but for that from which it was switched."""
     for k in (-1,) if track.doublings else (0, -1):
         point = track.points[k]
-        if track.events[k] in (Event.PERIOD_DOUBLING, Event.GRAZING) and _has_halved(point):
+        if track.events[k] in (Event.PERIOD_DOUBLING, Event.GRAZING) and has_halved(point):
             half = replace(point, revolutions=point.revolutions[: point.period // 2])
             held = np.zeros(point.motion.size + 1)
             held[-1] = 1.0

@@ -80,6 +80,7 @@ class Family:
         self.along, self.span = along, span
         self._operation = operation
         self._models: OrderedDict[int, tuple[Rig, Model]] = OrderedDict()
+        self._frequency: tuple[Model, float] | None = None
         self._setups: OrderedDict[tuple[int, float], ModalSetup] = OrderedDict()
         self._cases: OrderedDict[float, PiecewiseMotion] = OrderedDict()
 
@@ -112,7 +113,7 @@ class Family:
         spin = case.speed
         if spin is None:
             assert case.speed_ratio is not None
-            spin = case.speed_ratio * first_lateral_frequency(model)
+            spin = case.speed_ratio * self._first_frequency(model)
         clearance = case.clearance
         if clearance is None:
             assert case.clearance_ratio is not None
@@ -168,6 +169,12 @@ class Family:
         if self.along == "clearance":
             return 1.0
         return contact_free_amplitude(here.setup.model, here.setup.spin)
+
+    def _first_frequency(self, model: Model) -> float:
+        """Lowest lateral natural frequency of a model, rad/s, found once."""
+        if self._frequency is None or self._frequency[0] is not model:
+            self._frequency = model, first_lateral_frequency(model)
+        return self._frequency[1]
 
     def _model(self, rig: Rig) -> Model:
         if id(rig) not in self._models:

@@ -7,9 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
+from rubhpc.integrate.coupling import coupled_rows
 from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
 from rubhpc.integrate.standstill import Modes, at_standstill, parted, seen_degrees
 from rubhpc.integrate.truncation import kept_modes
@@ -165,10 +164,12 @@ def _visible(seen: Floats, stiffness: Floats, damping: Floats) -> NDArray[np.boo
     scale = np.sqrt(np.maximum(np.abs(np.diag(stiffness)), 1.0))
     couples = np.abs(stiffness) > UNSEEN * np.outer(scale, scale)
     couples |= np.abs(damping) > UNSEEN * np.sqrt(np.outer(scale, scale))
-    _, group = connected_components(csr_array(couples), directed=False)
     largest = np.abs(seen).max(axis=1, keepdims=True)
     moves = np.any(np.abs(seen) > UNSEEN * np.maximum(largest, np.finfo(float).tiny), axis=0)
-    return np.isin(group, group[moves])
+    is_visible = np.zeros(len(couples), dtype=bool)
+    for rows in coupled_rows(couples):
+        is_visible[rows] = moves[rows].any()
+    return is_visible
 
 
 def kernel_bodies(

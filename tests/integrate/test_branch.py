@@ -73,6 +73,21 @@ def test_stability_changes_at_events_alone(found):
             assert {branch.points[k].event, branch.points[k + 1].event} != {"none"}
 
 
+@pytest.mark.long
+def test_a_branch_between_two_doublings_is_followed_once():
+    """P2 begins at a doubling right behind a grazing, has a fold and meets P1 at another doubling."""
+    once, twice = rubhpc.branch(
+        "mokhtar2017", along="speed_ratio", start=0.713, stop=0.752, clearance="100 um", friction=0.3,
+        largest_step=0.008, keep=(),
+    )  # fmt: skip
+    doubled = [value for name, value in once.events() if name == "period_doubling"]
+    assert len(doubled) == 2
+    names, values = zip(*twice.events(), strict=True)
+    assert names == ("period_doubling", "grazing", "grazing", "fold", "period_doubling")
+    assert values[::4] == pytest.approx(doubled, rel=1e-8)
+    assert values[3] == max(twice.values)
+
+
 def test_dataset_has_a_value_a_point(found):
     data = found[1].to_dataset()
     assert dict(data.sizes)["point"] == len(found[1].points)
