@@ -12,13 +12,14 @@ from postproc.figures.overlay import overlaid
 from postproc.figures.small_multiples import legend_below
 from postproc.signals.spectra import samples_per_revolution
 from postproc.signals.waveforms import orbit_data
-from postproc.store.rig_of_case import stator_places
+from postproc.store.rig_of_case import rig_of, stator_places
 from postproc.store.units import scale_for, short_name
 from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
     from postproc.figures.options import Axis, Count
 
@@ -118,24 +119,37 @@ def _draw_one(vertical: xr.DataArray, horizontal: xr.DataArray, ax: Axes, factor
 
 
 def draw_stators(data: xr.Dataset, ax: Axes, factor: float, reach: float) -> None:
-    """Add the clearance circle and a stub of each stator; `reach` bounds what is worth showing."""
+    """Add the clearance circle and a stub of each stator; `reach` bounds what is worth showing.
+
+    Stators on a carrier, which may move by more than the clearance, are drawn at its mean displacement.
+    """
     from matplotlib.patches import Circle, Polygon
 
     clearance = float(data["clearance"].values) * factor
     if not 0 < clearance < 3 * reach:
         return
     edge = {"edgecolor": "0.6", "linestyle": ":", "linewidth": 0.7}
-    ax.add_patch(Circle((0, 0), clearance, fill=False, zorder=1, **edge))
+    places, is_moved = stator_places(data), "carrier_vertical" in data
+    shifts = _shifts(data) * factor if is_moved else np.zeros((len(places), 2))
+    centre = shifts[0] if len(shifts) and (shifts == shifts[0]).all() else np.zeros(2)
+    ax.add_patch(Circle((centre[0], centre[1]), clearance, fill=False, zorder=1, **edge))
     ax.plot([], [], color="0.6", linestyle=":", label="clearance")
-    places = stator_places(data)
     half_angle = math.pi / max(len(places), 3)  # the stators of a ring do not overlap
     for i, (angle, offset) in enumerate(places):
         gap = clearance + offset * factor
         # Normal from the disc to the stator and tangent along its face; the plane is (horizontal, vertical).
         n, t = np.array([np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), -np.sin(angle)])
         half, deep = min(0.2 * reach, 0.8 * gap * math.tan(half_angle)) * t, 0.12 * reach * n
-        face = np.array([gap * n - half, gap * n + half])
+        face = np.array([gap * n - half, gap * n + half]) + shifts[i]
         block = Polygon([*face, *(face[::-1] + deep)], facecolor="0.85", edgecolor="none", zorder=1)
-        block.set_label("_stator" if i else "stator")  # one of them is enough for a legend
+        name = "stator, mean position" if is_moved else "stator"
+        block.set_label("_stator" if i else name)  # one of them is enough for a legend
         ax.add_patch(block)
         ax.plot(face[:, 0], face[:, 1], color="0.35", linewidth=0.9, zorder=2)
+
+
+def _shifts(data: xr.Dataset) -> NDArray[np.float64]:
+    """Mean displacement (n, 2), m, of what each stator at the disc stands on: horizontal, vertical."""
+    stators = rig_of(data).stator
+    at_disc = [i for i, stator in enumerate(stators) if stator.node == stators[0].node]
+    return np.stack([data[f"carrier_{name}"].values[at_disc] for name in ("horizontal", "vertical")], axis=1)

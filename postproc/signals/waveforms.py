@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from postproc.signals.carried import NEEDED, mean_shift
 from postproc.signals.spectra import check_signal, last_revolutions
 from postproc.store.axes import find_axis, source
+from postproc.store.rig_of_case import is_carried
 from postproc.store.run_ups import is_run_up
 from postproc.store.select import narrow
 from postproc.store.variables import probe_of
@@ -67,6 +69,9 @@ def orbit_data(
 ) -> xr.Dataset:
     """Return the last revolutions of vertical and horizontal motion, with the clearance; lazy.
 
+    Of one case whose stators stand on a carrier, `carrier_vertical` and `carrier_horizontal` (m, over the
+    stators) are where that is on average in these revolutions.
+
     Parameters
     ----------
     store : Dataset
@@ -85,6 +90,10 @@ def orbit_data(
     if revolutions is not None:
         kept = last_revolutions(data["vertical"], revolutions)
         data = data.isel(sample=slice(-kept.sizes["sample"], None))
+    if probes is None and not spread and is_carried(data) and all(name in store for name in NEEDED):
+        tips = narrow(store, NEEDED, ["stator"]).isel(sample=slice(-data.sizes["sample"], None))
+        moved = zip(("carrier_vertical", "carrier_horizontal"), mean_shift(tips).T, strict=True)
+        data = data.assign({name: ("stator", values, {"units": "m"}) for name, values in moved})
     return data
 
 

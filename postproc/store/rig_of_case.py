@@ -109,6 +109,14 @@ def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
     return [(s.angle, s.clearance_offset) for s in stators if s.node == stators[0].node]
 
 
+def is_carried(case: xr.Dataset) -> bool:
+    """Whether stators at the disc stand on a carrier, with which they move."""
+    if "rig" not in case.attrs:
+        return False
+    stators = rig_of(case).stator
+    return any(s.carrier is not None for s in stators if s.node == stators[0].node)
+
+
 def rig_axes(case: xr.Dataset) -> dict[str, str]:
     """Return the axes of the study that are keys of the rig: coordinate to dotted key."""
     study: dict[str, Any] = case.attrs.get("study", {})
