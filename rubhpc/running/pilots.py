@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Recording
 
 _MOST_PILOTS, _FEW_PILOTS, _FEW_BRANCHED = 64, 6, 2  # cases; timed even if slow, and of a branch study
-_ENOUGH = 3.0  # processor seconds after which no more than the few are begun
+_ENOUGH, _MOST = 3.0, 12.0  # processor seconds after which no more are begun: where they agree, and at all
+_AGREED = 0.25  # standard error of the mean pace, as a share of it, where cases agree
 _LONG, _PILOT_TIME = 0.25, 0.5  # s: longer cases are shortened; of the longest run of such a case, about
 _FIRST_STEPS = 50_000  # predicted, of the first run of a case that is shortened
 _LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
@@ -110,8 +111,9 @@ def time_pilots(
     pilots = _Pilots(grid)
     few = _FEW_PILOTS if grid.study.branch is None else _FEW_BRANCHED
     for k, (index, steps) in enumerate(_picked(blocks, missing)):
-        if k >= few and time.process_time() - began - pilots.loading - pilots.compiling > _ENOUGH:
-            break
+        spent = time.process_time() - began - pilots.loading - pilots.compiling
+        if k >= few and spent > (_ENOUGH if _spread(paces, missing) <= _AGREED else _MOST):
+            break  # a few rubs among many free motions take most of the time of some studies
         try:
             paces.append(pilots.pace(index, steps))
         except Exception as error:  # whatever is wrong with the case: the others are timed all the same
@@ -124,17 +126,23 @@ def time_pilots(
     seconds = time.process_time() - began - pilots.loading
     if not paces:
         return Timing(pace=Pace(*[math.nan] * len(Pace._fields)), seconds=seconds, failures=tuple(failures))
-    steps_paces = np.array([pace.step for pace in paces])
-    unseen = 1.0 - len(paces) / max(int(missing.sum()), len(paces))  # share of the cases
-    deviation = steps_paces.std(ddof=1) * math.sqrt(unseen / len(paces)) if len(paces) > 1 else math.nan
     return Timing(
         pace=Pace(*np.mean(paces, axis=0).tolist())._replace(block=block),
         n_pilot=len(paces),
-        spread=float(deviation / steps_paces.mean()),
+        spread=_spread(paces, missing),
         is_bound=is_bound,
         seconds=seconds,
         failures=tuple(failures),
     )
+
+
+def _spread(paces: list[Pace], missing: NDArray[np.bool_]) -> float:
+    """Standard error of the mean time of a step, as a share of it; NaN of one case among several."""
+    steps = np.array([pace.step for pace in paces])
+    unseen = 1.0 - len(paces) / max(int(missing.sum()), len(paces))  # share of the cases
+    if len(paces) < 2:
+        return 0.0 if unseen == 0.0 and len(paces) else math.nan
+    return float(steps.std(ddof=1) * math.sqrt(unseen / len(paces)) / steps.mean())
 
 
 def _picked(blocks: list[Block], missing: NDArray[np.bool_]) -> Iterator[tuple[tuple[int, ...], float]]:

@@ -10,8 +10,19 @@ from running import ROOT, command, environment
 pytestmark = pytest.mark.bench
 
 # Of one name each; `large_map`, two minutes of it, is `map` at another resolution.
-STUDIES = ("quickstart", "cascade", "map", "sensitivity", "indicators", "hysteresis", "gravity")
-WORST = 2.0  # times as much or as little: the speed of a busy machine changes between the two
+STUDIES = (
+    "quickstart",
+    "cascade",
+    "map",
+    "sensitivity",
+    "indicators",
+    "hysteresis",
+    "gravity",
+    "basins",
+    "run_up",
+    "branches/chaos",
+)
+WORST = 1.5  # times as much or as little
 FRICTION = 'friction_law = "coulomb"'
 SMALL = """
 title = "Small"
@@ -30,6 +41,8 @@ revolutions = 32
 CONTACTS = {
     "coulomb": FRICTION,
     "restitution": "restitution = 0.5",
+    "both": FRICTION + "\nrestitution = 0.5",
+    "penalty": 'law = "penalty"\nstiffness = 1e7',
     "ring of 8": "",
 }
 
