@@ -386,7 +386,7 @@ def test_a_line_surrounds_what_is_out_of_range_where_that_is_most(plain_map, ax)
     shown = plain_map("peak_contact_force")
     shown["validity"] = shown["validity"].where(shown["validity"] > 0, 4)
     value_maps(shown, "peak_contact_force", [ax])
-    labels = [text.get_text() for text in ax.figure.legends[0].get_texts()]
+    labels = [text.get_text().replace("\n", " ") for text in ax.figure.legends[0].get_texts()]
     n = int((shown["status"] == 1).sum())
     assert labels[-1].startswith(f"out of range in all {n} cases: slip (6), Euler load (3), bending (")
     assert not [patch for patch in ax.patches if patch.get_label().startswith("out of range")]
