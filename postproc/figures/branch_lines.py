@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
     from numpy.typing import NDArray
 
 MARKED: dict[str, tuple[str, str, float]] = {  # event: name, marker, size
@@ -62,16 +63,16 @@ def draw_branches(data: xr.Dataset, variable: str, along: str, ax: Axes) -> Axes
     return ax
 
 
-def mark_events(data: xr.Dataset, x: NDArray[Any], y: NDArray[Any], ax: Axes) -> None:
-    """Mark the events at abscissas (n_point,) and ordinates (n_point, n), and name them for a legend."""
-    events = data["event"].values
+def mark_events(data: xr.Dataset, x: NDArray[Any], y: NDArray[Any], ax: Axes) -> list[Line2D]:
+    """Mark the events at abscissas (n_point,) and ordinates (n_point, n), named for a legend."""
+    events, drawn = data["event"].values, []
     for code, event in enumerate(BRANCH_EVENT):
         if event not in MARKED or not (events == code).any():
             continue
         text, marker, size = MARKED[event]
         at = events == code
         places = np.repeat(x[at], y.shape[1]), y[at].ravel()
-        ax.plot(
+        drawn += ax.plot(
             *places,
             linestyle="",
             marker=marker,
@@ -82,6 +83,7 @@ def mark_events(data: xr.Dataset, x: NDArray[Any], y: NDArray[Any], ax: Axes) ->
             label=text,
             zorder=4,
         )
+    return drawn
 
 
 def events_at(points: xr.Dataset, shown: xr.Dataset, x: str, y: str) -> xr.Dataset:
@@ -109,11 +111,10 @@ def events_at(points: xr.Dataset, shown: xr.Dataset, x: str, y: str) -> xr.Datas
     return points.isel(point=np.flatnonzero(is_here))
 
 
-def mark_over_map(points: xr.Dataset, shown: xr.Dataset, x: str, y: str, ax: Axes) -> None:
-    """Mark events over a map, in its units, and name them below it."""
+def mark_over_map(points: xr.Dataset, shown: xr.Dataset, x: str, y: str, ax: Axes) -> list[Line2D]:
+    """Mark events over a map, in its units; returns the marks, one a kind, for its legend."""
     places = [points[name].values * scale_of(shown[name]).factor for name in (x, y)]
-    mark_events(points, places[0], places[1][:, None], ax)
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, handletextpad=0.4, columnspacing=1.0)
+    return mark_events(points, places[0], places[1][:, None], ax)
 
 
 def runs(data: xr.Dataset) -> Iterator[NDArray[np.intp]]:

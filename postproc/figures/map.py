@@ -25,7 +25,7 @@ from rubhpc.schema import HAS_VALUES, INFERRED, MISSING
 from rubhpc.study.sampling import CASE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     import xarray as xr
     from matplotlib.artist import Artist
@@ -101,9 +101,15 @@ def map(  # noqa: A001 - the name of the command
         if is_sample:
             scatter_maps(shown, value, across, up, axes, log)
         else:
-            value_maps(shown, value, axes, log, contours or 0, computed)
-            if marked is not None:
-                mark_over_map(marked, shown, across, up, axes[0])
+            value_maps(
+                shown,
+                value,
+                axes,
+                log,
+                contours or 0,
+                computed,
+                marks=lambda ax: [] if marked is None else mark_over_map(marked, shown, across, up, ax),
+            )
 
     if not facets:
         return Drawing(shown=shown, draw=draw, height=75.0, lines=tuple(notes))
@@ -125,6 +131,7 @@ def value_maps(
     log: bool = False,
     n_contour: int = 0,
     computed: bool = False,
+    marks: Callable[[Axes], Sequence[Artist]] = lambda _: [],
 ) -> Sequence[Axes]:
     """Draw maps from `map_data`, one for each value of its facets, in one scale of colours.
 
@@ -141,6 +148,8 @@ def value_maps(
         Contour lines at about so many levels.
     computed : bool
         Whether dots mark the cases that were computed.
+    marks : callable
+        Draws over the first map, and returns what the legend is to name.
     """
     *facets, y_name, x_name = [str(name) for name in data[value].dims]
     data = data.sortby([*facets, y_name, x_name])
@@ -171,6 +180,7 @@ def value_maps(
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
         if note := paint.note(cells):
             write_over(ax, note)
+    handles |= {str(mark.get_label()): mark for mark in marks(axes[0])}
     tick_levels(axes[0], "x", data[x_name])
     tick_levels(axes[0], "y", data[y_name])
     if paint.has_bar:

@@ -123,8 +123,9 @@ def test_events_are_marked_over_a_map(store, synthetic_path):
     shown = xr.Dataset(coords={"clearance": clearance, "speed_ratio": ratio, "friction": 0.3})
     marked = events_at(points, shown, "clearance", "speed_ratio")
     ax = Figure().subplots()
-    mark_over_map(marked, shown, "clearance", "speed_ratio", ax)
+    named = mark_over_map(marked, shown, "clearance", "speed_ratio", ax)
     drawn = {line.get_label(): line for line in ax.lines}
+    assert [line.get_label() for line in named] == list(drawn)
     assert drawn["grazing"].get_xdata().max() == pytest.approx(122.3228824, abs=1e-3)
     assert set(drawn["grazing"].get_ydata()) == {0.74, 0.75}
     with pytest.raises(InputError, match="there is none at the values of the map"):
