@@ -231,7 +231,7 @@ class Model:
     carriers: tuple[CarrierModel, ...] = ()
     probe: ProbeRows | None = None
 
-    @property
+    @cached_property
     def bodies(self) -> tuple[Body, ...]:
         """Rotor, then stators: the order of every vector over all bodies.
 
@@ -254,7 +254,7 @@ class Model:
         later = {number - 1 for carrier in self.carriers for number in carrier.stators[1:]}
         return [i for i in range(len(self.stators)) if i not in later]
 
-    @property
+    @cached_property
     def body_start(self) -> tuple[int, ...]:
         """First row of each body among all degrees of freedom, and the number of all: (n_body + 1,)."""
         return tuple(accumulate((body.n_dof for body in self.bodies), initial=0))

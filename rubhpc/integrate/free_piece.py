@@ -102,10 +102,8 @@ class Spin:
             if self._begun is None:
                 start = self._initial
                 self._begun = start_of(start, setup, self._clearance) if isinstance(start, Initial) else start
-            begun = self._begun
-            passed = pass_piece(
-                setup, length, self._clearance, self._friction, begun, self._earlier, self._check
-            )
+            case = setup, length, self._clearance, self._friction, self._begun, self._earlier, self._check
+            passed = pass_piece(*case, is_balanced=True)
             if passed.reason:
                 return self._taken(passed, acceleration, length, per_revolution, torque, np.zeros(6))
             flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)

@@ -12,7 +12,6 @@ from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.divergence import displacement_reason, energy_reason
 from rubhpc.integrate.march import ALL_SAMPLES, March
 from rubhpc.integrate.record import State
-from rubhpc.integrate.reduction import kernel_bodies
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+_BEGUN = new_progress(1)  # to fill one anew takes a hundred times as long
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
 
 
@@ -69,12 +69,10 @@ class ModalMarch(March):
             contact_level=math.floor(math.log2(min(setup.interval, turn / CONTACT_STEPS) / setup.tick)),
             n_sample=0,
         )
-        self.bodies = kernel_bodies(
-            setup.reduced, setup.model, friction, self._clearance, setup.law, setup.displacement_limit
-        )
+        self.bodies = setup.bodies(friction, self._clearance)
         self._motion = self._reduce(initial)
         self._recorder = recorder(setup.model.n_place, setup.model.n_probe)
-        records = new_progress(1)
+        records = _BEGUN.copy()
         self.progress: Progress = records[0]
         self._bare_progress = bare(records)[0]  # the same, for kernels
 
@@ -160,10 +158,10 @@ class ModalMarch(March):
         if not is_at_event:
             motion = self.motion_of(self.progress, self._z)
         seen = setup.reduced.translations @ motion[: self.bodies.stiffness.shape[0]]
-        if np.any(accumulator.highest >= accumulator.lowest):  # a sample was taken
+        if (accumulator.highest >= accumulator.lowest).any():  # a sample was taken
             reached = np.maximum(accumulator.highest[:2], -accumulator.lowest[:2])
             seen[:2] = np.maximum(np.abs(seen[:2]), reached)
-        if not np.all(np.abs(seen) <= limit):
+        if not (np.abs(seen) <= limit).all():
             return displacement_reason(setup.model, seen, limit)
         if not is_at_event and not self._energy_of(motion) <= setup.energy_limit:
             return energy_reason(setup.energy_limit)

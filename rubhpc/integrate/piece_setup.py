@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.contact_mode import Solved
     from rubhpc.integrate.mode_library import ModeLibrary
     from rubhpc.integrate.reduction import ReducedModel
+    from rubhpc.kernels.contact_modes import Reduced
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -41,6 +42,7 @@ class HeldMatrices:
         self.model, self.reduced = model, reduced
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
         self.kept = KeptParts()
+        self.bodies: dict[float, Reduced] = {}  # of each friction, but for what a piece changes
         self._phasor, self._reach, self._acceleration = phasor, reach, acceleration
         self._libraries: dict[tuple[float, int, int], RetunedLibrary] = {}
 
@@ -98,6 +100,19 @@ class PieceSetup(ModalSetup):
     def _known(self) -> Solved:
         return self.held.kept
 
+    def bodies(self, friction: float, clearance: Floats) -> Reduced:
+        """The reduced bodies of a case as kernels take them; clearance (q,), m."""
+        known = self.held.bodies
+        if friction not in known:
+            known[friction] = super().bodies(friction, clearance)
+        of_pieces = known[friction]
+        return of_pieces._replace(
+            force_cosine=self.reduced.force[0].copy(),
+            force_sine=self.reduced.force[1].copy(),
+            rim_speed=of_pieces.radius * abs(self.spin),
+            clearance=clearance,
+        )
+
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, which serve until another piece asks for them."""
         return self.held.tuned(self, friction)
@@ -137,10 +152,12 @@ class Pieces:
         lag = acceleration * duration**2 / 12.0
         factor = (speed**2 - 1j * acceleration) * complex(np.exp(1j * (angle - lag)))
         phasor = self._phasor * factor
+        reduced = replace(held.reduced, spin=speed, force=np.stack([phasor.real, -phasor.imag]))
+        reduced.__dict__["translations"] = held.reduced.translations  # which need no computing anew
         return PieceSetup(
             scheme=fastest.scheme,
             model=held.model if fastest.free_spin is None else held.driven(torque, acceleration),
-            reduced=replace(held.reduced, spin=speed, force=np.stack([phasor.real, -phasor.imag])),
+            reduced=reduced,
             spin=speed,
             step=fastest.step,
             contact_step=fastest.contact_step,

@@ -11,6 +11,7 @@ alternates. The error falls with the square of the piece.
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -146,7 +147,7 @@ class Passed(NamedTuple):
     accumulators: list[Accumulator]  # of each revolution in it, or of the part of one that it is
     n_step: int
     final: State
-    gained: float  # mechanical energy, J
+    gained: float  # mechanical energy, J; NaN where it was not asked for
     reason: str  # why it could not go on, or ""
 
 
@@ -158,8 +159,13 @@ def pass_piece(
     state: State,
     earlier: Accumulator,
     check: Callable[[], None] | None,
+    *,
+    is_balanced: bool = False,
 ) -> Passed:
-    """Take one piece; `earlier` holds the contact forces before it, its clock that of the piece."""
+    """Take one piece; `earlier` holds the contact forces before it, its clock that of the piece.
+
+    `is_balanced`: its energies are asked for.
+    """
     model = setup.model
     stride = min(n_sample, setup.samples_per_revolution)
     for kind in (march_of(setup.scheme, setup), ContactSteppingMarch):
@@ -168,7 +174,7 @@ def pass_piece(
         reason = None
         try:
             march = kind(setup, clearance, friction, state, check)
-            before = march.energy()
+            before = march.energy() if is_balanced else math.nan
             for first in range(0, n_sample, stride):
                 accumulator = following_accumulator(accumulators[-1] if accumulators else earlier, 0.0)
                 accumulator.is_touching[:] = march.touching()
@@ -179,6 +185,6 @@ def pass_piece(
         except NoClosedForm:  # contacts that chatter: short steps need no events
             continue
         add_sag(samples, accumulators[0], model)
-        gained = march.energy() - before
+        gained = march.energy() - before if is_balanced else math.nan
         return Passed(samples.whole, accumulators, march.n_step, march.final(), gained, reason or "")
     raise AssertionError  # short steps always go on

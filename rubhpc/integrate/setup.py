@@ -28,7 +28,7 @@ from rubhpc.integrate.mode_library import (
 from rubhpc.integrate.mode_tables import tabulate
 from rubhpc.integrate.packing import Packed, law_of, pack
 from rubhpc.integrate.penalty_mode import Penalty
-from rubhpc.integrate.reduction import ReducedModel, directions, reduce_model
+from rubhpc.integrate.reduction import ReducedModel, directions, kernel_bodies, reduce_model
 from rubhpc.integrate.truncation import MOST_MODES, kept_modes, modal_error, sufficient_accuracy
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.laws import MULTIPLIER
@@ -38,15 +38,19 @@ from rubhpc.study.tables import SEARCH_STEP, check_bent
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from rubhpc.fem.free_spin import FreeSpin
     from rubhpc.fem.model import Model
     from rubhpc.integrate.contact_mode import Solved
-    from rubhpc.kernels.contact_modes import ModeTables
+    from rubhpc.kernels.contact_modes import ModeTables, Reduced
     from rubhpc.kernels.laws import Law
     from rubhpc.rig.probes import Probe
     from rubhpc.rig.rig import Rig
     from rubhpc.study.drive_law import DriveLaw
     from rubhpc.study.study import Contact, Integrator
+
+    Floats = NDArray[np.float64]
 
 L = TypeVar("L", bound=ModeLibrary)
 FINEST_TICK = 1.5e-9  # s
@@ -147,6 +151,10 @@ class ModalSetup:
             f"it needs more than {MOST_MODES} modes: those left out may change it by "
             f"{100 * self.modal_error:.2g} %; accuracy = {fix:.0e} keeps all"
         )
+
+    def bodies(self, friction: float, clearance: Floats) -> Reduced:
+        """The reduced bodies of a case as kernels take them; clearance (q,), m."""
+        return kernel_bodies(self.reduced, self.model, friction, clearance, self.law, self.displacement_limit)
 
     @cached_property
     def interval(self) -> float:

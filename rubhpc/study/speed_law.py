@@ -107,16 +107,17 @@ def cut(law: SpeedLaw, per_revolution: int, pieces_per_revolution: int | None = 
             raise InputError(f"pieces_per_revolution: {problem}; choose another number")
         return np.arange(n * pieces_per_revolution + 1) * (per_revolution // pieces_per_revolution)
     time, _, rate = law.at_angle(2.0 * np.pi * np.arange(n + 1))
+    bent = np.concatenate([[0], np.cumsum(np.diff(rate) != 0.0)])  # bends of the law before each revolution
     cuts, turn = [0], 0
     while turn < n:
         count = LONGEST_PIECE
         while count > 1 and (
             turn + count > n
-            or np.ptp(rate[turn : turn + count]) > 0.0  # a bend of the law is within
+            or bent[turn + count - 1] > bent[turn]
             or abs(rate[turn]) * (time[turn + count] - time[turn]) ** 2 > 12.0 * LAG
         ):
             count //= 2
-        steepest = np.abs(rate[turn : turn + 2]).max()
+        steepest = max(abs(rate[turn]), abs(rate[turn + 1]))
         parts, lag = 1, steepest * (time[turn + 1] - time[turn]) ** 2 / 12.0
         while count == 1 and lag > LAG * parts**2 and per_revolution % (2 * parts) == 0:
             parts *= 2
