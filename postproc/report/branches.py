@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from postproc.figures.bifurcation import bifurcation
 from postproc.figures.multipliers import multipliers
-from postproc.figures.style import house_style, new_figure
+from postproc.report.pictures import MOST_DRAWN, picture
 from postproc.store.branch_points import followed, is_of_points, other_axes
 from postproc.store.units import displayed
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from postproc.figures.drawing import Drawing
-
-MOST_DRAWN = 6  # cases: a picture takes 50 kB
 
 
 def branch_facts(store: xr.Dataset) -> dict[str, Any]:
@@ -46,22 +40,11 @@ def branch_facts(store: xr.Dataset) -> dict[str, Any]:
         cases.append(
             {
                 "label": ", ".join(f"{label.replace('$', '')} {float(value):.6g}" for value, label in shown),
-                "diagram": _picture(bifurcation(points)),
-                "multipliers": _picture(multipliers(points)),
+                "diagram": picture(bifurcation(points)),
+                "multipliers": picture(multipliers(points)),
             }
         )
     number = len(settings)
     left = f"; the first {MOST_DRAWN} of {number} cases are drawn" if number > MOST_DRAWN else ""
     text = f"{store.sizes['point']} periodic motions along {followed(store)}{left}."
     return {"text": text, "cases": cases}
-
-
-def _picture(drawing: Drawing) -> str:
-    """A figure as an address that contains it."""
-    n_row, n_column = drawing.panels or (1, 1)
-    content = io.BytesIO()
-    with house_style():
-        figure, axes = new_figure(n_row, drawing.height, drawing.width, n_column, is_shared=False)
-        drawing.draw(axes)
-        figure.savefig(content, format="png", dpi=110)
-    return "data:image/png;base64," + base64.b64encode(content.getvalue()).decode()

@@ -151,17 +151,17 @@ def drawn_rows(store: xr.Dataset) -> list[dict[str, str]]:
 
 
 def study_rows(store: xr.Dataset) -> list[tuple[str, str]]:
-    """Return how contact, integration and recording were set, from the attributes of the store."""
+    """Return how speed, contact, integration and recording were set, from the attributes of the store."""
     study = store.attrs.get("study")
     tables = study if isinstance(study, dict) else {}
     rows = []
-    for table in ("contact", "integrator", "record"):
+    for table in ("run_up", "drive", "contact", "integrator", "record"):
         settings = tables.get(table)
         if isinstance(settings, dict):
             text = ", ".join(
                 f"{k.replace('_', ' ')} {_value(v)}" for k, v in settings.items() if v is not None
             )
-            rows.append((table.capitalize(), text))
+            rows.append((table.replace("_", "-").capitalize(), text))
     return rows
 
 

@@ -27,6 +27,7 @@ from postproc.report.facts import (
 from postproc.report.grid import Measures, described_axes, validity_text
 from postproc.report.linear_design import design_facts
 from postproc.report.packing import as_text
+from postproc.report.run_ups import run_up_facts
 from postproc.report.side_view import description, side_view
 from postproc.store.axes import source
 from postproc.store.rig_of_case import natural_frequencies, rig_axes, rig_of, stator_places
@@ -47,7 +48,8 @@ class Page:
     """A page on the current state of a store; `measures` and `cases` are what it shows."""
 
     def __init__(self, store: xr.Dataset) -> None:
-        if is_run_up(store):  # measures are shown, revolutions by the figures of run-ups
+        self._whole = store
+        if is_run_up(store):  # the maps show measures, pictures the revolutions
             store = measures_alone(store)
         self._store = store
         self.measures = Measures(store)
@@ -108,6 +110,7 @@ class Page:
             "n_done": len(self.cases.done),
             "design": design_facts(store),
             "branches": branch_facts(store),
+            "run_ups": run_up_facts(self._whole),
         }
 
     def _embedded_facts(self, names: list[str], *, is_served: bool) -> dict[str, Any]:

@@ -122,9 +122,13 @@ def test_figures_of_one_case_see_its_signals(folder):
             spectrum(store, signal)
 
 
-def test_a_report_shows_the_measures(folder):
-    page = Page(rubhpc.open(folder / "run_ups.zarr"))
-    assert "peak_contact_force" in page.html()
+def test_a_report_shows_measures_and_pictures(folder):
+    page = Page(rubhpc.open(folder / "run_ups.zarr")).html()
+    assert "peak_contact_force" in page
+    assert "start 188.496, stop 157.08" in page
+    assert page.count('alt="Speed, ') == page.count('alt="Bode plot, ') == 4
+    assert 'alt="Waterfall' not in page  # of 13 revolutions at most
+    assert "Bode plot and waterfall of left." in page
 
 
 @pytest.mark.parametrize(
