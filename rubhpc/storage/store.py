@@ -279,6 +279,17 @@ class Store:
         """Whether the packed arrays are up to date with the journals."""
         return self._packed_state() == self._journal_state().encode()
 
+    def is_packing_garbled(self) -> bool:
+        """Whether what is noted of the packing is no earlier state of the journals: names and their sizes."""
+        noted = self._packed_state()
+        if noted is None:
+            return False
+        sizes = {path.name: path.stat().st_size for path in journals(self.journal_directory)}
+        try:
+            return not all(0 <= size <= sizes[name] for name, size in json.loads(noted))
+        except (ValueError, TypeError, KeyError, RecursionError):
+            return True
+
     def _packed_state(self) -> bytes | None:
         """State of the journals when they were packed; None where that is unknown."""
         try:

@@ -160,7 +160,12 @@ def _misplaced(store: Store) -> list[str]:
 
 
 def _damaged_packed(store: Store, ledger: Ledger) -> tuple[str, ...]:
-    """Packed arrays that do not hold what the journals say, though these have not changed since."""
+    """Packed arrays that do not hold what the journals say, though these have not changed since.
+
+    Where the note of that is garbled, it is named: nobody knows whether they should.
+    """
+    if store.is_packing_garbled():
+        return ("packed.json",)
     if not store.is_packed():
         return ()
     damaged = []

@@ -122,3 +122,24 @@ def test_what_cannot_be_used_is_refused(store, changed, where, value):
 def test_the_manifest_of_a_store_is_accepted(store):
     assert Manifest.read(store).refine is not None
     assert not verify(store)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"null",
+        b"[1]",
+        b"\xff",
+        b"[" * 100_000,
+        b'[["other", 1]]',
+        b'[["run000001-rank00000.journal", 1e9]]',
+    ],
+    ids=lambda content: repr(content[:12]),
+)
+def test_a_garbled_note_of_the_packing_is_named(store, content):
+    note = store / ".rubhpc" / "packed.json"
+    note.write_bytes(content)
+    assert verify(store).arrays == ("packed.json",)
+    assert not note.exists()  # the next run packs again
+    assert not verify(store)
