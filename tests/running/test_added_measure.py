@@ -19,7 +19,7 @@ from rubhpc.running import worker
 from rubhpc.running.driver import run
 from rubhpc.running.recompute import reproduce
 from rubhpc.schema import Variable
-from rubhpc.storage import growth, manifest, measures
+from rubhpc.storage import growth, measures, new_manifest
 from rubhpc.storage.manifest import PRIVATE
 from rubhpc.storage.measures import added_measures, unlisted_measures
 from rubhpc.storage.resume import bring_up_to_date, grid_for
@@ -81,7 +81,7 @@ def as_format_3(store: Path) -> None:
 def test_a_store_without_a_measure_is_resumed_and_grown(study, request, capsys, monkeypatch, is_format_3):
     with monkeypatch.context() as patch:
         if is_format_3:  # with the measures of its time
-            for module in (manifest, measures):
+            for module in (new_manifest, measures):
                 patch.setattr(module, "case_measures", unlisted_measures)
         run(study, quiet=True)
     if is_format_3:
