@@ -6,6 +6,8 @@ Tests in a browser are collected where there is one. Tests in parallel have a ca
 """
 
 import os
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -154,6 +156,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for name, places in (("slow", SLOW), ("serial", SERIAL)):
             if place.startswith(places):
                 item.add_marker(name)
+
+
+@pytest.fixture(autouse=True)
+def no_figures_left() -> Iterator[None]:
+    """Close what a test has drawn in pyplot, which complains of more than twenty figures."""
+    yield
+    if pyplot := sys.modules.get("matplotlib.pyplot"):
+        pyplot.close("all")
 
 
 @pytest.fixture(scope="session")

@@ -56,6 +56,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+OBSERVED = 1e-4  # of the tolerance of loads, while recording: energies are summed up by Simpson's rule
+
 
 @jit_lean_sum
 def advance_curved(
@@ -89,6 +91,7 @@ def advance_curved(
     interval = clock.tick * (1 << clock.sample_level)
     highest_level = tables.power_re.shape[1] - 1
     last_step = progress.n_step + MOST_STEPS
+    tolerance *= OBSERVED if is_recorded else 1.0
     progress.halving_level, progress.is_after_event = NONE, 0
     while True:
         if progress.wanted >= 0:
@@ -160,7 +163,7 @@ def advance_curved(
             if is_recorded:
                 if age != progress.contact_age:
                     progress.contact_age = age
-                    work.span[RESOLVED] = resolved_contact(tables, mode, z_re, z_im)
+                    work.span[RESOLVED] = resolved_contact(tables, mode, work.transient[0], work.transient[1])
                 level = min(level, clock.contact_level)
                 while level > FORCED_LEVEL and (1 << level) * clock.tick > work.span[RESOLVED]:
                     level -= 1

@@ -38,9 +38,6 @@ def unseen() -> Iterator[None]:
     with matplotlib.rc_context():
         matplotlib.use("agg")
         yield
-        from matplotlib import pyplot
-
-        pyplot.close("all")
 
 
 @pytest.mark.parametrize(

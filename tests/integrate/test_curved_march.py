@@ -63,21 +63,21 @@ def test_short_steps_come_to_the_curved_motion_as_they_are_halved(monkeypatch, n
 
 
 @pytest.mark.parametrize("geometry", ["linear", pytest.param("second_order", marks=pytest.mark.long)])
-def test_error_falls_with_the_fourth_power_of_the_steps_and_faster(monkeypatch, geometry):
+def test_error_falls_with_the_tolerance_and_steps_rise_with_its_fourth_root(monkeypatch, geometry):
     """A shaft that rests on its stator, so that no event ends a step; the modes are the same throughout."""
     keys = {"rotor.gravity": 9.81, "stator.angle": math.pi, "rotor.unbalance.mass": 5e-4}
     rig = with_keys(trial_rig(1), keys | {"stator.geometry": geometry})
     given = {"speed": 170.0, "clearance": "20 um", "friction": 0.4, "normal": "updated"}
     given |= {"transient": 1, "revolutions": 1, "samples_per_revolution": 16}
     records = []
-    for tolerance in (1e-9, 1e-4, 1e-7):
+    for tolerance in (1e-9, 1e-3, 1e-7):
         monkeypatch.setattr(curved_march, "LOAD_TOLERANCE", tolerance / 1e-9)
         records.append(simulate(rig, **given, accuracy=1e-9))
     known, coarse, fine = records
     assert known.contact_fraction[0] == pytest.approx(1.0)
-    gain = distance(coarse, known) / distance(fine, known)
-    assert np.log(gain) / np.log(fine.steps / coarse.steps) > 4.0
-    assert distance(coarse, known) < 1e-5
+    assert distance(coarse, known) < 2e-5
+    assert distance(coarse, known) / distance(fine, known) > 1e3
+    assert fine.steps < 1e4**0.25 * coarse.steps
 
 
 def test_error_is_controlled():
@@ -179,7 +179,7 @@ def test_reversed_spin_mirrors_the_motion():
 
 def test_run_goes_on_amid_a_contact():
     rig = trial_rig(2)
-    for phase in np.linspace(0, 2 * np.pi, 24):
+    for phase in np.linspace(5.5, 5.5 + 2 * np.pi, 24):  # the first or second is held
         turned = with_keys(rig, {"rotor.unbalance.phase": phase})
         first = simulate(turned, **(UPDATED | {"revolutions": 1, "accuracy": 1e-6}))
         if first.final.contact_force.max() > 1.0:
