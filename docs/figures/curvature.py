@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import itertools
 import sys
+import time
+from collections import defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -76,14 +78,21 @@ def simulate(stiffness: str, speed: float, clearance: float, friction: float, mo
     )
 
 
-def cases(stiffness: str) -> dict[str, list[Case]]:
-    """Compare the linear models with the best one, case by case."""
+def cases(stiffness: str, spent: dict[str, float]) -> dict[str, list[Case]]:
+    """Compare the linear models with the best one, case by case; add the time of each to `spent`, s."""
     *linear, best = MODELS
     found: dict[str, list[Case]] = {model: [] for model in linear}
+    for model in MODELS:  # kernels are compiled before times count
+        simulate(stiffness, 0.75, 0.5, 0.3, model)
     for place in itertools.product(SPEEDS, CLEARANCES, FRICTIONS):
-        known = simulate(stiffness, *place, best)
+        records = {}
+        for model in MODELS:
+            began = time.process_time()
+            records[model] = simulate(stiffness, *place, model)
+            spent[model] += time.process_time() - began
+        known = records[best]
         for model in linear:
-            record = simulate(stiffness, *place, model)
+            record = records[model]
             case = Case(
                 ratio=float(record.foreshortening_ratio[0]),
                 excess=float(record.peak_contact_force[0] / known.peak_contact_force[0]),
@@ -94,16 +103,17 @@ def cases(stiffness: str) -> dict[str, list[Case]]:
     return found
 
 
-def table(found: list[Case]) -> str:
-    """Rows of cases, median, least and largest excess, and other periods, by `foreshortening_ratio`."""
+def table(found: dict[str, list[Case]]) -> str:
+    """Rows of cases, median, range and other periods by `foreshortening_ratio`, of each linear model."""
     rows = []
     for low, high in itertools.pairwise(BINS):
-        inside = [case for case in found if low <= case.ratio < high]
-        if inside:
-            excess = [case.excess for case in inside]
-            other = sum(case.is_other_period for case in inside)
-            spread = f"{np.median(excess):.2f} | {min(excess):.2f} to {max(excess):.2f}"
-            rows.append(f"| {low:g} to {high:g} | {len(inside)} | {spread} | {other} |")
+        inside = [[case for case in those if low <= case.ratio < high] for those in found.values()]
+        excess = [[case.excess for case in those] for those in inside]
+        counts = " / ".join(str(len(those)) for those in inside)
+        medians = " / ".join(f"{np.median(those):.2f}" for those in excess)
+        spread = f"{min(map(min, excess)):.2f} to {max(map(max, excess)):.3g}"
+        other = " / ".join(str(sum(case.is_other_period for case in those)) for those in inside)
+        rows.append(f"| {low:g} to {high:g} | {counts} | {medians} | {spread} | {other} |")
     return "\n".join(rows)
 
 
@@ -137,13 +147,18 @@ def draw() -> None:
         figure = Figure(figsize=(2 * COLUMN_WIDTH, 0.85 * COLUMN_WIDTH), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.subplots(1, 2, sharey=True)
+        together: dict[str, list[Case]] = defaultdict(list)
         for ax, stiffness, letter in zip(axes, STIFFNESSES, "ab", strict=True):
-            found = cases(stiffness)
-            for model, those in found.items():
-                other = sum(case.is_other_period for case in those)
-                print(f"{stiffness}, {model}: {len(those)} cases, {other} with another period")
-                print(table(those))
+            spent = dict.fromkeys(MODELS, 0.0)
+            found = cases(stiffness, spent)
             draw_excess(ax, found).set_title(f"({letter}) {stiffness}", loc="left")
+            times = ", ".join(f"{model} {taken:.1f} s" for model, taken in spent.items())
+            print(f"{stiffness}, processor time: {times}")
+            for model, those in found.items():
+                together[model] += those
+        print(table(together))
+        bent = [case.deflection for case in together["linear, fixed normal"]]
+        print(f"second order: deflection over length {min(bent):.2g} to {max(bent):.2g}")
         axes[0].set_ylabel("peak force over that with\nsecond order and updated normal")
         axes[0].legend(loc="upper left")
         save(figure, Path(__file__).with_suffix(".png"))
