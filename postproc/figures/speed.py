@@ -60,10 +60,10 @@ def draw_speed(data: xr.Dataset, axes: list[Axes], critical: Sequence[float] = (
     for value in critical:
         top.axhline(RPM * value, color="0.6", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0.5)
         top.annotate(
-            f"critical, {RPM * value:.0f}",
+            f"critical, {RPM * value:.0f} rpm",
             (1.0, RPM * value),
             xycoords=("axes fraction", "data"),
-            xytext=(-2, 1),
+            xytext=(-7, 1),
             textcoords="offset points",
             ha="right",
             va="bottom",

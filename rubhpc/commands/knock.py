@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -71,32 +71,16 @@ def knock(
     progress = path.with_name(f".{path.stem}.progress")
     data_path = check_data_path(data) if data else None
     largest = None if most is None else quantity(most, "N*s", "--most")
+    search: dict[str, Any] = {"angles": angles, "nodes": nodes, "most": largest, "tolerance": tolerance}
+    search |= {"progress": progress, "report": _report()}
     if launch().size > 1:
         if workers > 1:
             raise InputError(
                 "--workers: mpirun has started several processes already; leave one of the two out"
             )
-        found = least_knock_on(
-            connect(),
-            lambda: read_study(study, trust_rig=trust_rig),
-            angles=angles,
-            nodes=nodes,
-            most=largest,
-            tolerance=tolerance,
-            progress=progress,
-            report=_report(),
-        )
+        found = least_knock_on(connect(), lambda: read_study(study, trust_rig=trust_rig), **search)
     else:
-        found = least_knock(
-            read_study(study, trust_rig=trust_rig),
-            angles=angles,
-            nodes=nodes,
-            most=largest,
-            tolerance=tolerance,
-            workers=workers,
-            progress=progress,
-            report=_report(),
-        )
+        found = least_knock(read_study(study, trust_rig=trust_rig), workers=workers, **search)
     if launch().rank > 0:
         return 0
     drawing = resilience(found)

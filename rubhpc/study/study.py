@@ -233,19 +233,17 @@ def read_study(
             _table(table, "branch", file), grid, rig, sample, file, is_refined=refine is not None
         )
     run_up = build(RunUpKeys, table["run_up"], file, "run_up") if "run_up" in table else None
-    axes = _read_axes(grid, rig, sample, file, branch.along if branch else "")
     drive = build(DriveKeys, table["drive"], file, "drive") if "drive" in table else None
-    if run_up is not None or drive is not None:
-        try:
-            refuse_speeds("run_up" if run_up else "drive", [axis.name for axis in axes])
-            changed = []
-            if run_up is not None:
-                changed.append(speed_axis(run_up.highest, "highest spin speed"))
-            elif drive is not None:
-                changed.append(speed_axis(first_speed(drive, axes), "first spin speed"))
-        except InputError as error:
-            raise InputError(f"{place(file)}: {error}") from None
-        axes = (*axes, *changed)
+    axes = _read_axes(grid, rig, sample, file, branch.along if branch else "")
+    try:
+        if run_up is not None:
+            refuse_speeds("run_up", [axis.name for axis in axes])
+            axes = (*axes, speed_axis(run_up.highest, "highest spin speed"))
+        elif drive is not None:
+            refuse_speeds("drive", [axis.name for axis in axes])
+            axes = (*axes, speed_axis(first_speed(drive, axes), "first spin speed"))
+    except InputError as error:
+        raise InputError(f"{place(file)}: {error}") from None
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
         raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
     for name in ("contact", "initial"):
