@@ -25,12 +25,17 @@ if TYPE_CHECKING:
 
 FIRST, LONGER = 32, 2.0  # revolutions before the first search, and by what those before the next are more
 WATCHED = 16  # revolutions, at least, in which a case must draw near
-SHARE = 0.5  # of what the linear theory takes from the square of its distance, that it loses at least
+BLOCK = 4  # periods, over which it must lose distance
+HALF = 1 / 4  # of the square of its distance, that is left when it has drawn near
+SLOWER = 2  # times the periods that the linear theory needs for that, in which it must have done so
+LINEAR = 0.1  # of its distance: it is as near after a period to where the linear theory takes it
 THERE = 1e-8  # of the motion's size: a case as near as that has arrived
+TICKS = 4  # times what a point of the orbit turns in the resolution of events: nearer no simulation comes
 NEARER = 0.3  # of its distance after one revolution: a return as near as that speaks for a longer period
 MOST_ITERATIONS, LEAST_STEP = 6, 1 / 4  # of Newton's method
 MOST_EVENTS = 24, 8  # in a revolution: of one pair, and more for each further one
 MOST_SQUARINGS = 60  # of the monodromy matrix, until nothing is left of it
+MOST_PERIODS = 4000  # that the linear theory is followed
 
 
 class Passed(NamedTuple):
@@ -72,9 +77,14 @@ class Approach:
         """Square of the distance (2 n,)."""
         return float(apart @ self._form @ apart)
 
-    def expected(self, apart: Floats, n_period: int) -> float:
-        """What it is some periods later, while the distance is small."""
-        return self.square(np.linalg.matrix_power(self._monodromy, n_period) @ apart)
+    def periods_to(self, share: float, apart: Floats) -> int:
+        """Periods until the linear theory leaves no more than a share of the square."""
+        least = share * self.square(apart)
+        for n_period in range(MOST_PERIODS):
+            if self.square(apart) <= least:
+                return n_period
+            apart = self._monodromy @ apart
+        return MOST_PERIODS
 
 
 class _Walk:
@@ -132,8 +142,9 @@ def pass_directly(
     """March until a stable periodic motion is found that the case draws near to; go on from that motion.
 
     After 32, 64, 128, ... revolutions the periodic motion is solved for from where the case stands, and the
-    case is simulated further to see whether it draws near (`_draws_near`). Where it does not, or none is
-    found, it goes on, at the latest to the longest transient.
+    case is simulated further to see whether it draws near (`draws_near`). Where it does not, or none is
+    found, it goes on, at the latest to the longest transient. The next search comes 32 revolutions after the
+    last one has failed, or later.
 
     Parameters
     ----------
@@ -158,40 +169,51 @@ def pass_directly(
         piecewise, orbit = found
         force = piecewise.contact_force(orbit.states, orbit.motion)
         aim = piecewise.march.state_of(orbit.motion, force)
-        is_near, reason = _draws_near(walk, piecewise, orbit, motion)
+        is_near, reason = draws_near(walk, piecewise, orbit, motion, wanted - LONGEST_PERIOD)
         if is_near:
             walk.begin_at(aim)
         if is_near or reason is not None:
             return walk.ended(reason)
+        wanted = max(wanted, walk.n_revolution + FIRST)
 
 
-def _draws_near(
-    walk: _Walk, piecewise: PiecewiseMotion, orbit: Orbit, motion: Floats
+def draws_near(
+    walk: _Walk, piecewise: PiecewiseMotion, orbit: Orbit, motion: Floats, until: int
 ) -> tuple[bool, str | None]:
     """Simulate a case further: whether it draws near to a stable motion, or why it cannot go on.
 
-    Its distance (`Approach`) is to fall in every period of 16 revolutions or more, by half at least of what
-    the linear theory says.
+    Its distance (`Approach`) is to fall from one block of four periods to the next, to half of what it was
+    and for 16 revolutions or more, in no more than twice the periods that the linear theory needs; and in the
+    last 16 revolutions each period is to take it where that theory says, to a tenth of its distance. A motion
+    that beats about another one, or only passes by, does not. Where the distance does not fall it is watched
+    anew, until so many revolutions have passed.
     """
     approach = Approach(orbit.monodromy, np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n))
-    first = motion - orbit.motion
-    begun = last = approach.square(first)
-    there = THERE * piecewise.size(orbit.motion)
-    n_period = -(-WATCHED // orbit.period)
-    if piecewise.size(first) <= there:
-        return True, None
-    for _ in range(n_period):
-        reached, reason = walk.repeat(orbit.period)
-        if reached is None:
-            return False, reason
-        apart = reached - orbit.motion
-        was, last = last, approach.square(apart)
-        if piecewise.size(apart) <= there:
-            return True, None
-        if last >= was:
-            return False, None
-    expected = approach.expected(first, n_period)
-    return begun - last >= SHARE * (begun - expected), None
+    least = -(-WATCHED // orbit.period)
+    resolved = TICKS * abs(piecewise.setup.spin) * piecewise.setup.tick
+    there = max(THERE, resolved) * piecewise.size(orbit.motion)
+    apart = motion - orbit.motion
+    while walk.n_revolution < until:
+        first = block = last = approach.square(apart)
+        most = max(least, SLOWER * approach.periods_to(HALF, apart))
+        n_linear = 0
+        for n_period in range(1, most + 1):
+            if piecewise.size(apart) <= there:
+                return True, None
+            reached, reason = walk.repeat(orbit.period)
+            if reached is None:
+                return False, reason
+            expected = orbit.monodromy @ apart
+            apart = reached - orbit.motion
+            was, last = last, approach.square(apart)
+            n_linear = n_linear + 1 if approach.square(apart - expected) <= LINEAR**2 * was else 0
+            if last <= HALF * first and n_linear >= least:
+                return True, None
+            if n_period % BLOCK == 0:
+                if last >= block:
+                    break
+                block = last
+    return False, None
 
 
 def _search(

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 PHYSICS = 15  # version of the physics: raised whenever a study gives other results than before
+DIRECT = 2  # the same of studies with transient = "direct"
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
@@ -40,6 +41,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
     swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
     parts = {
         "physics": PHYSICS,
+        **({"direct": DIRECT} if study.recording.is_transient_direct else {}),
         "axes": [axis.name for axis in study.axes],
         **({"sweep": swept} if swept else {}),  # absent in older stores
         "rig": rig,

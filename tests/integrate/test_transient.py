@@ -1,11 +1,13 @@
 """Transients that end where the motion has settled."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from rubhpc import simulate
 from rubhpc.errors import InputError
-from rubhpc.integrate.direct import Approach
+from rubhpc.integrate.direct import Approach, draws_near
 from rubhpc.integrate.transient import has_settled
 from rubhpc.schema import REGIME
 from rubhpc.study.study import Recording
@@ -135,17 +137,83 @@ def test_laws_without_closed_form_settle_as_with_auto():
     assert np.array_equal(found.vertical, plain.vertical)
 
 
+def test_what_simulation_cannot_resolve_has_arrived():
+    """Events are resolved to some 1e-9 s, so that no simulation came nearer than 4e-8 of the motion."""
+    found = simulate(
+        "mokhtar2017", transient="direct", clearance_ratio=0.781, speed_ratio=1.3995, friction=0.379,
+        **LIGHT | {"overrides": {"stator.youngs_modulus": "28 GPa"}}, initial=simulate(
+            "mokhtar2017", transient=100, clearance_ratio=0.781, speed_ratio=1.3995, friction=0.379,
+            **LIGHT | {"overrides": {"stator.youngs_modulus": "28 GPa"}},
+        ).final,
+    )  # fmt: skip
+    assert found.transient_revolutions == 32
+    assert found.period == 1
+
+
 def test_distance_falls_though_the_energy_rises_at_first():
     monodromy = np.array([[0.9, 5.0], [0.0, 0.8]])
     approach, apart = Approach(monodromy, np.ones(2)), np.array([0.0, 1.0])
     energies, squares = [], []
-    for k in range(5):
-        assert approach.square(apart) == pytest.approx(approach.expected(np.array([0.0, 1.0]), k))
+    for _ in range(5):
         energies.append(apart @ apart)
         squares.append(approach.square(apart))
         apart = monodromy @ apart
     assert energies[1] > 20 * energies[0]
     assert -np.diff(squares) == pytest.approx(energies[:-1], rel=1e-9)
+    square = approach.square(np.array([0.0, 1.0]))
+    assert approach.periods_to(0.5 * (squares[3] + squares[2]) / square, np.array([0.0, 1.0])) == 3
+
+
+class Spiral:
+    """A motion about a periodic one whose multipliers are 0.98 e^(+-0.7 i), which it obeys or not."""
+
+    def __init__(self, change, begin=(0.3, 0.0), most=400):
+        self.change, self.at, self.most, self.n_revolution = change, np.array(begin), most, 0
+
+    def repeat(self, period):
+        if self.n_revolution == self.most:
+            return None, None
+        self.n_revolution += period
+        self.at = self.change(self.at)
+        return self.at + ORBIT.motion, None
+
+
+TURN = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
+ORBIT = SimpleNamespace(motion=np.array([1.0, 0.0]), monodromy=0.98 * TURN, period=1)
+STILL = SimpleNamespace(n=1, setup=SimpleNamespace(spin=1.0, tick=1e-9), size=np.linalg.norm)
+
+
+def size_of(at):
+    return float(np.linalg.norm(at))
+
+
+@pytest.mark.parametrize(
+    ("change", "after"),
+    [
+        (lambda at: 0.98 * TURN @ at, 35),  # to half: ln 2 / ln(1 / 0.98) periods
+        (lambda at: (0.98 - size_of(at) ** 2 / 9) * TURN @ at, 25),  # as fast at first, in the end as linear
+        (lambda at: TURN @ at, None),  # a torus
+        (lambda at: (1 + 0.1 * np.cos(np.arctan2(at[1], at[0]) / 2)) * TURN @ at, None),  # one that beats
+        (lambda at: (0.98 + 0.015 * (size_of(at) > 0.1)) * TURN @ at, None),  # too slow
+        (lambda at: 0.98 * TURN.T @ at, None),  # as fast, but it turns the other way: of another motion
+        (lambda at: (0.98 if size_of(at) > 0.22 else 1.03) * TURN @ at, None),  # it passes by
+    ],
+)
+def test_motion_that_draws_near_halves_its_distance_as_the_linear_theory_says(change, after):
+    walk = Spiral(change)
+    is_near, reason = draws_near(walk, STILL, ORBIT, walk.at + ORBIT.motion, 100)
+    assert reason is None
+    assert is_near == (after is not None)
+    if after is not None:
+        assert walk.n_revolution == pytest.approx(after, abs=3)
+    else:
+        assert walk.n_revolution >= 100
+
+
+def test_transient_ends_before_a_motion_has_drawn_near():
+    walk = Spiral(lambda at: 0.98 * TURN @ at, most=20)
+    assert draws_near(walk, STILL, ORBIT, walk.at + ORBIT.motion, 100) == (False, None)
+    assert walk.n_revolution == 20
 
 
 def test_transient_of_more_calls_than_a_double_has_doublings():
