@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import platform
 import struct
@@ -16,6 +17,7 @@ import zarr
 from google_crc32c import value as crc32c
 from numcodecs.blosc import Blosc
 from zarr.codecs import BloscCodec, Crc32cCodec
+from zarr.core.buffer import default_buffer_prototype
 from zarr.storage import MemoryStore
 
 from rubhpc.schema import ORDERS, TURNED, VARIABLES
@@ -60,10 +62,19 @@ def skeleton(grid: CaseGrid, manifest: Manifest) -> dict[str, bytes]:
     group = zarr.create_group(
         MemoryStore(files), zarr_format=3, attributes=_attributes(grid, accepted=manifest.accepted)
     )
-    for variable in manifest.variables:
-        _create(group, variable, manifest, chunk=manifest.chunk, shard=manifest.shard)
-    for variable in manifest.packed:
-        _create(group, variable, manifest, chunk=_packed_chunk(manifest.shape))
+    made: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for variable in (*manifest.variables, *manifest.packed):
+        # Most measures differ in name and attributes alone; zarr takes 2 ms an array and makes one of a kind.
+        kind = (variable in manifest.packed, variable.dims, variable.dtype, repr(variable.fill_value))
+        if kind in made:
+            metadata = made[kind] | {"attributes": _attributes_of(variable, manifest)}
+            files[f"{variable.name}/zarr.json"] = _as_json(metadata)
+            continue
+        if variable in manifest.packed:
+            _create(group, variable, manifest, chunk=packed_chunk(manifest.shape))
+        else:
+            _create(group, variable, manifest, chunk=manifest.chunk, shard=manifest.shard)
+        made[kind] = json.loads(files[f"{variable.name}/zarr.json"].to_bytes())
     with zarr.config.set(_WRITE_ALL):
         for name, (dims, values, attributes) in _static(grid).items():
             group.create_array(
@@ -113,13 +124,13 @@ def most_bytes(dtype: str, shape: tuple[int, ...]) -> int:
     return math.prod(shape) * np.dtype(dtype).itemsize + _LEAST
 
 
-def get_array(group: zarr.Group, name: str) -> zarr.Array[Any]:
-    """An array of a group by name, ready to be written whole."""
-    with zarr.config.set(_WRITE_ALL):
-        array = group[name]
-    if not isinstance(array, zarr.Array):
-        raise TypeError(f"{name} is no array")
-    return array
+def packed_chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Cases of a chunk of a packed array along each dimension of the grid."""
+    chunk = list(shape)
+    while math.prod(chunk) > _PACKED_CHUNK:
+        longest = chunk.index(max(chunk))
+        chunk[longest] = -(-chunk[longest] // 2)
+    return tuple(chunk)
 
 
 def checksum(values: NDArray[Any], start: int = 0) -> int:
@@ -136,12 +147,6 @@ def _create(
     shard: tuple[int, ...] = (),
 ) -> None:
     extent = manifest.extent(variable)
-    attributes: dict[str, Any] = {"units": variable.unit, "long_name": variable.long_name}
-    if "sample" in variable.dims:
-        # CF: a coordinate that is no dimension
-        attributes["coordinates"] = TURNED if manifest.has_revolutions else "revolution"
-    if variable.flags:
-        attributes |= _flags(variable.flags)
     group.create_array(
         variable.name,
         shape=(*manifest.shape, *extent),
@@ -152,21 +157,29 @@ def _create(
         fill_value=variable.fill_value,
         compressors=_CODECS,
         dimension_names=(*manifest.dims, *variable.dims),
-        attributes=attributes,
+        attributes=_attributes_of(variable, manifest),
     )
+
+
+def _attributes_of(variable: Variable, manifest: Manifest) -> dict[str, Any]:
+    attributes: dict[str, Any] = {"units": variable.unit, "long_name": variable.long_name}
+    if "sample" in variable.dims:
+        # CF: a coordinate that is no dimension
+        attributes["coordinates"] = TURNED if manifest.has_revolutions else "revolution"
+    if variable.flags:
+        attributes |= _flags(variable.flags)
+    return attributes
+
+
+def _as_json(metadata: dict[str, Any]) -> Buffer:
+    """Metadata as zarr writes them."""
+    text = json.dumps(metadata, indent=zarr.config.get("json_indent"))
+    return default_buffer_prototype().buffer.from_bytes(text.encode())
 
 
 def _flags(meanings: tuple[str, ...]) -> dict[str, Any]:
     """CF attributes that name the values 0, 1, ..."""
     return {"flag_values": list(range(len(meanings))), "flag_meanings": " ".join(meanings)}
-
-
-def _packed_chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
-    chunk = list(shape)
-    while math.prod(chunk) > _PACKED_CHUNK:
-        longest = chunk.index(max(chunk))
-        chunk[longest] = -(-chunk[longest] // 2)
-    return tuple(chunk)
 
 
 def _static(grid: CaseGrid) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]]:

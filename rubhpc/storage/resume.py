@@ -11,11 +11,12 @@ import numpy as np
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE
 from rubhpc.storage.differences import differences, is_other_version
+from rubhpc.storage.drafts import remove_drafts
 from rubhpc.storage.growth import finish_growth, grow
 from rubhpc.storage.manifest import Manifest, manifests
 from rubhpc.storage.measures import added_measures
 from rubhpc.storage.new_manifest import manifest_of
-from rubhpc.storage.store import Store, remove_drafts
+from rubhpc.storage.store import Store
 from rubhpc.storage.tidy import tidy
 from rubhpc.study.cases import CaseGrid
 

@@ -7,7 +7,6 @@ under `.rubhpc`.
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import shutil
@@ -19,17 +18,18 @@ from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
 import numpy as np
-import zarr
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.storage import layout
 from rubhpc.storage.block_files import BlockFiles
-from rubhpc.storage.disk import disk_errors, read_regular, remove, write_whole
-from rubhpc.storage.journal import Entry, Journal, journals
+from rubhpc.storage.disk import disk_errors, read_regular, write_whole
+from rubhpc.storage.drafts import remove_drafts
+from rubhpc.storage.journal import Entry, Journal
 from rubhpc.storage.ledger import Ledger, replay
-from rubhpc.storage.lock import Lock, process_state
+from rubhpc.storage.lock import Lock
 from rubhpc.storage.manifest import GROWTH, PRIVATE, Manifest
+from rubhpc.storage.packed import PackingNote, state_of_journals, write_packed
 from rubhpc.storage.parts import Parts
 from rubhpc.storage.refined import status_of
 
@@ -51,8 +51,7 @@ class Store:
     def reopen(self) -> None:
         """Take the manifest as it now is."""
         self.manifest = Manifest.read(self.path)
-        for name in ("arrays", "block_files"):
-            self.__dict__.pop(name, None)
+        self.__dict__.pop("block_files", None)
 
     @classmethod
     def create(cls, path: Path, grid: CaseGrid) -> Self:
@@ -122,7 +121,7 @@ class Store:
     def replay(self, *, with_measures: bool = True) -> Ledger:
         """What the journals say."""
         with disk_errors(self.journal_directory):
-            state = self._journal_state()
+            state = state_of_journals(self.journal_directory)
             ledger = replay(self.journal_directory, self.manifest.header, with_measures=with_measures)
         ledger.state = state  # that of before: parts of the study may write while this one reads
         return ledger
@@ -160,18 +159,6 @@ class Store:
                 checks = {name: crc32(files[name]) for name in damaged}
                 self.manifest = replace(self.manifest, files=self.manifest.files | checks)
             self.manifest.write(self.path)
-
-    @cached_property
-    def arrays(self) -> dict[str, zarr.Array[Any]]:
-        """The zarr arrays by name."""
-        names = sorted({name.partition("/")[0] for name in self.manifest.files if "/" in name})
-        try:
-            group = zarr.open_group(self.path, mode="r+", use_consolidated=False)
-            return {name: layout.get_array(group, name) for name in names}
-        except (KeyError, ValueError, TypeError, OSError) as error:
-            raise StoreError(
-                f"{self.path}: its metadata is damaged ({error}); run its study again to repair it"
-            ) from None
 
     def blocks(self) -> Iterator[tuple[int, ...]]:
         """First case of every block of the grid."""
@@ -256,10 +243,11 @@ class Store:
     def pack(self, ledger: Ledger) -> None:
         """Write status and measures of every case as arrays, unless nothing has been journalled since."""
         with disk_errors(self.path):
-            if self._packed_state() != ledger.state.encode():
-                for name, values in self.packed_values(ledger).items():
-                    self.arrays[name][...] = values
-                write_whole(self.private / "packed.json", ledger.state.encode())
+            if self.packing_note.read() != ledger.state.encode():
+                values = self.packed_values(ledger)
+                for variable in self.manifest.packed:
+                    write_packed(self.path, self.manifest, variable, values[variable.name])
+                self.packing_note.write(ledger.state)
 
     def packed_values(self, ledger: Ledger) -> dict[str, NDArray[Any]]:
         """Status and measures as the packed arrays are to hold them."""
@@ -275,42 +263,22 @@ class Store:
             packed[variable.name] = values.reshape(*shape, *self.manifest.extent(variable))
         return packed
 
+    @property
+    def packing_note(self) -> PackingNote:
+        """Note of what the packed arrays hold."""
+        return PackingNote(self.private / "packed.json", self.journal_directory)
+
     def is_packed(self) -> bool:
         """Whether the packed arrays are up to date with the journals."""
-        return self._packed_state() == self._journal_state().encode()
-
-    def is_packing_garbled(self) -> bool:
-        """Whether what is noted of the packing is no earlier state of the journals: names and their sizes."""
-        noted = self._packed_state()
-        if noted is None:
-            return False
-        sizes = {path.name: path.stat().st_size for path in journals(self.journal_directory)}
-        try:
-            return not all(0 <= size <= sizes[name] for name, size in json.loads(noted))
-        except (ValueError, TypeError, KeyError, RecursionError):
-            return True
-
-    def _packed_state(self) -> bytes | None:
-        """State of the journals when they were packed; None where that is unknown."""
-        try:
-            return read_regular(self.private / "packed.json")
-        except OSError:
-            return None
+        return self.packing_note.is_current()
 
     def refine(self, table: dict[str, Any] | None) -> None:
         """Have the map refined in this way, or (None) computed whole; needs the store's lock."""
         if self.manifest.refine != table:
             with disk_errors(self.path):
-                self.forget_packing()
+                self.packing_note.remove()
                 self.manifest = replace(self.manifest, refine=table)
                 self.manifest.write(self.path)
-
-    def forget_packing(self) -> None:
-        """Have the next run pack again."""
-        remove(self.private / "packed.json")
-
-    def _journal_state(self) -> str:
-        return json.dumps([[path.name, path.stat().st_size] for path in journals(self.journal_directory)])
 
 
 def case_checksum(data: dict[str, NDArray[Any]], i_case: int) -> int:
@@ -330,18 +298,3 @@ def is_damaged(path: Path) -> bool:
         return check is not None and crc32(read_regular(path / "zarr.json")) != check
     except (StoreError, OSError):
         return False
-
-
-def remove_drafts(path: Path, *, is_made: bool = False) -> None:
-    """Remove drafts of this store that killed processes of this host left; once it is made, all of them.
-
-    A process that still writes one of those finds the store when it cannot rename its draft.
-    """
-    path = Path(os.path.realpath(path))
-    prefix, host = f".{path.name}.", socket.gethostname()
-    for name in os.listdir(path.parent):  # no pattern: a store's name may hold anything
-        if name.startswith(f"{prefix}{host}.") and name.endswith(".draft"):
-            pid = name.rsplit(".", 2)[1]
-            state = process_state(int(pid)) if pid.isdigit() else None
-            if pid.isdigit() and (is_made or state is None or state[0] in "ZX"):
-                shutil.rmtree(path.parent / name, ignore_errors=True)

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import zarr
 
 from rubhpc.errors import StoreError
-from rubhpc.schema import DIVERGED, DONE, INFERRED, MISSING
+from rubhpc.schema import DIVERGED, DONE, INFERRED, MISSING, VARIABLES
 from rubhpc.storage.disk import is_filled
 from rubhpc.storage.growth import finish_growth
 from rubhpc.storage.journal import next_run
 from rubhpc.storage.manifest import GROWTH, PRIVATE
-from rubhpc.storage.regular_files import RegularFiles
+from rubhpc.storage.packed import read_packed
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.storage.tidy import unfit
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from numpy.typing import NDArray
 
     from rubhpc.storage.ledger import Ledger
 
@@ -84,7 +81,7 @@ def verify(path: Path) -> Damage:
         try:
             with store.lock():
                 if packed:
-                    store.forget_packing()
+                    store.packing_note.remove()
                 store.mark_missing(ledger, sorted(damaged), next_run(store.journal_directory), "verify")
         except (StoreError, OSError) as error:
             note = str(error)
@@ -141,9 +138,9 @@ def _trouble(store: Store, start: tuple[int, ...]) -> str:
 def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:
     """Cases whose line in a journal is cut short, damaged, or packed and yet no longer there."""
     never = ~ledger.is_known
-    packed = _read(store, "status")
+    packed = read_packed(store.path, store.manifest, VARIABLES["status"])
     lost = set(ledger.damaged_cases)
-    if packed is not None and packed.size == len(never):
+    if packed is not None:
         lost |= set(np.flatnonzero(~np.isin(packed.ravel(), (MISSING, INFERRED)) & never).tolist())
     return {flat: "its line in the journal is damaged or gone" for flat in lost if never[flat]}
 
@@ -164,30 +161,14 @@ def _damaged_packed(store: Store, ledger: Ledger) -> tuple[str, ...]:
 
     Where the note of that is garbled, it is named: nobody knows whether they should.
     """
-    if store.is_packing_garbled():
+    if store.packing_note.is_garbled():
         return ("packed.json",)
     if not store.is_packed():
         return ()
     damaged = []
-    for name, values in store.packed_values(ledger).items():
-        stored = _read(store, name)
-        if stored is None or stored.tobytes() != values.tobytes() or not _is_whole(store, name):
-            damaged.append(name)
+    values = store.packed_values(ledger)
+    for variable in store.manifest.packed:
+        stored = read_packed(store.path, store.manifest, variable)
+        if stored is None or stored.tobytes() != values[variable.name].tobytes():
+            damaged.append(variable.name)
     return tuple(damaged)
-
-
-def _is_whole(store: Store, name: str) -> bool:
-    """Whether all chunks of an array are there; one that is gone reads as missing values."""
-    array = _open(store, name)
-    return array.nchunks_initialized == array.nchunks
-
-
-def _open(store: Store, name: str) -> zarr.Array[Any]:
-    return zarr.open_array(RegularFiles(store.path / name), mode="r")
-
-
-def _read(store: Store, name: str) -> NDArray[np.generic] | None:
-    try:
-        return np.ascontiguousarray(_open(store, name)[...])
-    except Exception:  # whatever zarr and its codecs raise on damaged bytes
-        return None

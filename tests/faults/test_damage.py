@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running import run, stored_bytes, write_study
+from running import array_of, run, stored_bytes, write_study
 
 from rubhpc.running.driver import run as run_study
 from rubhpc.storage.store import Store
@@ -53,7 +53,7 @@ def change_byte(path: Path, at: int) -> None:
 @pytest.mark.parametrize(("name", "at"), [("vertical", -1), ("contact_force", 16), ("section_torsion", -3)])
 def test_a_byte_of_a_chunk_is_changed(store, finished, name, at):
     """The chunk holds the cases (0, 1, 0) and (0, 1, 1); a byte may belong to one or to both."""
-    change_byte(store / name / "c" / "/".join("010" + "0" * (Store(store).arrays[name].ndim - 3)), at)
+    change_byte(store / name / "c" / "/".join("010" + "0" * (array_of(store, name).ndim - 3)), at)
     named = named_by_verify(store)
     assert named
     assert named <= {(0, 1, 0), (0, 1, 1)}
@@ -62,7 +62,7 @@ def test_a_byte_of_a_chunk_is_changed(store, finished, name, at):
 
 def test_one_case_of_a_chunk_is_changed(store, finished):
     """Only its own numbers: the other case of the chunk is carried over."""
-    Store(store).arrays["torsion"][1, 0, 0, 7] += 1e-9
+    array_of(store, "torsion")[1, 0, 0, 7] += 1e-9
     assert named_by_verify(store) == {(1, 0, 0)}
     assert mended_by_run(store, finished) == 1
 
@@ -112,7 +112,7 @@ def test_what_is_no_case_is_written_anew_without_computing(store, finished, name
 def test_a_chunk_of_missing_values_is_deleted(store, finished):
     """Readers see the same numbers without it; it is named and written anew."""
     chunk = store / "lyapunov_exponent" / "c" / "0" / "0" / "0"
-    assert np.isnan(Store(store).arrays["lyapunov_exponent"][...]).all()
+    assert np.isnan(array_of(store, "lyapunov_exponent")[...]).all()
     chunk.unlink()
     assert verify(store).arrays == ("lyapunov_exponent",)
     assert mended_by_run(store, finished) == 0

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import xarray as xr
-from running import stored_bytes, write_study
+from running import array_of, stored_bytes, write_study
 
 from rubhpc import State, assemble, simulate
 from rubhpc.errors import InputError, StoppedEarly, StoreError
@@ -166,7 +166,7 @@ def test_a_stop_keeps_what_has_ended_of_a_chain(finished, tmp_path, monkeypatch,
 def test_what_is_damaged_in_a_chain_is_computed_again_and_nothing_else(finished, tmp_path, computed):
     study = copied(finished, tmp_path)
     store = Store(study.output)
-    array = store.arrays["section_vertical"]
+    array = array_of(store.path, "section_vertical")
     array[1, 0, 0, 0, 0] = array[1, 0, 0, 0, 0] + 1e-9  # 1.2, in the block before 1.5
     assert len(verify(study.output).cases) == 1
     run(study, quiet=True)

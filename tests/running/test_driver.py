@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import xarray as xr
-from running import journalled_cases, write_sample, write_study
+from running import array_of, journalled_cases, write_sample, write_study
 from stub_physics import Physics, record
 
 from rubhpc.errors import InputError, StoppedEarly, StoreError
@@ -310,7 +310,7 @@ def test_a_block_found_damaged_on_the_way_is_computed_whole(physics, study):
     run(study, quiet=True)
     physics.poison = lambda **_: None
     store = Store(study.output)
-    store.arrays["torsion"][0, 0, 0, 5] = 99.0
+    array_of(store.path, "torsion")[0, 0, 0, 5] = 99.0
     physics.frictions.clear()
     summary = run(study, quiet=True, retry_failed=True)
     assert summary.counts == (0, 12, 0, 0, 0)

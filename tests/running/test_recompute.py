@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from running import write_study
+from running import array_of, write_study
 
 from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.running import worker
@@ -47,7 +47,7 @@ def test_a_case_comes_out_again_to_the_last_bit_and_the_store_is_not_touched(fin
 def test_what_differs_is_named(finished, tmp_path, name):
     study = replace(finished, output=Path(shutil.copytree(finished.output, tmp_path / "copy.zarr")))
     store = Store(study.output)
-    array = store.arrays[name]
+    array = array_of(store.path, name)
     array[1, 0, 2, 0] = array[1, 0, 2, 0] + 1e-7
     with pytest.raises(StoreError, match=rf"differs from what is stored in {name}; rubhpc verify"):
         reproduce(study, store.manifest.case_id(8))

@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from running import killed_after, shards, write_study
+from running import array_of, killed_after, shards, write_study
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
@@ -234,7 +234,7 @@ def test_a_damaged_case_is_left_behind(tmp_path):
     grid = {"speed_ratio": [0.9], "clearance_ratio": [0.7], "friction": [0.1, 0.2]}
     store = open_store(grid_for(make_study(tmp_path, grid)))
     compute(store, all_of_it=True)
-    store.arrays["section_torsion"][0, 0, 1, 0] = 99.0
+    array_of(store.path, "section_torsion")[0, 0, 1, 0] = 99.0
     study = make_study(tmp_path, {**grid, "friction": [0.05, 0.2, 0.1]})
     bring_up_to_date(store, grid_for(study))
     assert store.replay().status.tolist() == [MISSING, MISSING, DONE]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import xarray as xr
-from running import write_study
+from running import array_of, write_study
 
 from rubhpc import __version__
 from rubhpc.errors import StoreError
@@ -120,7 +120,7 @@ def test_a_chunk_is_written_as_zarr_writes_it(store):
             path.unlink()
         for name, values in data.items():
             window = store.window(start)
-            store.arrays[name][window] = values.reshape(1, 1, -1, *values.shape[1:])
+            array_of(store.path, name)[window] = values.reshape(1, 1, -1, *values.shape[1:])
         assert [path.read_bytes() for path in store.chunk_files(start)] == ours
 
 
@@ -153,12 +153,12 @@ def test_metrics_are_packed_from_the_journals(store):
 def test_a_store_is_packed_again_only_when_there_is_news(store):
     journal(store, (0, 0, 0), fill(store, (0, 0, 0)))
     store.pack(store.replay())
-    store.arrays["steps"][0, 0, 0] = 77
+    array_of(store.path, "steps")[0, 0, 0] = 77
     store.pack(store.replay())
-    assert store.arrays["steps"][0, 0, 0] == 77
+    assert array_of(store.path, "steps")[0, 0, 0] == 77
     journal(store, (1, 0, 0), fill(store, (1, 0, 0)))
     store.pack(store.replay())
-    assert store.arrays["steps"][0, 0, 0] == 0
+    assert array_of(store.path, "steps")[0, 0, 0] == 0
 
 
 def test_lengthened_axes_keep_what_is_there(tmp_path, study, store):

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import psutil
 import pytest
+import zarr
 
 from rubhpc.storage import new_manifest
 
@@ -280,6 +281,12 @@ def stored_bytes(store: Path) -> dict[str, bytes]:
         for path in store.rglob("*")
         if path.is_file() and not {".rubhpc", "wall_time"} & set(path.relative_to(store).parts)
     }
+
+
+def array_of(store: Path, name: str) -> zarr.Array[Any]:
+    """Return an array of a store as zarr opens it; a chunk of nothing but missing values is written too."""
+    with zarr.config.set({"array.write_empty_chunks": True}):
+        return zarr.open_array(store / name, mode="r+")
 
 
 def journalled_cases(store: Path) -> int:

@@ -1,0 +1,25 @@
+"""Drafts of stores: each is built beside its place and renamed, so that no store is ever incomplete."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+from pathlib import Path
+
+from rubhpc.storage.lock import process_state
+
+
+def remove_drafts(path: Path, *, is_made: bool = False) -> None:
+    """Remove drafts of this store that killed processes of this host left; once it is made, all of them.
+
+    A process that still writes one of those finds the store when it cannot rename its draft.
+    """
+    path = Path(os.path.realpath(path))
+    prefix, host = f".{path.name}.", socket.gethostname()
+    for name in os.listdir(path.parent):  # no pattern: a store's name may hold anything
+        if name.startswith(f"{prefix}{host}.") and name.endswith(".draft"):
+            pid = name.rsplit(".", 2)[1]
+            state = process_state(int(pid)) if pid.isdigit() else None
+            if pid.isdigit() and (is_made or state is None or state[0] in "ZX"):
+                shutil.rmtree(path.parent / name, ignore_errors=True)
