@@ -239,7 +239,7 @@ class Model:
         """
         return (self.rotor, *(self.stators[i].body for i in self._first_on_body))
 
-    @property
+    @cached_property
     def stator_start(self) -> tuple[int, ...]:
         """First row of the body of each stator among all degrees of freedom, (n_stator,)."""
         starts = dict(zip(self._first_on_body, self.body_start[1:-1], strict=True))

@@ -16,7 +16,7 @@ from rubhpc.integrate.closed_form import closed_form_march
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
 from rubhpc.integrate.curved_march import CurvedMarch
-from rubhpc.integrate.direct import pass_directly
+from rubhpc.integrate.direct import Passed, pass_directly
 from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.friction_march import FrictionMarch
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
@@ -37,6 +37,7 @@ from rubhpc.integrate.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.proof import Solver
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.setup import ModalSetup, Scheme
+from rubhpc.integrate.shared_motions import shared_motions
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.schema import DONE, SECTION_NAMES, lyapunov_variables
@@ -69,7 +70,7 @@ MARCHES: dict[Scheme, Callable[..., March]] = {
 def march_of(scheme: Scheme, setup: Setup) -> Callable[..., March]:
     """Return what integrates a case by a scheme."""
     march = MARCHES[scheme]
-    return closed_form_march(setup.law) if march is EventDrivenMarch else march
+    return closed_form_march(setup) if isinstance(setup, ModalSetup) and march is EventDrivenMarch else march
 
 
 def run_case(
@@ -116,7 +117,8 @@ def run_case(
     record.measures["modal_error"] = setup.modal_error if isinstance(setup, ModalSetup) else math.nan
     if isinstance(setup, ModalSetup) and np.any(record.measures["contact_fraction"] != 0.0):
         record = replace(record, advice=setup.modes_missing)  # without contact no mode is excited
-    record = replace(record, final=with_overlap(record.final, setup, clearance))
+    if record.final.overlap is None:
+        record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - seconds_compiling() - began
     return record
 
@@ -160,7 +162,10 @@ def _integrate(
 
     begin = partial(_solve_from, setup, clearance, friction)
     if recording.is_transient_direct and isinstance(march, EventDrivenMarch) and march.has_closed_form:
-        march, reason, n_transient, n_step = pass_directly(march, start, begin, recording)
+        passed, record = _pass_directly(march, start, begin, initial, setup, clearance, friction, recording)
+        if record is not None:
+            return record
+        march, reason, n_transient, n_step = passed.march, passed.reason, passed.n_revolution, passed.n_step
     else:
         reason, n_transient = pass_transient(march, recording)
     if reason is not None:  # what led to it is the record
@@ -226,6 +231,39 @@ def _integrate(
         left_closed_form=n_left + march.n_left,
     )
     return record
+
+
+def _pass_directly(
+    march: EventDrivenMarch,
+    start: Callable[[State], March],
+    begin: Callable[[State], PiecewiseMotion],
+    initial: State,
+    setup: Setup,
+    clearance: float,
+    friction: float,
+    recording: Recording,
+) -> tuple[Passed, Record | None]:
+    """Pass the transient in the direct way; with the record of the known motion that it leads to, if any."""
+    known = None
+    if recording.is_transient_shared:
+        assert isinstance(setup, ModalSetup)
+        known, is_new = shared_motions(setup, clearance, friction, recording, start, begin)
+        if is_new:  # the tables may have been filled anew
+            again = start(initial)
+            assert isinstance(again, EventDrivenMarch)
+            march = again
+    passed = pass_directly(march, start, begin, recording, known)
+    if known is None or passed.reached is None:
+        return passed, None
+    at_once = replace(recording, transient=0, transient_limit=None, transient_tolerance=None)
+
+    def begun_at(state: State) -> Record:
+        record = _integrate(start, state, setup, clearance, friction, at_once)
+        return replace(record, final=with_overlap(record.final, setup, clearance))
+
+    record = known.record(passed.reached, begun_at)
+    of_this = {"transient_revolutions": passed.n_revolution, "steps": passed.n_step + passed.march.n_step}
+    return passed, replace(record, measures=record.measures | of_this)
 
 
 def _solve_from(setup: Setup, clearance: float, friction: float, state: State) -> PiecewiseMotion:

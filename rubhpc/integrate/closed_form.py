@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 from rubhpc.integrate.event_driven_march import EventDrivenMarch
 from rubhpc.integrate.friction_march import FrictionMarch
@@ -10,11 +11,20 @@ from rubhpc.integrate.penalty_march import PenaltyMarch
 from rubhpc.kernels.laws import is_penalty, is_set_valued
 
 if TYPE_CHECKING:
+    from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.laws import Law
 
+_MARCHES: WeakKeyDictionary[ModalSetup, type[EventDrivenMarch]] = WeakKeyDictionary()
 
-def closed_form_march(law: Law) -> type[EventDrivenMarch]:
-    """Return the march whose pairs have the states of a law."""
+
+def closed_form_march(setup: ModalSetup) -> type[EventDrivenMarch]:
+    """Return the march whose pairs have the states of a set-up's law."""
+    if setup not in _MARCHES:
+        _MARCHES[setup] = _march_of(setup.law)  # to ask a kernel takes as long as a revolution
+    return _MARCHES[setup]
+
+
+def _march_of(law: Law) -> type[EventDrivenMarch]:
     if is_set_valued(law):
         return FrictionMarch
     return PenaltyMarch if is_penalty(law) else EventDrivenMarch

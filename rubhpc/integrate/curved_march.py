@@ -54,6 +54,10 @@ class CurvedMarch(EventDrivenMarch):
         _, n_row, n = self._pairs.row.shape
         self._work = curved_work(self._clearance.size, n_row, n, self._z.shape[1])
 
+    def motion(self) -> Floats:
+        """Reduced displacements, then velocities (2 n,), at the sample reached."""
+        return self.motion_of(self.progress, self._z)
+
     def motion_of(self, progress: Progress, z: Floats) -> Floats:
         """Reduced displacements, then velocities (2 n,), of modal coordinates (2, m)."""
         if progress.wanted >= 0:  # the mode is still to be entered with it

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.known_motions import HALF, LINEAR, SAME, Approach, KnownMotions, nothing
 from rubhpc.integrate.orbit_measures import LONGEST_PERIOD
 from rubhpc.integrate.shooting import NotConverged, Orbit, shoot
-from rubhpc.integrate.transient import pass_revolutions
+from rubhpc.integrate.transient import idle_of, pass_revolutions
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,16 +28,12 @@ if TYPE_CHECKING:
 FIRST, LONGER = 32, 2.0  # revolutions before the first search, and by what those before the next are more
 WATCHED = 16  # revolutions, at least, in which a case must draw near
 BLOCK = 4  # periods, over which it must lose distance
-HALF = 1 / 4  # of the square of its distance, that is left when it has drawn near
 SLOWER = 2  # times the periods that the linear theory needs for that, in which it must have done so
-LINEAR = 0.1  # of its distance: it is as near after a period to where the linear theory takes it
-THERE = 1e-8  # of the motion's size: a case as near as that has arrived
-TICKS = 4  # times what a point of the orbit turns in the resolution of events: nearer no simulation comes
 NEARER = 0.3  # of its distance after one revolution: a return as near as that speaks for a longer period
 MOST_ITERATIONS, LEAST_STEP = 6, 1 / 4  # of Newton's method
 MOST_EVENTS = 24, 8  # in a revolution: of one pair, and more for each further one
-MOST_SQUARINGS = 60  # of the monodromy matrix, until nothing is left of it
-MOST_PERIODS = 4000  # that the linear theory is followed
+LOOK, N_LOOK = 4, 2  # revolutions after which a case is compared with known motions; looks at the nearest
+FIRST_BESIDE = 64  # revolutions before the first search, where motions are known
 
 
 class Passed(NamedTuple):
@@ -45,46 +43,8 @@ class Passed(NamedTuple):
     reason: str | None  # why it cannot
     n_revolution: int  # simulated
     n_step: int  # taken by other marches than that one
-
-
-class Approach:
-    """How far a motion is from a stable periodic one, in a norm that falls while the distance is small.
-
-    Its square is `d'P d` with `P = sum over k of (M^k)'W M^k`: the sum over all periods to come of the energy
-    of the disturbance d, where M is the monodromy matrix and W the energy's. It falls by `d'W d` in a period.
-
-    Parameters
-    ----------
-    monodromy : (2 n, 2 n)
-        Its eigenvalues lie within the unit circle.
-    energy : (2 n,)
-        Diagonal of W.
-    """
-
-    def __init__(self, monodromy: Floats, energy: Floats) -> None:
-        """Sum the energies, twice as many periods at a time."""
-        self._monodromy = monodromy
-        power, form = monodromy, np.diag(energy)
-        for _ in range(MOST_SQUARINGS):
-            more = power.T @ form @ power
-            form = form + more
-            if np.abs(more).max() <= np.finfo(float).eps * np.abs(form).max():
-                break
-            power = power @ power
-        self._form = form
-
-    def square(self, apart: Floats) -> float:
-        """Square of the distance (2 n,)."""
-        return float(apart @ self._form @ apart)
-
-    def periods_to(self, share: float, apart: Floats) -> int:
-        """Periods until the linear theory leaves no more than a share of the square."""
-        least = share * self.square(apart)
-        for n_period in range(MOST_PERIODS):
-            if self.square(apart) <= least:
-                return n_period
-            apart = self._monodromy @ apart
-        return MOST_PERIODS
+    reached: int | None = None  # number of the place of a known motion, at which the case has arrived
+    found: tuple[PiecewiseMotion, Orbit] | None = None  # the motion that was solved for, where none was known
 
 
 class _Walk:
@@ -94,6 +54,7 @@ class _Walk:
         self, march: EventDrivenMarch, start: Callable[[State], March], recording: Recording
     ) -> None:
         self.march, self._start, self._recording = march, start, recording
+        self._idle = idle_of(march)
         self.n_revolution = self.n_step = 0
         self.passed: list[Floats] = []
 
@@ -107,7 +68,7 @@ class _Walk:
         for _ in range(kept):
             if (reason := self._pass(1)) is not None:
                 return reason
-            self.passed.append(self.march.motion_of(*self.march.place()))
+            self.passed.append(self.march.motion())
         return None
 
     def repeat(self, period: int) -> tuple[Floats | None, str | None]:
@@ -115,11 +76,11 @@ class _Walk:
         if self.n_revolution + period > self._recording.longest_transient:
             return None, None
         reason = self._pass(period)
-        return (self.march.motion_of(*self.march.place()) if reason is None else None), reason
+        return (self.march.motion() if reason is None else None), reason
 
     def _pass(self, n_revolution: int) -> str | None:
         self.n_revolution += n_revolution
-        return pass_revolutions(self.march, self._recording, n_revolution)
+        return pass_revolutions(self.march, self._recording, n_revolution, self._idle)
 
     def begin_at(self, state: State) -> Floats:
         """Take another state, or the same with tables that may have been filled anew; returns its motion."""
@@ -127,10 +88,51 @@ class _Walk:
         march = self._start(state)
         assert isinstance(march, EventDrivenMarch)
         self.march = march
-        return self.march.motion_of(*self.march.place())
+        return self.march.motion()
 
-    def ended(self, reason: str | None) -> Passed:
-        return Passed(self.march, reason, self.n_revolution, self.n_step)
+    def arrive(self, known: KnownMotions, wanted: int) -> tuple[int | None, str | None]:
+        """Go on to a known motion, or to a number of revolutions: its place, and why the case cannot go on.
+
+        Every four revolutions the case is compared with the nearest motion; it has arrived where it does as
+        the linear theory about that says (`Approach.obeys`) until it has halved its distance, and over four
+        revolutions or more.
+        """
+        while self.n_revolution + LOOK <= min(wanted, self._recording.longest_transient):
+            if (reason := self._pass(LOOK)) is not None:
+                return None, reason
+            number, reason = self._falls_to(known)
+            if number is not None or reason is not None:
+                return number, reason
+        return None, None
+
+    def _falls_to(self, known: KnownMotions) -> tuple[int | None, str | None]:
+        motion = self.march.motion()
+        number = known.nearest(motion)
+        if number is None:
+            return None, None
+        place = known.place(number)
+        apart = motion - place.motion
+        first = place.approach.square(apart)
+        for n_look in count(1):
+            if known.is_at(place, apart):
+                return number, None
+            reached, reason = self.repeat(place.n_period * place.period)
+            if reached is None:
+                return None, reason
+            before, apart = apart, reached - place.motion
+            if not place.approach.obeys(before, apart, place.n_period):
+                return None, None
+            if n_look >= N_LOOK and place.approach.square(apart) <= HALF * first:
+                return number, None
+        raise AssertionError  # the looks never end
+
+    def ended(
+        self,
+        reason: str | None,
+        reached: int | None = None,
+        found: tuple[PiecewiseMotion, Orbit] | None = None,
+    ) -> Passed:
+        return Passed(self.march, reason, self.n_revolution, self.n_step, reached, found)
 
 
 def pass_directly(
@@ -138,13 +140,15 @@ def pass_directly(
     start: Callable[[State], March],
     solve_from: Callable[[State], PiecewiseMotion],
     recording: Recording,
+    known: KnownMotions | None = None,
 ) -> Passed:
     """March until a stable periodic motion is found that the case draws near to; go on from that motion.
 
     After 32, 64, 128, ... revolutions the periodic motion is solved for from where the case stands, and the
     case is simulated further to see whether it draws near (`draws_near`). Where it does not, or none is
     found, it goes on, at the latest to the longest transient. The next search comes 32 revolutions after the
-    last one has failed, or later.
+    last one has failed, or later. Where motions are known, the case is compared with them first
+    (`_Walk.arrive`), and the first one is solved for after 64 revolutions.
 
     Parameters
     ----------
@@ -154,9 +158,15 @@ def pass_directly(
         Makes the case's march from a state.
     solve_from : callable
         Makes its piecewise motion from a state.
+    known : KnownMotions, optional
+        Motions that the case may reach.
     """
-    walk, wanted = _Walk(march, start, recording), FIRST
+    walk, wanted = _Walk(march, start, recording), FIRST_BESIDE if known else FIRST
     while True:
+        if known is not None:
+            reached, reason = walk.arrive(known, wanted - LONGEST_PERIOD - 1)
+            if reached is not None or reason is not None:
+                return walk.ended(reason, reached)
         reason = walk.on(wanted - walk.n_revolution)
         if reason is not None or walk.n_revolution >= recording.longest_transient:
             return walk.ended(reason)
@@ -170,10 +180,12 @@ def pass_directly(
         force = piecewise.contact_force(orbit.states, orbit.motion)
         aim = piecewise.march.state_of(orbit.motion, force)
         is_near, reason = draws_near(walk, piecewise, orbit, motion, wanted - LONGEST_PERIOD)
+        if is_near and known is not None and (same := known.nearest(orbit.motion, SAME)) is not None:
+            return walk.ended(reason, same)
         if is_near:
             walk.begin_at(aim)
         if is_near or reason is not None:
-            return walk.ended(reason)
+            return walk.ended(reason, found=found if is_near else None)
         wanted = max(wanted, walk.n_revolution + FIRST)
 
 
@@ -190,8 +202,7 @@ def draws_near(
     """
     approach = Approach(orbit.monodromy, np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n))
     least = -(-WATCHED // orbit.period)
-    resolved = TICKS * abs(piecewise.setup.spin) * piecewise.setup.tick
-    there = max(THERE, resolved) * piecewise.size(orbit.motion)
+    there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
     apart = motion - orbit.motion
     while walk.n_revolution < until:
         first = block = last = approach.square(apart)

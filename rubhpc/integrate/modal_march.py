@@ -90,7 +90,7 @@ class ModalMarch(March):
 
     def energy(self) -> float:
         """Mechanical energy, J."""
-        return self._energy_of(self.motion_of(self.progress, self._z))
+        return self._energy_of(self.motion())
 
     def _energy_of(self, motion: Floats) -> float:
         """Mechanical energy, J, of a reduced motion (2 n,)."""
@@ -100,7 +100,7 @@ class ModalMarch(March):
 
     def final(self) -> State:
         """State at the sample reached, as far as contact and outputs see it."""
-        return self.state_of(self.motion_of(self.progress, self._z), self._contact_force())
+        return self.state_of(self.motion(), self._contact_force())
 
     def state_of(self, motion: Floats, contact_force: Floats) -> State:
         """State of a reduced motion (2 n,) and of the forces (q,), N, at a whole revolution."""
@@ -109,9 +109,15 @@ class ModalMarch(March):
         displacement[: setup.model.rotor.n_dof] += setup.model.sag
         return State.of_bodies(setup.model, displacement, velocity, contact_force)
 
+    def motion(self) -> Floats:
+        """Reduced displacements, then velocities (2 n,), at the sample reached."""
+        return self._motion_in(self._bare_progress["mode"], self._z)
+
     def motion_of(self, progress: Progress, z: Floats) -> Floats:
         """Reduced displacements, then velocities (2 n,), of modal coordinates (2, m)."""
-        mode = progress.mode
+        return self._motion_in(progress.mode, z)
+
+    def _motion_in(self, mode: int, z: Floats) -> Floats:
         motion: Floats = self.tables.motion_re[mode] @ z[0] - self.tables.motion_im[mode] @ z[1]
         return motion
 
@@ -156,7 +162,7 @@ class ModalMarch(March):
         setup = self._setup
         limit, motion = setup.displacement_limit, self._motion
         if not is_at_event:
-            motion = self.motion_of(self.progress, self._z)
+            motion = self.motion()
         seen = setup.reduced.translations @ motion[: self.bodies.stiffness.shape[0]]
         if (accumulator.highest >= accumulator.lowest).any():  # a sample was taken
             reached = np.maximum(accumulator.highest[:2], -accumulator.lowest[:2])

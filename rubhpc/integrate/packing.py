@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -120,8 +121,18 @@ def whole_system(model: Model, spin: float) -> tuple[Floats, Floats, Floats, Flo
     return mass, damping, stiffness, force
 
 
+_DEGREES: WeakKeyDictionary[Model, Ints] = WeakKeyDictionary()
+
+
 def degrees_of(model: Model) -> Ints:
     """Rows of each pair's degrees (q, 5) among all degrees, rotor first, then stators; -1 where held."""
+    if model not in _DEGREES:
+        _DEGREES[model] = _find_degrees(model)
+        _DEGREES[model].flags.writeable = False
+    return _DEGREES[model]
+
+
+def _find_degrees(model: Model) -> Ints:
     first = model.stator_start
     degree = np.full((len(model.stators), N_DEGREE), -1)
     for i, stator in enumerate(model.stators):

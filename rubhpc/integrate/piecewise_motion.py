@@ -133,7 +133,7 @@ class PiecewiseMotion:
     def __init__(self, setup: ModalSetup, clearance: float, friction: float, initial: State) -> None:
         """Take a case in closed form; `NoClosedForm` where it has none."""
         self.has_states = is_set_valued(setup.law)
-        self.march = closed_form_march(setup.law)(setup, clearance, friction, initial, None)
+        self.march = closed_form_march(setup)(setup, clearance, friction, initial, None)
         self.setup = setup
         self.turn = setup.interval * setup.samples_per_revolution
         self.bodies = self.march.bodies

@@ -49,7 +49,7 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
         empty_samples(n_place, recording.samples_per_revolution),
         new_accumulator(march.touching().size, n_place),
     )
-    idle = _idle(march)
+    idle = idle_of(march)
     reference: Floats | None = None
     largest: Floats | None = None
     for i, pause in enumerate(chain([0], cycle(PAUSES))):
@@ -92,11 +92,11 @@ def pass_revolutions(
 
     What a march asks for to record into, and leaves as it is, may be given as `idle`.
     """
-    samples, accumulator = idle or _idle(march)
+    samples, accumulator = idle or idle_of(march)
     first = -n_revolution * recording.samples_per_revolution
     return march.advance(first, 0, samples, accumulator, is_recorded=False)
 
 
-def _idle(march: March) -> tuple[Samples, Accumulator]:
-    """Room for no samples, and sums."""
+def idle_of(march: March) -> tuple[Samples, Accumulator]:
+    """Room for no samples, and sums: what `pass_revolutions` leaves as it is."""
     return empty_samples(march.n_place, 0), new_accumulator(march.touching().size)

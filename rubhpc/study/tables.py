@@ -14,7 +14,8 @@ from rubhpc.schema import KEEPABLE, KEPT
 if TYPE_CHECKING:
     from rubhpc.study.contact_keys import Contact
 
-AUTO, DIRECT = "auto", "direct"  # transient until the motion has settled, or is solved for
+# Transient until the motion has settled, is solved for, or is one of those solved for all starts.
+AUTO, DIRECT, SHARED = "auto", "direct", "shared"
 LONGEST_TRANSIENT, SETTLED_WITHIN = 240, 1e-4  # then
 PAPER_STEP = 0.5e-6  # s
 SAFE_SHARE = 0.9  # of the stability limit
@@ -94,15 +95,15 @@ class Recording:
 
     transient: int | str = count(
         doc='Revolutions discarded; "auto" until the motion has settled, "direct" until it draws near to a '
-        "periodic motion that is solved for.",
+        'periodic motion that is solved for, "shared" to one that is solved once for all its starts.',
         example='"auto"',
         default=120,
         at_least=0,
         at_most=1_000_000,
-        or_words=(AUTO, DIRECT),
+        or_words=(AUTO, DIRECT, SHARED),
     )
     transient_limit: int | None = count(
-        doc='Most revolutions discarded with transient = "auto" or "direct"; by default 240.',
+        doc='Most revolutions discarded with transient = "auto", "direct" or "shared"; by default 240.',
         example="480",
         default=None,
         at_most=1_000_000,
@@ -163,12 +164,17 @@ class Recording:
     @property
     def is_transient_auto(self) -> bool:
         """Whether the transient ends where the motion has settled."""
-        return self.transient in (AUTO, DIRECT)  # the latter, where nothing is solved for
+        return isinstance(self.transient, str)  # of the others, where nothing is solved for
 
     @property
     def is_transient_direct(self) -> bool:
         """Whether the transient ends where the periodic motion that follows is solved for."""
-        return self.transient == DIRECT
+        return self.transient in (DIRECT, SHARED)
+
+    @property
+    def is_transient_shared(self) -> bool:
+        """Whether that motion is one of those that all starts at one operating point may reach."""
+        return self.transient == SHARED
 
     @property
     def longest_transient(self) -> int:

@@ -7,7 +7,8 @@ import pytest
 
 from rubhpc import simulate
 from rubhpc.errors import InputError
-from rubhpc.integrate.direct import Approach, draws_near
+from rubhpc.integrate.direct import draws_near
+from rubhpc.integrate.known_motions import Approach
 from rubhpc.integrate.transient import has_settled
 from rubhpc.schema import REGIME
 from rubhpc.study.study import Recording
@@ -91,7 +92,7 @@ def test_keys_of_auto_go_with_it_alone(key):
         Recording(transient=120, **{key: value})
     assert Recording(transient="auto", **{key: value}).is_transient_auto
     assert Recording(transient="direct", **{key: value}).is_transient_direct
-    with pytest.raises(InputError, match='or "auto", or "direct"'):
+    with pytest.raises(InputError, match='or "auto", or "direct", or "shared"'):
         simulate("mokhtar2017", transient="long", clearance="84 um", **CASE)
 
 
@@ -133,8 +134,11 @@ def test_direct_way_goes_on_to_the_limit_where_nothing_is_periodic():
 
 def test_laws_without_closed_form_settle_as_with_auto():
     case = {"clearance": "84 um", "normal": "updated", "transient_limit": 9, **CASE}
-    found, plain = (simulate("mokhtar2017", transient=word, **case) for word in ("direct", "auto"))
+    found, shared, plain = (
+        simulate("mokhtar2017", transient=word, **case) for word in ("direct", "shared", "auto")
+    )
     assert np.array_equal(found.vertical, plain.vertical)
+    assert np.array_equal(shared.vertical, plain.vertical)
 
 
 def test_what_simulation_cannot_resolve_has_arrived():
