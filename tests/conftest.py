@@ -24,31 +24,54 @@ SLOW = (
     "commands/test_cli.py",
     "commands/test_modes_command.py",
     "faults/",
+    "fem/test_campbell.py::test_critical_speed_of_another_order",
     "fem/test_campbell.py::test_critical_speeds_solve_the_synchronous_problem",
     "fem/test_critical_speeds.py",
+    "fem/test_linear_design.py::test_tables_set_the_range_and_the_sag",
+    "fem/test_speed_dependence.py::test_a_case_is_that_of_constant_bearings[central",
     "figures/test_accessor.py::test_each_figure_is_drawn",
+    "figures/test_basins.py::test_a_start_and_a_parameter_make_a_plane",
+    "figures/test_basins.py::test_cells_have_the_colour_of_their_motion",
+    "figures/test_bifurcation.py::test_command",
     "figures/test_cascade.py::test_figures_of_a_cascade",
+    "figures/test_cascade.py::test_speeds_in_rpm_are_written_out",
     "figures/test_catalogue.py",
     "figures/test_figure_commands.py",
     "figures/test_figures.py::test_figures_are_saved_by_their_extension",
+    "figures/test_linear_design_figures.py::test_a_rotor_of_matrices",
+    "figures/test_linear_design_figures.py::test_response",
     "figures/test_maps.py::test_command_draws",
+    "figures/test_maps.py::test_names_of_facets_stay_within_their_panels",
+    "figures/test_run_up_figures.py::test_a_waterfall_stacks_them_at_their_speeds",
     "input/test_reading.py::test_pint_stays_away_until_it_is_needed",
     "integrate/test_branch.py",
     "integrate/test_contact_stepping_march.py",
     "integrate/test_curved_march.py",
+    "integrate/test_driven.py",
     "integrate/test_event_driven_march.py::test_dry_whip_diverges_and_says_so",
     "integrate/test_event_driven_march.py::test_endless_events_are_left_to_short_steps",
+    "integrate/test_event_driven_march.py::test_run_goes_on_from_its_final_state",
     "integrate/test_event_driven_march.py::test_shorter_kernel_calls_change_nothing_but_rounding",
+    "integrate/test_friction_mode.py::test_tables_hold_rates",
     "integrate/test_initial_state.py",
     "integrate/test_knocks.py",
+    "integrate/test_lyapunov_spectrum.py::test_impact_oscillator",
+    "integrate/test_lyapunov_spectrum.py::test_studies_store_them",
+    "integrate/test_mode_library.py::test_forms_grow",
+    "integrate/test_mode_library.py::test_no_switch_function",
+    "integrate/test_penalty_march.py::test_shooting",
     "integrate/test_periodic.py::test_failure_says_why",
     "integrate/test_periodic.py::test_motion_beside_it_draws_near_by_the_largest_multiplier",
+    "integrate/test_probe_records.py::test_schemes_agree",
     "integrate/test_regimes_lyapunov.py",
     "integrate/test_retuned_modes.py",
-    "integrate/test_driven.py",
     "integrate/test_run_up.py",
+    "integrate/test_simulate.py::test_energy_balances[3-",
+    "integrate/test_simulate.py::test_run_goes_on_from_its_final_state[3",
     "integrate/test_transient.py::test_laws_without_closed_form_settle_as_with_auto",
     "kernels/test_accumulators.py",
+    "kernels/test_complementarity.py",
+    "kernels/test_contact_pairs.py",
     "kernels/test_coulomb_friction.py",
     "kernels/test_jit.py",
     "mokhtar2017/",
@@ -66,10 +89,13 @@ SLOW = (
     "storage/test_growth.py",
     "storage/test_shards.py",
     "storage/test_zarr_store.py::test_damaged_metadata_are_written_anew",
+    "store/test_directions.py::test_a_direction_is_selected_by_its_name",
     "store/test_directions.py::test_every_figure_takes_a_store_of_two_directions",
-    "store/test_export.py::test_whole_store_comes_back",
+    "store/test_export.py",
     "store/test_live.py",
+    "store/test_postproc_store.py::test_a_stator_is_chosen",
     "store/test_sample_store.py",
+    "store/test_worst.py",
     "study/test_cases.py::test_every_case_lies_in_exactly_one_block",
     "study/test_cases.py::test_growth_keeps_identity_and_ids",
     "study/test_contact_axes.py::test_a_study_of_laws_runs_is_selected_by_name_and_recomputed",
@@ -83,6 +109,60 @@ SLOW = (
     "study/test_study.py::test_no_slip_of_the_pen_gets_past_as_a_traceback",
     "study/test_warnings.py::test_unstable_speeds_are_named_once_and_have_no_amplitude",
     "validation/",
+)
+# Of the same claim, by other parameters or in a shorter form, `make test` has another; `make faults` or
+# `make validation` has these.
+LONG = (
+    "commands/test_modes_command.py::test_figure_is_written_in_the_format_of_its_name[png]",
+    "faults/test_damage.py::test_what_is_no_case_is_written_anew_without_computing[period]",
+    "faults/test_damage.py::test_what_is_no_case_is_written_anew_without_computing[revolution]",
+    "faults/test_damage.py::test_what_is_no_case_is_written_anew_without_computing[status]",
+    "faults/test_refined_kills.py::test_kills_of_workers",
+    "faults/test_small_disk.py",
+    "faults/test_stops.py::test_a_signal_stops_a_run[2-0]",
+    "faults/test_stops.py::test_the_file_stop_stops_all_ranks",
+    "integrate/test_contact_stepping_march.py::test_error_falls_with_the_square_of_the_step[3]",
+    "integrate/test_curved_march.py::test_bent_stator_moves_as_all_degrees_do_in_short_steps[updated]",
+    "integrate/test_curved_march.py::test_short_steps_come_to_the_curved_motion_as_they_are_halved[3-",
+    "integrate/test_event_driven_march.py::test_shorter_kernel_calls_change_nothing_but_rounding[updated-3]",
+    "integrate/test_initial_state.py::test_a_wall_that_moves_in_pushes_as_it_would_slowly[updated]",
+    "integrate/test_run_up.py::test_rub_in_a_passage_meets_full_order_stepping[150.0-",
+    "mpi/test_carried_chains.py::test_chains_that_are_killed_go_on_where_they_were",
+    "mpi/test_launchers.py::test_the_wrong_launcher_is_refused[Open MPI]",
+    "mpi/test_launchers.py::test_the_wrong_launcher_is_refused[srun",
+    "mpi/test_ranks.py::test_a_sample_killed_on_its_way",
+    "mpi/test_ranks.py::test_any_number_of_ranks_stores_equal_bytes",
+    "report/test_report.py::test_a_store_that_keeps_less_has_a_page_too[keep1]",
+    "report/test_report.py::test_a_store_that_keeps_less_has_a_page_too[keep2]",
+    "report/test_report.py::test_the_size_is_kept_and_what_is_left_out_is_said[300000-False]",
+    "running/test_added_measure.py::test_a_store_without_a_measure_is_resumed_and_grown[True]",
+    "running/test_continuation_runs.py::test_a_chain_goes_on_where_a_kill_has_cut_it[0]",
+    "running/test_continuation_runs.py::test_a_chain_goes_on_where_a_kill_has_cut_it[1]",
+    "running/test_continuation_runs.py::test_a_chain_goes_on_where_a_kill_has_cut_it[7]",
+    "running/test_driver.py::test_a_signal_drops_the_case_in_hand_and_keeps_the_finished_ones[10]",
+    "running/test_driver.py::test_a_signal_drops_the_case_in_hand_and_keeps_the_finished_ones[2]",
+    "running/test_parts.py::test_parts_killed_at_every_step_lose_nothing",
+    "running/test_refined_runs.py::test_kills_on_any_level_change_nothing[moments1]",
+    "running/test_refined_runs.py::test_kills_on_any_level_change_nothing[moments2]",
+    "running/test_workers.py::test_workers_end_with_their_parent",
+    "storage/test_growth.py::test_a_kill_at_any_step_of_a_growth_loses_nothing[shards",
+    "storage/test_growth.py::test_growth_in_any_order_keeps_every_case_though_it_is_killed",
+    "storage/test_shards.py::test_a_changed_byte_costs_the_cases_that_verify_names[-1]",
+    "storage/test_shards.py::test_a_changed_byte_costs_the_cases_that_verify_names[3]",
+    "storage/test_shards.py::test_blocks_that_are_not_packed_are_read_all_the_same[2]",
+    "validation/test_annular.py::test_denser_rings_come_to_the_closed_form",
+    "validation/test_bent_stator.py::test_peak_forces_of_the_packaged_rig_are_those_of_all_degrees[keys1",
+    "validation/test_carrier.py::test_the_modal_scheme_agrees_with_the_central_difference[{'restitution'",
+    "validation/test_carrier.py::test_the_modal_scheme_agrees_with_the_central_difference[{}]",
+    "validation/test_full_order.py::test_case_follows_the_full_order_solution[at two nodes-updated",
+    "validation/test_full_order.py::test_case_follows_the_full_order_solution[reversed spin-updated",
+    "validation/test_full_order.py::test_case_follows_the_full_order_solution[two side by side-updated",
+    "validation/test_full_order.py::test_usual_accuracy_gives_amplitudes_and_impulses[at two nodes-updated",
+    "validation/test_full_order.py::test_usual_accuracy_gives_amplitudes_and_impulses[reversed spin-updated",
+    "validation/test_full_order.py::test_usual_accuracy_gives_amplitudes_and_impulses[two side by side-up",
+    "validation/test_rub.py::test_finer_integration_gives_the_same_orbit[central-difference-two_lobes]",
+    "validation/test_rub.py::test_rub_is_the_same_at_every_angle_around_the_rim[central-difference-updated]",
+    "validation/test_rub.py::test_rub_is_the_same_at_every_angle_around_the_rim[modal-updated]",
 )
 # Files of more than ten seconds each, begun first: else one of them may be left for the end.
 LONGEST = (
@@ -113,7 +193,8 @@ LONGEST = (
 # These have deadlines, or start ranks that wait for each other busily: nothing else may run at the same time.
 # ALONE in the Makefile names their folders.
 SERIAL = (
-    "faults/test_deaths.py::test_a_case",
+    "faults/test_deaths.py::test_a_case_that_never_comes_back",
+    "faults/test_deaths.py::test_a_case_whose_rank_is_killed",
     "faults/test_kill_storm.py",
     "faults/test_stops.py",
     "integrate/test_event_driven_march.py::test_signals_are_answered_however_long_a_revolution_lasts",
@@ -148,14 +229,22 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what is slow, and what must run alone; the longest files come first."""
+    """Mark what is slow or long, and what must run alone; the longest files come first."""
     rank = {TESTS / name: i for i, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.path, len(rank)))
     for item in items:
         place = f"{item.path.relative_to(TESTS).as_posix()}::{item.name}"
-        for name, places in (("slow", SLOW), ("serial", SERIAL)):
+        for name, places in (("slow", SLOW), ("serial", SERIAL), ("long", LONG)):
             if place.startswith(places):
                 item.add_marker(name)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def no_power_cut() -> Iterator[None]:
+    """Do not wait for the disk, half of the time that a run in this process takes: no test cuts the power."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda handle: None)
+        yield
 
 
 @pytest.fixture(autouse=True)

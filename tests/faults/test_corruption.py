@@ -76,7 +76,7 @@ def check(finished: Path, strikes: list[tuple[int, str, float, int]]) -> None:
         assert Store(store).manifest.damaged_copies(store) == []
 
 
-@settings(max_examples=8, phases=[Phase.generate])  # a failure says all; to shrink it takes minutes
+@settings(max_examples=4, phases=[Phase.generate])  # a failure says all; to shrink it takes minutes
 @given(strikes=st.lists(blows, min_size=1, max_size=3))
 def test_any_damage_is_told_and_mended(finished, strikes):
     check(finished, strikes)

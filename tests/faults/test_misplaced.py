@@ -203,7 +203,7 @@ def one_in(count: int) -> list[Any]:
 
 
 @pytest.mark.timeout(120, func_only=True)
-@pytest.mark.parametrize(("where", "how"), one_in(3))
+@pytest.mark.parametrize(("where", "how"), one_in(10))
 def test_a_damage_is_reported_in_a_line_and_repaired(finished, tmp_path, capsys, where, how):
     store = damaged(finished, tmp_path, where, how)
     for command in ("status", "verify"):
@@ -214,7 +214,7 @@ def test_a_damage_is_reported_in_a_line_and_repaired(finished, tmp_path, capsys,
 
 
 @pytest.mark.timeout(120, func_only=True)
-@pytest.mark.parametrize(("where", "how"), one_in(11))  # a page takes longer than all the rest
+@pytest.mark.parametrize(("where", "how"), one_in(25))  # a page takes longer than all the rest
 def test_a_damage_does_not_break_the_report(finished, tmp_path, capsys, where, how):
     store = damaged(finished, tmp_path, where, how)
     check_said(*called(capsys, "report", store, "--output", tmp_path / "report.html"))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import matplotlib.pyplot as plt
 import nbformat
+import pytest
 from nbclient import NotebookClient
 from running import ROOT
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    import pytest
 
 NOTEBOOK = ROOT / "docs" / "notebook" / "first_study.ipynb"
 N_FIGURE = 6
@@ -23,6 +23,17 @@ def figures(notebook: nbformat.NotebookNode) -> int:
     return sum("image/png" in o.get("data", {}) for o in outputs)
 
 
+def test_its_cells_run_one_after_the_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for cell in nbformat.read(NOTEBOOK, as_version=4).cells:
+        if cell.cell_type == "code":
+            exec(cell.source, names)
+    assert len(plt.get_fignums()) == N_FIGURE
+    assert (tmp_path / "first.zarr").is_dir()
+
+
+@pytest.mark.long
 def test_the_notebook_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     monkeypatch.delenv("MPLBACKEND", raising=False)

@@ -154,8 +154,9 @@ def test_a_store_with_an_unknown_measure_is_read_resumed_and_grown(study, toys, 
         assert store.toy.attrs["long_name"] == "a measure added later"
 
 
-def test_a_kill_while_a_measure_is_added_loses_nothing(study, toys, tmp_path, monkeypatch):
-    """Killed at each of its writes: what is left is verified, and the next run adds the measure."""
+@pytest.mark.parametrize("apart", [31, pytest.param(7, marks=pytest.mark.long)])
+def test_a_kill_while_a_measure_is_added_loses_nothing(study, toys, tmp_path, monkeypatch, apart):
+    """Killed at some of its writes: what is left is verified, and the next run adds the measure."""
     for variable in TOYS:
         del schema.VARIABLES[variable.name]
     run(study, quiet=True)
@@ -184,7 +185,7 @@ def test_a_kill_while_a_measure_is_added_loses_nothing(study, toys, tmp_path, mo
     monkeypatch.setattr(growth.os, "sync", lambda: None)
     is_whole, n = False, 0
     while not is_whole:
-        n += 7
+        n += apart
         copy = replace(study, output=tmp_path / f"copy{n}.zarr")
         shutil.copytree(study.output, copy.output)
         writes = n

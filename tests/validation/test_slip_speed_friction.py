@@ -92,8 +92,8 @@ def test_limits_are_coulombs_law():
     given = {
         "speed_ratio": 0.75,
         "clearance": "84 um",
-        "transient": 2,
-        "revolutions": 4,
+        "transient": 1,
+        "revolutions": 2,
         "method": "central-difference",
     }
     coulomb = simulate("mokhtar2017", friction_law="coulomb", **given)
