@@ -97,7 +97,8 @@ def run_up(
     -------
     xarray.Dataset
         Signals as of `simulate` over `sample`; over `revolution` `speed` (rad/s), `time` (s),
-        `contact_fraction`, `peak_contact_force` and `friction_work`; and over `revolution` and `order` the
+        `contact_fraction`, `peak_contact_force` and `friction_work`; over `stator` the `minimum_slip_speed`
+        (m/s), below 0 where steady sliding does not hold; and over `revolution` and `order` the
         amplitude (zero to peak) and phase of the displacements of the disc, its torsion and the probes, over
         six revolutions: `amplitude_vertical`, `phase_vertical` (rad, by which the signal leads the order of
         the shaft's angle), and so on. A case that ends early says why in the attribute `reason`.
@@ -151,6 +152,11 @@ def run_up(
         name: (known[name].dims, values, _about(known[name].unit, known[name].long_name))
         for name, values in signals.items()
     }
+    variables["minimum_slip_speed"] = (
+        ("stator",),
+        np.where(np.isfinite(slip := found.together.least_slip), slip, np.nan),
+        _about("m s-1", VARIABLES["minimum_slip_speed"].long_name),
+    )
     own = drive_variables() | run_up_variables((probe.name, probe.quantity) for probe in measured)
     for name, values in by_revolution(found, signals, samples_per_revolution).items():
         short = name if name.startswith((AMPLITUDE, PHASE)) else name.removeprefix("revolution_")

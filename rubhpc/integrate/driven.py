@@ -25,6 +25,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.free_piece import Spin
 from rubhpc.integrate.measures import LEAST_EXCHANGE, empty_samples
 from rubhpc.integrate.run_up import RunUp
+from rubhpc.integrate.turns import Turns
 from rubhpc.study.speed_law import LAG, LONGEST_PIECE
 
 if TYPE_CHECKING:
@@ -96,13 +97,13 @@ def integrate_driven(
         The spin leaves its range within the first revolution.
     """
     model, per_revolution = fastest.model, fastest.samples_per_revolution
-    n, n_stator = drive.n_revolution, len(model.stators)
+    n = drive.n_revolution
     fixed = per_revolution // (pieces_per_revolution or 1)
     if pieces_per_revolution is not None and per_revolution != fixed * pieces_per_revolution:
         problem = f"{pieces_per_revolution} is no divisor of the {per_revolution} samples in a revolution"
         raise InputError(f"pieces_per_revolution: {problem}; choose another number")
     whole = empty_samples(model.n_place, n * per_revolution, model.n_probe).whole
-    contact_time, peak, friction_work = np.zeros((3, n, n_stator))
+    gathered = Turns(n, model)
     driven_by, braked = np.zeros((2, n))
     begins = np.zeros(n + 1)
     spin = Spin(fastest, drive, clearance, friction, initial, check)
@@ -124,9 +125,7 @@ def integrate_driven(
         turns = max(length // per_revolution, 1)
         for i, accumulator in enumerate(passed.accumulators):
             turn = at // per_revolution + i
-            contact_time[turn] += accumulator.contact_time
-            friction_work[turn] += accumulator.friction_work
-            peak[turn] = np.maximum(peak[turn], accumulator.peak_force)
+            gathered.add(turn, accumulator)
             driven_by[turn] += taken.drive_work[i]
             braked[turn] += taken.braking[i]
             if (at + (i + 1) * length // turns) % per_revolution == 0:
@@ -156,9 +155,10 @@ def integrate_driven(
         whole=whole[:, : n_done * per_revolution],
         speed=2.0 * np.pi / lasts,
         time=begins[:n_done],
-        contact_fraction=contact_time[:n_done] / lasts[:, np.newaxis],
-        peak_contact_force=peak[:n_done],
-        friction_work=friction_work[:n_done],
+        contact_fraction=gathered.contact_time[:n_done] / lasts[:, np.newaxis],
+        peak_contact_force=gathered.peak_force[:n_done],
+        friction_work=gathered.friction_work[:n_done],
+        together=gathered.together,
         n_step=n_step,
         final=spin.state,
         drive_work=driven_by[:n_done],

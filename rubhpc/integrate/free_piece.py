@@ -108,9 +108,11 @@ class Spin:
                 return self._taken(passed, acceleration, length, per_revolution, torque, np.zeros(6))
             flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)
             before, after = self._momentum(self._begun, first), self._momentum(passed.final, last)
-            carried = 0.5 * duration * (before[0] + after[0])  # of the unbalance alone, integrated
-            taken_up = (flows[UNBALANCE_WORK] + acceleration * carried + flows[DRIVE_WORK]) / mean
-            change = (torque * duration - taken_up - sum(after) + sum(before)) / inertia
+            turning = acceleration * 0.5 * duration * (before[1] + after[1])
+            given = torque * turned + turning - flows[UNBALANCE_WORK] - flows[DRIVE_WORK]
+            change = self._change(given, sum(before), sum(after))
+            if not math.isfinite(change):
+                return None
             error = abs(change / duration - acceleration) * duration**2 / 12.0
             if error <= GUESSED or (is_fixed and tried == MOST_TRIES - 1):
                 break
@@ -122,7 +124,6 @@ class Spin:
             inertia * 0.5 * speed**2 + speed * sum(carried_by)
             for speed, carried_by in ((self.speed, before), (self.speed + change, after))
         ]
-        turning = acceleration * 0.5 * duration * (before[1] + after[1])
         energies = np.array(
             [
                 held[1] - held[0],
@@ -166,6 +167,17 @@ class Spin:
         duration = sum(lasts)
         lag = abs(acceleration) * duration**2 / 12.0
         return Taken(passed, lag, times, work, braking, energies)
+
+    def _change(self, given: float, before: float, after: float) -> float:
+        """Change of the speed, rad/s, by the energy given to the spin, J; NaN where it would turn back.
+
+        `before` and `after` are momenta of the spin by the motion, kg m^2/s: `J W^2 / 2 + W P` grows by that
+        energy.
+        """
+        slope = self._free.inertia * self.speed + after
+        lacking = self.speed * (after - before) - given
+        square = slope**2 - 2.0 * self._free.inertia * lacking
+        return -2.0 * lacking / (slope + math.sqrt(square)) if square > 0.0 and slope > 0.0 else math.nan
 
     def _after(self, acceleration: float, angle: float) -> float:
         """Speed after an angle (rad) at an acceleration, rad/s; 0 where the spin does not get so far."""

@@ -24,6 +24,7 @@ from rubhpc.integrate.measures import add_sag, empty_samples, following_accumula
 from rubhpc.integrate.piece_setup import Pieces
 from rubhpc.integrate.record import State
 from rubhpc.integrate.start import start_of
+from rubhpc.integrate.turns import Turns
 from rubhpc.study.initial import Initial
 from rubhpc.study.speed_law import cut
 
@@ -56,6 +57,8 @@ class RunUp:
         When each begins.
     contact_fraction, peak_contact_force, friction_work : (n_revolution, n_stator)
         Of each revolution; 1, N and J.
+    together : Accumulator
+        What all revolutions have gathered of their contacts.
     n_step : int
     final : State
     """
@@ -67,6 +70,7 @@ class RunUp:
     contact_fraction: Floats
     peak_contact_force: Floats
     friction_work: Floats
+    together: Accumulator
     n_step: int
     final: State
 
@@ -103,7 +107,7 @@ def integrate_run_up(
     _, _, accelerations = law.at_angle(0.5 * (angles[1:] + angles[:-1]))
     begins, _, _ = law.at_angle(2.0 * np.pi * np.arange(n + 1))
     whole = empty_samples(model.n_place, n * per_revolution, model.n_probe).whole
-    contact_time, peak, work = np.zeros((3, n, n_stator))
+    gathered = Turns(n, model)
     pieces = Pieces(fastest)
     state = initial if isinstance(initial, State) else None
     n_step, reason, n_done = 0, "", n
@@ -118,9 +122,7 @@ def integrate_run_up(
         n_step += passed.n_step
         whole[:, first:last] = passed.whole
         for turn, accumulator in enumerate(passed.accumulators, first // per_revolution):
-            contact_time[turn] += accumulator.contact_time
-            work[turn] += accumulator.friction_work
-            peak[turn] = np.maximum(peak[turn], accumulator.peak_force)
+            gathered.add(turn, accumulator)
         if passed.reason:
             n_done = first // per_revolution + len(passed.accumulators) - 1
             reason = f"{passed.reason} in revolution {n_done + 1}"
@@ -132,9 +134,10 @@ def integrate_run_up(
         whole=whole[:, : n_done * per_revolution],
         speed=2.0 * np.pi / turns,
         time=begins[:n_done],
-        contact_fraction=contact_time[:n_done] / turns[:, np.newaxis],
-        peak_contact_force=peak[:n_done],
-        friction_work=work[:n_done],
+        contact_fraction=gathered.contact_time[:n_done] / turns[:, np.newaxis],
+        peak_contact_force=gathered.peak_force[:n_done],
+        friction_work=gathered.friction_work[:n_done],
+        together=gathered.together,
         n_step=n_step,
         final=state,
     )
@@ -166,6 +169,8 @@ def pass_piece(
 
     `is_balanced`: its energies are asked for.
     """
+    if check is not None:
+        check()
     model = setup.model
     stride = min(n_sample, setup.samples_per_revolution)
     for kind in (march_of(setup.scheme, setup), ContactSteppingMarch):

@@ -15,7 +15,8 @@ from rubhpc.integrate.driven import DrivenRun, integrate_driven
 from rubhpc.integrate.measures import by_name, probe_extents
 from rubhpc.integrate.run_up import integrate_run_up
 from rubhpc.integrate.setup import ModalSetup
-from rubhpc.schema import AMPLITUDE, DIVERGED, DONE, ORDERS, PHASE, PROBE, TRACKED
+from rubhpc.integrate.turns import contact_measures
+from rubhpc.schema import AMPLITUDE, DIVERGED, DONE, ORDERS, PHASE, PROBE, TRACKED, case_measures
 from rubhpc.spectra import track_order
 from rubhpc.study.drive_law import DriveLaw
 
@@ -82,22 +83,26 @@ def record_run_up(
     signals = by_name(found.whole, setup.model)
     turns = found.speed.size
     none = np.full(len(setup.model.stators), math.nan)
-    measures: dict[str, Any] = {
-        "contact_fraction": none,
-        "peak_contact_force": none,
-        "friction_work": none,
-    }
+    of_stators = [v.name for v in case_measures() if v.dims == ("stator",)]
+    measures: dict[str, Any] = dict.fromkeys(of_stators, none)
     if not found.reason:
         lasts = 2.0 * np.pi / found.speed
-        measures = {
-            "contact_fraction": lasts @ found.contact_fraction / lasts.sum(),
-            "peak_contact_force": found.peak_contact_force.max(axis=0),
-            "friction_work": found.friction_work.mean(axis=0),
-            "peak_torsion": float(np.abs(signals["torsion"]).max()),
-            "peak_to_peak_vertical": float(np.ptp(signals["vertical"])),
-            "peak_to_peak_horizontal": float(np.ptp(signals["horizontal"])),
-            **probe_extents(signals),
-        } | driven_measures(found)
+        of_contacts = contact_measures(
+            found.together, found.whole, turns, setup.model, is_round=setup.is_updated
+        )
+        measures |= (
+            of_contacts
+            | {
+                "contact_fraction": lasts @ found.contact_fraction / lasts.sum(),
+                "peak_contact_force": found.peak_contact_force.max(axis=0),
+                "friction_work": found.friction_work.mean(axis=0),
+                "peak_torsion": float(np.abs(signals["torsion"]).max()),
+                "peak_to_peak_vertical": float(np.ptp(signals["vertical"])),
+                "peak_to_peak_horizontal": float(np.ptp(signals["horizontal"])),
+                **probe_extents(signals),
+            }
+            | driven_measures(found)
+        )
     measures |= {
         "modal_error": setup.modal_error,
         "steps": found.n_step,

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 PHYSICS = 15  # version of the physics: raised whenever a study gives other results than before
 DIRECT = 2  # the same of studies with transient = "direct"
+CHANGING = 1  # added to PHYSICS where the speed changes: the end of a driven piece, and more measures
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
@@ -40,7 +41,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
     }
     swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
     parts = {
-        "physics": PHYSICS,
+        "physics": PHYSICS + (CHANGING if study.run_up or study.drive else 0),
         **({"direct": DIRECT} if study.recording.is_transient_direct else {}),
         "axes": [axis.name for axis in study.axes],
         **({"sweep": swept} if swept else {}),  # absent in older stores
