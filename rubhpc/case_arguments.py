@@ -17,6 +17,7 @@ from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
+from rubhpc.recent import recent
 from rubhpc.rig.probes import Probe
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.rig import Rig
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from os import PathLike
 
+    from rubhpc.fem.model import Model
     from rubhpc.integrate.setup import Setup
     from rubhpc.study.drive_law import DriveLaw
 
@@ -95,6 +97,8 @@ def case_of(
 ) -> Case:
     """Check the arguments of `caller` and assemble its case; `drive` turns it where its speed is free.
 
+    Calls with the same rig and speed share what they assemble, tables of contact modes included.
+
     Raises
     ------
     InputError
@@ -114,14 +118,13 @@ def case_of(
         raise InputError(f"{caller}: give speed or speed_ratio, one of the two")
     if (clearance is None) == (clearance_ratio is None):
         raise InputError(f"{caller}: give clearance or clearance_ratio, one of the two")
-    model = assemble(rig)
+    model = recent(lambda: assemble(rig), "model", rig)
     if speed_ratio is not None:
         ratio = parse_quantity(speed_ratio, "", f"{caller}: speed_ratio")
-        spin = ratio * first_lateral_frequency(model)
+        spin = ratio * recent(lambda: first_lateral_frequency(model), "first frequency", rig)
     else:
         spin = parse_quantity(speed, "rad/s", f"{caller}: speed")
-    unstable = instability_message(model, spin)
-    amplitude = math.nan if unstable else contact_free_amplitude(model, spin)
+    unstable, amplitude = recent(lambda: _without_contact(model, spin), "without contact", rig, spin)
     if clearance_ratio is not None:
         ratio = parse_quantity(clearance_ratio, "", f"{caller}: clearance_ratio")
         if unstable:
@@ -139,15 +142,18 @@ def case_of(
         raise InputError(f"{caller}: friction: {mu:g} is out of range; it must be at least 0")
     contact = _declared(Contact, given, caller)
     integrator = _declared(Integrator, given, caller)
-    setup = prepare(
-        rig,
-        spin,
-        contact=contact,
-        integrator=integrator,
-        samples_per_revolution=samples_per_revolution,
-        model=model,
-        probes=probes,
-        drive=drive,
+    setup = recent(
+        lambda: prepare(
+            rig,
+            spin,
+            contact=contact,
+            integrator=integrator,
+            samples_per_revolution=samples_per_revolution,
+            model=model,
+            probes=probes,
+            drive=drive,
+        ),
+        *("set-up", rig, spin, contact, integrator, samples_per_revolution, tuple(probes), drive),
     )
     return Case(
         rig=rig,
@@ -160,6 +166,12 @@ def case_of(
         initial=start,
         note=unstable,
     )
+
+
+def _without_contact(model: Model, spin: float) -> tuple[str, float]:
+    """What is wrong with a rotor at a speed, or "", and its amplitude there, m; NaN of an unstable one."""
+    unstable = instability_message(model, spin)
+    return unstable, math.nan if unstable else contact_free_amplitude(model, spin)
 
 
 def read_probes(caller: str, probes: Sequence[Probe | Mapping[str, object]]) -> tuple[Probe, ...]:

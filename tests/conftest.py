@@ -255,6 +255,13 @@ def no_figures_left() -> Iterator[None]:
         pyplot.close("all")
 
 
+@pytest.fixture(autouse=True)
+def nothing_recent() -> None:
+    """Forget what calls of tests before have made: a test may change what goes into it."""
+    if recent := sys.modules.get("rubhpc.recent"):
+        recent.forget()
+
+
 @pytest.fixture(scope="session")
 def synthetic_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A synthetic store on disk, which no test may change."""

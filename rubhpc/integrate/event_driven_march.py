@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -84,7 +85,6 @@ class EventDrivenMarch(ModalMarch):
 
         `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft.
         """
-        q = self._clearance.size
         return int(
             change_contacts(
                 self.bodies,
@@ -96,13 +96,21 @@ class EventDrivenMarch(ModalMarch):
                 np.sin(angle),
                 motion,
                 False,
-                np.zeros(q),
-                np.zeros(q),
-                np.zeros(q, dtype=np.bool_),
-                np.zeros((q, q + 1)),
-                new_accumulator(q),
+                *self._change_work,
+                self._unrecorded,
             )
         )
+
+    @cached_property
+    def _change_work(self) -> tuple[Floats, Floats, NDArray[np.bool_], Floats]:
+        """Room for an event that is taken by itself."""
+        q = self._clearance.size
+        return np.zeros(q), np.zeros(q), np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
+
+    @cached_property
+    def _unrecorded(self) -> Accumulator:
+        """What is asked for where nothing is recorded."""
+        return new_accumulator(self._clearance.size)
 
     def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
         """Contact modes of the case."""

@@ -10,7 +10,6 @@ from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
 from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.friction_mode import mask_of, states_of
 from rubhpc.integrate.march import NO_FORCES
-from rubhpc.integrate.measures import new_accumulator
 from rubhpc.integrate.workspace import empty_workspace
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
@@ -116,7 +115,7 @@ class FrictionMarch(EventDrivenMarch):
                 motion,
                 False,
                 self._work,
-                new_accumulator(self._clearance.size),
+                self._unrecorded,
             )
         )
 

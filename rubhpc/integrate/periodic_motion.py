@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rubhpc.errors import InputError, NoPeriodicMotion
 from rubhpc.integrate.case import run_case
+from rubhpc.integrate.closed_form import closed_form_march
 from rubhpc.integrate.event_driven_march import NoClosedForm
 from rubhpc.integrate.initial_state import fit_to_gaps
 from rubhpc.integrate.piecewise_motion import Change, PiecewiseMotion
@@ -184,14 +185,14 @@ def _search(
     unstable: tuple[PiecewiseMotion, Orbit] | None = None
     reason = ""
     for span in (first, *SPANS):
-        piecewise = PiecewiseMotion(setup, clearance, friction, state)
         if span:
-            ended = pass_revolutions(piecewise.march, recording, span)
+            march = closed_form_march(setup)(setup, clearance, friction, state, None)
+            ended = pass_revolutions(march, recording, span)
             if ended is not None:
                 reason = ended
                 break
-            state = fit_to_gaps(piecewise.march.final(), setup, clearance)
-            piecewise = PiecewiseMotion(setup, clearance, friction, state)
+            state = fit_to_gaps(march.final(), setup, clearance)
+        piecewise = PiecewiseMotion(setup, clearance, friction, state)
         try:
             orbit = shoot(piecewise, piecewise.start, piecewise.states, period)
         except NotConverged as problem:
@@ -228,7 +229,6 @@ def record_of_period(
     record = run_case(setup, clearance=clearance, friction=friction, recording=once, initial=state)
     signals = {name: np.tile(v, repeat) for name, v in record.signals.items()}
     sections = {name: np.tile(v, repeat) for name, v in record.sections.items()}
-    spectra = {f"spectrum_{name}": amplitude_spectrum(values) for name, values in signals.items()}
     has_touched = bool((record.measures["contact_impulse"] > 0.0).any())
     measures = record.measures | {
         "period": period,
@@ -242,7 +242,9 @@ def record_of_period(
     return replace(
         record,
         signals=signals if "waveform" in recording.keep else {},
-        spectra=spectra if "spectrum" in recording.keep else {},
+        spectra={f"spectrum_{name}": amplitude_spectrum(values) for name, values in signals.items()}
+        if "spectrum" in recording.keep
+        else {},
         sections=sections if "section" in recording.keep else {},
         measures=measures,
     )

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 Change = Literal["touch", "release", "slip", "stick"]
 
 MOST_EVENTS = 1000  # in a revolution
-NO_PAIR = np.zeros(0, dtype=np.int64)
+NO_PAIR, NO_SPEED = np.zeros(0, dtype=np.int64), np.zeros(0)
 STEPS_PER_REVOLUTION = 128  # at least, so that no turn of a gap between two steps is missed
 
 
@@ -33,8 +33,7 @@ class Unfollowed(Exception):  # noqa: N818 - a state of the motion, never seen b
     """A motion that cannot be followed from event to event: its text says why."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Piece:
+class Piece(NamedTuple):
     """Motion in one contact mode, m coordinates, n reduced degrees.
 
     Attributes
@@ -45,32 +44,27 @@ class Piece:
         Since the shaft passed its angle 0, and until the event or the end of the revolution.
     crossing : int
         Bits of the switch functions that vanish at the end; 0 where the revolution ends.
+    begun, ended : (2, m)
+        Coordinates at the beginning, and at the end before the event.
     before, after : (2 n,)
         Reduced displacements and velocities at the end, before and after the event.
-    rate_before : (2 n,)
-        Their rate before the event.
     touching, approach : (k,)
         Pairs whose gaps close at the end, and their speeds of approach, m/s.
-    switch_rate : float
-        Rate of the first switch function that vanishes, its unit per second.
     states_after : int
         What goes on.
-    rate_begun : (2 n,)
-        Rate of the motion at the beginning.
     """
 
     states: int
     begin: float
     duration: float
     crossing: int
+    begun: Floats
+    ended: Floats
     before: Floats
-    rate_before: Floats
     touching: NDArray[np.int64]
     approach: Floats
-    switch_rate: float
     after: Floats
     states_after: int
-    rate_begun: Floats
 
 
 class Mode(NamedTuple):
@@ -234,11 +228,12 @@ class PiecewiseMotion:
                 z,
                 turned,
             )
-            lowest = turned[:: self.n_switch // self.q]
-            least_gap = np.where(mode.is_open, np.minimum(least_gap, lowest), least_gap)
-            least_force = np.where(mode.is_closed, np.minimum(least_force, lowest), least_force)
+            if turned.min() < np.inf:
+                lowest = turned[:: self.n_switch // self.q]
+                least_gap = np.where(mode.is_open, np.minimum(least_gap, lowest), least_gap)
+                least_force = np.where(mode.is_closed, np.minimum(least_force, lowest), least_force)
             before = mode.shape_re @ z[0] - mode.shape_im @ z[1]
-            touching, approach, after, states_after = NO_PAIR, np.zeros(0), before, states
+            touching, approach, after, states_after = NO_PAIR, NO_SPEED, before, states
             if crossing:
                 if self.march.is_beyond(before):
                     raise Unfollowed(f"a displacement passes {self.setup.displacement_limit:.3g} m")
@@ -254,14 +249,13 @@ class PiecewiseMotion:
                     begin=time,
                     duration=duration,
                     crossing=crossing,
+                    begun=begun,
+                    ended=z,
                     before=before,
-                    rate_before=rate_of(mode, z),
-                    switch_rate=self._switch_rate(mode, crossing, z),
                     touching=touching,
                     approach=approach,
                     after=after,
                     states_after=states_after,
-                    rate_begun=rate_of(mode, begun),
                 )
             )
             time, motion, states = time + duration, after, states_after
@@ -288,6 +282,20 @@ class PiecewiseMotion:
         """First switch function that vanishes, of coordinates (m,), real and imaginary."""
         j = first_of(crossing)
         return float(self._tables.switch_re[mode.place, j] @ re - self._tables.switch_im[mode.place, j] @ im)
+
+    def rate_begun(self, piece: Piece) -> Floats:
+        """Rate (2 n,) of the motion at the beginning of a piece."""
+        return rate_of(self.mode(piece.states), piece.begun)
+
+    def rate_ended(self, piece: Piece) -> Floats:
+        """Rate (2 n,) of the motion at the end of a piece, before the event."""
+        return rate_of(self.mode(piece.states), piece.ended)
+
+    def switch_rate(self, piece: Piece) -> float:
+        """Rate of the first switch function that vanishes at the end of a piece, its unit per second."""
+        mode, j = self.mode(piece.states), first_of(piece.crossing)
+        re, im = self._tables.rate_re[mode.place, j], self._tables.rate_im[mode.place, j]
+        return float(re @ piece.ended[0] - im @ piece.ended[1])
 
     def unit_clearance(self, mode: Mode) -> tuple[Floats, Floats]:
         """What a clearance greater by 1 m at every pair adds to coordinates (m,), real and imaginary."""
@@ -339,20 +347,13 @@ class PiecewiseMotion:
             sine=sine,
         )
 
-    def _switch_rate(self, mode: Mode, crossing: int, z: Floats) -> float:
-        """Rate of the first switch function that vanishes, its unit per second; 0 where none does."""
-        if not crossing:
-            return 0.0
-        j = first_of(crossing)
-        re, im = self._tables.rate_re[mode.place, j], self._tables.rate_im[mode.place, j]
-        return float(re @ z[0] - im @ z[1])
-
     def _touch(self, mode: Mode, crossing: int, z: Floats) -> tuple[NDArray[np.int64], Floats]:
         """Pairs whose gaps close at an event, and their speeds of approach, m/s."""
         stride, tables = self.n_switch // self.q, self._tables
-        pairs = np.flatnonzero(
-            [crossing >> stride * i & 1 and is_open for i, is_open in enumerate(mode.is_open)]
-        )
+        found = [i for i in range(self.q) if crossing >> stride * i & 1 and mode.is_open[i]]
+        if not found:
+            return NO_PAIR, NO_SPEED
+        pairs = np.array(found)
         rows = stride * pairs
         return pairs, tables.rate_im[mode.place, rows] @ z[1] - tables.rate_re[mode.place, rows] @ z[0]
 

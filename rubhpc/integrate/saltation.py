@@ -67,8 +67,8 @@ def by_clearance(motion: PiecewiseMotion, revolutions: Iterable[Revolution]) -> 
                 continue
             impact = Impact(motion, piece)
             switched = motion.switch(mode, piece.crossing, z_re, z_im)
-            jump = following.rate_begun - impact.apply(piece.rate_before)
-            moved = impact.apply(moved) + jump * (switched / piece.switch_rate)
+            jump = motion.rate_begun(following) - impact.apply(motion.rate_ended(piece))
+            moved = impact.apply(moved) + jump * (switched / motion.switch_rate(piece))
     return moved
 
 
@@ -90,8 +90,8 @@ def saltate(motion: PiecewiseMotion, piece: Piece, following: Piece, tangent: Fl
         return tangent  # a release: the forces are continuous
     gradient = motion.gradient(motion.mode(piece.states), piece.crossing) @ tangent
     impact = Impact(motion, piece)
-    jump = following.rate_begun - impact.apply(piece.rate_before)
-    return impact.apply(tangent) + np.multiply.outer(jump, gradient / piece.switch_rate)
+    jump = motion.rate_begun(following) - impact.apply(motion.rate_ended(piece))
+    return impact.apply(tangent) + np.multiply.outer(jump, gradient / motion.switch_rate(piece))
 
 
 class Impact:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,13 +66,18 @@ def read_rig(
             raise InputError(f"{where}: {place(name)} returned a {type(rig).__name__}; return a rubhpc.Rig")
         return rig
     if name in packaged_rigs():
-        path = PACKAGED / f"{name}.toml"
-        return build(Rig, read_toml(path), f"{name}.toml")
+        return _packaged(PACKAGED / f"{name}.toml")
     path = (relative_to or Path()) / name
     if not name.endswith(".toml") and "/" not in name and not os.path.exists(path):
         fix = nearest(name, packaged_rigs())
         raise InputError(f"{where}: neither a packaged rig nor a file {place(str(path))}; {fix}")
     return build(Rig, read_toml(path, where), str(path))
+
+
+@cache
+def _packaged(path: Path) -> Rig:
+    """Read a packaged rig, once."""
+    return build(Rig, read_toml(path), path.name)
 
 
 def with_key(rig: Rig, dotted: str, value: object) -> Rig:

@@ -20,6 +20,7 @@ from rubhpc.integrate.march import NO_FORCES
 from rubhpc.integrate.mode_library import ModeLibrary
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
+from rubhpc.recent import forget
 from rubhpc.rig.parts import Torsion
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rig import Rig
@@ -87,6 +88,7 @@ def test_sets_are_made_anew_where_there_is_no_room_for_all(monkeypatch):
         return add(book, mask)
 
     monkeypatch.setattr(ModeLibrary, "add", counted)
+    forget()
     crowded = simulate(trial_rig(3), **CLOSE)
     assert len(made) > len(set(made))
     check_close(crowded, usual, 1e-9)
