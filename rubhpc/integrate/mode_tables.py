@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-MOST_MODES = 256  # sets of closed contacts of one speed and friction
+MOST_MODES = 1024  # sets of closed contacts of one speed and friction
 FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
 MOST_BYTES = 2**30  # of their tables
 GONE = -40.0  # exponent of what has died away

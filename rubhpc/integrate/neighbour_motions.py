@@ -94,12 +94,21 @@ class NeighbourMotions:
     def _tabulate(self) -> None:
         """Have the tables tabulated that are wanted.
 
-        A motion that is in a mode by now enters it anew: making room for another may move the tables.
+        A motion that is in a mode by now enters it anew where a set of contacts is new to the case. Where
+        one has only been forgotten it stays: what other cases have left in the library must not matter.
         """
         march, pair = self._march, self._pair
-        for progress, z, motion in zip(pair.progress, pair.z, pair.motion, strict=True):
-            if progress.wanted < 0:
-                motion[:] = march.motion_of(progress, z)
-                ask_for(progress, closed_pairs(progress, march.tables))
-        for wanted in pair.progress.wanted.tolist():
-            march.find(wanted)
+        masks = [
+            closed_pairs(progress, march.tables) if progress.wanted < 0 else int(progress.wanted)
+            for progress in pair.progress
+        ]
+        if not march.has_met(masks):
+            for progress, z, motion in zip(pair.progress, pair.z, pair.motion, strict=True):
+                if progress.wanted < 0:
+                    motion[:] = march.motion_of(progress, z)
+                    ask_for(progress, closed_pairs(progress, march.tables))
+        standing = [i for i, progress in enumerate(pair.progress) if progress.wanted < 0]
+        for i in sorted(range(2), key=standing.count):  # room for what is wanted is made first
+            march.find(masks[i])
+        for i in standing:
+            begin_in(pair.progress[i], march.tables.mask.tolist().index(masks[i]))

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.schema import FINAL_STATE
 from rubhpc.storage import layout
 from rubhpc.storage.disk import write_whole
 from rubhpc.storage.store import case_checksum
@@ -18,15 +17,13 @@ from rubhpc.storage.store import case_checksum
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.record import Record
     from rubhpc.storage.manifest import Manifest
 
 _REPEATS = 3
 
 
-def time_block(manifest: Manifest, record: Record) -> float:
-    """Processor seconds of a block full of a record, written to a temporary folder; 0 where none is."""
-    arrays = {**record.signals, **record.spectra, **record.sections, FINAL_STATE: record.final.packed()}
+def time_block(manifest: Manifest, arrays: dict[str, NDArray[Any]]) -> float:
+    """Processor seconds of a block full of a case's arrays, written to a temporary folder; 0 without one."""
     n_case = math.prod(manifest.chunk)
     data: dict[str, NDArray[Any]] = {}
     for variable in manifest.variables:

@@ -7,54 +7,30 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.branch_case import record_branches
-from rubhpc.integrate.case import compile_kernels, run_case
-from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.running.block_time import time_block
-from rubhpc.running.worker import operation_of, set_up
+from rubhpc.running.pilot_cases import Pace, Pilots
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.record import Record
-    from rubhpc.integrate.setup import Setup
     from rubhpc.running.preparations import Preparations
     from rubhpc.storage.manifest import Manifest
-    from rubhpc.study.cases import Block, Case, CaseGrid
-    from rubhpc.study.contact_keys import Contact
-    from rubhpc.study.study import Recording
+    from rubhpc.study.cases import Block, CaseGrid
 
 _MOST_PILOTS, _FEW_PILOTS, _FEW_BRANCHED = 64, 6, 2  # cases; timed even if slow, and of a branch study
 _ENOUGH, _MOST = 3.0, 12.0  # processor seconds after which no more are begun: where they agree, and at all
 _AGREED = 0.25  # standard error of the mean pace, as a share of it, where cases agree
-_LONG, _PILOT_TIME = 0.25, 0.5  # s: longer cases are shortened; of the longest run of such a case, about
-_FIRST_STEPS = 50_000  # predicted, of the first run of a case that is shortened
-_LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
-_RUN_UP_COST = 3.5  # of a revolution with changing speed, times that of one at the highest speed
-_LATE = 0.25  # least pace of what is left of a shortened case, over that of what was timed
+_DEAR = 0.2  # share of the time of all pilot cases from which one that was shortened is run whole
+_LONGEST = 20.0  # s, in which such cases are run whole, together
 # Positions that spread evenly over a square, however many (R. Kronecker; steps of M. Roberts' R2 sequence).
 _AMONG_BLOCKS, _WITHIN_BLOCK = 0.7548776662466927, 0.5698402909980532
-
-
-class Pace(NamedTuple):
-    """What a run spends its time on, seconds.
-
-    `step` is that of a predicted step, `rig` of assembling a rig, `speed` of preparing it at a speed with the
-    modes, `friction` of solving the contact modes of a friction, `block` of writing a block.
-    """
-
-    step: float
-    rig: float
-    speed: float
-    friction: float
-    block: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,10 +62,6 @@ class Timing:
     failures: tuple[str, ...] = ()
 
 
-class _Enough(Exception):  # noqa: N818 - no error: what ends the branches of a pilot case
-    """A pilot case takes longer than is waited for."""
-
-
 def seconds_of(pace: Pace, steps: float, n: Preparations, n_block: int) -> float:
     """Time of a whole run on one core."""
     prepared = pace.rig * n.rig + pace.speed * n.speed + pace.friction * n.friction
@@ -105,10 +77,11 @@ def time_pilots(
     picked ones is that of all; they spread evenly over the blocks and over the cases of a block.
     """
     paces: list[Pace] = []
+    picked: list[tuple[tuple[int, ...], float]] = []
     failures: list[str] = []
     is_bound = False
     began = time.process_time()
-    pilots = _Pilots(grid)
+    pilots = Pilots(grid)
     few = _FEW_PILOTS if grid.study.branch is None else _FEW_BRANCHED
     for k, (index, steps) in enumerate(_picked(blocks, missing)):
         spent = time.process_time() - began - pilots.loading - pilots.compiling
@@ -116,13 +89,15 @@ def time_pilots(
             break  # a few rubs among many free motions take most of the time of some studies
         try:
             paces.append(pilots.pace(index, steps))
+            picked.append((index, steps))
         except Exception as error:  # whatever is wrong with the case: the others are timed all the same
             where = manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))
             failures.append(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}")
         if pilots.was_cut:  # another would take as long
             is_bound = True
             break
-    block = time_block(manifest, pilots.record) if pilots.record is not None else 0.0
+    is_bound |= _run_dear_ones(pilots, picked, paces)
+    block = time_block(manifest, pilots.arrays) if pilots.arrays else 0.0
     seconds = time.process_time() - began - pilots.loading
     if not paces:
         return Timing(pace=Pace(*[math.nan] * len(Pace._fields)), seconds=seconds, failures=tuple(failures))
@@ -134,6 +109,26 @@ def time_pilots(
         seconds=seconds,
         failures=tuple(failures),
     )
+
+
+def _run_dear_ones(pilots: Pilots, picked: list[tuple[tuple[int, ...], float]], paces: list[Pace]) -> bool:
+    """Run whole, the dearest first, the shortened cases that cost most of all; whether one was cut off.
+
+    What such a case comes to is hardly known from its beginning: more and more sets of contacts, neighbours
+    of a motion without a period.
+    """
+    guessed = [pace.step * steps for pace, (_, steps) in zip(paces, picked, strict=True)]
+    left = _LONGEST
+    for k in sorted(range(len(paces)), key=lambda k: -guessed[k]):
+        index, steps = picked[k]
+        if index not in pilots.shortened or guessed[k] < _DEAR * sum(guessed) or left <= guessed[k]:
+            continue
+        began = time.process_time()
+        paces[k] = pilots.whole(index, steps, paces[k], left)
+        left -= time.process_time() - began
+        if pilots.was_cut:
+            return True
+    return False
 
 
 def _spread(paces: list[Pace], missing: NDArray[np.bool_]) -> float:
@@ -168,153 +163,3 @@ def _picked(blocks: list[Block], missing: NDArray[np.bool_]) -> Iterator[tuple[t
 def share_of(block: Block, missing: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which cases of a block are missing, of its shape."""
     return missing[tuple(slice(s, s + n) for s, n in zip(block.start, block.shape, strict=True))]
-
-
-class _Pilots:
-    """Times cases of a grid, one after another.
-
-    Attributes
-    ----------
-    was_cut : bool
-        The last one took longer than is waited for.
-    loading, compiling : float
-        Processor seconds in which kernels were loaded, and in which such were compiled that no cache held.
-    record : Record or None
-        Of the latest case that was run.
-    """
-
-    def __init__(self, grid: CaseGrid) -> None:
-        self._grid, self._study = grid, grid.study
-        self._compiled: set[Contact] = set()
-        self._paces: list[float] = []  # of the cases so far, seconds a predicted step
-        self.was_cut = False
-        self.loading = self.compiling = 0.0
-        self.record: Record | None = None
-
-    def pace(self, index: tuple[int, ...], steps: float) -> Pace:
-        """Times of a case, shortened where the whole of it takes long, and of its preparation."""
-        case = self._grid.case(index)
-        if self._study.branch is not None:
-            return Pace(self._branches(case) / steps, 0.0, 0.0, 0.0)
-        rig, speed, setup = self._prepared(case)
-        runs, recording = self._runs(case, setup, steps)
-        done, taken = runs[-1]
-        if len(runs) == 1:  # it has solved the contact modes
-            first, again = taken, min(taken, self._run(case, setup, recording))
-        else:
-            first = self._run(case, set_up(self._study, case, setup.model), recording)
-            again = min(taken, first)
-        whole = again
-        if done < 1.0:  # a rub may begin late, and then costs more
-            before = runs[-2] if len(runs) > 1 else (0.0, 0.0)
-            slope = max((again - before[1]) / (done - before[0]), _LATE * again / done)
-            whole = again + (1.0 - done) * slope
-        self._paces.append(whole / steps)
-        if case.speed_law is not None:
-            whole *= _RUN_UP_COST
-        return Pace(step=whole / steps, rig=rig, speed=speed, friction=max(0.0, first - again))
-
-    def _prepared(self, case: Case) -> tuple[float, float, Setup]:
-        """Times of assembling the rig and of preparing the speed, and the set-up, its kernels compiled."""
-        if case.contact not in self._compiled:
-            compiled, began = seconds_compiling(), time.process_time()
-            compile_kernels(
-                set_up(self._study, case),
-                clearance=case.clearance,
-                friction=case.friction,
-                recording=self._study.recording,
-            )
-            self._compiled.add(case.contact)
-            if seconds_compiling() == compiled:
-                self.loading += time.process_time() - began
-            else:
-                self.compiling += time.process_time() - began
-        began = time.process_time()
-        setup = set_up(self._study, case)
-        middle = time.process_time()
-        set_up(self._study, case, setup.model)
-        prepared = time.process_time() - middle
-        return max(0.0, middle - began - prepared), prepared, setup
-
-    def _runs(self, case: Case, setup: Setup, steps: float) -> tuple[list[tuple[float, float]], Recording]:
-        """Shares of the case that were run, each longer than the last, what they took, s, and the longest."""
-        whole = self._whole(case)
-        known = max(self._paces, default=math.nan) * steps
-        ends_by_itself = isinstance(whole.transient, str)  # nobody knows when, but by trying
-        share = 1.0 if ends_by_itself or known < _LONG else min(1 / 16, _FIRST_STEPS / steps)
-        runs: list[tuple[float, float]] = []
-        while True:
-            recording = _shortened(whole, share)
-            taken = self._run(case, setup, recording)
-            done = (recording.longest_transient + recording.revolutions) / (
-                whole.longest_transient + whole.revolutions
-            )
-            runs.append((done, taken))
-            longer = min(1.0, done * _PILOT_TIME / taken, 4 * share)
-            if done == 1.0 or (longer < 1.0 and longer < 2 * share):
-                return runs, recording
-            share = longer
-
-    def _whole(self, case: Case) -> Recording:
-        """The recording of a case; of a run-up as many revolutions at its highest speed."""
-        recording = self._study.recording
-        if case.speed_law is None:
-            return recording
-        return replace(
-            recording,
-            transient=0,
-            transient_limit=None,
-            transient_tolerance=None,
-            revolutions=case.speed_law.n_revolution,
-        )
-
-    def _branches(self, case: Case) -> float:
-        """Time of the branches of a case; `was_cut` where they were not followed to their ends."""
-        study = self._study
-        assert study.branch is not None
-        span = study.axis(study.branch.along).drawn_from
-        assert span is not None
-
-        def check() -> None:
-            if time.process_time() - began > _LONGEST_BRANCHES:
-                raise _Enough
-
-        while True:
-            compiled, began = seconds_compiling(), time.process_time()
-            try:
-                record_branches(operation_of(self._grid, case), study.branch, span, study.recording, check)
-            except _Enough:
-                self.was_cut = seconds_compiling() == compiled
-            taken = time.process_time() - began
-            if seconds_compiling() == compiled:
-                return taken
-            self.compiling += taken
-
-    def _run(self, case: Case, setup: Setup, recording: Recording) -> float:
-        """Processor time of a case, s; it is run once more where kernels were compiled meanwhile."""
-        while True:
-            compiled, began = seconds_compiling(), time.process_time()
-            self.record = run_case(
-                setup,
-                clearance=case.clearance,
-                friction=case.friction,
-                recording=recording,
-                initial=case.initial,
-            )
-            taken = time.process_time() - began
-            if seconds_compiling() == compiled:
-                return max(taken, 1e-6)
-            self.compiling += taken
-
-
-def _shortened(whole: Recording, share: float) -> Recording:
-    """A recording, or a share of it: what is recorded costs more than what is not."""
-    if share == 1.0:
-        return whole
-    return replace(
-        whole,
-        transient=round(share * whole.longest_transient),
-        transient_limit=None,
-        transient_tolerance=None,
-        revolutions=round(share * whole.revolutions) or 1,
-    )

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _LINE = 400  # bytes of a case in a journal, about, for one stator
 _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the settings
-_AT_EDGES = 1.6  # cases that a refined map computes over all cases, seconds a step: 1.5 and 1.65 in two maps
+_AT_EDGES = 1.1  # cases that a refined map computes over all cases, seconds a step, about
 _PRIVATE_FILES = 8  # manifests, journals, records of runs
 
 

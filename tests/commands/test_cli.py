@@ -210,14 +210,14 @@ def test_the_python_face(tmp_path: Path):
 
 def test_plan_extrapolates_cases_that_take_long_from_where_they_rub(tmp_path, monkeypatch):
     """Of a case that is shortened, the revolutions before its first contact are the cheapest."""
-    from rubhpc.running import pilots
+    from rubhpc.running import pilot_cases
     from rubhpc.running.plan import make_plan
     from rubhpc.study.study import read_study
 
     def seconds(_pilots, _case, _setup, recording):
         return 0.01 * max(0, recording.longest_transient + recording.revolutions - 5)
 
-    monkeypatch.setattr(pilots._Pilots, "_run", seconds)
+    monkeypatch.setattr(pilot_cases.Pilots, "_run", seconds)
     study = read_study(write_study(tmp_path, transient=60, revolutions=64))
     found = make_plan(study)
     assert found.timing.pace.friction == 0.0
@@ -243,16 +243,16 @@ def test_plan_times_a_transient_that_ends_by_itself(tmp_path, capsys):
 
 def test_pilots_see_every_value_of_an_axis_within_blocks(tmp_path, monkeypatch):
     """The first cases of blocks, which hold all of a friction axis, would never rub."""
-    from rubhpc.running import pilots, plan
+    from rubhpc.running import pilot_cases, plan
     from rubhpc.study.study import read_study
 
     asked = []
 
     def pace(self, index, steps):
         asked.append(self._grid.case(index))
-        return pilots.Pace(1.0, 0.0, 0.0, 0.0)
+        return pilot_cases.Pace(1.0, 0.0, 0.0, 0.0)
 
-    monkeypatch.setattr(pilots._Pilots, "pace", pace)
+    monkeypatch.setattr(pilot_cases.Pilots, "pace", pace)
     study = read_study(write_study(tmp_path))
     plan.make_plan(study)
     assert {case.friction for case in asked} == set(study.axis("friction").values)
@@ -261,7 +261,7 @@ def test_pilots_see_every_value_of_an_axis_within_blocks(tmp_path, monkeypatch):
 
 def test_pilots_stand_for_all_cases(tmp_path, monkeypatch):
     """Their mean pace is that of the whole study where dear cases take more steps, too; few cases suffice."""
-    from rubhpc.running import pilots, plan
+    from rubhpc.running import pilot_cases, plan
     from rubhpc.study.cases import CaseGrid
     from rubhpc.study.study import read_study
 
@@ -275,9 +275,9 @@ def test_pilots_stand_for_all_cases(tmp_path, monkeypatch):
 
     def pace(self, index, steps):
         paces[index] = seconds(index, steps) / steps
-        return pilots.Pace(paces[index], 0.0, 0.0, 0.0)
+        return pilot_cases.Pace(paces[index], 0.0, 0.0, 0.0)
 
-    monkeypatch.setattr(pilots._Pilots, "pace", pace)
+    monkeypatch.setattr(pilot_cases.Pilots, "pace", pace)
     grid = CaseGrid(study)
     cost = {
         case.index: block.cost / math.prod(block.shape)
@@ -305,12 +305,12 @@ def test_only_missing_cases_are_timed(tmp_path, monkeypatch):
 
 
 def test_plan_tells_why_its_pilots_failed(tmp_path, monkeypatch, capsys):
-    from rubhpc.running import pilots
+    from rubhpc.running import pilot_cases
 
     def burst(*_: object) -> None:
         raise ZeroDivisionError("by\nzero")
 
-    monkeypatch.setattr(pilots, "set_up", burst)
+    monkeypatch.setattr(pilot_cases, "set_up", burst)
     code, out, err = call(capsys, "plan", write_study(tmp_path))
     assert (code, err) == (0, "")
     assert "core-hours unknown: the pilot cases failed" in out

@@ -18,6 +18,7 @@ from rubhpc.integrate.case import run_case
 from rubhpc.integrate.divergence import energy_limit
 from rubhpc.integrate.march import NO_FORCES
 from rubhpc.integrate.mode_library import ModeLibrary
+from rubhpc.integrate.neighbour_motions import NeighbourMotions
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
 from rubhpc.recent import forget
@@ -93,6 +94,22 @@ def test_sets_are_made_anew_where_there_is_no_room_for_all(monkeypatch):
     assert len(made) > len(set(made))
     check_close(crowded, usual, 1e-9)
     assert crowded.peak_contact_force == pytest.approx(usual.peak_contact_force, rel=1e-7)
+
+
+def test_neighbours_do_not_depend_on_what_is_forgotten(monkeypatch):
+    """Not even their last bits: other cases, which other ranks compute, fill the same tables."""
+    monkeypatch.setattr(event_driven_march, "MOST_REFILLS", 1000)
+    ratios = []
+    for most in (1024, 4):
+        monkeypatch.setattr(ModeLibrary, "_most_modes", most)
+        setup = prepare(
+            trial_rig(3), SPEED, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
+        )
+        march = event_driven_march.EventDrivenMarch(setup, 40e-6, 0.2, State.at_rest(setup.model), None)
+        neighbours = NeighbourMotions(march)
+        ratios.append([neighbours.part(1) for _ in range(6)])
+    assert None not in ratios[0]
+    assert ratios[0] == ratios[1]
 
 
 def test_sets_of_contacts_are_met_as_they_come():

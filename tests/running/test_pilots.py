@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from rubhpc.running import pilots
+from rubhpc.running.pilot_cases import parts
+from rubhpc.study.drive_law import DriveLaw
+from rubhpc.study.speed_law import SpeedLaw
 
 
 @pytest.mark.parametrize(
@@ -22,7 +25,7 @@ def test_more_cases_are_timed_where_they_differ(costs, n_pilot, monkeypatch):
 
     class Pilots:
         loading = compiling = 0.0
-        was_cut, record = False, None
+        was_cut, arrays, shortened = False, {}, frozenset()
 
         def __init__(self, grid):
             pass
@@ -31,10 +34,55 @@ def test_more_cases_are_timed_where_they_differ(costs, n_pilot, monkeypatch):
             now[0] += costs[index[0]]
             return pilots.Pace(costs[index[0]] / steps, 0.0, 0.0, 0.0)
 
-    monkeypatch.setattr(pilots, "_Pilots", Pilots)
+    monkeypatch.setattr(pilots, "Pilots", Pilots)
     monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3) for i in range(64)))
     monkeypatch.setattr(pilots, "time", SimpleNamespace(process_time=lambda: now[0]))
     grid = SimpleNamespace(study=SimpleNamespace(branch=None))
     timing = pilots.time_pilots(grid, None, [], np.ones(1000, dtype=bool))
     assert timing.n_pilot == n_pilot
     assert timing.pace.step == pytest.approx(np.mean(costs[:n_pilot]) / 1e3)
+
+
+def test_parts_of_a_run_up_spread_over_its_speeds():
+    """Its cost is that of the pieces it is cut into, which depend on the speed."""
+    law = SpeedLaw(time=(0.0, 4.0, 10.0), speed=(50.0, 300.0, 100.0))
+    found = parts(law, 64)
+    assert [part.n_revolution for part in found] == [16] * 4
+    speeds = [part.speed[0] for part in found]
+    turns = [round((k + 0.5) / 4 * (law.n_revolution - 16)) for k in range(4)]
+    assert speeds == pytest.approx(law.at_angle(2 * np.pi * np.array(turns))[1])
+    assert max(len(part.speed) for part in found) == 3  # the bend lies in one of them
+    assert parts(law, law.n_revolution) == [law]
+
+
+def test_part_of_a_drive_is_its_beginning():
+    law = DriveLaw(torque=(1.0,), start=100.0, n_revolution=400, lowest=1.0)
+    assert [part.n_revolution for part in parts(law, 64)] == [64]
+
+
+def test_dearest_case_is_run_whole(monkeypatch):
+    """What a shortened one comes to is not known from its beginning: it is run whole if it dominates."""
+    now = [0.0]
+
+    class Pilots:
+        loading = compiling = 0.0
+        was_cut, arrays, shortened = False, {}, {(0,), (1,)}
+
+        def __init__(self, grid):
+            pass
+
+        def pace(self, index, steps):
+            now[0] += 0.5
+            return pilots.Pace(3.0 / steps if index == (0,) else 0.1 / steps, 0.0, 0.0, 0.0)
+
+        def whole(self, index, steps, guessed, limit):
+            assert index == (0,)
+            assert limit == pilots._LONGEST
+            return guessed._replace(step=15.0 / steps)
+
+    monkeypatch.setattr(pilots, "Pilots", Pilots)
+    monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3) for i in range(6)))
+    monkeypatch.setattr(pilots, "time", SimpleNamespace(process_time=lambda: now[0]))
+    grid = SimpleNamespace(study=SimpleNamespace(branch=None))
+    timing = pilots.time_pilots(grid, None, [], np.ones(6, dtype=bool))
+    assert timing.pace.step == pytest.approx((15.0 + 5 * 0.1) / 6 / 1e3)

@@ -1,0 +1,280 @@
+"""What single cases of a study take: timed whole, or shortened where that would take long."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rubhpc.integrate.branch_case import record_branches
+from rubhpc.integrate.case import compile_kernels, run_case
+from rubhpc.integrate.compilation import seconds_compiling
+from rubhpc.integrate.run_up_case import RunUpRecord
+from rubhpc.running.worker import integrate, operation_of, set_up
+from rubhpc.schema import FINAL_STATE
+from rubhpc.study.drive_law import DriveLaw
+from rubhpc.study.speed_law import SpeedLaw
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.record import Record
+    from rubhpc.integrate.setup import Setup
+    from rubhpc.study.cases import Case, CaseGrid
+    from rubhpc.study.contact_keys import Contact
+    from rubhpc.study.study import Recording
+
+_LONG, _PILOT_TIME = 0.25, 0.5  # s: longer cases are shortened; of the longest run of such a case, about
+_FIRST_STEPS = 50_000  # predicted, of the first run of a case that is shortened
+_LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
+_FIRST_TURNS, _WINDOWS = 64, 4  # revolutions of a changing speed that are tried first, and in how many parts
+_WHOLE_TURNS = 3.0  # s: such cases are run whole if that takes no longer
+_LATE = 0.25  # least pace of what is left of a shortened case, over that of what was timed
+
+
+class Pace(NamedTuple):
+    """What a run spends its time on, seconds.
+
+    `step` is that of a predicted step, `rig` of assembling a rig, `speed` of preparing it at a speed with the
+    modes, `friction` of solving the contact modes of a friction, `block` of writing a block.
+    """
+
+    step: float
+    rig: float
+    speed: float
+    friction: float
+    block: float = 0.0
+
+
+class _Enough(Exception):  # noqa: N818 - no error: what ends the branches of a pilot case
+    """A pilot case takes longer than is waited for."""
+
+
+class Pilots:
+    """Times cases of a grid, one after another.
+
+    Attributes
+    ----------
+    was_cut : bool
+        The last one took longer than is waited for.
+    loading, compiling : float
+        Processor seconds in which kernels were loaded, and in which such were compiled that no cache held.
+    shortened : set of tuple of int
+        Cases that were not run whole.
+    arrays : dict
+        Signals and the like of the latest case that was run, by name.
+    """
+
+    def __init__(self, grid: CaseGrid) -> None:
+        self._grid, self._study = grid, grid.study
+        self._compiled: set[Contact] = set()
+        self._paces: list[float] = []  # of the cases so far, seconds a predicted step
+        self.was_cut = False
+        self.loading = self.compiling = 0.0
+        self.shortened: set[tuple[int, ...]] = set()
+        self.arrays: dict[str, NDArray[Any]] = {}
+
+    def pace(self, index: tuple[int, ...], steps: float) -> Pace:
+        """Times of a case, shortened where the whole of it takes long, and of its preparation."""
+        case = self._grid.case(index)
+        if self._study.branch is not None:
+            return Pace(self._branches(case) / steps, 0.0, 0.0, 0.0)
+        rig, speed, setup = self._prepared(case)
+        if case.speed_law is not None:
+            return Pace(self._turning(case, setup, case.speed_law) / steps, rig, speed, 0.0)
+        runs, recording = self._runs(case, setup, steps)
+        done, taken = runs[-1]
+        if len(runs) == 1:  # it has solved the contact modes
+            first, again = taken, min(taken, self._run(case, setup, recording))
+        else:
+            first = self._run(case, set_up(self._study, case, setup.model), recording)
+            again = min(taken, first)
+        whole = again
+        if done < 1.0:  # a rub may begin late, and then costs more
+            before = runs[-2] if len(runs) > 1 else (0.0, 0.0)
+            slope = max((again - before[1]) / (done - before[0]), _LATE * again / done)
+            whole = again + (1.0 - done) * slope
+            self.shortened.add(index)
+        self._paces.append(whole / steps)
+        return Pace(step=whole / steps, rig=rig, speed=speed, friction=max(0.0, first - again))
+
+    def _prepared(self, case: Case) -> tuple[float, float, Setup]:
+        """Times of assembling the rig and of preparing the speed, and the set-up, its kernels compiled."""
+        if case.contact not in self._compiled:
+            compiled, began = seconds_compiling(), time.process_time()
+            compile_kernels(
+                set_up(self._study, case),
+                clearance=case.clearance,
+                friction=case.friction,
+                recording=self._study.recording,
+            )
+            self._compiled.add(case.contact)
+            if seconds_compiling() == compiled:
+                self.loading += time.process_time() - began
+            else:
+                self.compiling += time.process_time() - began
+        began = time.process_time()
+        setup = set_up(self._study, case)
+        middle = time.process_time()
+        set_up(self._study, case, setup.model)
+        prepared = time.process_time() - middle
+        return max(0.0, middle - began - prepared), prepared, setup
+
+    def _runs(self, case: Case, setup: Setup, steps: float) -> tuple[list[tuple[float, float]], Recording]:
+        """Shares of the case that were run, each longer than the last, what they took, s, and the longest."""
+        whole = self._study.recording
+        known = max(self._paces, default=math.nan) * steps
+        ends_by_itself = isinstance(whole.transient, str)  # nobody knows when, but by trying
+        share = 1.0 if ends_by_itself or known < _LONG else min(1 / 16, _FIRST_STEPS / steps)
+        runs: list[tuple[float, float]] = []
+        while True:
+            recording = _shortened(whole, share)
+            taken = self._run(case, setup, recording)
+            done = (recording.longest_transient + recording.revolutions) / (
+                whole.longest_transient + whole.revolutions
+            )
+            runs.append((done, taken))
+            longer = min(1.0, done * _PILOT_TIME / taken, 4 * share)
+            if done == 1.0 or (longer < 1.0 and longer < 2 * share):
+                return runs, recording
+            share = longer
+
+    def whole(self, index: tuple[int, ...], steps: float, guessed: Pace, limit: float) -> Pace:
+        """Times of a whole case; `was_cut` and the longer of guess and `limit` (s) where it takes longer."""
+        case = self._grid.case(index)
+        while True:
+            setup = set_up(self._study, case)
+            compiled, began = seconds_compiling(), time.process_time()
+            try:
+                integrate(self._study, case, setup, case.initial, _limited(limit))
+            except _Enough:
+                self.was_cut = True
+            taken = time.process_time() - began
+            if seconds_compiling() == compiled:
+                break
+            self.compiling += taken
+            self.was_cut = False
+        if self.was_cut:
+            taken = max(taken, guessed.step * steps + guessed.friction)
+        return guessed._replace(step=max(taken - guessed.friction, 0.0) / steps)
+
+    def _turning(self, case: Case, setup: Setup, law: SpeedLaw | DriveLaw) -> float:
+        """Time of a case whose speed changes, which takes most of it for setting up its pieces."""
+        n, turns = law.n_revolution, min(law.n_revolution, _FIRST_TURNS)
+        while True:
+            taken = sum(
+                self._timed(
+                    partial(integrate, self._study, replace(case, speed_law=part), setup, case.initial)
+                )
+                for part in parts(law, turns)
+            )
+            whole = taken * n / turns
+            longer = n if whole <= _WHOLE_TURNS else min(n, round(turns * _WHOLE_TURNS / 2 / taken))
+            if turns == n or longer < 2 * turns:
+                return whole
+            turns = longer
+
+    def _branches(self, case: Case) -> float:
+        """Time of the branches of a case; `was_cut` where they were not followed to their ends."""
+        study = self._study
+        assert study.branch is not None
+        span = study.axis(study.branch.along).drawn_from
+        assert span is not None
+
+        while True:
+            compiled, began = seconds_compiling(), time.process_time()
+            try:
+                record_branches(
+                    operation_of(self._grid, case),
+                    study.branch,
+                    span,
+                    study.recording,
+                    _limited(_LONGEST_BRANCHES),
+                )
+            except _Enough:
+                self.was_cut = seconds_compiling() == compiled
+            taken = time.process_time() - began
+            if seconds_compiling() == compiled:
+                return taken
+            self.compiling += taken
+
+    def _run(self, case: Case, setup: Setup, recording: Recording) -> float:
+        """Processor time of a case, s."""
+        return self._timed(
+            lambda: run_case(
+                setup,
+                clearance=case.clearance,
+                friction=case.friction,
+                recording=recording,
+                initial=case.initial,
+            )
+        )
+
+    def _timed(self, run: Callable[[], Record | RunUpRecord]) -> float:
+        """Processor time of what yields a record, s; it is run once more where kernels were compiled."""
+        while True:
+            compiled, began = seconds_compiling(), time.process_time()
+            record = run()
+            taken = time.process_time() - began
+            if seconds_compiling() == compiled:
+                self.arrays = arrays_of(record)
+                return max(taken, 1e-6)
+            self.compiling += taken
+
+
+def arrays_of(record: Record | RunUpRecord) -> dict[str, NDArray[Any]]:
+    """All that a store keeps of a record, by name."""
+    if isinstance(record, RunUpRecord):
+        return record.arrays
+    return {**record.signals, **record.spectra, **record.sections, FINAL_STATE: record.final.packed()}
+
+
+def _limited(seconds: float) -> Callable[[], None]:
+    """What ends a case after so much processor time from now."""
+    end = time.process_time() + seconds
+
+    def check() -> None:
+        if time.process_time() > end:
+            raise _Enough
+
+    return check
+
+
+def parts(law: SpeedLaw | DriveLaw, turns: int) -> list[SpeedLaw | DriveLaw]:
+    """So many revolutions of a changing speed: the first ones of a drive, else parts spread over the law."""
+    if isinstance(law, DriveLaw):
+        return [replace(law, n_revolution=turns)]
+    n = law.n_revolution
+    if turns >= n:
+        return [law]
+    each = max(turns // _WINDOWS, 1)
+    firsts = [round((k + 0.5) / _WINDOWS * (n - each)) for k in range(_WINDOWS)]
+    return [_between(law, first, first + each) for first in firsts]
+
+
+def _between(law: SpeedLaw, first: int, last: int) -> SpeedLaw:
+    """A law from one revolution to another."""
+    (begin, end), speeds, _ = law.at_angle(2.0 * np.pi * np.array([first, last * (1.0 + 1e-9)]))
+    inner = [(t, v) for t, v in zip(law.time, law.speed, strict=True) if begin < t < end]
+    points = [(begin, speeds[0]), *inner, (end, speeds[1])]
+    times, values = zip(*points, strict=True)
+    return SpeedLaw(time=tuple(map(float, times)), speed=tuple(map(float, values)))
+
+
+def _shortened(whole: Recording, share: float) -> Recording:
+    """A recording, or a share of it: what is recorded costs more than what is not."""
+    if share == 1.0:
+        return whole
+    return replace(
+        whole,
+        transient=round(share * whole.longest_transient),
+        transient_limit=None,
+        transient_tolerance=None,
+        revolutions=round(share * whole.revolutions) or 1,
+    )
