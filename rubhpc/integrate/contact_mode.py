@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     Solved = dict[bytes, tuple[Complexes, Complexes, Complexes]]  # parts, by the bytes of their matrices
 
 WORST_CONDITION = 1e11  # of the eigenvectors; beyond it their sum loses its digits, and they are set apart
+SMALL = 64  # states of a part that is kept
 
 
 class KeptParts(dict[bytes, "tuple[Complexes, Complexes, Complexes]"]):
@@ -134,6 +137,11 @@ def confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats,
     `rate` (r, n) is the gap Jacobian of the closed pairs and `force` (n, r) their contact-force directions;
     the system (2 n_free, 2 n_free) is that of the coordinates y and their rates.
     """
+    n = reduced.stiffness.shape[0]
+    if not len(rate):
+        whole = np.eye(n)
+        free = np.block([[np.zeros((n, n)), whole], [-reduced.stiffness, -reduced.damping]])
+        return whole, whole, free
     tangent, left = _null_space(rate), _null_space(force.T)
     n_free = tangent.shape[1]
     project = np.asarray(np.linalg.solve(left.T @ tangent, left.T), dtype=np.float64)
@@ -182,13 +190,27 @@ def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Co
 
 
 def solve_part(part: Floats) -> tuple[Complexes, Complexes, Complexes]:
-    """Exponents, shapes and inverse shapes of a part of a system that nothing couples to the rest."""
+    """Exponents, shapes and inverse shapes of a part of a system that nothing couples to the rest.
+
+    Small ones, such as an open stator, which is the same at every speed, are not solved again.
+    """
+    worst = WORST_CONDITION
+    return _recalled(part.tobytes(), worst) if len(part) <= SMALL else _solve_part(part, worst)
+
+
+@lru_cache(maxsize=32)
+def _recalled(part: bytes, worst: float) -> tuple[Complexes, Complexes, Complexes]:
+    """The same of a part (n, n) as bytes."""
+    n = math.isqrt(len(part) // 8)
+    return _solve_part(np.frombuffer(part).reshape(n, n), worst)
+
+
+def _solve_part(part: Floats, worst: float) -> tuple[Complexes, Complexes, Complexes]:
     exponent, shape = np.linalg.eig(part)
-    if np.linalg.cond(shape) <= WORST_CONDITION:
-        inverse = np.linalg.inv(shape)
-    elif (separated := separate(part)) is not None:
+    inverse = _inverse(shape, worst)
+    if inverse is None and (separated := separate(part)) is not None:
         exponent, shape, inverse = separated
-    else:
+    if inverse is None:
         raise InputError(
             "[integrator] method: modal cannot separate the modes of this rig, some of which coincide (a "
             'free body, critical damping); take method = "central-difference"'
@@ -200,6 +222,16 @@ def solve_part(part: Floats) -> tuple[Complexes, Complexes, Complexes]:
         (shape * weight)[:, keep].astype(np.complex128),
         inverse[keep].astype(np.complex128),
     )
+
+
+def _inverse(shape: Complexes, worst: float) -> Complexes | None:
+    """Inverse of eigenvectors whose condition is not worse; the bound by Frobenius norms is tried first."""
+    try:
+        inverse = np.linalg.inv(shape)
+    except np.linalg.LinAlgError:
+        return None
+    bound = np.linalg.norm(shape) * np.linalg.norm(inverse)
+    return np.asarray(inverse) if bound <= worst or np.linalg.cond(shape) <= worst else None
 
 
 def solve_parts(system: Floats) -> Solved:
