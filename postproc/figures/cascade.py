@@ -12,10 +12,12 @@ from postproc.figures.cells import cell_edges, is_geometric
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import hertz
 from postproc.figures.ticks import tick_levels
-from postproc.signals.cascade import below, hold_peaks, hold_rows
+from postproc.signals.cascade import below, default_axis, hold_peaks, hold_rows
 from postproc.signals.cascade import cascade as cascade_data
 from postproc.signals.lines import SPIKE, parse_orders, spikes
+from postproc.store.axes import find_axis
 from postproc.store.rig_of_case import natural_frequencies
+from postproc.store.select import first_of_rest
 from postproc.store.units import displayed, scale_of, short_name
 from postproc.store.variables import require_results
 
@@ -53,7 +55,7 @@ def cascade(
     Parameters
     ----------
     cases
-        All axes but one are of one value, or selected.
+        Other axes are taken at their first value.
     signal
         Which recorded signal.
     full
@@ -74,6 +76,8 @@ def cascade(
         Mark one more frequency; may be repeated.
     """
     lines = parse_orders(order_lines, "--order-lines")
+    along = find_axis(cases, along) if along else default_axis(cases)
+    cases, notes = first_of_rest(cases, [along, "stator"], "status")
     spectra = cascade_data(cases, "whirl" if full else signal, along)
     frequencies: dict[str, Any] = dict(natural_frequencies(cases, str(spectra.dims[0])))
     if spectra.name == "spectrum_whirl":  # lateral motion alone
@@ -94,7 +98,7 @@ def cascade(
         draw_frequencies(axes[0], spectra, frequencies, abscissa, "C1" if is_waterfall else "#56B4E9")
 
     shown = below(spectra, limit, abscissa).to_dataset(name=str(spectra.name))
-    return Drawing(shown=shown, draw=draw, height=80)
+    return Drawing(shown=shown, draw=draw, height=80, lines=tuple(notes))
 
 
 def waterfall(

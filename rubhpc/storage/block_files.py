@@ -141,6 +141,22 @@ class BlockFiles:
         with suppress(OSError):
             self.folder.rmdir()
 
+    def oversized(self) -> list[Path]:
+        """Shards with bytes of no chunk, as of one that was written twice: readers find all cases in them."""
+        found = []
+        for variable in self._manifest.variables if self.is_sharded else ():
+            for file in sorted((self._path / variable.name).glob("c.*[0-9]")):
+                index = _index_of(file, self.n_inner)
+                if index is not None:
+                    used = index[index[:, 0] != ABSENT, 1].sum() + 16 * self.n_inner + 4
+                    found += [file] if file.stat().st_size > used else []
+        return found
+
+    def compact(self) -> None:
+        """Write such shards anew; needs the store's lock."""
+        for file in self.oversized():
+            self._pack(file, {})
+
     def compose(self, variable: Variable, shard: Place, most: int) -> bytes:
         """The shard as it would be packed now; b"" where it has no chunk."""
         chunks = (self.read(variable, self.chunk_at(shard, i), most) for i in range(self.n_inner))

@@ -147,7 +147,9 @@ class Store:
         return damaged
 
     def repair_files(self, grid: CaseGrid) -> None:
-        """Rewrite damaged metadata, coordinates and settings, and the manifest."""
+        """Rewrite damaged metadata, coordinates and settings, the manifest, and shards written twice."""
+        with disk_errors(self.path):
+            self.block_files.compact()
         damaged = self.damaged_files()
         if not damaged and not self.manifest.damaged_copies(self.path):
             return

@@ -75,6 +75,9 @@ def verify(path: Path) -> Damage:
     damaged = _damaged_cases(store, ledger)
     lost = _lost_lines(store, ledger)
     packed = _damaged_packed(store, ledger)
+    oversized = dict.fromkeys(
+        f"{file.parent.name} (a shard with bytes of no case)" for file in store.block_files.oversized()
+    )
     files = dict.fromkeys(_named(name) for name in store.damaged_files())
     n_checked = int(np.isin(ledger.status, (DONE, DIVERGED)).sum())
     if damaged or packed:
@@ -89,7 +92,9 @@ def verify(path: Path) -> Damage:
         store=path,
         cases={i: f"{_name(store, i)}: {text}" for i, text in sorted((damaged | lost).items())},
         arrays=tuple(
-            dict.fromkeys((*files, *packed, *store.manifest.damaged_copies(path), *_misplaced(store)))
+            dict.fromkeys(
+                (*files, *packed, *oversized, *store.manifest.damaged_copies(path), *_misplaced(store))
+            )
         ),
         n_checked=n_checked,
         note=note,

@@ -95,6 +95,14 @@ def test_data_come_as_json_with_null_for_what_is_missing(run, synthetic_path):
     assert table["data_vars"]["peak_contact_force"]["data"][1][0] == pytest.approx(75.0)
 
 
+def test_a_cascade_takes_other_axes_at_their_first_values(run, synthetic_path):
+    """As a map does, and says so."""
+    said = run("cascade", synthetic_path, *options(CLEARANCE, MODULUS), "--data", "lines.nc")
+    assert "friction = 0.1: the first of 2; change with --select friction=VALUE" in said
+    with xr.open_dataset("lines.nc") as opened:
+        assert float(opened["friction"]) == 0.1
+
+
 @pytest.mark.parametrize("name", ["orbit.zarr", "orbit.nc"])
 def test_data_come_as_arrays(run, synthetic_path, name):
     run("orbit", synthetic_path, *ONE, "--data", name)

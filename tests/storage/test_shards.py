@@ -184,6 +184,16 @@ def test_a_run_repairs_a_lost_or_truncated_shard_by_itself(store, packed, left):
     assert 0 < rerun(store, packed) <= 6
 
 
+def test_a_shard_that_was_written_twice_is_named_and_written_anew(store, packed):
+    """Its index lies at its end, so that readers find all cases in it."""
+    shard = next((store / "vertical").glob("c.*"))
+    shard.write_bytes(2 * shard.read_bytes())
+    damage = verify(store)
+    assert damage.arrays == ("vertical (a shard with bytes of no case)",)
+    assert not damage.cases
+    assert rerun(store, packed) == 0
+
+
 def test_one_case_is_recomputed_and_compared(packed):
     study = read_study(packed.with_name("tiny.toml"))
     name = Store(packed).manifest.case_id(5)
