@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from rubhpc.running.job import Job, RunRequest
+    from rubhpc.running.beginning import RunRequest
+    from rubhpc.running.job import Job
     from rubhpc.running.pool import Pool
     from rubhpc.running.slabs import Slab
     from rubhpc.storage.journal import Entry

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 
 from rubhpc.errors import RubError, StoppedEarly
 from rubhpc.integrate.compilation import announced_by, seconds_compiling
+from rubhpc.running.beginning import RunRequest
 from rubhpc.running.computing import Computing
 from rubhpc.running.crash import crash
 from rubhpc.running.finish import finish_part, finish_run
-from rubhpc.running.job import RunRequest, prepare_job
+from rubhpc.running.job import prepare_job
 from rubhpc.running.pool import Pool, RankLost, Totals, connect
 from rubhpc.running.stopping import Stopping
 from rubhpc.running.workers import start_workers

@@ -16,7 +16,8 @@ from rubhpc.storage.store import Store
 from rubhpc.storage.summary import Summary
 
 if TYPE_CHECKING:
-    from rubhpc.running.job import Job, RunRequest
+    from rubhpc.running.beginning import RunRequest
+    from rubhpc.running.job import Job
     from rubhpc.storage.ledger import Ledger
 
 _REASONS = 100  # failed cases a summary names, at most

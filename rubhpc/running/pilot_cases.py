@@ -14,7 +14,8 @@ from rubhpc.integrate.branch_case import record_branches
 from rubhpc.integrate.case import compile_kernels, run_case
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.run_up_case import RunUpRecord
-from rubhpc.running.worker import integrate, operation_of, set_up
+from rubhpc.running.case_setup import operation_of, set_up
+from rubhpc.running.worker import integrate
 from rubhpc.schema import FINAL_STATE
 from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.speed_law import SpeedLaw

@@ -12,17 +12,16 @@ import numpy as np
 from rubhpc.integrate.branch_case import BranchRecord, record_branches
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.compilation import seconds_compiling
-from rubhpc.integrate.family import CLEARANCES, SPEEDS, Operation
 from rubhpc.integrate.record import State
 from rubhpc.integrate.run_up_case import RunUpRecord, record_run_up
-from rubhpc.integrate.setup import prepare
+from rubhpc.running.case_rows import packed_measures, put_any
+from rubhpc.running.case_setup import operation_of, set_up
 from rubhpc.running.initial_states import InitialState, InitialStates
 from rubhpc.running.pool import Totals
 from rubhpc.running.stopping import Stopped
-from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING
+from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
 from rubhpc.storage.disk import disk_errors, flush_to_disk
 from rubhpc.storage.journal import Entry
-from rubhpc.storage.measures import missing_value
 from rubhpc.storage.store import case_checksum
 from rubhpc.study.drive_law import DriveLaw
 
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.fem.model import Model
     from rubhpc.integrate.record import Record
     from rubhpc.integrate.setup import Setup
     from rubhpc.rig.rig import Rig
@@ -51,21 +49,6 @@ if TYPE_CHECKING:
 # Seconds between syncs, at least, and times what the last took: slow disks cost 2 %.
 _SYNC_GAP, _SYNC_SHARE = 1.0, 50.0
 MOST_SETUPS = 4  # prepared setups a rank keeps; a block shares one, and neighbours often do
-
-
-def set_up(study: Study, case: Case, model: Model | None = None) -> Setup:
-    """What the cases of this rig, speed and contact share; `model` is the rig's, if it is assembled."""
-    drive = case.speed_law if isinstance(case.speed_law, DriveLaw) else None
-    return prepare(
-        case.rig,
-        case.speed,
-        contact=case.contact,
-        integrator=study.integrator,
-        samples_per_revolution=study.recording.samples_per_revolution,
-        model=model if drive is None else None,  # its driven end is not free
-        probes=study.recording.probe,
-        drive=drive,
-    )
 
 
 class _OverTime(Exception):  # noqa: N818 - becomes the reason of a failed case
@@ -325,64 +308,6 @@ def integrate(
         initial=initial,
         check=check,
     )
-
-
-def put_any(record: Record | BranchRecord | RunUpRecord, data: Arrays, i_case: int) -> None:
-    """Put the arrays of a record into those of a block."""
-    if isinstance(record, BranchRecord | RunUpRecord):
-        put_points(record, data, i_case)
-    else:
-        put(record, data, i_case)
-
-
-def put(record: Record, data: Arrays, i_case: int) -> None:
-    """Put the arrays of a record that is done into those of a block.
-
-    Raises
-    ------
-    FloatingPointError
-        One of them is not finite.
-    """
-    if record.status != DONE:
-        return
-    arrays = {**record.signals, **record.spectra, **record.sections}
-    if FINAL_STATE in data:
-        arrays[FINAL_STATE] = record.final.packed()
-    for name, values in data.items():
-        if not np.isfinite(arrays[name]).all():
-            raise FloatingPointError(f"{name} is not finite")
-        values[i_case] = arrays[name]
-
-
-def put_points(record: BranchRecord | RunUpRecord, data: Arrays, i_case: int) -> None:
-    """Put the points of branches, or the revolutions and samples of a run-up, into the arrays of a block."""
-    for name, values in data.items():
-        values[i_case] = np.nan
-        found = record.arrays.get(name, np.zeros(0))
-        place = tuple(slice(n) for n in found.shape)
-        values[i_case][place] = found
-
-
-def operation_of(grid: CaseGrid, case: Case) -> Operation:
-    """How the rig of a case runs, its speed and clearance as the axes give them."""
-    axes = grid.study.axes
-    given = dict(zip([axis.name for axis in axes], grid.points.at(case.index), strict=True))
-    return Operation(
-        rig=case.rig,
-        **{name: given.get(name) for name in (*SPEEDS, *CLEARANCES)},
-        friction=case.friction,
-        contact=case.contact,
-        integrator=grid.study.integrator,
-        samples_per_revolution=grid.study.recording.samples_per_revolution,
-    )
-
-
-def packed_measures(record: Record | BranchRecord | RunUpRecord, kind: np.dtype[np.void]) -> NDArray[np.void]:
-    """The measures of a record, packed; one that this version does not know is missing."""
-    row = np.zeros((), kind)
-    for name in kind.names or ():
-        row[name] = record.measures[name] if name in record.measures else missing_value(kind[name])
-    return row
 
 
 def _reason(error: Exception) -> str:

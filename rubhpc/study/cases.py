@@ -15,13 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fem.assemble import assemble
-from rubhpc.fem.model import state_size
 from rubhpc.input.messages import place
-from rubhpc.rig.reading import with_keys
 from rubhpc.schema import STATE
-from rubhpc.study.axes import FROM_REST, RUN_UP_TIME
+from rubhpc.study.axes import RUN_UP_TIME
 from rubhpc.study.continuation import CaseIds, continuation_of
+from rubhpc.study.final_states import check_start, count_state
 from rubhpc.study.identity import identity_parts
 from rubhpc.study.operating_points import OperatingPoints
 from rubhpc.study.points import Points, boxed
@@ -32,7 +30,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.fem.model import Model
     from rubhpc.rig.rig import Rig
     from rubhpc.study.contact_keys import Contact
     from rubhpc.study.drive_law import DriveLaw
@@ -42,7 +39,6 @@ if TYPE_CHECKING:
 
 MOST_CASES = 10_000_000  # a larger grid is taken for a mistake: it would fill the memory
 _BLOCK = 16  # cases of a block by default, at most
-_MOST_RIGS = 64  # along an axis: assembled before the run, 1 ms each; of more values only the two ends
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -281,49 +277,3 @@ def _named(study: Study) -> Iterator[None]:
         if study.source is None:
             raise
         raise InputError(f"{place(str(study.source))}: {error}") from None
-
-
-def count_state(study: Study) -> int:
-    """Length of the final state of a case: displacement and velocity of each degree, two per stator.
-
-    Raises
-    ------
-    InputError
-        When it differs between cases: the final state of one cannot start another.
-    """
-    models = _models(study)
-    n_state = state_size(next(models)[1])
-    for name, model in models:
-        if state_size(model) == n_state:
-            continue
-        swept = next((a.name for a in study.axes if a.sweep != FROM_REST), None)
-        problem = "changes the number of degrees of freedom"
-        if swept is None:
-            fix = f'remove this axis, or "{STATE}" from [record] keep'
-            raise InputError(f"[grid] {name}: {problem}, so final states differ in length; {fix}")
-        problem += ", so a final state cannot start the next case"
-        raise InputError(f"[grid] {name}: {problem}; remove this axis, or the sweep of {swept}")
-    return n_state
-
-
-def check_start(study: Study) -> None:
-    """Refuse a state of a store that does not fit the rigs of a study.
-
-    Raises
-    ------
-    InputError
-        Names the degrees of freedom of both.
-    """
-    if study.initial.state is not None:
-        for _, model in _models(study):
-            study.initial.state.check_fit(model)
-
-
-def _models(study: Study) -> Iterator[tuple[str, Model]]:
-    """The model at the first values, named "", then those along each axis of the rig, few of a long one."""
-    first = {axis.name: axis.values[0] for axis in study.axes if axis.is_rig_key}
-    yield "", assemble(with_keys(study.rig, first))
-    for axis in study.axes:
-        values = axis.values if len(axis.values) <= _MOST_RIGS else axis.values[:: len(axis.values) - 1]
-        for value in values if axis.is_rig_key else ():
-            yield axis.name, assemble(with_keys(study.rig, {**first, axis.name: value}))

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
 from rubhpc.input.messages import brief, place
-from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build, plain, read_toml, refuse_unknown
-from rubhpc.rig.reading import read_rig, with_keys
+from rubhpc.rig.reading import read_rig
 from rubhpc.rig.stators import has_bent_stator
 from rubhpc.study import contact_axes
 from rubhpc.study.axes import BOTH, DIRECTION, FROM_REST, SPEED_AXES, Axis, direction_axis
-from rubhpc.study.axis_reading import flatten, make_axis, make_range, unit_of
-from rubhpc.study.branch_keys import BranchKeys, branch_axis, check_branch
+from rubhpc.study.axis_reading import flatten, make_axis, make_range
+from rubhpc.study.branch_keys import BranchKeys, check_branch
 from rubhpc.study.changing_speed import refuse_speeds, speed_axis
 from rubhpc.study.checks import check_axes, check_rigs
 from rubhpc.study.contact_axes import check_contacts
@@ -26,6 +25,7 @@ from rubhpc.study.refine import Refine
 from rubhpc.study.run_up_keys import RunUpKeys, check_run_up
 from rubhpc.study.sampling import draw
 from rubhpc.study.state_of_case import with_state
+from rubhpc.study.study_tables import line_of_text, overridden, read_axes, read_branch, table_of
 from rubhpc.study.tables import Integrator, Recording, Run, Sample, check_bent
 
 if TYPE_CHECKING:
@@ -216,25 +216,27 @@ def read_study(
     file = str(source)
     table = read_toml(source)
     refuse_unknown(table, dict.fromkeys(_TABLES), file, "")
-    title = _text(table, "title", source.stem, file)
-    store = output if output is not None else _text(table, "output", f"{source.stem}.zarr", file)
+    title = line_of_text(table, "title", source.stem, file)
+    store = output if output is not None else line_of_text(table, "output", f"{source.stem}.zarr", file)
     if "rig" not in table:
         raise InputError(
             f'{place(file, "", "rig")}: missing; add rig = "mokhtar2017", or the path of a rig file'
         )
-    rig = read_rig(_text(table, "rig", "", file), source.parent, place(file, "", "rig"), trust_rig=trust_rig)
-    rig = _overridden(rig, _table(table, "override", file), file)
+    rig = read_rig(
+        line_of_text(table, "rig", "", file), source.parent, place(file, "", "rig"), trust_rig=trust_rig
+    )
+    rig = overridden(rig, table_of(table, "override", file), file)
     sample = build(Sample, table["sample"], file, "sample") if "sample" in table else None
     refine = build(Refine, table["refine"], file, "refine") if "refine" in table else None
-    grid = _table(table, "grid", file)
+    grid = table_of(table, "grid", file)
     branch = None
     if "branch" in table:
-        branch = _read_branch(
-            _table(table, "branch", file), grid, rig, sample, file, is_refined=refine is not None
+        branch = read_branch(
+            table_of(table, "branch", file), grid, rig, sample, file, is_refined=refine is not None
         )
     run_up = build(RunUpKeys, table["run_up"], file, "run_up") if "run_up" in table else None
     drive = build(DriveKeys, table["drive"], file, "drive") if "drive" in table else None
-    axes = _read_axes(grid, rig, sample, file, branch.along if branch else "")
+    axes = read_axes(grid, rig, sample, file, branch.along if branch else "")
     try:
         if run_up is not None:
             refuse_speeds("run_up", [axis.name for axis in axes])
@@ -247,13 +249,13 @@ def read_study(
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
         raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
     for name in ("contact", "initial"):
-        for key in _table(table, name, file):
+        for key in table_of(table, name, file):
             if f"{name}.{key}" in {axis.name for axis in axes}:
                 raise InputError(f"{place(file, name, key)}: is an axis of the grid too; leave one out")
     is_varied = any(axis.is_contact_key for axis in axes)
     contact = build(ContactKeys if is_varied else Contact, table.get("contact", {}), file, "contact")
     starts = {"from": CONTACT_FREE} if run_up is not None or drive is not None else {}
-    initial = build(Initial, starts | _table(table, "initial", file), file, "initial")
+    initial = build(Initial, starts | table_of(table, "initial", file), file, "initial")
     integrator = build(Integrator, table.get("integrator", {}), file, "integrator")
     recording = build(Recording, table.get("record", {}), file, "record")
     run = build(Run, table.get("run", {}), file, "run")
@@ -275,76 +277,5 @@ def read_study(
             output=Path(store),
             source=source,
         )
-    except InputError as error:
-        raise InputError(f"{place(file)}: {error}") from None
-
-
-def _text(table: dict[str, Any], key: str, default: str, file: str) -> str:
-    value = table.get(key, default)
-    if not isinstance(value, str) or not value.strip() or not value.isprintable():
-        raise InputError(f'{place(file, "", key)}: {brief(value)} is not a line of text; write {key} = "..."')
-    return value
-
-
-def _table(table: dict[str, Any], key: str, file: str) -> dict[str, Any]:
-    value = table.get(key, {})
-    if not isinstance(value, dict):
-        raise InputError(f"{place(file, key)}: {brief(value)} is no table; write [{key}] and its keys below")
-    return value
-
-
-def _overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
-    try:
-        return with_keys(rig, dict(flatten(table)))
-    except InputError as error:
-        raise InputError(f"{place(file, 'override')} {error}") from None
-
-
-def _read_branch(
-    table: dict[str, Any],
-    grid: dict[str, Any],
-    rig: Rig,
-    sample: Sample | None,
-    file: str,
-    *,
-    is_refined: bool,
-) -> BranchKeys:
-    """Return the table [branch], its step in the unit of its axis."""
-    along, step = table.get("along"), table.get("step")
-    if isinstance(along, str) and along not in dict(flatten(grid)):
-        fix = f"{along} is no axis of the grid; add it as {{ start, stop }}"
-        raise InputError(f"{place(file, 'branch', 'along')}: {fix}")
-    if sample is not None:
-        fix = "a sample has no axis to follow; remove [sample] or [branch]"
-        raise InputError(f"{place(file, 'branch')}: {fix}")
-    if is_refined:
-        raise InputError(f"{place(file, 'branch')}: branches are not refined; remove [refine] or [branch]")
-    if isinstance(along, str) and isinstance(step, str):
-        where = place(file, "branch", "step")
-        try:
-            table = {**table, "step": parse_quantity(step, unit_of(along, rig), where)}
-        except InputError as error:
-            raise InputError(str(error) if where in str(error) else f"{where}: {error}") from None
-    return build(BranchKeys, table, file, "branch")
-
-
-def _read_axes(
-    table: dict[str, Any], rig: Rig, sample: Sample | None, file: str, along: str
-) -> tuple[Axis, ...]:
-    pairs = flatten(table)
-    names = [name for name, _ in pairs]
-    if len(names) > _MOST_AXES:
-        problem = f"{len(names)} axes are too many; use at most {_MOST_AXES}, and [override] for the others"
-        raise InputError(f"{place(file, 'grid')}: {problem}")
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"{place(file, 'grid', name)}: is duplicated; remove one")
-    if sample is None:
-        return tuple(
-            (branch_axis if name == along else make_axis)(name, values, rig, file) for name, values in pairs
-        )
-    axes = [(make_range if isinstance(v, dict) else make_axis)(name, v, rig, file) for name, v in pairs]
-    try:
-        return draw(axes, sample)
     except InputError as error:
         raise InputError(f"{place(file)}: {error}") from None

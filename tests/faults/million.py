@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.rig.reading import read_rig
-from rubhpc.running import driver, job, plan, worker
+from rubhpc.running import case_setup, driver, job, plan, worker
 from rubhpc.schema import DONE, case_measures
 from rubhpc.storage.status import read_status
 from rubhpc.study.axes import Axis
@@ -41,7 +41,7 @@ def peak_memory() -> float:
     return int(status.split("VmHWM:")[1].split()[0]) / 1000
 
 
-for module in (job, plan, worker):
+for module in (case_setup, job, plan, worker):
     vars(module).update({name: value for name, value in stub.items() if name in vars(module)})
 
 

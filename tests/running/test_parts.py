@@ -15,7 +15,7 @@ from running import killed_after, shards, start, stored_bytes, write_study
 from stub_physics import Physics, record
 
 from rubhpc.errors import InputError, StoppedEarly, StoreError
-from rubhpc.running import job, worker
+from rubhpc.running import case_setup, job, worker
 from rubhpc.running.driver import run
 from rubhpc.running.pilots import Pace, Timing
 from rubhpc.running.plan import make_plan
@@ -48,7 +48,7 @@ class Distinct(Physics):
 def physics(monkeypatch: pytest.MonkeyPatch) -> Physics:
     stub = Distinct()
     monkeypatch.setattr(os, "sync", lambda: None)  # no power is cut
-    monkeypatch.setattr(worker, "prepare", stub.prepare)
+    monkeypatch.setattr(case_setup, "prepare", stub.prepare)
     monkeypatch.setattr(worker, "run_case", stub.run_case)
     monkeypatch.setattr(job, "_warm_up", lambda *_: None)
     return stub

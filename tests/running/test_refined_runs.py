@@ -13,7 +13,7 @@ from stub_physics import Physics, record
 from postproc.store.live import open_live
 from postproc.store.open import open_store
 from rubhpc.errors import InputError, StoppedEarly
-from rubhpc.running import computing, driver, job, worker
+from rubhpc.running import case_setup, computing, driver, job, worker
 from rubhpc.running.driver import run
 from rubhpc.running.plan import make_plan
 from rubhpc.running.pool import Alone
@@ -66,7 +66,7 @@ class Maps(Physics):
 @pytest.fixture
 def physics(monkeypatch):
     stub = Maps()
-    monkeypatch.setattr(worker, "prepare", stub.prepare)
+    monkeypatch.setattr(case_setup, "prepare", stub.prepare)
     monkeypatch.setattr(worker, "run_case", stub.run_case)
     monkeypatch.setattr(job, "_warm_up", lambda *_: None)
     return stub

@@ -1,0 +1,44 @@
+"""What integration needs of a case of a study."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rubhpc.integrate.family import CLEARANCES, SPEEDS, Operation
+from rubhpc.integrate.setup import prepare
+from rubhpc.study.drive_law import DriveLaw
+
+if TYPE_CHECKING:
+    from rubhpc.fem.model import Model
+    from rubhpc.integrate.setup import Setup
+    from rubhpc.study.cases import Case, CaseGrid
+    from rubhpc.study.study import Study
+
+
+def set_up(study: Study, case: Case, model: Model | None = None) -> Setup:
+    """What the cases of this rig, speed and contact share; `model` is the rig's, if it is assembled."""
+    drive = case.speed_law if isinstance(case.speed_law, DriveLaw) else None
+    return prepare(
+        case.rig,
+        case.speed,
+        contact=case.contact,
+        integrator=study.integrator,
+        samples_per_revolution=study.recording.samples_per_revolution,
+        model=model if drive is None else None,  # its driven end is not free
+        probes=study.recording.probe,
+        drive=drive,
+    )
+
+
+def operation_of(grid: CaseGrid, case: Case) -> Operation:
+    """How the rig of a case runs, its speed and clearance as the axes give them."""
+    axes = grid.study.axes
+    given = dict(zip([axis.name for axis in axes], grid.points.at(case.index), strict=True))
+    return Operation(
+        rig=case.rig,
+        **{name: given.get(name) for name in (*SPEEDS, *CLEARANCES)},
+        friction=case.friction,
+        contact=case.contact,
+        integrator=grid.study.integrator,
+        samples_per_revolution=grid.study.recording.samples_per_revolution,
+    )
