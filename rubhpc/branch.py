@@ -101,8 +101,8 @@ def branch(
     Raises
     ------
     InputError
-        If an argument cannot be used, or the case has no closed form: the updated normal, a penalty with
-        set-valued friction and the central difference.
+        If an argument cannot be used, or the case has no closed form: the updated normal, friction
+        that depends on the slip speed, and the central difference.
     NoPeriodicMotion
         If there is none at `start`.
 

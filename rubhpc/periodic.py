@@ -75,8 +75,8 @@ def periodic(
     Raises
     ------
     InputError
-        If an argument cannot be used, or the case has no closed form: the updated normal, a penalty with
-        set-valued friction, friction that depends on the slip speed, and the central difference.
+        If an argument cannot be used, or the case has no closed form: the updated normal, friction
+        that depends on the slip speed, and the central difference.
     NoPeriodicMotion
         If none was found; the text says why.
 

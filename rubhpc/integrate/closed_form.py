@@ -7,6 +7,7 @@ from weakref import WeakKeyDictionary
 
 from rubhpc.integrate.event_driven_march import EventDrivenMarch
 from rubhpc.integrate.friction_march import FrictionMarch
+from rubhpc.integrate.penalty_friction_march import PenaltyFrictionMarch
 from rubhpc.integrate.penalty_march import PenaltyMarch
 from rubhpc.kernels.laws import is_penalty, is_set_valued
 
@@ -26,5 +27,5 @@ def closed_form_march(setup: ModalSetup) -> type[EventDrivenMarch]:
 
 def _march_of(law: Law) -> type[EventDrivenMarch]:
     if is_set_valued(law):
-        return FrictionMarch
+        return PenaltyFrictionMarch if is_penalty(law) else FrictionMarch
     return PenaltyMarch if is_penalty(law) else EventDrivenMarch

@@ -197,7 +197,7 @@ class Family:
             if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
                 raise InputError(
                     f"{self.along}: branches need motion in closed form between events; take method modal, "
-                    "normal fixed, friction_law sliding or coulomb, and with law penalty sliding"
+                    "normal fixed, and friction_law sliding or coulomb"
                 )
             self._setups[key] = setup
             if len(self._setups) > MOST_KEPT:

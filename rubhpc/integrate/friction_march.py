@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.contact_pairs import Workspace
 
     Floats = NDArray[np.float64]
 
@@ -45,6 +46,9 @@ class FrictionMarch(EventDrivenMarch):
     Where events follow one another without end, or no forces obey the laws, up to a revolution is taken in
     short steps; then the case goes on from event to event.
     """
+
+    most_pairs = MOST_PAIRS
+    take_change = staticmethod(change_states)
 
     def __init__(
         self,
@@ -68,7 +72,7 @@ class FrictionMarch(EventDrivenMarch):
 
     def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
         q = self._clearance.size
-        if q > MOST_PAIRS:
+        if q > self.most_pairs:
             raise NoClosedForm
         self._entered_with = np.append(self._clearance, 1.0)
         self.bodies = self.bodies._replace(clearance=self._entered_with)
@@ -82,21 +86,28 @@ class FrictionMarch(EventDrivenMarch):
         solver = empty_workspace(q)
         solver.matrix[:], solver.coupling[:] = gap_jacobian @ gap_jacobian.T, gap_jacobian @ along.T
         solver.tangential[:] = -along @ gap_jacobian.T, -along @ along.T
+        self._soften(solver)
         self._work = friction_work(solver, q, self.bodies.stiffness.shape[0])
         return setup.friction_library(friction)
+
+    def _soften(self, solver: Workspace) -> None:
+        """Change how normal forces follow from gaps: here they hold them, and nothing changes."""
 
     def _first_mask(self, initial: State) -> int:
         return self._states_after(initial.contact_force > 0.0, 0.0)
 
-    def _states_after(self, is_pressed: NDArray[np.bool_], angle: float) -> int:
-        """States that go on from the motion, with the shaft at an angle, rad, and some gaps closed."""
+    def _states_after(self, is_pressed: NDArray[np.bool_], angle: float, further: int = 0) -> int:
+        """States that go on from the motion, with the shaft at an angle, rad, and some gaps closed.
+
+        `further` are bits of the set of states beyond two a pair.
+        """
         n = self.bodies.stiffness.shape[0]
         slip = self._friction.rim_speed + self.bodies.slip @ self._motion[n:]
         sliding = np.where(slip >= 0.0, FORWARD, BACKWARD)
         states = np.where(
             is_pressed, np.where(np.abs(slip) <= AT_REST * self._friction.rim_speed, STUCK, sliding), OPEN
         )
-        found = self.change(mask_of(states.tolist()), 0, angle, self._motion)
+        found = self.change(mask_of(states.tolist()) | further, 0, angle, self._motion)
         if found < 0:
             raise NoClosedForm
         return found
@@ -104,7 +115,7 @@ class FrictionMarch(EventDrivenMarch):
     def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
         """Take an event: `motion` (2 n,) after it, in place, and the states that go on, or -1."""
         return int(
-            change_states(
+            self.take_change(
                 self.bodies,
                 self._friction,
                 mask,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.integrate.contact_mode import ContactMode, confine, modes_of
-from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK
+from rubhpc.integrate.penalty_mode import damped, stored_energy
+from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, lifted_place
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -67,6 +68,20 @@ class FrictionPairs:
     friction: float
     static_ratio: float  # coefficient at rest over that in sliding
     rim_speed: Floats  # (q,), m/s, not negative
+    stiffness: float = 0.0  # N/m, of a penalty; 0: closed gaps are held
+    damping: float = 0.0  # N s/m, of a penalty
+
+    def closed(self, mask: int) -> list[int]:
+        """Pairs that are closed in a set of states."""
+        return [i for i, state in enumerate(states_of(mask, len(self.gap_jacobian))) if state != OPEN]
+
+    def damped(self, reduced: ReducedModel, mask: int) -> ReducedModel:
+        """The model with the penalty's dampers of the closed pairs."""
+        return damped(reduced, self.damping, self.gap_jacobian[self.closed(mask)])
+
+    def stored_energy(self, mode: ContactMode, width: int) -> Floats:
+        """Energy of the penalty's springs, J, as a form of the coordinates of a mode: (2 width, 2 width)."""
+        return stored_energy(self.stiffness, self.gap_jacobian, self.closed(mode.mask), mode, width)
 
 
 def states_of(mask: int, q: int) -> list[int]:
@@ -87,17 +102,26 @@ def solve_friction_mode(
     A closed gap and a slip that sticks are constraints `R x = c(t)`, where c holds the clearances and the
     displacements phi that grow as the rims move. With `x = T y + E c`, `R T = 0`, the forces drop out of the
     equations projected on L, `L^T B = 0`, B being their directions: that of a sliding pair's normal force has
-    its friction, that of a pair that sticks has none.
+    its friction, that of a pair that sticks has none. Under a penalty gaps are no constraints: `k P Q` and
+    `c P Q` join the matrices, and `-k P` is the load of the clearances, as in `penalty_mode`.
     """
     n, q = reduced.stiffness.shape[0], len(pairs.gap_jacobian)
     states = np.array(states_of(mask, q))
     closed, stuck = np.flatnonzero(states != OPEN), np.flatnonzero(states == STUCK)
+    held, soft = (closed[:0], closed) if pairs.stiffness else (closed, closed[:0])
     sense = np.where(states == STUCK, 0.0, np.where(states == BACKWARD, -1.0, 1.0))[closed]
-    rows = np.vstack([pairs.gap_jacobian[closed], pairs.friction_direction[stuck]])
+    rows = np.vstack([pairs.gap_jacobian[held], pairs.friction_direction[stuck]])
     pressed = pairs.gap_jacobian[closed] + pairs.friction * sense[:, None] * pairs.friction_direction[closed]
-    force = np.vstack([pressed, pairs.friction_direction[stuck]]).T
+    if soft.size:
+        along = pressed.T @ pairs.gap_jacobian[soft]
+        reduced = replace(
+            reduced,
+            stiffness=reduced.stiffness + pairs.stiffness * along,
+            damping=reduced.damping + pairs.damping * along,
+        )
+    force = np.vstack([pressed[: held.size], pairs.friction_direction[stuck]]).T
     tangent, project, system = confine(reduced, rows, force)
-    n_free, n_closed, n_row = tangent.shape[1], closed.size, len(rows)
+    n_free, n_held, n_row = tangent.shape[1], held.size, len(rows)
     exponent, shape, inverse = modes_of(system, known)
     m = exponent.size
     phasor = reduced.force[0] - 1j * reduced.force[1]
@@ -115,38 +139,55 @@ def solve_friction_mode(
     enter[:m] = inverse @ expand.T
     take_off[0, :m], take_off[1, :m] = inverse @ response.real, -inverse @ response.imag
     switch = np.zeros((2 * q, end), dtype=np.complex128)
+    forces = np.zeros((n_row, end), dtype=np.complex128)
     if n_row:
         # Quasi-static: y = constant @ c + ramp, both in closed form because c grows linearly.
-        offset, speed = np.linalg.pinv(rows), np.concatenate([np.zeros(n_closed), pairs.rim_speed[stuck]])
+        offset, speed = np.linalg.pinv(rows), np.concatenate([np.zeros(n_held), pairs.rim_speed[stuck]])
         pulled, drawn = project @ reduced.stiffness, project @ reduced.damping
         constant = -np.linalg.solve(pulled @ tangent, pulled @ offset)
         ramp = -np.linalg.solve(pulled @ tangent, drawn @ (tangent @ constant + offset) @ speed)
         still = tangent @ constant + offset
-        motion[:n, clear], motion[:n, ahead] = -still[:, :n_closed], still[:, n_closed:]
+        motion[:n, m + 1 + held], motion[:n, ahead] = -still[:, :n_held], still[:, n_held:]
         motion[:n, one], motion[n:, one] = tangent @ ramp, still @ speed
         into = inverse[:, :n_free] @ constant  # (m, n_row)
-        enter[:m, :n] -= into[:, n_closed:] @ pairs.friction_direction[stuck]
+        enter[:m, :n] -= into[:, n_held:] @ pairs.friction_direction[stuck]
         enter[ahead, :n] = pairs.friction_direction[stuck]
-        take_off[2 + closed, :m] = -into[:, :n_closed].T
+        take_off[2 + held, :m] = -into[:, :n_held].T
         take_off[2 + q, :m] = inverse @ np.concatenate([ramp, constant @ speed])
+    if soft.size:
+        load = -pairs.stiffness * pressed.T  # (n, closed), of unit clearances
+        yielding = np.linalg.solve(project @ reduced.stiffness @ tangent, project @ load)
+        motion[:n, clear] = tangent @ yielding
+        take_off[2 + closed, :m] = (inverse[:, :n_free] @ yielding).T
+    if n_row:
         reaction = np.linalg.solve(rows @ force, rows)
-        forces = reaction @ (np.hstack([reduced.stiffness, reduced.damping]) @ motion)
+        forces += reaction @ (np.hstack([reduced.stiffness, reduced.damping]) @ motion)
         forces[:, m] -= reaction @ phasor
-        static = pairs.friction * pairs.static_ratio
-        for a, i in enumerate(closed):
-            if states[i] == STUCK:
-                traction = forces[n_closed + np.searchsorted(stuck, i)]
-                switch[2 * i], switch[2 * i + 1] = (
-                    static * forces[a] - traction,
-                    static * forces[a] + traction,
-                )
-            else:
-                slip = -pairs.friction_direction[i] @ motion[n:]
-                slip[one] += pairs.rim_speed[i]
-                switch[2 * i], switch[2 * i + 1] = forces[a], sense[a] * slip
+        if soft.size:
+            forces[:, clear] -= reaction @ load
+    if soft.size:
+        gap, gap_rate = pairs.gap_jacobian @ motion[:n], pairs.gap_jacobian @ motion[n:]
+        gap[np.arange(q), m + 1 + np.arange(q)] += 1.0
+        springs = -pairs.stiffness * gap[soft] - pairs.damping * gap_rate[soft]
+        forces = np.concatenate([springs, forces]).astype(np.complex128)
+    static = pairs.friction * pairs.static_ratio
+    for a, i in enumerate(closed):
+        if states[i] == STUCK:
+            traction = forces[closed.size + np.searchsorted(stuck, i)]
+            switch[2 * i], switch[2 * i + 1] = (
+                static * forces[a] - traction,
+                static * forces[a] + traction,
+            )
+        else:
+            slip = -pairs.friction_direction[i] @ motion[n:]
+            slip[one] += pairs.rim_speed[i]
+            switch[2 * i], switch[2 * i + 1] = forces[a], sense[a] * slip
     for i in np.flatnonzero(states == OPEN):
         switch[2 * i] = pairs.gap_jacobian[i] @ motion[:n]
         switch[2 * i, m + 1 + i] += 1.0
+        if mask >> lifted_place(q, int(i)) & 1:
+            gap_rate = pairs.gap_jacobian[i] @ motion[n:]
+            switch[2 * i] = pairs.stiffness * switch[2 * i] + pairs.damping * gap_rate
         switch[2 * i + 1, one] = 1.0
     return FrictionMode(
         mask=mask,

@@ -9,7 +9,7 @@ import numpy as np
 from rubhpc.integrate.contact_mode import ContactMode, count_coordinates, solve_contact_mode
 from rubhpc.integrate.friction_mode import FrictionMode, solve_friction_mode
 from rubhpc.integrate.mode_tables import MOST_MODES, TableStack, tabulate
-from rubhpc.integrate.penalty_mode import Penalty, solve_penalty_mode, stored_energy
+from rubhpc.integrate.penalty_mode import Penalty, solve_penalty_mode
 from rubhpc.integrate.reduction import ReducedModel, directions
 from rubhpc.kernels.friction_states import FORWARD
 
@@ -187,12 +187,15 @@ class PenaltyLibrary(ModeLibrary):
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
         tables = super()._tables_of(mode, self._penalty.damped(reduced, mode.mask))
-        tables.loss[0] += stored_energy(self._penalty, mode, self.width)
+        tables.loss[0] += self._penalty.stored_energy(mode, self.width)
         return tables
 
 
 class FrictionLibrary(ModeLibrary):
-    """Contact modes of pairs that slide in either sense or stick; masks hold two bits a pair."""
+    """Contact modes of pairs that slide in either sense or stick; masks hold two bits a pair.
+
+    Under a penalty they hold a third, and its springs and dampers are counted as in `PenaltyLibrary`.
+    """
 
     _most_modes = MOST_FRICTION_MODES
 
@@ -230,6 +233,13 @@ class FrictionLibrary(ModeLibrary):
         if mask == 0:
             return self._opened
         return solve_friction_mode(self.reduced, self._pairs, mask, self._known)
+
+    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
+        if not self._pairs.stiffness:
+            return super()._tables_of(mode, reduced)
+        tables = super()._tables_of(mode, self._pairs.damped(reduced, mode.mask))
+        tables.loss[0] += self._pairs.stored_energy(mode, self.width)
+        return tables
 
     def _slip_rows(self) -> Floats:
         return self.slip[:0]

@@ -37,8 +37,11 @@ class Penalty(NamedTuple):
 
     def damped(self, reduced: ReducedModel, mask: int) -> ReducedModel:
         """The model with the dampers of the pairs that press; what friction makes of them is no damping."""
-        along = self.gap_jacobian[self.pressed(mask)]
-        return replace(reduced, damping=reduced.damping + self.damping * along.T @ along)
+        return damped(reduced, self.damping, self.gap_jacobian[self.pressed(mask)])
+
+    def stored_energy(self, mode: ContactMode, width: int) -> Floats:
+        """Energy of the springs that press, J, as a form of the coordinates of a mode: (2 width, 2 width)."""
+        return stored_energy(self.stiffness, self.gap_jacobian, self.pressed(mode.mask), mode, width)
 
 
 def solve_penalty_mode(
@@ -81,14 +84,24 @@ def solve_penalty_mode(
     return replace(mode, switch=switch)
 
 
-def stored_energy(penalty: Penalty, mode: ContactMode, width: int) -> Floats:
-    """Energy of the springs that press, J, as a form of the coordinates of a mode: (2 width, 2 width)."""
-    n, q = penalty.gap_jacobian.shape[1], len(penalty.gap_jacobian)
+def damped(reduced: ReducedModel, damping: float, along: Floats) -> ReducedModel:
+    """Return the model with dampers (N s/m) along gaps (k, n); what friction makes of them is no damping."""
+    return replace(reduced, damping=reduced.damping + damping * along.T @ along)
+
+
+def stored_energy(
+    stiffness: float, gap_jacobian: Floats, pressed: list[int], mode: ContactMode, width: int
+) -> Floats:
+    """Return the energy of springs (N/m) in the pairs that press, J, as a form of a mode's coordinates.
+
+    It is (2 width, 2 width), for their real and imaginary parts.
+    """
+    n = gap_jacobian.shape[1]
     form = np.zeros((2 * width, 2 * width))
-    for i in penalty.pressed(mode.mask):
-        gap = penalty.gap_jacobian[i] @ mode.motion[:n]
-        gap[gap.size - q + i] += 1.0
+    for i in pressed:
+        gap = gap_jacobian[i] @ mode.motion[:n]
+        gap[mode.n_eigenmode + 1 + i] += 1.0
         row = np.zeros((2, width))
         row[0, : gap.size], row[1, : gap.size] = gap.real, -gap.imag
-        form += 0.5 * penalty.stiffness * np.outer(row, row)
+        form += 0.5 * stiffness * np.outer(row, row)
     return form

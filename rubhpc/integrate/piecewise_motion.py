@@ -300,7 +300,7 @@ class PiecewiseMotion:
     def unit_clearance(self, mode: Mode) -> tuple[Floats, Floats]:
         """What a clearance greater by 1 m at every pair adds to coordinates (m,), real and imaginary."""
         first = self._tables.n_eigenmode[mode.place]
-        re, im = -self._tables.enter_constant[mode.place].sum(axis=0)
+        re, im = -self._tables.enter_constant[mode.place, : self.q].sum(axis=0)
         re[first], im[first] = 0.0, 0.0
         re[first + 1 : first + 1 + self.q] = 1.0
         return re, im

@@ -232,6 +232,8 @@ class ModalSetup:
             friction=friction,
             static_ratio=self.law.static_friction_ratio,
             rim_speed=radius * abs(self.spin),
+            stiffness=self.law.stiffness,
+            damping=self.law.damping,
         )
 
     def friction_library(self, friction: float) -> FrictionLibrary:

@@ -244,8 +244,9 @@ def bring_to_rest(
         work.rate[i] = product(reduced.gap_jacobian[i], velocity)
         work.slip[i] = bodies.rim_speed[i] + product(reduced.slip[i], velocity)
         work.rest_speed[i], work.rest_speed[q + i] = work.rate[i], work.slip[i]
-        work.is_at_rest[i], work.is_at_rest[q + i] = state != OPEN, state == STUCK
-        moves = moves or (state != OPEN and abs(work.rate[i]) > AT_REST)
+        is_held = state != OPEN and reduced.spring == 0.0
+        work.is_at_rest[i], work.is_at_rest[q + i] = is_held, state == STUCK
+        moves = moves or (is_held and abs(work.rate[i]) > AT_REST)
         moves = moves or (state == STUCK and abs(work.slip[i]) > AT_REST)
     if not moves:
         return

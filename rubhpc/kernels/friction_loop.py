@@ -53,6 +53,7 @@ from rubhpc.kernels.friction_events import FrictionWork, change_states, observe_
 from rubhpc.kernels.friction_measuring import begin_friction, observe_friction, resolved_friction
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
 from rubhpc.kernels.measuring import Recorder, begin_span
+from rubhpc.kernels.soft_friction_events import change_soft_states
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -261,20 +262,36 @@ def take_change(
         tables, reduced, clock, is_recorded, progress, z, motion, work.impulse, recorder, accumulator
     ):
         return DIVERGED
-    angle = shaft_angle(clock, progress.tick)
-    wanted = change_states(
-        reduced,
-        bodies,
-        states,
-        crossing,
-        (1 << FORCED_LEVEL) * clock.tick,
-        np.cos(angle),
-        np.sin(angle),
-        motion,
-        is_recorded,
-        work,
-        accumulator,
-    )
+    angle, moment = shaft_angle(clock, progress.tick), (1 << FORCED_LEVEL) * clock.tick
+    cosine, sine = np.cos(angle), np.sin(angle)
+    if reduced.spring > 0.0:
+        wanted = change_soft_states(
+            reduced,
+            bodies,
+            states,
+            crossing,
+            moment,
+            cosine,
+            sine,
+            motion,
+            is_recorded,
+            work,
+            accumulator,
+        )
+    else:
+        wanted = change_states(
+            reduced,
+            bodies,
+            states,
+            crossing,
+            moment,
+            cosine,
+            sine,
+            motion,
+            is_recorded,
+            work,
+            accumulator,
+        )
     if is_recorded:
         for i in range(work.impulse.size):
             record_event(clock, progress, work.impulse, i, samples, accumulator)

@@ -1,4 +1,8 @@
-"""States of a pair under set-valued friction, two bits a pair in a set of states."""
+"""States of a pair under set-valued friction, two bits a pair in a set of states.
+
+Under a penalty with a damper an open pair may be lifted: overlapped still, its force ended by the damper. A
+further bit a pair says so, behind those of all states.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +17,7 @@ Floats = NDArray[np.float64]
 
 OPEN, FORWARD, BACKWARD, STUCK = range(4)  # the rim outruns the tip, the tip outruns the rim
 MOST_PAIRS = 31  # whose states an integer holds
+MOST_SOFT_PAIRS = 20  # likewise, with the bits of those that are lifted
 
 
 class FrictionBodies(NamedTuple):
@@ -27,6 +32,12 @@ class FrictionBodies(NamedTuple):
 def state_of(states: int, i: int) -> int:
     """State of pair i in a set of states."""
     return (states >> (2 * i)) & 3
+
+
+@jit_inline_sum
+def lifted_place(q: int, i: int) -> int:
+    """Place of the bit that says whether pair i of q is lifted."""
+    return 2 * q + i
 
 
 @jit_inline_sum

@@ -28,15 +28,20 @@ def gap_of(reduced: Reduced, i: int, motion: Floats) -> float:
 
 
 @jit_lean_sum
+def force_of(reduced: Reduced, i: int, motion: Floats) -> float:
+    """Force of the spring and damper of pair i, N, in a motion (2 n,); negative where they would pull."""
+    rate = product(reduced.gap_jacobian[i], motion[reduced.gap_jacobian.shape[1] :])
+    return float(-reduced.spring * gap_of(reduced, i, motion) - reduced.damper * rate)
+
+
+@jit_lean_sum
 def pressed_pairs(reduced: Reduced, motion: Floats) -> int:
     """States of the pairs in a motion (2 n,) of which nothing is known."""
-    q, n = reduced.gap_jacobian.shape
+    q = reduced.gap_jacobian.shape[0]
     found = int(np.int64(0))
     for i in range(q):
-        gap = gap_of(reduced, i, motion)
-        force = -reduced.spring * gap - reduced.damper * product(reduced.gap_jacobian[i], motion[n:])
-        if gap < 0.0:
-            found |= 1 << (i if force > 0.0 else q + i)
+        if gap_of(reduced, i, motion) < 0.0:
+            found |= 1 << (i if force_of(reduced, i, motion) > 0.0 else q + i)
     return found
 
 

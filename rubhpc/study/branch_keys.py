@@ -111,7 +111,7 @@ def check_branch(
     if integrator.method != "modal" or contact.closed_form == "never" or "contact.law" in varied:
         raise InputError(
             "[branch] along: branches need motion in closed form between events; take method modal, normal "
-            "fixed, friction_law sliding or coulomb, and with law penalty sliding"
+            "fixed, and friction_law sliding or coulomb"
         )
     if recording.probe:
         raise InputError("[branch] along: branches have no probes; remove [[record.probe]]")

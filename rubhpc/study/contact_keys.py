@@ -108,7 +108,7 @@ class ContactKeys:
     @property
     def closed_form(self) -> ClosedForm:
         """When the modal scheme has a closed form of contact; elsewhere it takes short steps."""
-        if self.normal == "updated" or (self.law == "penalty" and self.friction_law != "sliding"):
+        if self.normal == "updated":
             return "never"
         return CLOSED_FORM[self.friction_law]
 

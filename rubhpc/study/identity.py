@@ -14,12 +14,33 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 PHYSICS = 15  # version of the physics: raised whenever a study gives other results than before
-DIRECT = 2  # the same of studies with transient = "direct"
-CHANGING = 1  # added to PHYSICS where the speed changes: the end of a driven piece, and more measures
+# Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
+DIRECT = 1  # transient = "direct"
+CHANGING_SPEED = 1  # run-ups and drives
+SOFT_FRICTION = 1  # a penalty with set-valued friction
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
 _AXIS = "axis"  # in place of a value that every case sets
+
+
+def physics_of(study: Study) -> int:
+    """Return the version of the physics that a study takes: no other gives the same results."""
+    is_soft = "penalty" in _laws(study, "law") and _laws(study, "friction_law") != {"sliding"}
+    return (
+        PHYSICS
+        + DIRECT * study.recording.is_transient_direct
+        + CHANGING_SPEED * bool(study.run_up or study.drive)
+        + SOFT_FRICTION * is_soft
+    )
+
+
+def _laws(study: Study, key: str) -> set[str]:
+    """Return the laws that the cases take, by a key of [contact]."""
+    name = contact_axes.PREFIX + key
+    words = contact_axes.choices_of(name)
+    on_axis = {words[int(value)] for axis in study.axes if axis.name == name for value in axis.tried}
+    return on_axis or {getattr(study.contact, key)}
 
 
 def identity_parts(study: Study) -> dict[str, Any]:
@@ -41,8 +62,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
     }
     swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
     parts = {
-        "physics": PHYSICS + (CHANGING if study.run_up or study.drive else 0),
-        **({"direct": DIRECT} if study.recording.is_transient_direct else {}),
+        "physics": physics_of(study),
         "axes": [axis.name for axis in study.axes],
         **({"sweep": swept} if swept else {}),  # absent in older stores
         "rig": rig,

@@ -22,11 +22,13 @@ FIRST = Recording(transient=2, revolutions=2, samples_per_revolution=SAMPLES, ke
 GRID = [(ratio, micron * 1e-6) for ratio in np.linspace(0.6, 6.0, 13) for micron in (40, 60, 80, 100)]
 RUBS = [(0.75, 84e-6), (1.5, 90e-6)]
 COULOMB = {"friction_law": "coulomb"}
+PENALTY = {"law": "penalty", "stiffness": 1e7}
 ROWS = [  # rig, friction, cases (speed ratio, clearance), law, the ratio asked
     ("one stator, 52 cases", 1, 0.5, GRID, "Coulomb", COULOMB, 3.0),
-    ("one stator, 52 cases", 1, 0.5, GRID, "penalty", {"law": "penalty", "stiffness": 1e7}, 3.0),
+    ("one stator, 52 cases", 1, 0.5, GRID, "penalty", PENALTY, 3.0),
     ("one stator, 52 cases", 1, 0.5, GRID, "restitution 0.5", {"restitution": 0.5}, 3.0),
     ("one stator, 52 cases", 1, 0.5, GRID, "Coulomb, restitution 0.5", COULOMB | {"restitution": 0.5}, 3.0),
+    ("one stator, 52 cases", 1, 0.5, GRID, "Coulomb, penalty", COULOMB | PENALTY, 3.0),
     ("ring of 16, 2 cases", 16, 0.1, RUBS, "Coulomb", COULOMB, 5.0),
 ]
 

@@ -12,6 +12,7 @@ from rubhpc.running.driver import run
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
+from rubhpc.study import identity
 from rubhpc.study.axes import Axis
 from rubhpc.study.axis_reading import make_axis
 from rubhpc.study.cases import CaseGrid
@@ -54,6 +55,20 @@ def test_each_case_takes_its_own_contact(tmp_path):
         Contact(restitution=0.5),
         Contact(restitution=0.5, static_friction_ratio=1.2, **coulomb),
     }
+
+
+@pytest.mark.parametrize(
+    ("axes", "contact", "further"),
+    [
+        ("", 'law = "penalty"\nstiffness = 1e7', 0),
+        ("", 'law = "penalty"\nstiffness = 1e7\nfriction_law = "coulomb"', 1),
+        ('"contact.friction_law" = ["sliding", "coulomb"]', 'law = "penalty"\nstiffness = 1e7', 1),
+        ('"contact.law" = ["lagrange", "penalty"]', 'friction_law = "coulomb"\nstiffness = 1e7', 1),
+        ("", 'friction_law = "coulomb"', 0),
+    ],
+)
+def test_a_version_of_some_laws_is_that_of_the_studies_that_take_them(tmp_path, axes, contact, further):
+    assert identity.physics_of(study_of(tmp_path, axes, contact)) == identity.PHYSICS + further
 
 
 def test_quantities_are_axes_in_si_units(tmp_path):
