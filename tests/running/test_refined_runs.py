@@ -29,7 +29,7 @@ SPEED = "{ start = 1.0, stop = 2.0, num = 17 }"
 REFINE = '[refine]\naxes = ["speed_ratio", "friction"]\ncoarse = 4'
 
 
-RATED = 139.7  # rad/s
+RATED, SLOWEST = 139.7, 198.3  # rad/s
 
 
 class Maps(Physics):
@@ -129,6 +129,51 @@ def test_kills_on_any_level_change_nothing(tmp_path, physics, moments):
             run(study, quiet=True)
     end = -1
     run(study, quiet=True)
+    assert stored_bytes(study.output) == stored_bytes(whole.output)
+
+
+class Islands(Maps):
+    """An island of contact near the edge, and one without contact far from it: the first level meets none."""
+
+    near, far = (6, 4), (14, 14)  # number of speed and friction
+
+    def run_case(self, setup, *, friction, **rest):
+        made = super().run_case(setup, friction=friction, **rest)
+        here = round(16 * (setup.spin * RATED / SLOWEST - 1.0)), round(20 * friction)
+        for regime, (i, j) in (("periodic", self.near), ("no_contact", self.far)):
+            if max(abs(here[0] - i), abs(here[1] - j)) <= 1:
+                made.measures["regime"] = REGIME.index(regime)
+        return made
+
+
+def test_kills_with_islands_smaller_than_the_first_step(tmp_path, physics, monkeypatch):
+    """An island near an edge is met and complete, one far from all is not, however often a run is killed."""
+    islands = Islands()
+    monkeypatch.setattr(worker, "prepare", islands.prepare)
+    monkeypatch.setattr(worker, "run_case", islands.run_case)
+    study = study_of(tmp_path)
+
+    def count_down():
+        if islands.n_case == end:
+            raise Killed
+
+    islands.on_case = count_down
+    for n_case in (100, 3, 3):
+        end = islands.n_case + n_case
+        with pytest.raises(Killed):
+            run(study, quiet=True)
+    end = -1
+    run(study, quiet=True)
+    store = open_store(study.output)
+    found = store.regime.values[:, 0] == REGIME.index("periodic")
+    assert found[5:8, 3:6].all()
+    assert (store.status.values[13:16, 0, 13:16] == INFERRED).all()
+    edge = store.friction.values > 0.9 - 0.3 * store.spin_speed.values[:, None] / RATED
+    edge[5:8, 3:6] = True
+    assert (found == edge).all()
+    islands.on_case = lambda: None
+    whole = study_of(tmp_path, "whole")
+    run(whole, quiet=True)
     assert stored_bytes(study.output) == stored_bytes(whole.output)
 
 
