@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 SPEEDS, DIRECTIONS = (1.0, 3.0), 4  # of the output node, over spin times clearance; on the way to a motion
 MOST_POINTS = 16  # operating points of one set-up whose motions are kept
 LONGEST = 128  # revolutions in which a fixed start is to reach its motion
+MOST_VAIN = 3  # starts in a row that reach none: where motions are not periodic, all are in vain
 
 _Kept = OrderedDict[tuple[float, float, "Recording"], KnownMotions]
 _KEPT: WeakKeyDictionary[ModalSetup, _Kept] = WeakKeyDictionary()
@@ -46,7 +47,8 @@ def shared_motions(
     """Return the stable periodic motions that a fixed set of starts reaches, and whether they are new.
 
     These are the contact-free motion and rest, and the first of them with the output node moving up, left,
-    down and right at one and at three times the spin times the clearance.
+    down and right at one and at three times the spin times the clearance; none after three in a row that
+    reach nothing.
 
     Parameters
     ----------
@@ -61,8 +63,12 @@ def shared_motions(
     if is_new:
         known = KnownMotions(setup)
         limit = min(LONGEST, recording.longest_transient)
+        n_vain = 0
         for state in _starts(setup, clearance):
-            _add(known, state, replace(recording, transient_limit=limit), start, solve_from)
+            has_settled = _add(known, state, replace(recording, transient_limit=limit), start, solve_from)
+            n_vain = 0 if has_settled else n_vain + 1
+            if n_vain == MOST_VAIN:
+                break
         kept[key] = known
         if len(kept) > MOST_POINTS:
             kept.popitem(last=False)
@@ -75,8 +81,8 @@ def _add(
     recording: Recording,
     start: Callable[[State], March],
     solve_from: Callable[[State], PiecewiseMotion],
-) -> None:
-    """Add the motion that a start reaches, if it is not known."""
+) -> bool:
+    """Add the motion that a start reaches, if it is not known; returns whether it reaches one."""
     try:
         march = start(state)
         assert isinstance(march, EventDrivenMarch)
@@ -84,7 +90,8 @@ def _add(
         if passed.found is not None:
             known.add(*passed.found)
     except NoClosedForm:
-        return
+        return False
+    return passed.found is not None or passed.reached is not None
 
 
 def _starts(setup: ModalSetup, clearance: float) -> Iterator[State]:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from postproc.figures.resilience_curve import resilience
 from rubhpc.errors import InputError
-from rubhpc.knock_cases import LeastKnock, Progress
+from rubhpc.knock_cases import LeastKnock, Progress, _Knocks
 from rubhpc.knock_search import Direction, find_least
 from rubhpc.knocks import least_knock
 from rubhpc.simulate import simulate
+from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import read_study
 
 STUDY = """
@@ -29,6 +32,18 @@ transient = "auto"
 revolutions = 16
 samples_per_revolution = 64
 """
+RING = """
+rig = "{rig}"
+[grid]
+speed_ratio = 1.22
+clearance = "300 um"
+friction = 0.0
+[record]
+transient = "shared"
+revolutions = 4
+samples_per_revolution = 32
+"""
+ROOT = Path(__file__).parents[2]
 ALL_ROUND = [Direction(2 * math.pi * i / 12, None) for i in range(12)]
 
 
@@ -87,6 +102,21 @@ def test_every_smaller_knock_of_a_grid_is_harmless(tmp_path):
     assert rubs(least, float(found.worst_angle))
     grid = [(share * harmless, angle) for share in np.linspace(0.1, 1.0, 6) for angle in (0.0, math.pi)]
     assert not any(rubs(*at) for at in grid)
+
+
+def test_a_knock_elsewhere_on_a_rotor_in_a_ring(tmp_path):
+    """Eight stators, knocked beside the disc: the harmless knock dies out in the long run, the least not."""
+    path = tmp_path / "ring.toml"
+    path.write_text(RING.format(rig=ROOT / "jobs" / "branches" / "rigs" / "ring_of_springs.toml"))
+    study = read_study(path)
+    found = least_knock(study, angles=1, nodes=[4], tolerance=0.2).squeeze()
+    least, harmless = float(found.least_impulse), float(found.harmless_impulse)
+    assert 0.799 * least < harmless < least
+    assert int(found.worst_node) == 4
+    settled = replace(study, recording=replace(study.recording, transient=80))
+    knock = _Knocks(settled, CaseGrid(settled).case((0, 0, 0)), (4,))
+    rubs = [knock(impulse, Direction(0.0, 4)) for impulse in (harmless, least)]
+    assert rubs == [False, True]
 
 
 def test_a_machine_without_a_contact_free_motion_and_its_figure(tmp_path):
