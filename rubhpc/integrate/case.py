@@ -261,9 +261,10 @@ def _pass_directly(
         record = _integrate(start, state, setup, clearance, friction, at_once)
         return replace(record, final=with_overlap(record.final, setup, clearance))
 
-    record = known.record(passed.reached, begun_at)
-    of_this = {"transient_revolutions": passed.n_revolution, "steps": passed.n_step + passed.march.n_step}
-    return passed, replace(record, measures=record.measures | of_this)
+    record = known.record(passed.reached, begun_at).copied()
+    record.measures["transient_revolutions"] = passed.n_revolution
+    record.measures["steps"] = passed.n_step + passed.march.n_step
+    return passed, record
 
 
 def _solve_from(setup: Setup, clearance: float, friction: float, state: State) -> PiecewiseMotion:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -144,6 +144,14 @@ class Record(RecordVariables):
 
     def _groups(self) -> tuple[dict[str, Any], ...]:
         return self.signals, self.spectra, self.sections, self.measures, self.settings
+
+    def copied(self) -> Record:
+        """Return the record with arrays of its own, but for the final state."""
+        own = [
+            {name: value.copy() if isinstance(value, np.ndarray) else value for name, value in group.items()}
+            for group in (self.signals, self.spectra, self.sections, self.measures)
+        ]
+        return replace(self, signals=own[0], spectra=own[1], sections=own[2], measures=own[3])
 
     def __dir__(self) -> list[str]:
         """Return all attributes, the variables that this record holds among them."""

@@ -149,7 +149,7 @@ class Islands(Maps):
 def test_kills_with_islands_smaller_than_the_first_step(tmp_path, physics, monkeypatch):
     """An island near an edge is met and complete, one far from all is not, however often a run is killed."""
     islands = Islands()
-    monkeypatch.setattr(worker, "prepare", islands.prepare)
+    monkeypatch.setattr(case_setup, "prepare", islands.prepare)
     monkeypatch.setattr(worker, "run_case", islands.run_case)
     study = study_of(tmp_path)
 
