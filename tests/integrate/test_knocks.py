@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from running import write_knocks
 
 from postproc.figures.resilience_curve import resilience
 from rubhpc.errors import InputError
@@ -18,20 +19,6 @@ from rubhpc.simulate import simulate
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import read_study
 
-STUDY = """
-rig = "mokhtar2017"
-[grid]
-speed_ratio = {speed}
-clearance = "300 um"
-friction = 0.1
-{rest}
-[override]
-"stator.youngs_modulus" = "30 GPa"
-[record]
-transient = "auto"
-revolutions = 16
-samples_per_revolution = 64
-"""
 RING = """
 rig = "{rig}"
 [grid]
@@ -48,9 +35,7 @@ ALL_ROUND = [Direction(2 * math.pi * i / 12, None) for i in range(12)]
 
 
 def study_of(folder, speed="1.25", rest=""):
-    path = folder / "a.toml"
-    path.write_text(STUDY.format(speed=speed, rest=rest))
-    return read_study(path)
+    return read_study(write_knocks(folder, speed, rest))
 
 
 @pytest.mark.parametrize("least", [0.013, 0.4, 7.0])

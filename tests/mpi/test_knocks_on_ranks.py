@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 import pytest
-from running import each_launcher, run, start
+from running import each_launcher, run, start, write_knocks
 
 from rubhpc.errors import InputError
 from rubhpc.knock_cases import LeastKnock, Progress
@@ -14,31 +14,12 @@ from rubhpc.running.knocks_on_ranks import least_knock_on
 from rubhpc.running.pool import Alone
 from rubhpc.study.study import read_study
 
-STUDY = """
-rig = "mokhtar2017"
-[grid]
-speed_ratio = {speed}
-clearance = "300 um"
-friction = 0.1
-[override]
-"stator.youngs_modulus" = "30 GPa"
-[record]
-transient = "auto"
-revolutions = 16
-samples_per_revolution = 64
-"""
 RUBBING = "[1.0, 1.05, 1.1]"  # without contact-free motion: one knock each
 HOW = {"angles": 1, "nodes": (), "most": None, "tolerance": 0.2}
 
 
-def study_of(folder, speed=RUBBING):
-    path = folder / "a.toml"
-    path.write_text(STUDY.format(speed=speed))
-    return path
-
-
 def test_a_rank_goes_on_from_what_others_have_left(tmp_path):
-    study = read_study(study_of(tmp_path))
+    study = read_study(write_knocks(tmp_path, RUBBING))
     search, shown = search_of(study, **HOW), []
     first, second = (search.key(index) for index in search.left({})[:2])
     Progress(tmp_path / "kept").enter(first, LeastKnock())
@@ -55,13 +36,13 @@ def test_a_rank_goes_on_from_what_others_have_left(tmp_path):
 
 
 def test_ranks_find_what_one_process_finds(tmp_path):
-    study = read_study(study_of(tmp_path))
+    study = read_study(write_knocks(tmp_path, RUBBING))
     found = least_knock_on(Alone(), lambda: study, **HOW, progress=tmp_path / "kept", report=lambda *_: None)
     assert found.identical(least_knock(study, **HOW))
 
 
 def test_what_cannot_be_searched_is_refused(tmp_path):
-    study = read_study(study_of(tmp_path))
+    study = read_study(write_knocks(tmp_path, RUBBING))
     with pytest.raises(InputError, match="angles 0"):
         least_knock_on(
             Alone(), lambda: study, **HOW | {"angles": 0}, progress=tmp_path / "kept", report=lambda *_: None
@@ -71,7 +52,7 @@ def test_what_cannot_be_searched_is_refused(tmp_path):
 @pytest.mark.long
 @each_launcher
 def test_ranks_and_kills_change_no_byte(tmp_path, launcher):
-    study = study_of(tmp_path, "{ start = 1.0, stop = 1.3, num = 6 }")
+    study = write_knocks(tmp_path, "{ start = 1.0, stop = 1.3, num = 6 }")
     whole, killed = tmp_path / "whole.csv", tmp_path / "killed.csv"
     options = ("--angles", 2, "--figure")
     assert run("knock", study, *options, tmp_path / "w.png", "--data", whole).returncode == 0

@@ -1,10 +1,12 @@
 """Studies with [drive]: what is stored and opened, resumption, one case again, and what is refused."""
 
 import math
-import shutil
+from functools import partial
 
 import numpy as np
 import pytest
+import running
+from running import check_a_lost_chunk
 
 import rubhpc
 from postproc.figures.bode import bode
@@ -13,7 +15,6 @@ from rubhpc.errors import InputError
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
 from rubhpc.study.cases import CaseGrid
-from rubhpc.study.study import read_study
 
 STUDY = """
 rig = "mokhtar2017"
@@ -33,15 +34,13 @@ block = 1
 """
 
 
-def study_of(folder, text=STUDY):
-    (folder / "study.toml").write_text(text)
-    return read_study(folder / "study.toml", folder / "driven.zarr")
+study_of = partial(running.study_of, output="driven.zarr")
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("driven")
-    rubhpc.run(study_of(folder), quiet=True)
+    rubhpc.run(study_of(folder, STUDY), quiet=True)
     return folder
 
 
@@ -80,24 +79,19 @@ def test_a_record_ends_where_the_spin_is_too_slow(folder):
 
 
 def test_a_resumed_study_has_the_same_bytes(folder, tmp_path):
-    shutil.copytree(folder / "driven.zarr", tmp_path / "driven.zarr")
-    lost = tmp_path / "driven.zarr" / "revolution_braking_torque" / "c"
-    first = sorted(path for path in lost.rglob("*") if path.is_file())[0]
-    content = first.read_bytes()
-    first.unlink()
-    rubhpc.run(study_of(tmp_path), quiet=True)
-    assert first.read_bytes() == content
+    check_a_lost_chunk(folder / "driven.zarr", study_of(tmp_path, STUDY), "revolution_braking_torque")
 
 
 def test_one_case_is_computed_again(folder):
     name = Store(folder / "driven.zarr").manifest.case_id(3)
-    assert "holds the same, bit for bit" in reproduce(study_of(folder), name).verdict
+    assert "holds the same, bit for bit" in reproduce(study_of(folder, STUDY), name).verdict
 
 
 def test_a_case_does_not_depend_on_the_others_of_its_study(folder, tmp_path):
     other = study_of(tmp_path, STUDY.replace('"-5 N m", "1 N m"', '"1 N m", "9 N m"'))
-    ids = {CaseGrid(each).case((i, 0, 0, 0)).id for each, i in ((study_of(folder), 1), (other, 0))}
-    speeds = {CaseGrid(each).case((i, 0, 0, 0)).speed for each, i in ((study_of(folder), 1), (other, 0))}
+    both = ((study_of(folder, STUDY), 1), (other, 0))
+    ids = {CaseGrid(each).case((i, 0, 0, 0)).id for each, i in both}
+    speeds = {CaseGrid(each).case((i, 0, 0, 0)).speed for each, i in both}
     assert len(ids) == len(speeds) == 1
 
 
@@ -175,7 +169,7 @@ def test_speeds_of_several_torques_are_laid_over_one_another(folder):
 
 @pytest.mark.serial
 def test_workers_write_the_same_bytes(folder, tmp_path):
-    rubhpc.run(study_of(tmp_path), quiet=True, workers=2)
+    rubhpc.run(study_of(tmp_path, STUDY), quiet=True, workers=2)
     chunks = [
         path.relative_to(folder)
         for path in (folder / "driven.zarr").rglob("*")

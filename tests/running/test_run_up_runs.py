@@ -1,9 +1,11 @@
 """Studies with [run_up]: what is stored and opened, resumption, one case again, and what is refused."""
 
-import shutil
+from functools import partial
 
 import numpy as np
 import pytest
+import running
+from running import check_a_lost_chunk
 
 import rubhpc
 from postproc.figures.bode import bode
@@ -16,7 +18,6 @@ from rubhpc.errors import InputError
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
-from rubhpc.study.study import read_study
 
 STUDY = """
 rig = "mokhtar2017"
@@ -38,15 +39,13 @@ block = 1
 """
 
 
-def study_of(folder, text=STUDY):
-    (folder / "study.toml").write_text(text)
-    return read_study(folder / "study.toml", folder / "run_ups.zarr")
+study_of = partial(running.study_of, output="run_ups.zarr")
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run_ups")
-    rubhpc.run(study_of(folder), quiet=True)
+    rubhpc.run(study_of(folder, STUDY), quiet=True)
     return folder
 
 
@@ -80,14 +79,7 @@ def test_cases_are_those_of_the_function(folder):
 
 
 def test_a_resumed_study_has_the_same_bytes(folder, tmp_path):
-    shutil.copytree(folder / "run_ups.zarr", tmp_path / "run_ups.zarr")
-    study = study_of(tmp_path)
-    lost = tmp_path / "run_ups.zarr" / "revolution_speed" / "c"
-    first = sorted(path for path in lost.rglob("*") if path.is_file())[0]
-    content = first.read_bytes()
-    first.unlink()
-    rubhpc.run(study, quiet=True)
-    assert first.read_bytes() == content
+    check_a_lost_chunk(folder / "run_ups.zarr", study_of(tmp_path, STUDY), "revolution_speed")
 
 
 def test_a_plan_counts_the_revolutions_of_every_case(tmp_path):
@@ -99,7 +91,7 @@ def test_a_plan_counts_the_revolutions_of_every_case(tmp_path):
 
 
 def test_one_case_is_computed_again(folder):
-    study = study_of(folder)
+    study = study_of(folder, STUDY)
     name = Store(folder / "run_ups.zarr").manifest.case_id(2)
     assert "holds the same, bit for bit" in reproduce(study, name).verdict
 

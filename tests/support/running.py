@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -16,10 +17,14 @@ import psutil
 import pytest
 import zarr
 
+import rubhpc
 from rubhpc.storage import new_manifest
+from rubhpc.study.study import read_study
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from rubhpc.study.study import Study
 
 ROOT = Path(__file__).parents[2]
 STUDY = """
@@ -79,6 +84,46 @@ def write_sample(
         "run": f"[sample]\nn = {n}\nseed = {seed}",
     }
     return write_study(folder, name, **(ranges | changes))
+
+
+def study_of(folder: Path, text: str, output: str) -> Study:
+    """Write a study file of some text and read it; its store lies beside it."""
+    (folder / "study.toml").write_text(text)
+    return read_study(folder / "study.toml", folder / output)
+
+
+KNOCKS = """
+rig = "mokhtar2017"
+[grid]
+speed_ratio = {speed}
+clearance = "300 um"
+friction = 0.1
+{rest}
+[override]
+"stator.youngs_modulus" = "30 GPa"
+[record]
+transient = "auto"
+revolutions = 16
+samples_per_revolution = 64
+"""
+
+
+def write_knocks(folder: Path, speed: str, rest: str = "") -> Path:
+    """Write a study whose least knocks are quickly found; `rest` belongs to its grid."""
+    path = folder / "knocks.toml"
+    path.write_text(KNOCKS.format(speed=speed, rest=rest))
+    return path
+
+
+def check_a_lost_chunk(whole: Path, study: Study, array: str) -> None:
+    """Take a chunk from a copy of a finished store, where the study has its store: a run brings it back."""
+    shutil.copytree(whole, study.output)
+    lost = study.output / array / "c"
+    chunk = sorted(path for path in lost.rglob("*") if path.is_file())[0]
+    content = chunk.read_bytes()
+    chunk.unlink()
+    rubhpc.run(study, quiet=True)
+    assert chunk.read_bytes() == content
 
 
 @contextmanager
