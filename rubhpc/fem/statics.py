@@ -43,6 +43,8 @@ def sag_at_stators(model: Model) -> tuple[Floats, Floats]:
     Displacements are measured from the sagged shaft, relative to which the stators are offset.
     """
     nearer, aside = np.zeros((2, len(model.stators)))
+    if not model.sag.any():
+        return nearer, aside
     for i, stator in enumerate(model.stators):
         rows = [model.rotor.index(stator.node, name) for name in ("v", "w")]
         v, w = (model.sag[row] if row >= 0 else 0.0 for row in rows)

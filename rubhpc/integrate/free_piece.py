@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.measures import following_accumulator, new_accumulator
+from rubhpc.integrate.measures import new_accumulator
 from rubhpc.integrate.piece_setup import Pieces
 from rubhpc.integrate.run_up import Passed, pass_piece
 from rubhpc.integrate.start import start_of
@@ -71,7 +71,8 @@ class Spin:
         self.speed, self.time = drive.start, 0.0
         self._brake = 0.0  # N m, mean of the last piece
         self._begun: State | None = None
-        self._earlier = new_accumulator(len(model.stators), model.n_place)  # contact forces so far
+        # The contact forces of the piece before, and how long it took, s.
+        self._earlier = new_accumulator(len(model.stators), model.n_place), 0.0
 
     @property
     def state(self) -> State:
@@ -141,7 +142,7 @@ class Spin:
         self.time += duration
         self._brake = torque - inertia * change / duration
         self._begun = passed.final
-        self._earlier = following_accumulator(passed.accumulators[-1], duration)
+        self._earlier = passed.accumulators[-1], duration
         return found
 
     def _taken(

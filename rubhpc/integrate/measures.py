@@ -65,26 +65,12 @@ def empty_samples(n_place: int, n_sample: int, n_probe: int = 0) -> Samples:
 
 def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
     """Sums at zero, extrema at their neutral ends; places as in `empty_samples`, by default the stators."""
-    return Accumulator(
-        highest=np.full(3, -np.inf),
-        lowest=np.full(3, np.inf),
-        is_touching=np.zeros(n_stator, dtype=np.bool_),
-        n_contact=np.zeros(n_stator, dtype=np.int64),
-        contact_time=np.zeros(n_stator),
-        impulse=np.zeros(n_stator),
-        stick_time=np.zeros(n_stator),
-        sense=np.zeros(n_stator, dtype=np.int64),
-        reversals=np.zeros(n_stator, dtype=np.int64),
-        friction_work=np.zeros(n_stator),
-        least_slip=np.full(n_stator, np.inf),
-        peak_force=np.zeros(n_stator),
+    return _accumulator(
+        n_stator,
+        n_stator if n_place is None else n_place,
         force_piece=np.zeros((n_stator, LAST + 1, MOST_PIECES)),
         force_held=np.zeros((n_stator, 2), dtype=np.int64),
         origin=np.zeros(1),
-        peak_lateral=np.zeros(n_stator if n_place is None else n_place),
-        energy=np.zeros(5),
-        pivots=np.zeros(1, dtype=np.int64),
-        residual=np.zeros((3, 2)),
     )
 
 
@@ -93,11 +79,39 @@ def following_accumulator(before: Accumulator, passed: float) -> Accumulator:
 
     Means of the contact force reach back beyond it.
     """
-    new = new_accumulator(before.impulse.size, before.peak_lateral.size)
-    return new._replace(
+    return _accumulator(
+        before.impulse.size,
+        before.peak_lateral.size,
         force_piece=before.force_piece.copy(),
         force_held=before.force_held.copy(),
         origin=before.origin + passed,
+    )
+
+
+def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
+    """Sums at zero, but for the window of the mean force; a run-up takes one a revolution."""
+    contact_time, impulse, stick_time, friction_work, peak_force, least_slip = np.zeros((6, n_stator))
+    n_contact, sense, reversals = np.zeros((3, n_stator), dtype=np.int64)
+    highest, lowest = np.zeros((2, 3))
+    highest[:], lowest[:], least_slip[:] = -np.inf, np.inf, np.inf
+    return Accumulator(
+        highest=highest,
+        lowest=lowest,
+        is_touching=np.zeros(n_stator, dtype=np.bool_),
+        n_contact=n_contact,
+        contact_time=contact_time,
+        impulse=impulse,
+        stick_time=stick_time,
+        sense=sense,
+        reversals=reversals,
+        friction_work=friction_work,
+        least_slip=least_slip,
+        peak_force=peak_force,
+        peak_lateral=np.zeros(n_place),
+        energy=np.zeros(5),
+        pivots=np.zeros(1, dtype=np.int64),
+        residual=np.zeros((3, 2)),
+        **window,
     )
 
 

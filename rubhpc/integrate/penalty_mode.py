@@ -96,12 +96,18 @@ def stored_energy(
 
     It is (2 width, 2 width), for their real and imaginary parts.
     """
-    n = gap_jacobian.shape[1]
     form = np.zeros((2 * width, 2 * width))
-    for i in pressed:
-        gap = gap_jacobian[i] @ mode.motion[:n]
-        gap[mode.n_eigenmode + 1 + i] += 1.0
-        row = np.zeros((2, width))
-        row[0, : gap.size], row[1, : gap.size] = gap.real, -gap.imag
+    for row in overlap_rows(gap_jacobian, pressed, mode, width):
         form += 0.5 * stiffness * np.outer(row, row)
     return form
+
+
+def overlap_rows(gap_jacobian: Floats, pressed: list[int], mode: ContactMode, width: int) -> Floats:
+    """Return the gaps of the pairs that press by the coordinates of a mode, (pressed, 2 width), m."""
+    n = gap_jacobian.shape[1]
+    rows = np.zeros((len(pressed), 2, width))
+    for row, i in zip(rows, pressed, strict=True):
+        gap = gap_jacobian[i] @ mode.motion[:n]
+        gap[mode.n_eigenmode + 1 + i] += 1.0
+        row[0, : gap.size], row[1, : gap.size] = gap.real, -gap.imag
+    return rows.reshape(len(pressed), 2 * width)

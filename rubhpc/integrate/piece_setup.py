@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -14,14 +14,20 @@ from rubhpc.fem.statics import sag_under
 from rubhpc.integrate.contact_mode import KeptParts
 from rubhpc.integrate.held_matrices import held_range
 from rubhpc.integrate.packing import whole_system
+from rubhpc.integrate.penalty_mode import Penalty
+from rubhpc.integrate.reduction import directions
+from rubhpc.integrate.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
 from rubhpc.integrate.retuned_modes import RetunedLibrary
 from rubhpc.integrate.setup import ModalSetup
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.contact_mode import Solved
+    from rubhpc.integrate.friction_mode import FrictionPairs
     from rubhpc.integrate.mode_library import ModeLibrary
     from rubhpc.integrate.reduction import ReducedModel
     from rubhpc.kernels.contact_modes import Reduced
@@ -29,6 +35,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
+R = TypeVar("R", bound=RetunedLibrary)
 SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the speed is taken
 ACCELERATION_STEP = 0.005  # of the square of the speed: a change of `phi'' G` below it is left out
 
@@ -44,7 +51,8 @@ class HeldMatrices:
         self.kept = KeptParts()
         self.bodies: dict[float, Reduced] = {}  # of each friction, but for what a piece changes
         self._phasor, self._reach, self._acceleration = phasor, reach, acceleration
-        self._libraries: dict[tuple[float, int, int], RetunedLibrary] = {}
+        self._libraries: dict[tuple[str, float, int, int], RetunedLibrary] = {}
+        self._pairs: dict[float, FrictionPairs] = {}
 
     def serve(self, speed: float, acceleration: float) -> bool:
         """Whether a piece may use them."""
@@ -56,11 +64,13 @@ class HeldMatrices:
         moved = torque * self.twist + acceleration * self.lean
         return _sagging(self.model, self.model.sag + moved)
 
-    def tuned(self, piece: PieceSetup, friction: float) -> RetunedLibrary:
-        """Contact modes of a friction, tuned to a piece."""
-        key = friction, piece.sample_level, piece.n_level
+    def tuned(
+        self, kind: type[R], piece: PieceSetup, friction: float, make: Callable[[], dict[str, Any]]
+    ) -> R:
+        """Contact modes of a friction, tuned to a piece; `make` gives what this kind of library asks for."""
+        key = kind.__name__, friction, piece.sample_level, piece.n_level
         if key not in self._libraries:
-            self._libraries[key] = RetunedLibrary(
+            self._libraries[key] = kind(
                 self.reduced,
                 self.model,
                 friction,
@@ -69,9 +79,18 @@ class HeldMatrices:
                 tick=piece.tick,
                 sample_level=piece.sample_level,
                 n_level=piece.n_level,
+                **make(),
             )
-        self._libraries[key].tune(piece.spin, piece.factor, piece.tick)
-        return self._libraries[key]
+        library = self._libraries[key]
+        assert isinstance(library, kind)
+        library.tune(piece.spin, piece.factor, piece.tick)
+        return library
+
+    def pairs(self, friction: float, make: Callable[[float], FrictionPairs]) -> FrictionPairs:
+        """The pairs of a friction, with the rims at the speed of some piece."""
+        if friction not in self._pairs:
+            self._pairs[friction] = make(friction)
+        return self._pairs[friction]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,7 +134,35 @@ class PieceSetup(ModalSetup):
 
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, which serve until another piece asks for them."""
-        return self.held.tuned(self, friction)
+        return self.held.tuned(RetunedLibrary, self, friction, dict)
+
+    def penalty_library(self, friction: float) -> ModeLibrary:
+        """The same under a penalty."""
+
+        def penalty() -> dict[str, Any]:
+            gap_jacobian, force_direction, _ = directions(self.held.reduced, self.held.model, friction)
+            law = self.law
+            return {"penalty": Penalty(law.stiffness, law.damping, gap_jacobian, force_direction)}
+
+        return self.held.tuned(RetunedPenaltyLibrary, self, friction, penalty)
+
+    def friction_pairs(self, friction: float) -> FrictionPairs:
+        """The pairs of a friction."""
+        pairs = self.held.pairs(friction, super().friction_pairs)
+        radius = np.array([stator.radius for stator in self.model.stators])
+        return replace(pairs, rim_speed=radius * abs(self.spin))
+
+    def friction_library(self, friction: float) -> ModeLibrary:
+        """Contact modes of a friction whose slip may turn; with a penalty besides, solved for this piece."""
+        if self.law.stiffness:
+            return super().friction_library(friction)
+
+        def pairs() -> dict[str, Any]:
+            radius = np.array([stator.radius for stator in self.model.stators])
+            rim_speed = radius * abs(self.held.reduced.spin)
+            return {"pairs": replace(self.friction_pairs(friction), rim_speed=rim_speed)}
+
+        return self.held.tuned(RetunedFrictionLibrary, self, friction, pairs)
 
 
 class Pieces:
@@ -153,7 +200,8 @@ class Pieces:
         factor = (speed**2 - 1j * acceleration) * complex(np.exp(1j * (angle - lag)))
         phasor = self._phasor * factor
         reduced = replace(held.reduced, spin=speed, force=np.stack([phasor.real, -phasor.imag]))
-        reduced.__dict__["translations"] = held.reduced.translations  # which need no computing anew
+        for name in ("translations", "project"):  # which need no computing anew
+            reduced.__dict__[name] = getattr(held.reduced, name)
         return PieceSetup(
             scheme=fastest.scheme,
             model=held.model if fastest.free_spin is None else held.driven(torque, acceleration),

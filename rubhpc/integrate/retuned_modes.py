@@ -6,9 +6,10 @@ run-up (`kernels.retuning`).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
 
 from rubhpc.integrate.contact_mode import confine, solve_contact_mode
 from rubhpc.integrate.mode_library import ModeLibrary, width_without_modes
@@ -20,10 +21,9 @@ from rubhpc.kernels.retuning import HeldMode, retune
 NOT_TUNED = -2  # in place of a set of closed pairs
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from rubhpc.fem.model import Model
     from rubhpc.integrate.contact_mode import ContactMode, Solved
+    from rubhpc.kernels.contact_modes import ModeTables
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -60,9 +60,9 @@ class RetunedLibrary(ModeLibrary):
         self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self._phasor, self._output = phasor, _output_operators(reduced)
-        self._opened = solve_contact_mode(reduced, self.gap_jacobian, self.force_direction, 0, known)
+        self._opened = self._solve(0)
         self.first_masks = [0]
-        self.width = width_without_modes(reduced, model, friction, self._opened.exponent.size)
+        self.width = self._width_of(model, friction)
         self._tables = TableStack(1 + len(self.gap_jacobian), self._most_modes)
         self._exponents = {}
         self._place: dict[int, int] = {}  # of each set of closed pairs in the tables
@@ -89,7 +89,10 @@ class RetunedLibrary(ModeLibrary):
             self.masks.append(mask)
         place = self._place[mask]
         interval = self._tick * 2.0**self._sample_level
-        retune(self.tables(), place, self._held[place], self._spin, self._factor, self._tick, interval)
+        tables = self.tables()
+        self._before(place, tables)
+        retune(tables, place, self._held[place], self._spin, self._factor, self._tick, interval)
+        self._after(place, tables)
         self.masks[place] = mask
         return True
 
@@ -102,48 +105,84 @@ class RetunedLibrary(ModeLibrary):
         self.masks = []
         self.add(0)
 
-    def _hold(self, mode: ContactMode) -> HeldMode:
-        """What the spin speed leaves alone of a mode."""
-        reduced, m, width = self.reduced, mode.n_eigenmode, self.width
-        n, q = self.slip.shape[1], len(self.slip)
+    def _solve(self, mask: int) -> ContactMode:
+        """The mode of a set of states."""
+        return solve_contact_mode(self.reduced, self.gap_jacobian, self.force_direction, mask, self._known)
+
+    def _solved(self, mask: int) -> ContactMode:
+        return self._opened if mask == 0 else self._solve(mask)
+
+    def _width_of(self, model: Model, friction: float) -> int:
+        """Width of tables for any mode that is met later."""
+        return width_without_modes(self.reduced, model, friction, self._opened.exponent.size)
+
+    def _linear(self, mode: ContactMode) -> Linear:
+        """What a set of closed pairs makes of the motion."""
+        reduced, q, n = self.reduced, *self.slip.shape
         closed = np.array([i for i in range(q) if mode.mask >> i & 1], dtype=int)
         rate, force = self.gap_jacobian[closed], self.force_direction[closed].T
         tangent, project, _ = confine(reduced, rate, force)
-        seen = tangent @ (project @ self._phasor)  # what the constraints leave of the unbalance
         switch, reaction = np.hstack([self.gap_jacobian, np.zeros((q, n))]), np.zeros(q, dtype=complex)
         if closed.size:
             solved = np.linalg.solve(rate @ force, rate)
             switch[closed] = solved @ np.hstack([reduced.stiffness, reduced.damping])
             reaction[closed] = solved @ self._phasor
+        across = np.zeros((n, q))
+        across[:, closed] = (self.force_direction - self.gap_jacobian)[closed].T
+        return Linear(tangent @ (project @ self._phasor), switch, reaction, across, reduced.damping)
+
+    def _before(self, place: int, tables: ModeTables) -> None:
+        """Change what the kernel does not know of."""
+
+    def _after(self, place: int, tables: ModeTables) -> None:
+        """The same of what it fills in."""
+
+    def _hold(self, mode: ContactMode) -> HeldMode:
+        """What the spin speed leaves alone of a mode."""
+        reduced, m, width = self.reduced, mode.n_eigenmode, self.width
+        linear, slip = self._linear(mode), self._slip_rows()
+        n = slip.shape[1]
         skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
-        across = (self.force_direction - self.gap_jacobian)[closed].T
-        resistance = np.hstack([skew, reduced.damping]) - across @ switch[closed]
+        resistance = np.hstack([skew, linear.damping]) - linear.across @ linear.switch
         motion = np.pad(mode.motion, ((0, 0), (0, width - mode.exponent.size)))
         exponent = np.pad(mode.exponent, (0, width - mode.exponent.size))
         position, velocity, acceleration = self._output
         row = position @ motion[:n] + velocity @ motion[n:]
         row += (acceleration @ motion[n:]) * exponent
         # An inverse shape times its shape is 2 where a mode stands for a conjugate pair, and is doubled.
-        doubled = np.einsum("ka,ak->k", mode.enter, mode.motion[:, :m]).real
+        enter = mode.enter[:m]
+        doubled = np.einsum("ka,ak->k", enter, mode.motion[:, :m]).real
+        resisting = np.hstack([skew, linear.damping]) @ motion
+        resisting[:, : mode.exponent.size] -= linear.across @ mode.switch
         return HeldMode(
             n_coordinate=mode.exponent.size,
             exponent=exponent,
             is_pair=doubled > 1.5,
             motion=np.ascontiguousarray(mode.motion[:, :m].T),
-            drive=mode.enter[:, n:] @ seen,
-            mirrored_drive=mode.enter[:, n:].conj() @ seen,
-            switch=switch,
-            reaction=reaction,
-            slip=np.ascontiguousarray(self.slip),
+            drive=enter[:, n:] @ linear.seen,
+            mirrored_drive=enter[:, n:].conj() @ linear.seen,
+            switch=linear.switch,
+            reaction=linear.reaction,
+            slip=np.ascontiguousarray(slip),
             resistance=resistance,
             rate=np.ascontiguousarray(motion[n:].T),
-            rubbed=across @ reaction[closed],
-            resisting=np.ascontiguousarray((resistance @ motion).T),
+            rubbed=linear.across @ linear.reaction,
+            resisting=np.ascontiguousarray(resisting.T),
             phasor=self._phasor,
             work=np.stack([self._phasor @ motion[n:], self._phasor.conj() @ motion[n:]]),
             output=np.hstack(self._output),
             row=row,
         )
+
+
+class Linear(NamedTuple):
+    """What a set of states makes of the motion: n reduced degrees, r switch functions."""
+
+    seen: Complexes  # (n,), what the constraints leave of the unbalance at unit speed
+    switch: Floats  # (r, 2 n), switch functions of the motion
+    reaction: Complexes  # (r,), what they lose by the unbalance at unit speed
+    across: Floats  # (n, r), friction forces by switch functions
+    damping: Floats  # (n, n)
 
 
 def _output_operators(reduced: ReducedModel) -> tuple[Floats, Floats, Floats]:

@@ -110,15 +110,16 @@ def integrate_run_up(
     gathered = Turns(n, model)
     pieces = Pieces(fastest)
     state = initial if isinstance(initial, State) else None
-    n_step, reason, n_done = 0, "", n
+    n_step, reason, n_done, before = 0, "", n, 0.0
     earlier = new_accumulator(n_stator, model.n_place)
     for i, (first, last) in enumerate(itertools.pairwise(cuts)):
         duration = times[i + 1] - times[i]
         setup = pieces.setup((angles[i + 1] - angles[i]) / duration, accelerations[i], angles[i], duration)
         if state is None:
             state = start_of(initial, setup, clearance) if isinstance(initial, Initial) else initial
-        passed = pass_piece(setup, last - first, clearance, friction, state, earlier, check)
-        state, earlier = passed.final, following_accumulator(passed.accumulators[-1], duration)
+        case = setup, last - first, clearance, friction, state, (earlier, before), check
+        passed = pass_piece(*case)
+        state, earlier, before = passed.final, passed.accumulators[-1], duration
         n_step += passed.n_step
         whole[:, first:last] = passed.whole
         for turn, accumulator in enumerate(passed.accumulators, first // per_revolution):
@@ -160,12 +161,12 @@ def pass_piece(
     clearance: float,
     friction: float,
     state: State,
-    earlier: Accumulator,
+    earlier: tuple[Accumulator, float],
     check: Callable[[], None] | None,
     *,
     is_balanced: bool = False,
 ) -> Passed:
-    """Take one piece; `earlier` holds the contact forces before it, its clock that of the piece.
+    """Take one piece; `earlier` holds the contact forces of the piece before, and how long that took, s.
 
     `is_balanced`: its energies are asked for.
     """
@@ -181,7 +182,8 @@ def pass_piece(
             march = kind(setup, clearance, friction, state, check)
             before = march.energy() if is_balanced else math.nan
             for first in range(0, n_sample, stride):
-                accumulator = following_accumulator(accumulators[-1] if accumulators else earlier, 0.0)
+                follows = (accumulators[-1], 0.0) if accumulators else earlier
+                accumulator = following_accumulator(*follows)
                 accumulator.is_touching[:] = march.touching()
                 accumulators.append(accumulator)
                 reason = march.advance(first, first + stride, samples, accumulator, is_recorded=True)

@@ -236,7 +236,7 @@ class ModalSetup:
             damping=self.law.damping,
         )
 
-    def friction_library(self, friction: float) -> FrictionLibrary:
+    def friction_library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction whose slip may turn, shared by its cases."""
         if friction not in self._friction_libraries:
             pairs = self.friction_pairs(friction)
@@ -259,7 +259,7 @@ class ModalSetup:
         for held in libraries:
             held.pop(friction, None)
 
-    def penalty_library(self, friction: float) -> PenaltyLibrary:
+    def penalty_library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction under a penalty, shared by its cases."""
         if friction not in self._penalty_libraries:
             gap_jacobian, force_direction, _ = directions(self.reduced, self.model, friction)
