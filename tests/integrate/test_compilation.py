@@ -24,3 +24,25 @@ def test_parts_are_names_of_kernels():
 
     kernels = {**vars(flow), **vars(separation), **vars(stepping_loop), **vars(curved_loop)}
     assert all(name in kernels for name in compilation._PARTS)
+
+
+def test_no_garbage_is_looked_for_while_kernels_are_compiled():
+    import gc
+
+    import numba
+    from numba.core import event
+
+    collects = []
+
+    class Watching(event.Listener):
+        def on_start(self, event):
+            collects.append(gc.isenabled())
+
+        def on_end(self, event):
+            pass
+
+    with event.install_listener("numba:compile", Watching()):
+        assert numba.njit(lambda x: x + 1.0)(1.0) == 2.0
+    assert collects
+    assert not any(collects)
+    assert gc.isenabled()
