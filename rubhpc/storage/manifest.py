@@ -246,7 +246,7 @@ class Manifest:
         for name in _NAMES:
             try:
                 _vouched(store / PRIVATE / name)
-            except (ValueError, OSError):
+            except (ValueError, OSError, _OtherFormat):
                 names.append(name)
         return names
 

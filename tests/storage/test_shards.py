@@ -194,6 +194,15 @@ def test_a_shard_that_was_written_twice_is_named_and_written_anew(store, packed)
     assert rerun(store, packed) == 0
 
 
+@pytest.mark.parametrize("content", [b'{"run": 1}', b"rubhpc 99 00000000\n{}"])
+def test_a_copy_of_the_manifest_with_other_content_is_named_and_repaired(store, packed, content):
+    """It looks as if another version had written it."""
+    copy = store / ".rubhpc" / "manifest.copy.json"
+    copy.write_bytes(content)
+    assert verify(store).arrays == (copy.name,)
+    assert rerun(store, packed) == 0
+
+
 def test_one_case_is_recomputed_and_compared(packed):
     study = read_study(packed.with_name("tiny.toml"))
     name = Store(packed).manifest.case_id(5)
