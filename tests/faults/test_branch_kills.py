@@ -1,4 +1,4 @@
-"""Studies of branches and of run-ups are killed on their way, again and again: their bytes do not change."""
+"""Studies of branches, run-ups and drives are killed on their way, again and again: the bytes stay."""
 
 from __future__ import annotations
 
@@ -43,11 +43,28 @@ node = 1
 [run]
 block = 2
 """
+DRIVES = """
+rig = "mokhtar2017"
+[drive]
+start = "1500 rpm"
+revolutions = 120
+inertia = "0.02 kg m^2"
+[grid]
+"drive.torque" = ["-0.2 N m", "0.3 N m", "1 N m"]
+clearance = ["60 um", "100 um", "5 mm"]
+friction = [0.1, 0.2]
+[contact]
+friction_law = "coulomb"
+[record]
+samples_per_revolution = 64
+[run]
+block = 1
+"""
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("how", [{"options": ("--workers", "2")}, {"ranks": 2}], ids=["workers", "ranks"])
-@pytest.mark.parametrize("text", [BRANCHES, RUN_UPS], ids=["branches", "run_ups"])
+@pytest.mark.parametrize("text", [BRANCHES, RUN_UPS, DRIVES], ids=["branches", "run_ups", "drives"])
 def test_kills_leave_the_same_bytes(tmp_path, text, how):
     options, under = how.get("options", ()), {"ranks": how.get("ranks", 0)}
     whole, study, store = (tmp_path / name for name in ("whole.toml", "killed.toml", "killed.zarr"))
