@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from postproc.figures.options import Axis, Positive
 
+LABEL = 0.25  # width of a label of a critical speed, of the axis
 _RPM = 30 / math.pi
 
 
@@ -99,14 +100,18 @@ def draw_bode(
     if n_curve > 1:
         top.legend(loc="best", fontsize=6)
     bottom.set(xlabel="Spin speed (rpm)", ylabel="Phase lag (\N{DEGREE SIGN})")
-    for speed in critical:
+    low, high = top.get_xlim()
+    above, last = 0, -math.inf  # labels of near speeds stand above one another
+    for speed in sorted(critical):
+        above = above + 1 if (speed - last) * _RPM < LABEL * (high - low) else 0
+        last = speed
         for ax in axes:
             ax.axvline(speed * _RPM, color="0.6", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0.5)
         top.annotate(
             f"critical, {speed * _RPM:.0f}",
             (speed * _RPM, 0.0),
             xycoords=("data", "axes fraction"),
-            xytext=(2, 2),
+            xytext=(2, 2 + 8 * above),
             textcoords="offset points",
             va="bottom",
             fontsize=6,
