@@ -113,6 +113,8 @@ class Impact:
         if motion.has_states:
             both = np.linalg.lstsq(np.concatenate([normal, along]).T, change, rcond=1e-12)[0]
             force, traction = np.split(both, 2)
+        elif len(normal) == 1:
+            force = normal @ change / bodies.delassus[0]
         else:
             force = np.linalg.lstsq(bodies.delassus, normal @ change, rcond=1e-12)[0]
         hit = np.flatnonzero(force > NO_IMPULSE * np.abs(force).max())

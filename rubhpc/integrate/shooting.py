@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,7 +58,7 @@ class Orbit:
         """Revolutions."""
         return len(self.revolutions)
 
-    @property
+    @cached_property
     def multipliers(self) -> Complexes:
         """Eigenvalues of the monodromy matrix, largest first, (2 n,)."""
         found = np.linalg.eigvals(self.monodromy).astype(np.complex128)
