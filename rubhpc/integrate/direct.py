@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 FIRST, LONGER = 32, 2.0  # revolutions before the first search, and by what those before the next are more
 WATCHED = 16  # revolutions, at least, in which a case must draw near
-BLOCK = 4  # periods, over which it must lose distance
 SLOWER = 2  # times the periods that the linear theory needs for that, in which it must have done so
 NEARER = 0.3  # of its distance after one revolution: a return as near as that speaks for a longer period
 MOST_ITERATIONS, LEAST_STEP = 6, 1 / 4  # of Newton's method
@@ -194,36 +193,36 @@ def draws_near(
 ) -> tuple[bool, str | None]:
     """Simulate a case further: whether it draws near to a stable motion, or why it cannot go on.
 
-    Its distance (`Approach`) is to fall from one block of four periods to the next, to half of what it was
-    and for 16 revolutions or more, in no more than twice the periods that the linear theory needs; and in the
-    last 16 revolutions each period is to take it where that theory says, to a tenth of its distance. A motion
-    that beats about another one, or only passes by, does not. Where the distance does not fall it is watched
-    anew, until so many revolutions have passed.
+    Its distance (`Approach`) is to fall from one look to the next, four revolutions or a period later, to
+    half of what it was and for 16 revolutions or more, in no more than twice the periods that the linear
+    theory needs; and in the last 16 revolutions it is to be at each look where that theory takes it from the
+    one before, to a tenth of its distance. A motion that beats about another one, or only passes by, does
+    not. Where the distance does not fall it is watched anew, until so many revolutions have passed.
     """
     approach = Approach(orbit.monodromy, np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n))
-    least = -(-WATCHED // orbit.period)
+    stride = max(1, LOOK // orbit.period)  # periods from one look to the next
+    onward = np.linalg.matrix_power(orbit.monodromy, stride)
+    least = -(-WATCHED // (stride * orbit.period))
     there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
     apart = motion - orbit.motion
     while walk.n_revolution < until:
-        first = block = last = approach.square(apart)
-        most = max(least, SLOWER * approach.periods_to(HALF, apart))
+        first = last = approach.square(apart)
+        most = max(least, -(-SLOWER * approach.periods_to(HALF, apart) // stride))
         n_linear = 0
-        for n_period in range(1, most + 1):
+        for _ in range(most):
             if piecewise.size(apart) <= there:
                 return True, None
-            reached, reason = walk.repeat(orbit.period)
+            reached, reason = walk.repeat(stride * orbit.period)
             if reached is None:
                 return False, reason
-            expected = orbit.monodromy @ apart
+            expected = onward @ apart
             apart = reached - orbit.motion
             was, last = last, approach.square(apart)
             n_linear = n_linear + 1 if approach.square(apart - expected) <= LINEAR**2 * was else 0
             if last <= HALF * first and n_linear >= least:
                 return True, None
-            if n_period % BLOCK == 0:
-                if last >= block:
-                    break
-                block = last
+            if last >= was:
+                break
     return False, None
 
 

@@ -175,10 +175,11 @@ class Spiral:
         self.change, self.at, self.most, self.n_revolution = change, np.array(begin), most, 0
 
     def repeat(self, period):
-        if self.n_revolution == self.most:
+        if self.n_revolution + period > self.most:
             return None, None
         self.n_revolution += period
-        self.at = self.change(self.at)
+        for _ in range(period):
+            self.at = self.change(self.at)
         return self.at + ORBIT.motion, None
 
 
