@@ -18,6 +18,7 @@ PHYSICS = 15  # version of the physics: raised whenever a study gives other resu
 DIRECT = 1  # transient = "direct"
 CHANGING_SPEED = 1  # run-ups and drives
 SOFT_FRICTION = 1  # a penalty with set-valued friction
+MANY_STATORS = 1  # more than five, whose sets of closed contacts or states may be more than 256
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
@@ -32,6 +33,7 @@ def physics_of(study: Study) -> int:
         + DIRECT * study.recording.is_transient_direct
         + CHANGING_SPEED * bool(study.run_up or study.drive)
         + SOFT_FRICTION * is_soft
+        + MANY_STATORS * (len(study.rig.stator) > 5)
     )
 
 
