@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
-from postproc.figures.run_up_marks import critical_speeds
+from postproc.figures.run_up_marks import RPM, critical_speeds, written_speeds
 from postproc.signals.orders import order_over_speed
 from postproc.store.run_ups import is_run_up
 from postproc.store.units import scale_for, short_name
@@ -22,9 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from postproc.figures.options import Axis, Positive
-
-LABEL = 0.25  # width of a label of a critical speed, of the axis
-_RPM = 30 / math.pi
 
 
 def bode(
@@ -74,7 +70,7 @@ def draw_bode(
     top, bottom = axes
     along = "revolution" if is_run_up(data) else "speed"
     speeds = data["speed"]
-    ends = float(speeds.min()) * _RPM, float(speeds.max()) * _RPM
+    ends = float(speeds.min()) * RPM, float(speeds.max()) * RPM
     unit = str(data[f"amplitude_{signals[0]}"].attrs.get("units", "1"))
     sizes = [float(np.nanmax(data[f"amplitude_{name}"].values)) for name in signals]
     scale = scale_for(unit, max(sizes))
@@ -87,7 +83,7 @@ def draw_bode(
         curves = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
         for i_case, ((case, height), (_, lead)) in enumerate(curves):
             own_speeds = speeds.isel({over: i_case}) if over in speeds.dims else speeds
-            rpm = own_speeds.values * _RPM
+            rpm = own_speeds.values * RPM
             own = name.removeprefix("probe_").replace("_", " ") if len(signals) > 1 else None
             label = ", ".join(text for text in (own, case) if text) or None
             top.plot(rpm, height.values * scale.factor, label=label, **style)
@@ -97,26 +93,14 @@ def draw_bode(
     top.set_title(", ".join([*shown, written_order(order)]), fontsize=8)
     top.set(ylabel=scale.label("Amplitude"), xlim=ends)
     top.set_ylim(bottom=0.0)
-    if n_curve > 1:
-        top.legend(loc="best", fontsize=6)
+    for i, speed in enumerate(critical):
+        line: dict[str, Any] = {"color": "0.6", "linewidth": 0.6, "linestyle": (0, (4, 3)), "zorder": 0.5}
+        top.axvline(speed * RPM, label=None if i else written_speeds(critical), **line)
+        bottom.axvline(speed * RPM, **line)
+    if n_curve > 1 or critical:
+        place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2), "ncols": 2}
+        bottom.legend(*top.get_legend_handles_labels(), fontsize=6, frameon=False, **place)
     bottom.set(xlabel="Spin speed (rpm)", ylabel="Phase lag (\N{DEGREE SIGN})")
-    low, high = top.get_xlim()
-    above, last = 0, -math.inf  # labels of near speeds stand above one another
-    for speed in sorted(critical):
-        above = above + 1 if (speed - last) * _RPM < LABEL * (high - low) else 0
-        last = speed
-        for ax in axes:
-            ax.axvline(speed * _RPM, color="0.6", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0.5)
-        top.annotate(
-            f"critical, {speed * _RPM:.0f}",
-            (speed * _RPM, 0.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(2, 2 + 8 * above),
-            textcoords="offset points",
-            va="bottom",
-            fontsize=6,
-            color="0.35",
-        )
     bottom.invert_yaxis()
     high, low = bottom.get_ylim()
     bottom.yaxis.set_major_locator(MultipleLocator(90 * max(1, round((high - low) / 450))))

@@ -9,7 +9,7 @@ import numpy as np
 from postproc.figures.bode import signal_name, written_order
 from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
-from postproc.figures.run_up_marks import RPM, critical_speeds, draw_rotation, name_speeds
+from postproc.figures.run_up_marks import critical_speeds, draw_rotation, name_speeds, written_speeds
 from postproc.signals.orders import order_over_speed
 from postproc.store.run_ups import is_run_up
 from postproc.store.units import scale_for
@@ -86,15 +86,16 @@ def draw_polar(
         curves.append((x, y, own.values))
     name_speeds(ax, *curves[0])
     style: dict[str, Any] = {"marker": "D", "markersize": 4, "linestyle": "", "color": "k"}
-    is_named = False
-    for speed in critical or []:
-        for x, y, at in curves:
+    passed: set[float] = set()
+    for x, y, at in curves:
+        for speed in critical or []:
             if np.nanmin(at) <= speed <= np.nanmax(at):
                 i = int(np.nanargmin(np.abs(at - speed)))
-                label = None if is_named else f"critical speed, {RPM * speed:.0f} rpm"
-                ax.plot(x[i], y[i], label=label, markerfacecolor="white", **style)
-                is_named = True
-    if len(curves) > 1 or is_named:
+                ax.plot(x[i], y[i], markerfacecolor="white", **style)
+                passed.add(speed)
+    if passed:
+        ax.plot([], [], label=written_speeds(passed), markerfacecolor="white", **style)
+    if len(curves) > 1 or passed:
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.01), ncols=2, frameon=False, fontsize=6)
     draw_rotation(ax)
     ax.set_title(scale.label(f"{signal_name(amplitude)}, {written_order(order)}"), fontsize=8)

@@ -10,6 +10,8 @@ import numpy as np
 from postproc.store.rig_of_case import rig_axes, rig_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     import xarray as xr
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
@@ -37,6 +39,12 @@ def critical_speeds(cases: xr.Dataset, low: float, high: float) -> list[float]:
             return []
     found = find_critical_speeds(model, np.linspace(low, high, _STEPS))
     return [critical.speed for critical in found if critical.is_excited]
+
+
+def written_speeds(speeds: Iterable[float]) -> str:
+    """Words for some critical speeds, rad/s, in a legend."""
+    numbers = [f"{RPM * speed:.0f}" for speed in sorted(speeds)]
+    return f"critical speed{'s' if len(numbers) > 1 else ''}, {', '.join(numbers)} rpm"
 
 
 def name_speeds(ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], speed: NDArray[np.float64]) -> None:

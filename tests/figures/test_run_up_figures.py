@@ -102,21 +102,30 @@ def test_a_centreline_is_the_mean_of_each_revolution():
     assert ax.lines[0].get_xdata() == pytest.approx(0.0, abs=1e-9 * scale)
 
 
-def test_critical_speeds_are_those_that_the_unbalance_excites():
-    stator = LumpedStator(node=1, mass=0.1, stiffness=1e5, damping=1.0, radius=0.1)
-    rig = Rig.from_matrices(
+def mass_of_1_kg(*stiffness):
+    """A rig with these two stiffnesses, N/m."""
+    return Rig.from_matrices(
         np.diag([1.0, 1.0]),
         None,
-        np.diag([1e4, 9e6]),
+        np.diag(stiffness),
         degrees=[(1, "v"), (1, "w")],
-        stators=[stator],
+        stators=[LumpedStator(node=1, mass=0.1, stiffness=1e5, damping=1.0, radius=0.1)],
         unbalance=[Unbalance(node=1, mass=1e-4, radius=0.1)],
     )
-    cases = run_up(rig=rig.as_dict())
+
+
+def test_a_polar_plot_names_all_critical_speeds():
+    for upper, words in ((1.69e4, "critical speeds, 955, 1241 rpm"), (9e6, "critical speed, 955 rpm")):
+        ax = polar(run_up(rig=mass_of_1_kg(1e4, upper).as_dict()), "probe_left").show()
+        assert [text.get_text() for text in ax.get_legend().get_texts()][-1] == words
+
+
+def test_critical_speeds_are_those_that_the_unbalance_excites():
+    cases = run_up(rig=mass_of_1_kg(1e4, 9e6).as_dict())
     assert critical_speeds(cases, 50.0, 150.0) == pytest.approx([100.0])
     assert critical_speeds(run_up(), 50.0, 150.0) == []
-    top, _ = bode(cases, "probe_left").show()
-    assert any("critical, 955" in text.get_text() for text in top.texts)
+    _, phase = bode(cases, "probe_left").show()
+    assert [text.get_text() for text in phase.get_legend().get_texts()] == ["critical speed, 955 rpm"]
 
 
 def test_what_has_no_run_up_is_refused():
