@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-LONG_ROLES = ("waveform", "spectrum", "section")
+SIGNAL_ROLES = ("waveform", "spectrum")  # whose chunks are large
+LONG_ROLES = (*SIGNAL_ROLES, "section")
 # One number a case, or one a stator of it.
 MEASURES = tuple(n for n, v in VARIABLES.items() if v.role in ("measure", "setting"))
 
