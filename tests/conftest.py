@@ -110,8 +110,9 @@ SLOW = (
     "study/test_warnings.py::test_unstable_speeds_are_named_once_and_have_no_amplitude",
     "validation/",
 )
-# Of the same claim, by other parameters or in a shorter form, `make test` has another; `make faults` or
-# `make validation` has these.
+# `make faults` or `make validation` has these. Of most claims `make test` has another, by other parameters or
+# in a shorter form; of these it has none: STOP on ranks, kills of workers in a refined map and of chains on
+# ranks, dense rings.
 LONG = (
     "commands/test_modes_command.py::test_figure_is_written_in_the_format_of_its_name[png]",
     "faults/test_damage.py::test_what_is_no_case_is_written_anew_without_computing[period]",
@@ -144,9 +145,7 @@ LONG = (
     "running/test_parts.py::test_parts_killed_at_every_step_lose_nothing",
     "running/test_refined_runs.py::test_kills_on_any_level_change_nothing[moments1]",
     "running/test_refined_runs.py::test_kills_on_any_level_change_nothing[moments2]",
-    "running/test_workers.py::test_workers_end_with_their_parent",
     "storage/test_growth.py::test_a_kill_at_any_step_of_a_growth_loses_nothing[shards",
-    "storage/test_growth.py::test_growth_in_any_order_keeps_every_case_though_it_is_killed",
     "storage/test_shards.py::test_a_changed_byte_costs_the_cases_that_verify_names[-1]",
     "storage/test_shards.py::test_a_changed_byte_costs_the_cases_that_verify_names[3]",
     "storage/test_shards.py::test_blocks_that_are_not_packed_are_read_all_the_same[2]",

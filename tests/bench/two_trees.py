@@ -43,10 +43,10 @@ def seconds(tree: Path) -> float:
     """Processor time of all cases in a process of its own, the better of two after one to warm up."""
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
     environment = {**os.environ, **threads, "PYTHONPATH": str(tree)}
-    told = subprocess.run(
+    printed = subprocess.run(
         [sys.executable, "-c", TIMED], env=environment, cwd=tree, capture_output=True, text=True, check=True
     )
-    return float(told.stdout.split()[-1])
+    return float(printed.stdout.split()[-1])
 
 
 if __name__ == "__main__":
