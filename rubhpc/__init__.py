@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rubhpc.errors import InputError, NoPeriodicMotion, RubError, StoppedEarly, StoreError
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.linear_design import linear_design
-    from rubhpc.integrate.branches import Branch
+    from rubhpc.integrate.branches.branch import Branch
     from rubhpc.integrate.periodic_motion import PeriodicMotion
     from rubhpc.integrate.record import Record, State
     from rubhpc.knocks import least_knock
@@ -72,7 +72,7 @@ __all__ = [
 
 # Module of each name; imported at first use, so that `import rubhpc` is fast.
 _HOMES = {
-    "Branch": "rubhpc.integrate.branches:Branch",
+    "Branch": "rubhpc.integrate.branches.branch:Branch",
     "Carrier": "rubhpc.rig.carriers:Carrier",
     "InputError": "rubhpc.errors:InputError",
     "Load": "rubhpc.rig.forces:Load",

@@ -10,15 +10,15 @@ import numpy as np
 from rubhpc.case_arguments import CaseArguments, case_of
 from rubhpc.errors import InputError, NoPeriodicMotion
 from rubhpc.input.quantity import parse_quantity
-from rubhpc.integrate.branch_point import Branching
-from rubhpc.integrate.branch_search import search
-from rubhpc.integrate.branch_start import shot, simulated, starts
-from rubhpc.integrate.branches import branch_of
-from rubhpc.integrate.family import CLEARANCES, SPEEDS, Family, Operation
+from rubhpc.integrate.branches.branch import branch_of
+from rubhpc.integrate.branches.point import Branching
+from rubhpc.integrate.branches.search import search
+from rubhpc.integrate.branches.start import shot, simulated, starts
 from rubhpc.integrate.initial_state import fit_to_gaps
-from rubhpc.integrate.piecewise_motion import PiecewiseMotion, Unfollowed
+from rubhpc.integrate.periodic_motions.family import CLEARANCES, SPEEDS, Family, Operation
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
+from rubhpc.integrate.periodic_motions.shooting import NotConverged
 from rubhpc.integrate.record import State
-from rubhpc.integrate.shooting import NotConverged
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
 from rubhpc.study.axis_reading import unit_of
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from os import PathLike
     from typing import Unpack
 
-    from rubhpc.integrate.branch_point import Point
-    from rubhpc.integrate.branches import Branch
+    from rubhpc.integrate.branches.branch import Branch
+    from rubhpc.integrate.branches.point import Point
     from rubhpc.study.initial import Initial
 
 STEPS = 50  # in the range, where no step is given

@@ -13,10 +13,10 @@ from rubhpc.fem.free_spin import release
 from rubhpc.input.fields import FieldError
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build, plain
-from rubhpc.integrate.driven import DrivenRun, integrate_driven
-from rubhpc.integrate.measures import by_name
-from rubhpc.integrate.run_up import integrate_run_up
-from rubhpc.integrate.run_up_case import by_revolution
+from rubhpc.integrate.changing_speed.case import by_revolution
+from rubhpc.integrate.changing_speed.driven import DrivenRun, integrate_driven
+from rubhpc.integrate.changing_speed.run_up import integrate_run_up
+from rubhpc.integrate.measuring.measures import by_name
 from rubhpc.integrate.setup import ModalSetup
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.rig import Rig

@@ -10,19 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.carried import carrier_displacement, tip_deflection
-from rubhpc.integrate.central_difference_march import CentralDifferenceMarch
-from rubhpc.integrate.closed_form import closed_form_march
 from rubhpc.integrate.compilation import seconds_compiling
-from rubhpc.integrate.contact_stepping_march import ContactSteppingMarch
-from rubhpc.integrate.curved_march import CurvedMarch
-from rubhpc.integrate.direct import Passed, pass_directly
-from rubhpc.integrate.event_driven_march import EventDrivenMarch, NoClosedForm
-from rubhpc.integrate.friction_march import FrictionMarch
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
 from rubhpc.integrate.lyapunov import Marches, growth
-from rubhpc.integrate.lyapunov_spectrum import spectrum_of
-from rubhpc.integrate.measures import (
+from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
+from rubhpc.integrate.marches.closed_form import closed_form_march
+from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
+from rubhpc.integrate.marches.curved import CurvedMarch
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.marches.friction import FrictionMarch
+from rubhpc.integrate.measuring.carried import carrier_displacement, tip_deflection
+from rubhpc.integrate.measuring.measures import (
     add_sag,
     by_name,
     diverged_record,
@@ -33,11 +31,13 @@ from rubhpc.integrate.measures import (
     samples_within,
 )
 from rubhpc.integrate.neighbour_motions import NeighbourMotions
-from rubhpc.integrate.piecewise_motion import PiecewiseMotion
-from rubhpc.integrate.proof import Solver
+from rubhpc.integrate.periodic_motions.direct import Passed, pass_directly
+from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+from rubhpc.integrate.periodic_motions.proof import Solver
+from rubhpc.integrate.periodic_motions.shared_motions import shared_motions
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.setup import ModalSetup, Scheme
-from rubhpc.integrate.shared_motions import shared_motions
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.schema import DONE, SECTION_NAMES, lyapunov_variables
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.lyapunov import Neighbours
-    from rubhpc.integrate.march import March
+    from rubhpc.integrate.marches.march import March
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
     from rubhpc.study.study import Recording

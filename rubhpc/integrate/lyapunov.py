@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from rubhpc.integrate.regimes import N_ALL
+from rubhpc.integrate.measuring.regimes import N_ALL
 from rubhpc.integrate.transient import pass_revolutions
 from rubhpc.kernels.separation import DISPLACED, LOST
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.march import March
+    from rubhpc.integrate.marches.march import March
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import Setup
     from rubhpc.study.study import Recording

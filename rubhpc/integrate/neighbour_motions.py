@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.event_driven_march import NoClosedForm
 from rubhpc.integrate.lyapunov import N_ALIGNING
-from rubhpc.integrate.measures import empty_samples, new_accumulator
-from rubhpc.integrate.regimes import N_MOST
+from rubhpc.integrate.marches.event_driven import NoClosedForm
+from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
+from rubhpc.integrate.measuring.regimes import N_MOST
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -26,7 +26,7 @@ from rubhpc.kernels.measuring import recorder
 from rubhpc.kernels.separation import Pair, part
 
 if TYPE_CHECKING:
-    from rubhpc.integrate.event_driven_march import EventDrivenMarch
+    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 
 N_SPAN = 4  # passed by one kernel call
 

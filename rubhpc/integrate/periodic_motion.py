@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from rubhpc.errors import InputError, NoPeriodicMotion
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.closed_form import closed_form_march
-from rubhpc.integrate.event_driven_march import NoClosedForm
 from rubhpc.integrate.initial_state import fit_to_gaps
-from rubhpc.integrate.piecewise_motion import Change, PiecewiseMotion
+from rubhpc.integrate.marches.closed_form import closed_form_march
+from rubhpc.integrate.marches.event_driven import NoClosedForm
+from rubhpc.integrate.periodic_motions.piecewise_motion import Change, PiecewiseMotion
+from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.setup import ModalSetup, Scheme
-from rubhpc.integrate.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions
 from rubhpc.schema import REGIME

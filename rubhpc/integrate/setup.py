@@ -15,21 +15,21 @@ from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.free_spin import release
 from rubhpc.fem.probes import with_probes
 from rubhpc.fem.response import step_limit
-from rubhpc.integrate.contact_mode import ContactMode, confine, solve_contact_mode, solve_parts
-from rubhpc.integrate.curved_library import CurvedLibrary
-from rubhpc.integrate.divergence import energy_limit
-from rubhpc.integrate.friction_mode import FrictionPairs, solve_friction_mode
-from rubhpc.integrate.mode_library import (
+from rubhpc.integrate.measuring.divergence import energy_limit
+from rubhpc.integrate.packing import Packed, law_of, pack
+from rubhpc.integrate.reduced_model.contact_mode import ContactMode, confine, solve_contact_mode, solve_parts
+from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
+from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
+from rubhpc.integrate.reduced_model.mode_library import (
     FrictionLibrary,
     ModeLibrary,
     PenaltyLibrary,
     width_without_modes,
 )
-from rubhpc.integrate.mode_tables import tabulate
-from rubhpc.integrate.packing import Packed, law_of, pack
-from rubhpc.integrate.penalty_mode import Penalty
-from rubhpc.integrate.reduction import ReducedModel, directions, kernel_bodies, reduce_model
-from rubhpc.integrate.truncation import MOST_MODES, kept_modes, modal_error, sufficient_accuracy
+from rubhpc.integrate.reduced_model.mode_tables import tabulate
+from rubhpc.integrate.reduced_model.penalty_mode import Penalty
+from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies, reduce_model
+from rubhpc.integrate.reduced_model.truncation import MOST_MODES, kept_modes, modal_error, sufficient_accuracy
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.schema import SCHEMES
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.free_spin import FreeSpin
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.contact_mode import Solved
+    from rubhpc.integrate.reduced_model.contact_mode import Solved
     from rubhpc.kernels.contact_modes import ModeTables, Reduced
     from rubhpc.kernels.laws import Law
     from rubhpc.rig.probes import Probe

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.measures import empty_samples, new_accumulator
+from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
 from rubhpc.kernels.accumulators import HORIZONTAL, TWIST, VERTICAL
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.march import March
+    from rubhpc.integrate.marches.march import March
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.study.study import Recording
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.branch_case import BranchRecord
-from rubhpc.integrate.run_up_case import RunUpRecord
+from rubhpc.integrate.branches.case import BranchRecord
+from rubhpc.integrate.changing_speed.case import RunUpRecord
 from rubhpc.schema import DONE, FINAL_STATE
 from rubhpc.storage.measures import missing_value
 

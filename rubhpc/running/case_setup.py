@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rubhpc.integrate.family import CLEARANCES, SPEEDS, Operation
+from rubhpc.integrate.periodic_motions.family import CLEARANCES, SPEEDS, Operation
 from rubhpc.integrate.setup import prepare
 from rubhpc.study.drive_law import DriveLaw
 

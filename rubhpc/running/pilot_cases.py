@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.branch_case import record_branches
+from rubhpc.integrate.branches.case import record_branches
 from rubhpc.integrate.case import compile_kernels, run_case
+from rubhpc.integrate.changing_speed.case import RunUpRecord
 from rubhpc.integrate.compilation import seconds_compiling
-from rubhpc.integrate.run_up_case import RunUpRecord
 from rubhpc.running.case_setup import operation_of, set_up
 from rubhpc.running.worker import integrate
 from rubhpc.schema import FINAL_STATE

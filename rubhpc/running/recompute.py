@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.run_up_case import RunUpRecord
+    from rubhpc.integrate.changing_speed.case import RunUpRecord
     from rubhpc.study.cases import Case, CaseGrid
     from rubhpc.study.study import Study
 

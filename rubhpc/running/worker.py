@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.branch_case import BranchRecord, record_branches
+from rubhpc.integrate.branches.case import BranchRecord, record_branches
 from rubhpc.integrate.case import run_case
+from rubhpc.integrate.changing_speed.case import RunUpRecord, record_run_up
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.record import State
-from rubhpc.integrate.run_up_case import RunUpRecord, record_run_up
 from rubhpc.running.case_rows import packed_measures, put_any
 from rubhpc.running.case_setup import operation_of, set_up
 from rubhpc.running.initial_states import InitialState, InitialStates

@@ -12,8 +12,9 @@ from rivals import run as run_rival
 
 import rubhpc
 from rubhpc.integrate import case as case_module
-from rubhpc.integrate import event_driven_march, neighbour_motions
+from rubhpc.integrate import neighbour_motions
 from rubhpc.integrate.case import run_case
+from rubhpc.integrate.marches import event_driven as event_driven_march
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.study.study import Contact, Integrator, Recording

@@ -7,7 +7,7 @@ import pytest
 from trial_rig import trial_rig
 
 from rubhpc import read_rig, simulate
-from rubhpc.integrate.mode_library import ModeLibrary
+from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.rig.reading import with_keys
 
 STIFF = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": 3e10})

@@ -11,8 +11,8 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.fem.response import steady_response
 from rubhpc.integrate.packing import degrees_of, whole_system
-from rubhpc.integrate.reduction import reduce_model
-from rubhpc.integrate.standstill import cutoff_frequency
+from rubhpc.integrate.reduced_model.reduction import reduce_model
+from rubhpc.integrate.reduced_model.standstill import cutoff_frequency
 from rubhpc.kernels.contact_pairs import AXIAL, TORSION, V, W
 
 SPIN = 210.0

@@ -9,8 +9,8 @@ import pytest
 from rubhpc import InputError, State, read_rig, simulate
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
-from rubhpc.integrate import march
 from rubhpc.integrate.case import run_case
+from rubhpc.integrate.marches import march
 from rubhpc.integrate.record import Record
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import PACKAGED, with_keys

@@ -7,8 +7,8 @@ import pytest
 
 from rubhpc import simulate
 from rubhpc.errors import InputError
-from rubhpc.integrate.direct import draws_near
-from rubhpc.integrate.known_motions import Approach
+from rubhpc.integrate.periodic_motions.direct import draws_near
+from rubhpc.integrate.periodic_motions.known_motions import Approach
 from rubhpc.integrate.transient import has_settled
 from rubhpc.schema import REGIME
 from rubhpc.study.study import Recording

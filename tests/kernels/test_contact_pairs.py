@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import root
 
-from rubhpc.integrate.workspace import workspace
+from rubhpc.integrate.marches.workspace import workspace
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_forces import solve_contact
 from rubhpc.kernels.contact_pairs import (

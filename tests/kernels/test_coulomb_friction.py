@@ -10,7 +10,7 @@ from kernel_case import KernelCase
 from scipy.optimize import linprog
 from trial_rig import trial_rig
 
-from rubhpc.integrate.workspace import workspace
+from rubhpc.integrate.marches.workspace import workspace
 from rubhpc.kernels.central_difference import FINISHED
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_forces import fill_residual, solve_contact

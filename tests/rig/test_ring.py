@@ -9,8 +9,8 @@ import pytest
 
 import rubhpc
 from rubhpc import InputError, Rig, assemble, read_rig
+from rubhpc.integrate.marches.workspace import workspace
 from rubhpc.integrate.packing import pack, pairs_of
-from rubhpc.integrate.workspace import workspace
 from rubhpc.kernels.complementarity import UNSOLVED, solve_complementarity
 from rubhpc.rig.reading import rig_from_dict, with_key
 from rubhpc.rig.stators import MOST_STATORS

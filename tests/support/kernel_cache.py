@@ -63,7 +63,7 @@ def use(scheme: str) -> None:
 
 def _use_neighbours() -> None:
     import rubhpc
-    from rubhpc.integrate.event_driven_march import EventDrivenMarch
+    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
     from rubhpc.integrate.neighbour_motions import NeighbourMotions
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import prepare

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.integrate.measures import empty_samples, new_accumulator
+from rubhpc.integrate.marches.workspace import workspace
+from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
 from rubhpc.integrate.packing import pack, pairs_of
-from rubhpc.integrate.workspace import workspace
 from rubhpc.kernels.central_difference import advance
 from rubhpc.kernels.laws import MULTIPLIER
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from rubhpc.fem.model import Body, Model, StatorModel
 from rubhpc.integrate.packing import law_of, pack
-from rubhpc.integrate.reduction import reduce_model
+from rubhpc.integrate.reduced_model.reduction import reduce_model
 from rubhpc.integrate.setup import CentralDifferenceSetup, ModalSetup, scheme_of
 from rubhpc.study.tables import Integrator
 

@@ -17,13 +17,13 @@ from lone_bodies import body, set_up_modal, tip
 
 import rubhpc
 from rubhpc import LumpedStator, Rig, Unbalance, read_rig
-from rubhpc.integrate.arclength import follow
-from rubhpc.integrate.branch_events import Event
-from rubhpc.integrate.branch_point import Branching
-from rubhpc.integrate.branch_search import search
-from rubhpc.integrate.family import Family
+from rubhpc.integrate.branches.arclength import follow
+from rubhpc.integrate.branches.events import Event
+from rubhpc.integrate.branches.point import Branching
+from rubhpc.integrate.branches.search import search
 from rubhpc.integrate.periodic_motion import find_periodic_motion
-from rubhpc.integrate.piecewise_motion import PiecewiseMotion
+from rubhpc.integrate.periodic_motions.family import Family
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.setup import prepare
 from rubhpc.study.initial import Initial
 from rubhpc.study.study import Contact, Integrator, Recording

@@ -23,8 +23,8 @@ from rubhpc import (
 from rubhpc.errors import InputError
 from rubhpc.fem.annular import annular_rub
 from rubhpc.fem.modes import modes
-from rubhpc.integrate.carried import tip_deflection
-from rubhpc.integrate.measures import empty_samples, new_accumulator
+from rubhpc.integrate.measuring.carried import tip_deflection
+from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
 from rubhpc.rig.reading import rig_from_dict
 
 BASE = read_rig("mokhtar2017")

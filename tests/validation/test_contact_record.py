@@ -7,7 +7,7 @@ import pytest
 from trial_rig import trial_rig
 
 from rubhpc import LumpedStator, Rig, State, assemble, simulate
-from rubhpc.integrate.march import NO_FORCES
+from rubhpc.integrate.marches.march import NO_FORCES
 
 LAWS = [
     {},

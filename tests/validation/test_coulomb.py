@@ -12,7 +12,7 @@ from rubhpc import State, read_rig, simulate
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import first_lateral_frequency
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.friction_march import FrictionMarch
+from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.setup import Scheme, prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DIVERGED, DONE

@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 from rubhpc import State, read_rig
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.packing import pack
-from rubhpc.integrate.reduction import reduce_model
+from rubhpc.integrate.reduced_model.reduction import reduce_model
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.force_average import AVERAGING_TIME
 from rubhpc.rig.reading import with_keys

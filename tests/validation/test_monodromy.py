@@ -9,8 +9,8 @@ from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.periodic_motion import find_periodic_motion
-from rubhpc.integrate.piecewise_motion import PiecewiseMotion
-from rubhpc.integrate.saltation import monodromy
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+from rubhpc.integrate.periodic_motions.saltation import monodromy
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.initial import Initial

@@ -14,8 +14,8 @@ from scipy.optimize import brentq
 
 from rubhpc import State
 from rubhpc.integrate.periodic_motion import find_periodic_motion
-from rubhpc.integrate.piecewise_motion import PiecewiseMotion
-from rubhpc.integrate.saltation import saltate
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+from rubhpc.integrate.periodic_motions.saltation import saltate
 from rubhpc.study.initial import Initial
 from rubhpc.study.study import Contact, Recording
 

@@ -1,0 +1,1 @@
+"""Branches of periodic motions: followed through folds, with the events on them."""

@@ -1,0 +1,239 @@
+"""Pseudo-arclength continuation: a branch followed from point to point, through folds, to its end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.integrate.branches.events import Event, half_change, halving
+from rubhpc.integrate.branches.grazing import grazing, passed
+from rubhpc.integrate.branches.point import away_from_events
+from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
+from rubhpc.integrate.periodic_motions.shooting import SAME, NotConverged
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.branches.point import Branching, Point
+
+    Floats = NDArray[np.float64]
+
+FIRST, LEAST, LONGEST = 0.1, 1e-4, 1.0  # lengths of a step
+GOOD, POOR = 0.03, 0.15  # distance from a prediction over the step's length: go on with more, with less
+STRAIGHT = 0.75  # cosine of the angle between two steps, at least
+SHORT = 0.02  # length of the step in which a branch may pass a motion of half its period
+FEWEST = 6  # points of a branch that is closed
+SHORTEST = 1e-3  # length of a step in which several contacts may come and go at once
+BEYOND = (0.02, 0.1, 0.5)  # steps past a grazing at which the branch is sought again
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Track:
+    """Points of a branch in order, with what happens at each, and why it ends.
+
+    `is_halved` says that it ends at a motion of half its period, `is_closed` that it ends where it began,
+    `doublings` how many have led to it.
+    """
+
+    points: list[Point]
+    events: list[Event]
+    end: str
+    is_halved: bool = False
+    is_closed: bool = False
+    doublings: int = 0
+
+
+def follow(
+    branching: Branching,
+    start: list[Point],
+    sense: float,
+    *,
+    low: float,
+    high: float,
+    most: int,
+) -> Track:
+    """Follow a branch until it leaves a range of the parameter, closes, or is lost.
+
+    Parameters
+    ----------
+    start : list of Point
+        One point, or two from the first of which the branch goes through the second.
+    sense : float
+        1 or -1: whether the parameter rises at first, from a single point.
+    most : int
+        Points, at most.
+    """
+    points, events = list(start), [Event.NONE] * len(start)
+    history, end = list(start), f"{most} points"
+    length = FIRST if len(start) == 1 else float(np.linalg.norm(branching.difference(*start)))
+    length = min(FIRST, length)
+    is_halved = is_closed = False
+    heading, has_turned = None, False  # where it goes from a single point; whether its contacts are new
+
+    def add(event: Event, point: Point) -> None:
+        points.append(point)
+        events.append(event)
+
+    try:
+        while len(points) < most:
+            if ahead := away_from_events(history[-1]):
+                history = [branching.moved(point, ahead) for point in history[-3:]]
+            base = history[-1]
+            if has_turned or len(history) == 1:
+                toward = np.append(np.zeros(base.motion.size), sense)
+                if len(history) > 1:
+                    toward = branching.difference(*history[-2:])
+                heading, history, has_turned = branching.tangent(base, toward), [base], False
+            edge, found, guess, happened = 0.0, None, None, []
+            while length >= LEAST:
+                if heading is not None:
+                    guess, along = length * heading, heading
+                else:
+                    guess, along = predict(branching, history, length)
+                value = base.value + guess[-1] * branching.step
+                edge = low if value <= low else high if value >= high else 0.0
+                if value <= low or value >= high:
+                    guess = guess * (edge - base.value) / (guess[-1] * branching.step)
+                    along = np.zeros_like(along)
+                    along[-1] = 1.0
+                try:
+                    trial = branching.correct(base, guess, along)
+                except NotConverged:
+                    length *= 0.5
+                    continue
+                is_back = _is_half(trial) or (trial.sequence == base.sequence and _is_back(trial, base))
+                is_last = length <= SHORTEST
+                if _is_near(branching, history, guess, trial) and (length <= SHORT or not is_back):
+                    events_between = passed(branching, base, trial, is_last=is_last)
+                    if events_between is not None or is_last:
+                        found, happened = trial, events_between or []
+                        break
+                length *= 0.5
+            if found is None:
+                point = grazing(branching, history, predict)
+                if point is None:
+                    end = "no motion is found that goes on from here"
+                    break
+                add(Event.GRAZING, point)
+                follower = _beyond(branching, history[-2], base, point)
+                if follower is None:
+                    end = "a contact grazes"
+                    break
+                add(Event.NONE, follower)
+                history, length, has_turned = [point, follower], FIRST, True
+                continue
+            is_same = found.sequence == base.sequence
+            has_halved = _is_half(found) or (is_same and _is_back(found, base))
+            for event, point in happened:
+                if not has_halved or event not in (Event.FOLD, Event.BRANCH_POINT):
+                    add(event, point)  # where the period halves a multiplier of 1 is no other event
+            if has_halved:
+                if half := halving(branching, base, found):
+                    add(Event.PERIOD_DOUBLING, half)
+                end, is_halved = "it meets a motion of half the period", True
+                break
+            if closing := _closing(branching, points, base, found):
+                add(Event.END, closing)
+                end, is_closed = "the branch is closed", True
+                break
+            is_at_edge = found.value in (low, high)
+            add(Event.END if is_at_edge else Event.NONE, found)
+            if is_at_edge:
+                end = "the range ends"
+                break
+            assert guess is not None
+            miss = _miss(branching, base, guess, found) / length
+            corner = [point for event, point in happened if event is Event.GRAZING][-1:]
+            history, heading, has_turned = [*(corner or history[-2:]), found], None, not is_same
+            length = min(LONGEST, 1.5 * length) if miss < GOOD else (0.6 * length if miss > POOR else length)
+    except (Unfollowed, InputError, NotConverged, np.linalg.LinAlgError) as problem:
+        end = str(problem)
+    if events[-1] is Event.NONE and len(points) < most:
+        events[-1] = Event.END
+    return Track(points=points, events=events, end=end, is_halved=is_halved, is_closed=is_closed)
+
+
+def predict(branching: Branching, history: list[Point], length: float) -> tuple[Floats, Floats]:
+    """Motion some length ahead of two or three points, in steps from the last, and the direction there."""
+    ahead = branching.difference(*history[-2:])
+    first = float(np.linalg.norm(ahead))
+    slope, bend = ahead / first, np.zeros_like(ahead)
+    if len(history) > 2:
+        earlier = branching.difference(*history[-3:-1])
+        second = float(np.linalg.norm(earlier))
+        if earlier.size == ahead.size and second > 0.0:
+            bend = (slope - earlier / second) / (first + second)
+    guess = length * slope + length * (length + first) * bend
+    along = slope + (2.0 * length + first) * bend
+    return guess, along / np.linalg.norm(along)
+
+
+def _miss(branching: Branching, base: Point, guess: Floats, found: Point) -> float:
+    change = branching.difference(base, found)
+    return float(np.linalg.norm(change - guess)) if change.size == guess.size else 0.0
+
+
+def _is_near(branching: Branching, history: list[Point], guess: Floats, found: Point) -> bool:
+    """Whether a motion lies where the branch was going, not on another."""
+    change = branching.difference(history[-1], found)
+    length = float(np.linalg.norm(guess))
+    if change.size != guess.size:
+        return True
+    moved = float(np.linalg.norm(change))
+    return bool(moved > 0.0 and change @ guess > STRAIGHT * moved * length and moved < 2.0 * length)
+
+
+def _beyond(branching: Branching, before: Point, base: Point, grazing_point: Point) -> Point | None:
+    """A motion of other contacts next to a grazing: further along the parameter, or back."""
+    sense = np.sign(grazing_point.value - before.value)
+    n = 2 * grazing_point.case.n
+    for steps in BEYOND:
+        for direction in (sense, -sense):
+            guess = np.zeros(n + 1)
+            guess[-1] = direction * steps
+            along = np.zeros(n + 1)
+            along[-1] = 1.0
+            try:
+                found = branching.correct(grazing_point, guess, along, most=12)
+            except NotConverged:
+                continue
+            is_other = len(found.sequence) != len(base.sequence)
+            if is_other and np.linalg.norm(branching.difference(grazing_point, found)) < 1.0:
+                return found
+    return None
+
+
+def _is_back(found: Point, base: Point) -> bool:
+    """Whether a motion has passed one of half its period, and goes on as it came, half a period later."""
+    if found.period % 2:
+        return False
+    now, before = half_change(found), half_change(base)
+    return bool(now.size == before.size and now @ before < 0.0)
+
+
+def _is_half(point: Point) -> bool:
+    """Whether a motion has half the period it is followed with."""
+    if point.period % 2:
+        return False
+    return bool(point.case.size(half_change(point)) < SAME * point.case.size(point.motion))
+
+
+def _closing(branching: Branching, points: list[Point], base: Point, found: Point) -> Point | None:
+    """The motion with which a branch began, where it comes by once more between two points, in one sense."""
+    first, step = points[0], found.value - base.value
+    if len(points) < FEWEST or step * (points[1].value - first.value) <= 0.0:
+        return None
+    share = (first.value - base.value) / step
+    if not 0.0 <= share <= 1.0 or found.motion.size != first.motion.size:
+        return None
+    change = branching.difference(base, found)
+    held = np.zeros(change.size)
+    held[-1] = 1.0
+    try:
+        there = branching.correct(base, share * change, held)
+    except NotConverged:
+        return None
+    return there if branching.is_same(there, first) else None

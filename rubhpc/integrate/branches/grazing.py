@@ -1,0 +1,247 @@
+"""Grazing on a branch: where a contact more or less begins, between two points or ahead of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rubhpc.integrate.branches.events import LOCATED, Event, crossings, tolerance_of
+from rubhpc.integrate.periodic_motions.shooting import NotConverged
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.branches.point import Branching, Point
+
+    Floats = NDArray[np.float64]
+    Predictor = Callable[[Branching, list[Point], float], tuple[Floats, Floats]]
+
+APPROACH = 0.1  # of its distance to grazing that a trial leaves
+MOST_TRIALS = 40
+CLOSE = 1e-4  # steps before a grazing at which its point may lie
+BESIDE = (
+    1e-3,
+    1e-2,
+    0.1,
+)  # shares of a step from a grazing, at which the motion with more contacts is sought
+MEETING, NEIGHBOURS = 0.5, 2.0  # of a step, within which the motions on both sides of a grazing lie
+WITHIN_REACH = 3.0  # steps, in which a distance to grazing would vanish
+
+
+def passed(
+    branching: Branching, a: Point, b: Point, *, is_last: bool = False
+) -> list[tuple[Event, Point]] | None:
+    """What happens between two points of a branch, in order; None where b does not follow from a.
+
+    A contact more or less begins with grazing, and there both motions are one. Where several contacts come
+    and go the points are to be nearer, unless it `is_last`: by symmetry several may graze at once.
+    """
+    if a.sequence == b.sequence:
+        return list(crossings(branching, a, b))
+    was, now = touches(a), touches(b)
+    n_changed = (was - now).total() + (now - was).total()
+    if n_changed == 0:
+        return list(crossings(branching, a, b))  # other contacts overlap than before
+    if n_changed > 1 and not is_last:
+        return None
+    reach_of_sides = NEIGHBOURS if is_last else MEETING
+    nearest = reach_of_sides * np.linalg.norm(branching.difference(a, b))
+    for locate in (grazing_between, grazing_beside):
+        graze = locate(branching, a, b)
+        if graze is None:
+            continue
+        sides = [graze.point, graze.beyond]
+        if graze.point.sequence != a.sequence:
+            sides.reverse()
+        if np.linalg.norm(branching.difference(*sides)) <= nearest:
+            return [
+                *crossings(branching, a, sides[0]),
+                (Event.GRAZING, graze.point),
+                *crossings(branching, sides[1], b),
+            ]
+    return None
+
+
+def touches(point: Point) -> Counter[int]:
+    """How often each pair touches in a period."""
+    return Counter(pair for _, touching in point.sequence for pair in touching)
+
+
+def distances(point: Point) -> Floats:
+    """Distances to grazing: least gaps and speeds of approach over those of a whirl in the gap; forces, N."""
+    gap = np.min([revolution.least_gap for revolution in point.revolutions], axis=0)
+    force = np.min([revolution.least_force for revolution in point.revolutions], axis=0)
+    approach = [speed for r in point.revolutions for piece in r.pieces for speed in piece.approach.tolist()]
+    clearance = np.maximum(point.case.bodies.clearance, np.finfo(float).tiny)
+    whirl = abs(point.case.setup.spin) * float(clearance.max())
+    return np.concatenate([gap / clearance, force, np.array(approach) / whirl])
+
+
+def reach(branching: Branching, before: Point, point: Point) -> float:
+    """Length, in steps, after which a distance to grazing vanishes if all go on as between two points."""
+    was, now = distances(before), distances(point)
+    length = float(np.linalg.norm(branching.difference(before, point)))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ahead = np.where(np.isfinite(was) & np.isfinite(now) & (now < was), now / (was - now), np.inf)
+    return float(ahead.min()) * length
+
+
+def grazing(branching: Branching, history: list[Point], predict: Predictor) -> Point | None:
+    """Approach the grazing ahead of some points; returns the last motion before it, None where there is none.
+
+    Every trial leaves a tenth of the distance that is left, as the points before have it. The contacts must
+    stay as they are: the derivative is unbounded on the other side.
+    """
+    if len(history) < 2 or history[-2].sequence != history[-1].sequence:
+        return None
+    ahead = reach(branching, *history[-2:])
+    if ahead > WITHIN_REACH:
+        return None
+    left = APPROACH
+    for _ in range(MOST_TRIALS):
+        guess, along = predict(branching, history[-3:], (1.0 - left) * ahead)
+        try:
+            trial = branching.correct(history[-1], guess, along)
+        except NotConverged:
+            trial = None
+        if trial is None or trial.sequence != history[-1].sequence:
+            left = 0.5 * (1.0 + left)
+            if left > 0.99:
+                return None
+            continue
+        change = branching.difference(history[-1], trial)
+        rate = abs(change[-1]) * branching.step / float(np.linalg.norm(change))
+        history = [*history[-2:], trial]
+        ahead = reach(branching, *history[-2:])
+        if ahead < CLOSE and ahead * rate < LOCATED * branching.family.span:
+            return trial
+        if not ahead < WITHIN_REACH:
+            return None
+        left = APPROACH
+    return None
+
+
+class Grazing(NamedTuple):
+    """Motions on both sides of a grazing."""
+
+    point: Point  # with fewer contacts
+    beyond: Point  # with more, as near as it was found
+
+
+def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
+    """Locate the grazing between two points with one contact more or less.
+
+    On the side with fewer contacts the least gap falls linearly to zero, along which it is sought; else the
+    place is halved.
+    """
+    change = branching.difference(a, b)
+    n_touch = [touches(point).total() for point in (a, b)]
+    if n_touch[0] == n_touch[1]:
+        return None
+    direction, is_first_free = change / np.linalg.norm(change), n_touch[0] < n_touch[1]
+    tolerance = tolerance_of(branching, a, b)
+    ends = {a.sequence: 0.0, b.sequence: 1.0}
+    free: list[tuple[float, Point]] = [(0.0, a) if is_first_free else (1.0, b)]
+    root = None
+
+    def impacting(at: float) -> Point:
+        """The motion with more contacts that is nearest to the grazing."""
+        end, other = (1.0, b) if is_first_free else (0.0, a)
+        for part in BESIDE:
+            for base, share in ((a, at + part * (end - at)), (free[-1][1], part * (end - at))):
+                try:
+                    found = branching.correct(base, share * change, direction, is_free=True)
+                except NotConverged:
+                    continue
+                if found.sequence == other.sequence:
+                    return found
+        return other
+
+    for _ in range(MOST_TRIALS):
+        near, far = free[-1][0], ends[b.sequence if is_first_free else a.sequence]
+        root = _root(free) or root  # a gap of rounding is not seen any more
+        if root is None or not min(near, far) < root < max(near, far):
+            share = 0.5 * (near + far)
+        elif abs(root - near) < tolerance:
+            return Grazing(free[-1][1], impacting(near))
+        else:
+            share = root + APPROACH * (near - root)
+        if abs(near - far) < tolerance:
+            return Grazing(free[-1][1], impacting(near))
+        try:
+            ahead = _ahead(branching, free, change)
+            trial = branching.correct(free[-1][1], (share - near) * ahead, direction)
+        except NotConverged:
+            trial = None
+        if trial is not None and trial.sequence == free[0][1].sequence:
+            free = [free[-1], (share, trial)]
+        else:
+            ends[b.sequence if is_first_free else a.sequence] = share
+    return None
+
+
+def grazing_beside(branching: Branching, a: Point, b: Point) -> Grazing | None:
+    """Locate the grazing next to two points with one contact more or less, where the branch has a corner.
+
+    It need not lie between them: where an impact makes a motion unstable, both may rise from it.
+    From the side with fewer contacts the least gap is followed to zero along the parameter.
+    """
+    n_touch = [touches(point).total() for point in (a, b)]
+    if n_touch[0] == n_touch[1]:
+        return None
+    free, other = (a, b) if n_touch[0] < n_touch[1] else (b, a)
+    held = np.zeros(free.motion.size + 1)
+    held[-1] = 1.0
+    move = BESIDE[1] * max(abs(a.value - b.value) / branching.step, BESIDE[0])
+    pair: list[tuple[float, Point]] = []
+    try:
+        for sense in (1.0, -1.0):
+            pair = [(0.0, free), (sense * move, branching.correct(free, sense * move * held, held))]
+            if (root := _root(pair)) is not None:
+                break
+        for _ in range(MOST_TRIALS):
+            near, point = pair[-1]
+            if root is None or abs(root) > WITHIN_REACH or point.sequence != free.sequence:
+                return None
+            if abs(root - near) * branching.step < LOCATED * branching.family.span:
+                break
+            there = root + APPROACH * (near - root)
+            pair = [pair[-1], (there, branching.correct(point, (there - near) * held, held))]
+            root = _root(pair)
+        else:
+            return None
+        toward = branching.difference(pair[-1][1], other)
+        length = float(np.linalg.norm(toward))
+        for part in BESIDE:
+            beyond = branching.correct(pair[-1][1], part * toward, toward / length, is_free=True)
+            if beyond.sequence == other.sequence:
+                return Grazing(pair[-1][1], beyond)
+    except NotConverged:
+        if len(pair) < 2 or abs(pair[-1][0] - pair[-2][0]) * branching.step > branching.family.span:
+            return None
+    return Grazing(pair[-1][1], other)
+
+
+def _ahead(branching: Branching, free: list[tuple[float, Point]], change: Floats) -> Floats:
+    """Where the side without the contact goes in a whole step, by its last two points; else `change`."""
+    if len(free) < 2:
+        return change
+    ahead = branching.difference(free[0][1], free[1][1])
+    along = float(ahead @ change)
+    return ahead * (change @ change / along) if along else change
+
+
+def _root(free: list[tuple[float, Point]]) -> float | None:
+    """Where the first least gap or force vanishes that falls from one point to the next."""
+    if len(free) < 2:
+        return None
+    (x, before), (y, point) = free
+    n = 2 * point.case.q
+    was, now = distances(before)[:n], distances(point)[:n]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ahead = np.where(np.isfinite(was) & np.isfinite(now) & (now < was), now / (was - now), np.inf)
+    return float(y + (y - x) * ahead.min()) if np.isfinite(ahead.min()) else None

@@ -1,0 +1,1 @@
+"""Cases whose speed changes: pieces of constant speed under a law of speed or a drive."""

@@ -1,0 +1,196 @@
+"""The spin of a driven rotor under way, piece by piece (`driven`)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rubhpc.integrate.changing_speed.piece_setup import Pieces
+from rubhpc.integrate.changing_speed.run_up import Passed, pass_piece
+from rubhpc.integrate.measuring.measures import new_accumulator
+from rubhpc.integrate.start import start_of
+from rubhpc.kernels.accumulators import (
+    DAMPING_LOSS,
+    DRIVE_WORK,
+    FRICTION_LOSS,
+    IMPACT_LOSS,
+    UNBALANCE_WORK,
+)
+from rubhpc.study.initial import Initial
+from rubhpc.study.speed_law import LAG
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.record import State
+    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.study.drive_law import DriveLaw
+
+    Floats = NDArray[np.float64]
+
+GUESSED = 0.02 * LAG  # rad, by which the shaft's angle may depart from that of the acceleration guessed
+MOST_TRIES = 4  # of a piece, after which it is halved
+
+
+class Taken(NamedTuple):
+    """A piece that has been taken."""
+
+    passed: Passed
+    lag: float  # rad, as of `speed_law.LAG`
+    times: list[float]  # s, at its beginning and at the ends of the revolutions, or of the part, in it
+    drive_work: list[float]  # J, in each of them
+    braking: list[float]  # N m s, in each of them
+    energies: Floats  # (6,), J: spin, motion, drive, friction, damping, impacts
+
+
+class Spin:
+    """The spin of a case under way, and the motion that it carries."""
+
+    def __init__(
+        self,
+        fastest: ModalSetup,
+        drive: DriveLaw,
+        clearance: float,
+        friction: float,
+        initial: State | Initial,
+        check: Callable[[], None] | None,
+    ) -> None:
+        assert fastest.free_spin is not None
+        model = fastest.model
+        self._drive, self._initial, self._check = drive, initial, check
+        self._clearance, self._friction = clearance, friction
+        self._pieces = Pieces(fastest)
+        self._free = fastest.free_spin
+        self._gyroscopic = model.rotor.gyroscopic
+        self._phasor = model.unbalance_cosine - 1j * model.unbalance_sine
+        self.speed, self.time = drive.start, 0.0
+        self._brake = 0.0  # N m, mean of the last piece
+        self._begun: State | None = None
+        # The contact forces of the piece before, and how long it took, s.
+        self._earlier = new_accumulator(len(model.stators), model.n_place), 0.0
+
+    @property
+    def state(self) -> State:
+        """The motion reached."""
+        assert self._begun is not None
+        return self._begun
+
+    def take(self, at: int, length: int, per_revolution: int, *, is_fixed: bool) -> Taken | None:
+        """Take a piece from sample `at`; None where it is too long, or the spin does not get so far.
+
+        `is_fixed`: it may not be shortened for the sake of accuracy.
+        """
+        drive, inertia = self._drive, self._free.inertia
+        turned = 2.0 * math.pi * length / per_revolution
+        first, last = (2.0 * math.pi * i / per_revolution for i in (at, at + length))
+        acceleration = (drive.at(self.speed) - self._brake) / inertia
+        acceleration = (drive.at(self._after(acceleration, 0.5 * turned)) - self._brake) / inertia
+        for tried in range(MOST_TRIES):
+            end_speed = self._after(acceleration, turned)
+            if not end_speed > 0.0:
+                return None
+            mean = 0.5 * (self.speed + end_speed)
+            duration = turned / mean
+            if not is_fixed and abs(acceleration) * duration**2 > 12.0 * LAG and length > 1:
+                return None
+            torque = self._mean_torque(end_speed)
+            setup = self._pieces.setup(mean, acceleration, first, duration, torque)
+            if self._begun is None:
+                start = self._initial
+                self._begun = start_of(start, setup, self._clearance) if isinstance(start, Initial) else start
+            case = setup, length, self._clearance, self._friction, self._begun, self._earlier, self._check
+            passed = pass_piece(*case, is_balanced=True)
+            if passed.reason:
+                return self._taken(passed, acceleration, length, per_revolution, torque, np.zeros(6))
+            flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)
+            before, after = self._momentum(self._begun, first), self._momentum(passed.final, last)
+            turning = acceleration * 0.5 * duration * (before[1] + after[1])
+            given = torque * turned + turning - flows[UNBALANCE_WORK] - flows[DRIVE_WORK]
+            change = self._change(given, sum(before), sum(after))
+            if not math.isfinite(change):
+                return None
+            error = abs(change / duration - acceleration) * duration**2 / 12.0
+            if error <= GUESSED or (is_fixed and tried == MOST_TRIES - 1):
+                break
+            acceleration = change / duration
+        else:
+            if length % 2 == 0:
+                return None
+        held = [
+            inertia * 0.5 * speed**2 + speed * sum(carried_by)
+            for speed, carried_by in ((self.speed, before), (self.speed + change, after))
+        ]
+        energies = np.array(
+            [
+                held[1] - held[0],
+                passed.gained,
+                torque * turned + turning,
+                flows[FRICTION_LOSS],
+                flows[DAMPING_LOSS],
+                flows[IMPACT_LOSS],
+            ]
+        )
+        found = self._taken(passed, acceleration, length, per_revolution, torque, energies)
+        self.speed += change
+        if not self.speed > 0.0:
+            return None
+        self.time += duration
+        self._brake = torque - inertia * change / duration
+        self._begun = passed.final
+        self._earlier = passed.accumulators[-1], duration
+        return found
+
+    def _taken(
+        self,
+        passed: Passed,
+        acceleration: float,
+        length: int,
+        per_revolution: int,
+        torque: float,
+        energies: Floats,
+    ) -> Taken:
+        """What a piece has yielded, revolution by revolution."""
+        n = max(length // per_revolution, 1)
+        turned = 2.0 * math.pi * length / (n * per_revolution)
+        speeds = [self._after(acceleration, i * turned) for i in range(n + 1)]
+        lasts = [2.0 * turned / (a + b) for a, b in itertools.pairwise(speeds)]
+        times = (self.time + np.cumsum([0.0, *lasts])).tolist()
+        work, braking = [], []
+        for low, high, duration in zip(speeds[:-1], speeds[1:], lasts, strict=True):
+            mean = torque if n == 1 else self._drive.at(0.5 * (low + high))
+            work.append(mean * turned)
+            braking.append(mean * duration - self._free.inertia * (high - low))
+        duration = sum(lasts)
+        lag = abs(acceleration) * duration**2 / 12.0
+        return Taken(passed, lag, times, work, braking, energies)
+
+    def _change(self, given: float, before: float, after: float) -> float:
+        """Change of the speed, rad/s, by the energy given to the spin, J; NaN where it would turn back.
+
+        `before` and `after` are momenta of the spin by the motion, kg m^2/s: `J W^2 / 2 + W P` grows by that
+        energy.
+        """
+        slope = self._free.inertia * self.speed + after
+        lacking = self.speed * (after - before) - given
+        square = slope**2 - 2.0 * self._free.inertia * lacking
+        return -2.0 * lacking / (slope + math.sqrt(square)) if square > 0.0 and slope > 0.0 else math.nan
+
+    def _after(self, acceleration: float, angle: float) -> float:
+        """Speed after an angle (rad) at an acceleration, rad/s; 0 where the spin does not get so far."""
+        return math.sqrt(max(self.speed**2 + 2.0 * acceleration * angle, 0.0))
+
+    def _mean_torque(self, end_speed: float) -> float:
+        """Mean of the drive's torque over a piece whose speed changes evenly, N m, by Simpson's rule."""
+        drive, middle = self._drive, 0.5 * (self.speed + end_speed)
+        return (drive.at(self.speed) + 4.0 * drive.at(middle) + drive.at(end_speed)) / 6.0
+
+    def _momentum(self, state: State, angle: float) -> tuple[float, float]:
+        """Momentum of the spin by unbalance and by tilt, kg m^2/s, at an angle of the shaft (rad)."""
+        turning = (1j * self._phasor * complex(np.exp(1j * angle))).real
+        tilted = state.rotor_displacement @ (self._gyroscopic @ state.rotor_velocity)
+        return float(turning @ state.rotor_velocity), -0.5 * float(tilted)

@@ -1,0 +1,197 @@
+"""A case whose spin speed changes: pieces of constant speed, each in closed form.
+
+With the angle phi of the shaft, the unbalance acts as `Re[p (phi'^2 - i phi'') exp(i phi)]`, p being its
+phasor at unit speed; a disc whose spin momentum follows its tilt needs `phi'' G u` besides `phi' G u'`; and
+the inertia of the shaft twists it by the static response to `-phi'' J`. The angle is exact at the ends of a
+piece. Within it, of the duration T, it lags at the time s behind that of the steady spin between these ends
+by `phi'' s (T - s) / 2`: the mean, `phi'' T^2 / 12`, is taken off the phase, so that what is left
+alternates. The error falls with the square of the piece.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rubhpc.integrate.case import march_of
+from rubhpc.integrate.changing_speed.piece_setup import Pieces
+from rubhpc.integrate.changing_speed.turns import Turns
+from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
+from rubhpc.integrate.marches.event_driven import NoClosedForm
+from rubhpc.integrate.measuring.measures import add_sag, empty_samples, following_accumulator, new_accumulator
+from rubhpc.integrate.record import State
+from rubhpc.integrate.start import start_of
+from rubhpc.study.initial import Initial
+from rubhpc.study.speed_law import cut
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.kernels.accumulators import Accumulator
+    from rubhpc.study.speed_law import SpeedLaw
+
+    Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunUp:
+    """What a run-up has yielded, revolution by revolution.
+
+    Attributes
+    ----------
+    reason : str
+        Why it ended early; "" where it did not.
+    whole : (n_row, n_sample)
+        Samples as `Samples.whole`, locked to the shaft.
+    speed : (n_revolution,), rad/s
+        Mean over each revolution.
+    time : (n_revolution,), s
+        When each begins.
+    contact_fraction, peak_contact_force, friction_work : (n_revolution, n_stator)
+        Of each revolution; 1, N and J.
+    together : Accumulator
+        What all revolutions have gathered of their contacts.
+    n_step : int
+    final : State
+    """
+
+    reason: str
+    whole: Floats
+    speed: Floats
+    time: Floats
+    contact_fraction: Floats
+    peak_contact_force: Floats
+    friction_work: Floats
+    together: Accumulator
+    n_step: int
+    final: State
+
+
+def integrate_run_up(
+    fastest: ModalSetup,
+    law: SpeedLaw,
+    *,
+    clearance: float,
+    friction: float,
+    initial: State | Initial,
+    pieces_per_revolution: int | None = None,
+    check: Callable[[], None] | None = None,
+) -> RunUp:
+    """Integrate a case with a changing speed and record every revolution.
+
+    Parameters
+    ----------
+    fastest : ModalSetup
+        The case at the highest speed of the law.
+    clearance : float, m
+    friction : float
+    pieces_per_revolution : int, optional
+        Into how many pieces of constant speed every revolution is cut, a divisor of the samples in it; by
+        default as the change of speed asks for (`speed_law.cut`).
+    check : callable, optional
+        Called between kernel calls; what it raises ends the run-up.
+    """
+    model, per_revolution = fastest.model, fastest.samples_per_revolution
+    cuts = cut(law, per_revolution, pieces_per_revolution)
+    n_stator, n = len(model.stators), law.n_revolution
+    angles = 2.0 * np.pi / per_revolution * cuts
+    times, _, _ = law.at_angle(angles)
+    _, _, accelerations = law.at_angle(0.5 * (angles[1:] + angles[:-1]))
+    begins, _, _ = law.at_angle(2.0 * np.pi * np.arange(n + 1))
+    whole = empty_samples(model.n_place, n * per_revolution, model.n_probe).whole
+    gathered = Turns(n, model)
+    pieces = Pieces(fastest)
+    state = initial if isinstance(initial, State) else None
+    n_step, reason, n_done, before = 0, "", n, 0.0
+    earlier = new_accumulator(n_stator, model.n_place)
+    for i, (first, last) in enumerate(itertools.pairwise(cuts)):
+        duration = times[i + 1] - times[i]
+        setup = pieces.setup((angles[i + 1] - angles[i]) / duration, accelerations[i], angles[i], duration)
+        if state is None:
+            state = start_of(initial, setup, clearance) if isinstance(initial, Initial) else initial
+        case = setup, last - first, clearance, friction, state, (earlier, before), check
+        passed = pass_piece(*case)
+        state, earlier, before = passed.final, passed.accumulators[-1], duration
+        n_step += passed.n_step
+        whole[:, first:last] = passed.whole
+        for turn, accumulator in enumerate(passed.accumulators, first // per_revolution):
+            gathered.add(turn, accumulator)
+        if passed.reason:
+            n_done = first // per_revolution + len(passed.accumulators) - 1
+            reason = f"{passed.reason} in revolution {n_done + 1}"
+            break
+    assert state is not None  # a law has a whole revolution at least
+    turns = np.diff(begins)[:n_done]
+    return RunUp(
+        reason=reason,
+        whole=whole[:, : n_done * per_revolution],
+        speed=2.0 * np.pi / turns,
+        time=begins[:n_done],
+        contact_fraction=gathered.contact_time[:n_done] / turns[:, np.newaxis],
+        peak_contact_force=gathered.peak_force[:n_done],
+        friction_work=gathered.friction_work[:n_done],
+        together=gathered.together,
+        n_step=n_step,
+        final=state,
+    )
+
+
+class Passed(NamedTuple):
+    """What a piece has yielded."""
+
+    whole: Floats  # (n_row, n_sample)
+    accumulators: list[Accumulator]  # of each revolution in it, or of the part of one that it is
+    n_step: int
+    final: State
+    gained: float  # mechanical energy, J; NaN where it was not asked for
+    reason: str  # why it could not go on, or ""
+
+
+def pass_piece(
+    setup: PieceSetup,
+    n_sample: int,
+    clearance: float,
+    friction: float,
+    state: State,
+    earlier: tuple[Accumulator, float],
+    check: Callable[[], None] | None,
+    *,
+    is_balanced: bool = False,
+) -> Passed:
+    """Take one piece; `earlier` holds the contact forces of the piece before, and how long that took, s.
+
+    `is_balanced`: its energies are asked for.
+    """
+    if check is not None:
+        check()
+    model = setup.model
+    stride = min(n_sample, setup.samples_per_revolution)
+    for kind in (march_of(setup.scheme, setup), ContactSteppingMarch):
+        samples = empty_samples(model.n_place, n_sample, model.n_probe)
+        accumulators: list[Accumulator] = []
+        reason = None
+        try:
+            march = kind(setup, clearance, friction, state, check)
+            before = march.energy() if is_balanced else math.nan
+            for first in range(0, n_sample, stride):
+                follows = (accumulators[-1], 0.0) if accumulators else earlier
+                accumulator = following_accumulator(*follows)
+                accumulator.is_touching[:] = march.touching()
+                accumulators.append(accumulator)
+                reason = march.advance(first, first + stride, samples, accumulator, is_recorded=True)
+                if reason is not None:
+                    break
+        except NoClosedForm:  # contacts that chatter: short steps need no events
+            continue
+        add_sag(samples, accumulators[0], model)
+        gained = march.energy() - before if is_balanced else math.nan
+        return Passed(samples.whole, accumulators, march.n_step, march.final(), gained, reason or "")
+    raise AssertionError  # short steps always go on

@@ -1,0 +1,81 @@
+"""What the revolutions of a record with a changing speed gather, each by itself and together."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.integrate.measuring.carried import carrier_displacement, tip_deflection
+from rubhpc.integrate.measuring.measures import empty_samples, foreshortening_ratio, new_accumulator
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+    from rubhpc.kernels.accumulators import Accumulator
+
+    Floats = NDArray[np.float64]
+
+_SUMMED = ("n_contact", "contact_time", "impulse", "stick_time")
+
+
+class Turns:
+    """Contact of each revolution, and what a whole record has of it.
+
+    Attributes
+    ----------
+    contact_time, peak_force, friction_work : (n_revolution, n_stator)
+        Of each revolution; s, N and J.
+    together : Accumulator
+        Sums and extrema of all revolutions.
+    """
+
+    def __init__(self, n: int, model: Model) -> None:
+        n_stator = len(model.stators)
+        self.contact_time, self.peak_force, self.friction_work = np.zeros((3, n, n_stator))
+        self.together = new_accumulator(n_stator, model.n_place)
+
+    def add(self, turn: int, accumulator: Accumulator) -> None:
+        """Add what a revolution, or a part of one, has gathered."""
+        self.contact_time[turn] += accumulator.contact_time
+        self.friction_work[turn] += accumulator.friction_work
+        np.maximum(self.peak_force[turn], accumulator.peak_force, out=self.peak_force[turn])
+        together = self.together
+        for name in _SUMMED:
+            total = getattr(together, name)
+            total += getattr(accumulator, name)
+        np.minimum(together.least_slip, accumulator.least_slip, out=together.least_slip)
+        np.maximum(together.peak_force, accumulator.peak_force, out=together.peak_force)
+        np.maximum(together.peak_lateral, accumulator.peak_lateral, out=together.peak_lateral)
+
+
+def contact_measures(
+    together: Accumulator, whole: Floats, n_revolution: int, model: Model, *, is_round: bool
+) -> dict[str, Any]:
+    """Measures of the contacts of a whole record, as those of a constant speed are (`measures_of`).
+
+    `together` is what all revolutions have gathered, `whole` their samples (`Samples.whole`), `is_round`
+    whether the gap knows that the rim is round.
+    """
+    has_touched, stators = together.impulse > 0.0, model.stators
+    samples = empty_samples(model.n_place, whole.shape[1], model.n_probe)
+    samples.whole[:] = whole
+    deflection, none = tip_deflection(samples, together, model), np.zeros(len(stators))
+    return {
+        "contacts_per_revolution": together.n_contact / n_revolution,
+        "contact_duration": np.where(
+            has_touched, together.contact_time / np.maximum(together.n_contact, 1), 0.0
+        ),
+        "contact_impulse": together.impulse / n_revolution,
+        "stick_fraction": np.divide(
+            together.stick_time, together.contact_time, out=none, where=together.contact_time > 0.0
+        ),
+        "minimum_slip_speed": np.where(np.isfinite(together.least_slip), together.least_slip, np.nan),
+        "force_over_euler_load": together.peak_force / [stator.euler_load for stator in stators],
+        "tip_deflection_ratio": deflection / [stator.length for stator in stators],
+        "foreshortening_ratio": foreshortening_ratio(
+            stators, deflection, together.peak_force, is_round=is_round
+        ),
+        "carrier_displacement": carrier_displacement(samples, model),
+    }

@@ -1,0 +1,31 @@
+"""Which march follows a law from event to event."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.marches.friction import FrictionMarch
+from rubhpc.integrate.marches.penalty import PenaltyMarch
+from rubhpc.integrate.marches.penalty_friction import PenaltyFrictionMarch
+from rubhpc.kernels.laws import is_penalty, is_set_valued
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.kernels.laws import Law
+
+_MARCHES: WeakKeyDictionary[ModalSetup, type[EventDrivenMarch]] = WeakKeyDictionary()
+
+
+def closed_form_march(setup: ModalSetup) -> type[EventDrivenMarch]:
+    """Return the march whose pairs have the states of a set-up's law."""
+    if setup not in _MARCHES:
+        _MARCHES[setup] = _march_of(setup.law)  # to ask a kernel takes as long as a revolution
+    return _MARCHES[setup]
+
+
+def _march_of(law: Law) -> type[EventDrivenMarch]:
+    if is_set_valued(law):
+        return PenaltyFrictionMarch if is_penalty(law) else FrictionMarch
+    return PenaltyMarch if is_penalty(law) else EventDrivenMarch

@@ -1,0 +1,129 @@
+"""A case whose gaps are curved: flights in closed form, closed contacts in steps of order 4."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.marches.march import NO_FORCES
+from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
+from rubhpc.integrate.reduced_model.curved_tables import curved_pairs
+from rubhpc.kernels.case_progress import MODE_WANTED, ask_for, begin_in
+from rubhpc.kernels.curved_contact import curved_work
+from rubhpc.kernels.curved_loop import advance_curved
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.record import State
+    from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
+    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.case_progress import Progress
+
+    Floats = NDArray[np.float64]
+
+LOAD_TOLERANCE = 1.0  # of the loads of closed contacts, over the accuracy of the integrator
+
+
+class CurvedMarch(EventDrivenMarch):
+    """A case from one contact mode to another, of which only flights have a closed form."""
+
+    has_closed_form = False
+
+    def __init__(
+        self,
+        setup: ModalSetup,
+        clearance: float,
+        friction: float,
+        initial: State,
+        check: Callable[[], None] | None,
+    ) -> None:
+        """Start from `initial`, with the contacts closed that its forces press."""
+        self._force = initial.contact_force.copy()
+        self._is_bent = any(stator.squared_slope is not None for stator in setup.model.stators)
+        super().__init__(setup, clearance, friction, initial, check)
+        self._pairs = curved_pairs(
+            setup.reduced, setup.model, friction, self._clearance, is_round=setup.is_updated
+        )
+        _, n_row, n = self._pairs.row.shape
+        self._work = curved_work(self._clearance.size, n_row, n, self._z.shape[1])
+
+    def motion(self) -> Floats:
+        """Reduced displacements, then velocities (2 n,), at the sample reached."""
+        return self.motion_of(self.progress, self._z)
+
+    def motion_of(self, progress: Progress, z: Floats) -> Floats:
+        """Reduced displacements, then velocities (2 n,), of modal coordinates (2, m)."""
+        if progress.wanted >= 0:  # the mode is still to be entered with it
+            return self._motion
+        motion = super().motion_of(progress, z)
+        shift, n = self._curved.shift[progress.mode], self.bodies.stiffness.shape[0]
+        motion[:n] -= self._work.h[0] @ shift
+        motion[n:] -= self._work.rate[0] @ shift
+        return motion
+
+    def find(self, mask: int) -> None:
+        """See that the tables hold a set of contacts.
+
+        Raises
+        ------
+        InputError
+            Too many sets for bent stators, of which short steps know nothing.
+        """
+        try:
+            super().find(mask)
+        except NoClosedForm:
+            if not self._is_bent:
+                raise
+            problem = "too many sets of contacts for second_order"
+            raise InputError(f'[stator] geometry: {problem}; take geometry = "linear"') from None
+        assert isinstance(self._library, CurvedLibrary)
+        self._curved = self._library.curved_tables()
+
+    def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
+        return setup.curved_library(friction)
+
+    def _start(self, mode: int) -> None:
+        begin_in(self.progress, mode)
+        ask_for(self.progress, int(self.tables.mask[mode]))
+
+    def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        while True:
+            outcome = advance_curved(
+                self.tables,
+                self._curved,
+                self._pairs,
+                self.bodies,
+                self.clock,
+                LOAD_TOLERANCE * self._setup.accuracy,
+                last_tick,
+                is_recorded,
+                self._bare_progress,
+                self._z,
+                self._z_next,
+                self._motion,
+                self._work,
+                self._event_work,
+                self._recorder,
+                samples,
+                accumulator,
+            )
+            if outcome != MODE_WANTED:
+                return outcome
+            self.find(self.progress.wanted)
+
+    def _unsolved(self) -> str:
+        if self._is_bent:  # short steps know nothing of a bent stator
+            return NO_FORCES
+        raise NoClosedForm
+
+    def _contact_force(self) -> Floats:
+        if self.progress.wanted >= 0:
+            return self._force
+        return np.where(self.touching(), np.maximum(self._work.force[0], np.finfo(float).tiny), 0.0)

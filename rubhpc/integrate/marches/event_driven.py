@@ -1,0 +1,178 @@
+"""A case from event to event, in closed form between them: the exact modal integrator."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.marches.modal import ModalMarch
+from rubhpc.integrate.measuring.measures import new_accumulator
+from rubhpc.kernels.case_progress import MODE_WANTED, closed_pairs
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, find_mode
+from rubhpc.kernels.event_loop import advance, event_work
+from rubhpc.kernels.mode_change import change_contacts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.record import State
+    from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
+    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.case_progress import Progress
+
+    Floats = NDArray[np.float64]
+
+MOST_REFILLS = 8  # of tables that one case may meet; where it meets more, short steps cost less
+
+
+class NoClosedForm(Exception):  # noqa: N818 - a state of the motion, never seen by users
+    """What only short steps can follow.
+
+    Contacts open and close without end, or in too many combinations to tabulate.
+    """
+
+
+class EventDrivenMarch(ModalMarch):
+    """A case that goes from one contact mode to another; `NoClosedForm` leaves it to contact stepping."""
+
+    has_closed_form = True  # of its closed contacts
+
+    def __init__(
+        self,
+        setup: ModalSetup,
+        clearance: float,
+        friction: float,
+        initial: State,
+        check: Callable[[], None] | None,
+    ) -> None:
+        """Start from `initial`, with the contacts closed that its forces press."""
+        super().__init__(setup, clearance, friction, initial, check)
+        self._event_work = event_work(self._clearance.size)
+        self._library = self._find_library(setup, friction)
+        self._met = set(self._library.first_masks)  # sets of closed contacts
+        mask = self._first_mask(initial)
+        self.find(mask)
+        self._start(find_mode(self.tables.mask, mask))
+
+    def touching(self) -> NDArray[np.bool_]:
+        """Which pairs are closed, (q,)."""
+        return self.closed(closed_pairs(self.progress, self.tables))
+
+    def closed(self, mask: int) -> NDArray[np.bool_]:
+        """Which pairs are closed in a contact mode, (q,)."""
+        return np.array([bool(mask >> i & 1) for i in range(self._clearance.size)])
+
+    def opened(self, mask: int) -> NDArray[np.bool_]:
+        """Which pairs are open in a contact mode, and watched for their gap, (q,)."""
+        return ~self.closed(mask)
+
+    def forces(self, mode: int, z: Floats) -> Floats:
+        """Forces (q,), N, at coordinates (2, m) of a contact mode, given by its index in the tables."""
+        force = self.tables.switch_re[mode] @ z[0] - self.tables.switch_im[mode] @ z[1]
+        return np.where(self.closed(int(self.tables.mask[mode])), force, 0.0)
+
+    def exponents(self, mask: int) -> tuple[Floats, Floats]:
+        """Exponents of the coordinates of a contact mode and their drift (`ModeLibrary.exponents`)."""
+        return self._library.exponents(mask)
+
+    def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
+        """Take an event: `motion` (2 n,) after it, in place, and the contact mode that goes on, or -1.
+
+        `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft.
+        """
+        return int(
+            change_contacts(
+                self.bodies,
+                mask,
+                crossing,
+                self.clock.spin,
+                self.clock.tick * 2**FORCED_LEVEL,
+                np.cos(angle),
+                np.sin(angle),
+                motion,
+                False,
+                *self._change_work,
+                self._unrecorded,
+            )
+        )
+
+    @cached_property
+    def _change_work(self) -> tuple[Floats, Floats, NDArray[np.bool_], Floats]:
+        """Room for an event that is taken by itself."""
+        q = self._clearance.size
+        return np.zeros(q), np.zeros(q), np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
+
+    @cached_property
+    def _unrecorded(self) -> Accumulator:
+        """What is asked for where nothing is recorded."""
+        return new_accumulator(self._clearance.size)
+
+    def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
+        """Contact modes of the case."""
+        return setup.library(friction)
+
+    def _first_mask(self, initial: State) -> int:
+        """Set of the contacts with which the case begins."""
+        return sum(1 << i for i, force in enumerate(initial.contact_force) if force > 0.0)
+
+    def place(self) -> tuple[Progress, Floats]:
+        """Where the case stands, and its modal coordinates (2, m)."""
+        return self.progress, self._z
+
+    def has_met(self, masks: list[int]) -> bool:
+        """Whether this case has met these sets of contacts."""
+        return self._met.issuperset(masks)
+
+    def find(self, mask: int) -> None:
+        """See that the tables hold a set of contacts.
+
+        The kernel is shown no set but those that this case has met: what it does must not depend on what
+        other cases have left in the library.
+        """
+        self._met.add(mask)
+        if len(self._met) > MOST_REFILLS * self._library.n_most:
+            raise NoClosedForm
+        if mask not in self._library.masks:
+            if self._library.is_full:
+                self._library.forget()
+            if not self._library.add(mask):
+                raise NoClosedForm
+        tables = self._library.tables()
+        unmet = [mode for mode, known in enumerate(self._library.masks) if known not in self._met]
+        if unmet:
+            shown = tables.mask.copy()
+            shown[unmet] = -1
+            tables = tables._replace(mask=shown)
+        self._use(tables)
+
+    def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        while True:
+            outcome = advance(
+                self.tables,
+                self.bodies,
+                self.clock,
+                last_tick,
+                is_recorded,
+                self._bare_progress,
+                self._z,
+                self._z_next,
+                self._motion,
+                self._event_work,
+                self._recorder,
+                samples,
+                accumulator,
+            )
+            if outcome != MODE_WANTED:
+                return outcome
+            self.find(self.progress.wanted)
+
+    def _unsolved(self) -> str:
+        raise NoClosedForm
+
+    def _contact_force(self) -> Floats:
+        return self.forces(self.progress.mode, self._z)

@@ -1,0 +1,200 @@
+"""A case from event to event under set-valued friction, in closed form between slip, stick and flight."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.marches.march import NO_FORCES
+from rubhpc.integrate.marches.workspace import empty_workspace
+from rubhpc.integrate.reduced_model.friction_mode import mask_of, states_of
+from rubhpc.kernels.case_progress import (
+    CONTACT_UNSOLVED,
+    FINISHED,
+    MODE_WANTED,
+    ask_for,
+    follow,
+    shaft_angle,
+)
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, enter
+from rubhpc.kernels.friction_events import change_states, friction_work
+from rubhpc.kernels.friction_loop import advance_with_friction
+from rubhpc.kernels.friction_states import BACKWARD, FORWARD, MOST_PAIRS, OPEN, STUCK, FrictionBodies
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.record import State
+    from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
+    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.contact_pairs import Workspace
+
+    Floats = NDArray[np.float64]
+
+AT_REST = 1e-4  # of the rim speed: a pair that slips less than that at the beginning of a case has stuck
+
+
+class FrictionMarch(EventDrivenMarch):
+    """A case whose pairs open, slide in either sense and stick.
+
+    Where events follow one another without end, or no forces obey the laws, up to a revolution is taken in
+    short steps; then the case goes on from event to event.
+    """
+
+    most_pairs = MOST_PAIRS
+    take_change = staticmethod(change_states)
+
+    def __init__(
+        self,
+        setup: ModalSetup,
+        clearance: float,
+        friction: float,
+        initial: State,
+        check: Callable[[], None] | None,
+    ) -> None:
+        """Start from `initial`, each pressed pair in the state that its forces give."""
+        self._make_steps: Callable[[], ContactSteppingMarch] = lambda: ContactSteppingMarch(
+            setup, clearance, friction, initial, check
+        )
+        self._steps: ContactSteppingMarch | None = None
+        self._n_short = 0  # ticks to be taken in short steps
+        super().__init__(setup, clearance, friction, initial, check)
+
+    def closed(self, mask: int) -> NDArray[np.bool_]:
+        """Which pairs are closed in a contact mode, (q,)."""
+        return np.array([state != OPEN for state in states_of(mask, self._clearance.size)])
+
+    def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
+        q = self._clearance.size
+        if q > self.most_pairs:
+            raise NoClosedForm
+        self._entered_with = np.append(self._clearance, 1.0)
+        self.bodies = self.bodies._replace(clearance=self._entered_with)
+        pairs = setup.friction_pairs(friction)
+        self._friction = FrictionBodies(
+            sliding=np.full(q, friction),
+            static=np.full(q, friction * pairs.static_ratio),
+            rim_speed=pairs.rim_speed,
+        )
+        gap_jacobian, along = pairs.gap_jacobian, pairs.friction_direction
+        solver = empty_workspace(q)
+        solver.matrix[:], solver.coupling[:] = gap_jacobian @ gap_jacobian.T, gap_jacobian @ along.T
+        solver.tangential[:] = -along @ gap_jacobian.T, -along @ along.T
+        self._soften(solver)
+        self._work = friction_work(solver, q, self.bodies.stiffness.shape[0])
+        return setup.friction_library(friction)
+
+    def _soften(self, solver: Workspace) -> None:
+        """Change how normal forces follow from gaps: here they hold them, and nothing changes."""
+
+    def _first_mask(self, initial: State) -> int:
+        return self._states_after(initial.contact_force > 0.0, 0.0)
+
+    def _states_after(self, is_pressed: NDArray[np.bool_], angle: float, further: int = 0) -> int:
+        """States that go on from the motion, with the shaft at an angle, rad, and some gaps closed.
+
+        `further` are bits of the set of states beyond two a pair.
+        """
+        n = self.bodies.stiffness.shape[0]
+        slip = self._friction.rim_speed + self.bodies.slip @ self._motion[n:]
+        sliding = np.where(slip >= 0.0, FORWARD, BACKWARD)
+        states = np.where(
+            is_pressed, np.where(np.abs(slip) <= AT_REST * self._friction.rim_speed, STUCK, sliding), OPEN
+        )
+        found = self.change(mask_of(states.tolist()) | further, 0, angle, self._motion)
+        if found < 0:
+            raise NoClosedForm
+        return found
+
+    def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
+        """Take an event: `motion` (2 n,) after it, in place, and the states that go on, or -1."""
+        return int(
+            self.take_change(
+                self.bodies,
+                self._friction,
+                mask,
+                crossing,
+                self.clock.tick * 2**FORCED_LEVEL,
+                np.cos(angle),
+                np.sin(angle),
+                motion,
+                False,
+                self._work,
+                self._unrecorded,
+            )
+        )
+
+    def _start(self, mode: int) -> None:
+        super()._start(mode)
+        enter(self.tables, mode, self._entered_with, 1.0, 0.0, self._motion, self._z)
+
+    def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        while True:
+            if self._n_short:
+                outcome = self._step_on(last_tick, samples, accumulator, is_recorded)
+                if outcome != FINISHED:
+                    return outcome
+            outcome = advance_with_friction(
+                self.tables,
+                self.bodies,
+                self._friction,
+                self.clock,
+                last_tick,
+                is_recorded,
+                self._bare_progress,
+                self._z,
+                self._z_next,
+                self._motion,
+                self._work,
+                self._recorder,
+                samples,
+                accumulator,
+            )
+            if outcome == MODE_WANTED:
+                self.find(self.progress.wanted)
+            elif outcome == CONTACT_UNSOLVED:
+                self._hand_over()
+            else:
+                return outcome
+
+    def _hand_over(self) -> None:
+        """Go over to short steps, from the motion at the tick reached."""
+        self._steps = self._steps or self._make_steps()
+        self.n_left += 1
+        clock = self.clock
+        self._n_short = clock.samples_per_revolution << clock.sample_level
+        follow(self._steps.progress, self.progress)
+        self._steps.take_over(clock, self._recorder, self._motion)
+
+    def _step_on(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        """Short steps as far as they are to go; then the states that go on are wanted."""
+        steps, before = self._steps, int(self.progress.tick)
+        assert steps is not None
+        stop = min(last_tick, before + self._n_short)
+        outcome = steps.step_to(stop, self.clock, samples, accumulator, is_recorded)
+        follow(self.progress, steps.progress)
+        self._n_short -= int(self.progress.tick) - before
+        if outcome == FINISHED:
+            self._n_short = 0
+            self._motion[:] = steps.motion_of(steps.progress, steps.coordinates)
+            angle = shaft_angle(self.clock, self.progress.tick)
+            ask_for(self.progress, self._states_after(steps.touching(), angle))
+        return outcome
+
+    def _unsolved(self) -> str:
+        return NO_FORCES
+
+    def forces(self, mode: int, z: Floats) -> Floats:
+        """Normal forces (q,), N, at coordinates (2, m) of a contact mode, by its index in the tables."""
+        q, tables = self._clearance.size, self.tables
+        value = (tables.switch_re[mode] @ z[0] - tables.switch_im[mode] @ z[1]).reshape(q, 2)
+        states = np.array(states_of(int(tables.mask[mode]), q))
+        static = np.where(self._friction.static > 0.0, self._friction.static, 1.0)
+        pressed = np.where(states == STUCK, 0.5 * value.sum(axis=1) / static, value[:, 0])
+        return np.where(states == OPEN, 0.0, np.maximum(pressed, np.finfo(float).tiny))

@@ -1,0 +1,181 @@
+"""What the two modal marches share: modal coordinates of a reduced model, advanced by kernels."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.fem.statics import sag_at_stators
+from rubhpc.integrate.marches.march import ALL_SAMPLES, March
+from rubhpc.integrate.measuring.divergence import displacement_reason, energy_reason
+from rubhpc.integrate.record import State
+from rubhpc.kernels.case_progress import (
+    CONTACT_UNSOLVED,
+    DIVERGED,
+    FINISHED,
+    Clock,
+    bare,
+    begin_in,
+    new_progress,
+    restart_clock,
+)
+from rubhpc.kernels.contact_modes import enter
+from rubhpc.kernels.measuring import recorder
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.case_progress import Progress
+    from rubhpc.kernels.contact_modes import ModeTables
+
+    Floats = NDArray[np.float64]
+
+_BEGUN = new_progress(1)  # to fill one anew takes a hundred times as long
+CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
+
+
+class ModalMarch(March):
+    """A case in modal coordinates z (2, m), real and imaginary, of the contact mode that it is in."""
+
+    tables: ModeTables
+
+    def __init__(
+        self,
+        setup: ModalSetup,
+        clearance: float,
+        friction: float,
+        initial: State,
+        check: Callable[[], None] | None,
+    ) -> None:
+        """Take the case and its reduced initial motion; it is put into a contact mode by `_start`."""
+        super().__init__(check, ALL_SAMPLES, setup.model)
+        self._setup = setup
+        offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
+        self._clearance = clearance + offsets - sag_at_stators(setup.model)[0]
+        turn = setup.interval * setup.samples_per_revolution
+        self.clock = Clock(
+            spin=setup.spin,
+            tick=setup.tick,
+            sample_level=setup.sample_level,
+            samples_per_revolution=setup.samples_per_revolution,
+            search_level=setup.level_within(setup.step),
+            contact_level=math.floor(math.log2(min(setup.interval, turn / CONTACT_STEPS) / setup.tick)),
+            n_sample=0,
+        )
+        self.bodies = setup.bodies(friction, self._clearance)
+        self._motion = self._reduce(initial)
+        self._recorder = recorder(setup.model.n_place, setup.model.n_probe)
+        records = _BEGUN.copy()
+        self.progress: Progress = records[0]
+        self._bare_progress = bare(records)[0]  # the same, for kernels
+
+    @abstractmethod
+    def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        """Advance from the tick reached to `last_tick`; returns an outcome of `kernels.case_progress`."""
+
+    @abstractmethod
+    def _unsolved(self) -> str:
+        """Why the case cannot go on where the kernel finds no forces, unless it goes on by another march."""
+
+    @abstractmethod
+    def _contact_force(self) -> Floats:
+        """Forces at the sample reached, (q,), N."""
+
+    def energy(self) -> float:
+        """Mechanical energy, J."""
+        return self._energy_of(self.motion())
+
+    def _energy_of(self, motion: Floats) -> float:
+        """Mechanical energy, J, of a reduced motion (2 n,)."""
+        n = self.bodies.stiffness.shape[0]
+        displacement, velocity = motion[:n], motion[n:]
+        return float(0.5 * (velocity @ velocity + displacement @ self.bodies.stiffness @ displacement))
+
+    def final(self) -> State:
+        """State at the sample reached, as far as contact and outputs see it."""
+        return self.state_of(self.motion(), self._contact_force())
+
+    def state_of(self, motion: Floats, contact_force: Floats) -> State:
+        """State of a reduced motion (2 n,) and of the forces (q,), N, at a whole revolution."""
+        setup = self._setup
+        displacement, velocity = (setup.reduced.basis @ motion.reshape(2, -1).T).T.copy()
+        displacement[: setup.model.rotor.n_dof] += setup.model.sag
+        return State.of_bodies(setup.model, displacement, velocity, contact_force)
+
+    def motion(self) -> Floats:
+        """Reduced displacements, then velocities (2 n,), at the sample reached."""
+        return self._motion_in(self._bare_progress["mode"], self._z)
+
+    def motion_of(self, progress: Progress, z: Floats) -> Floats:
+        """Reduced displacements, then velocities (2 n,), of modal coordinates (2, m)."""
+        return self._motion_in(progress.mode, z)
+
+    def _motion_in(self, mode: int, z: Floats) -> Floats:
+        motion: Floats = self.tables.motion_re[mode] @ z[0] - self.tables.motion_im[mode] @ z[1]
+        return motion
+
+    def is_beyond(self, motion: Floats) -> bool:
+        """Whether a motion (2 n,) takes the rotor beyond the limit."""
+        seen = self._setup.reduced.translations @ motion[: self.bodies.stiffness.shape[0]]
+        return not np.all(np.abs(seen) <= self._setup.displacement_limit)
+
+    def _use(self, tables: ModeTables) -> None:
+        """Take tables, and coordinates of their width."""
+        self.tables = tables
+        self._z = np.zeros((2, tables.switch_re.shape[2]))
+        self._z_next = np.zeros_like(self._z)
+
+    def _start(self, mode: int) -> None:
+        """Begin in a contact mode of the tables, at the shaft's angle 0."""
+        begin_in(self.progress, mode)
+        enter(self.tables, mode, self._clearance, 1.0, 0.0, self._motion, self._z)
+
+    def _call(
+        self, stop: int, samples: Samples, accumulator: Accumulator, *, is_recorded: bool
+    ) -> str | None:
+        sample_level = self.clock.sample_level
+        restart_clock(self._bare_progress, self.sample << sample_level, self.sample, is_recorded=is_recorded)
+        self.clock = self.clock._replace(n_sample=samples.rotor.shape[1])
+        while True:
+            outcome = self._kernel(stop << sample_level, samples, accumulator, is_recorded)
+            self.n_step = int(self._bare_progress["n_step"])
+            self.sample = int(self._bare_progress["tick"]) >> sample_level
+            if outcome == CONTACT_UNSOLVED:
+                return self._unsolved()
+            reason = self._why_diverged(outcome == DIVERGED, accumulator)
+            if reason is not None:
+                return reason
+            if outcome == FINISHED:
+                return None
+            if self.check is not None:
+                self.check()
+
+    def _why_diverged(self, is_at_event: bool, accumulator: Accumulator) -> str | None:
+        """What of the motion is beyond its limit; of the output node also what was so at a sample."""
+        setup = self._setup
+        limit, motion = setup.displacement_limit, self._motion
+        if not is_at_event:
+            motion = self.motion()
+        seen = setup.reduced.translations @ motion[: self.bodies.stiffness.shape[0]]
+        if (accumulator.highest >= accumulator.lowest).any():  # a sample was taken
+            reached = np.maximum(accumulator.highest[:2], -accumulator.lowest[:2])
+            seen[:2] = np.maximum(np.abs(seen[:2]), reached)
+        if not (np.abs(seen) <= limit).all():
+            return displacement_reason(setup.model, seen, limit)
+        if not is_at_event and not self._energy_of(motion) <= setup.energy_limit:
+            return energy_reason(setup.energy_limit)
+        return None
+
+    def _reduce(self, state: State) -> Floats:
+        """Reduced coordinates and velocities of a state."""
+        project = self._setup.reduced.project
+        displacement = state.displacement
+        displacement[: self._setup.model.sag.size] -= self._setup.model.sag
+        return np.concatenate([project @ displacement, project @ state.velocity])

@@ -1,0 +1,38 @@
+"""A case from event to event under a penalty: springs and dampers join bodies that press, in closed form."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
+from rubhpc.kernels.penalty_events import MOST_PAIRS, change_pressed, pressed_pairs
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.record import State
+    from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
+    from rubhpc.integrate.setup import ModalSetup
+
+    Floats = NDArray[np.float64]
+
+
+class PenaltyMarch(EventDrivenMarch):
+    """A case whose pairs are open, press, or are lifted: overlapped still, and without a force."""
+
+    def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
+        """Take an event, which leaves `motion` (2 n,) as it is; returns the states that go on."""
+        return int(change_pressed(self.bodies, mask, crossing, motion))
+
+    def opened(self, mask: int) -> NDArray[np.bool_]:
+        """Which pairs are open, and not lifted, (q,)."""
+        return ~self.closed(mask) & ~self.closed(mask >> self._clearance.size)
+
+    def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
+        if self._clearance.size > MOST_PAIRS:
+            raise NoClosedForm
+        return setup.penalty_library(friction)
+
+    def _first_mask(self, initial: State) -> int:
+        return int(pressed_pairs(self.bodies, self._motion))

@@ -1,0 +1,1 @@
+"""From samples and sums to named measures: regime, period, settling, divergence."""

@@ -1,0 +1,213 @@
+"""The regime of a motion: no contact, periodic, quasi-periodic or chaotic."""
+
+from __future__ import annotations
+
+import math
+from itertools import islice
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.integrate.measuring.orbit_measures import LONGEST_PERIOD, PERIOD_TOLERANCE, ends_change
+from rubhpc.schema import REGIME
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+Floats = NDArray[np.float64]
+
+MOST_DOUBLED = 2 * LONGEST_PERIOD  # revolutions, to which period doublings are followed
+MOST_DISTANT = 0.1  # of the orbit's size: a record that is farther from a motion does not settle on it
+LEAST_REVOLUTIONS = LONGEST_PERIOD  # of a record without a period that is worth following further
+TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may show a torus, or a longer period, by itself
+N_FIRST, N_ALL, N_MOST = 16, 64, 256  # spans whose growth is measured, each where the last left it open
+CLEAR = 0.05  # per revolution: an exponent beyond that over 16 spans keeps its sign
+ZERO = 0.01  # per revolution: an exponent within that is none
+SURE = 2.0  # standard errors: an exponent within that is none, too
+# A torus: the nearest return is that near, of the distance between cycles; that of twice as many revolutions
+# is twice as far, by 8 %; and neither half of the record has the farther ones.
+NEAR, TWICE, EVEN = 0.21, (1.85, 2.16), 1.5
+
+
+class Solution(NamedTuple):
+    """A periodic motion."""
+
+    period: int  # revolutions
+    multiplier: complex  # the largest
+    section: (
+        Floats  # (period, 2), m, vertical and horizontal at the shaft's angle 0, the end of a record first
+    )
+
+
+class Verdict(NamedTuple):
+    """What a motion is."""
+
+    flag: int  # of `schema.REGIME`
+    period: int  # revolutions; 0: none found
+    exponent: float = math.nan  # largest Lyapunov exponent per revolution, where it had to be measured
+    multiplier: complex = complex(math.nan, math.nan)  # largest, where the periodic motion was solved for
+    is_reached: bool = True  # false where the record still settles on it
+
+
+def regime(
+    vertical: Floats,
+    horizontal: Floats,
+    samples_per_revolution: int,
+    *,
+    period: int,
+    is_contact: bool,
+    growth: Iterable[float],
+    solve: Callable[[int], Solution | None] | None = None,
+) -> Verdict:
+    """Judge a record.
+
+    A record that looks periodic is so if a stable periodic motion is found next to its end, which the record
+    agrees with or draws near to. Where motions cannot be solved for, it is taken for what it looks like.
+    A record shorter than 16 revolutions without a period leaves the motion undecided: it is too short for
+    some periods. From 16 to 31 the growth alone decides, for it is measured beyond the record; a longer
+    record may show a torus, or a period beyond 16, by itself.
+
+    Parameters
+    ----------
+    vertical, horizontal : (n_revolution * samples_per_revolution,), m
+    period : int
+        Revolutions after which the record looks the same, or 0 where there are none up to 16.
+    growth : iterable of float
+        Growth of a small displacement per revolution, span by span; read only where it is needed.
+    solve : callable, optional
+        Finds the motion of a period next to the end of the record (`proof.Solver`).
+    """
+    if not is_contact:
+        return Verdict(REGIME.index("no_contact"), period)
+    orbit = _Orbit(vertical, horizontal, samples_per_revolution)
+    periodic = REGIME.index("periodic")
+    is_open = False  # looks periodic, but no solution is found that would decide
+    if period > 0:
+        verdict = _proved(orbit, period, solve)
+        is_open = verdict is not None and solve is not None and math.isnan(abs(verdict.multiplier))
+        if verdict is not None and (not is_open or orbit.n_revolution < LEAST_REVOLUTIONS):
+            return verdict
+    if orbit.n_revolution < LEAST_REVOLUTIONS:
+        return Verdict(REGIME.index("undecided"), 0)
+    distances, nearest = None, 0
+    if orbit.n_revolution >= TORUS_REVOLUTIONS:
+        distances = cycle_distances(vertical, horizontal, samples_per_revolution)
+        square = returns(distances)
+        nearest = int(square.argmin()) + 1
+        if period == 0 and square.min() <= PERIOD_TOLERANCE**2 * orbit.size**2:
+            verdict = _proved(orbit, nearest, solve)
+            if verdict is not None:
+                is_solved = not math.isnan(abs(verdict.multiplier))
+                return verdict if is_solved else Verdict(periodic, 0)
+    flag, exponent = by_growth(growth, None if is_open else distances)
+    if is_open and flag != REGIME.index("chaotic"):
+        return Verdict(periodic, period, exponent)
+    is_regular = flag in (periodic, REGIME.index("quasi_periodic"))
+    if solve and is_regular and period == 0 and nearest > LONGEST_PERIOD // 2:
+        verdict = _proved(orbit, nearest, solve)
+        if verdict is not None and not math.isnan(abs(verdict.multiplier)):
+            return verdict._replace(exponent=exponent)
+    return Verdict(flag, 0, exponent)
+
+
+class _Orbit:
+    """A recorded orbit, its section and size."""
+
+    def __init__(self, vertical: Floats, horizontal: Floats, samples_per_revolution: int) -> None:
+        self.signals = np.stack([vertical, horizontal])
+        self.n_revolution = vertical.size // samples_per_revolution
+        self.size = math.sqrt(float(self.signals.var(axis=1).sum()))
+        self.section = self.signals[:, ::samples_per_revolution].T
+        self.cycles = self.signals.reshape(2, self.n_revolution, -1).swapaxes(0, 1)
+
+    def distances(self, solution: Solution) -> Floats:
+        """Distance of each section point from that of a solution, over the size of the orbit."""
+        place = (np.arange(self.n_revolution) - self.n_revolution) % solution.period
+        apart = np.linalg.norm(self.section - solution.section[place], axis=1)
+        return np.asarray(apart / max(self.size, np.finfo(float).tiny))
+
+    def has_equal_ends(self, period: int) -> bool:
+        """Whether the first cycles are those as many whole periods later as there are."""
+        change = ends_change(self.cycles.reshape(self.n_revolution, -1), period)
+        return change <= PERIOD_TOLERANCE * self.size * math.sqrt(self.cycles.shape[2])
+
+
+def _proved(orbit: _Orbit, period: int, solve: Callable[[int], Solution | None] | None) -> Verdict | None:
+    """Judge a record that looks periodic; None where it is not.
+
+    An unstable motion whose disturbances change sides in every period is followed to twice its period.
+    """
+    periodic = REGIME.index("periodic")
+    if solve is None:
+        return Verdict(periodic, period)
+    found = solve(period)
+    asked = period
+    while found is not None and found.multiplier.real < -1.0 and asked < MOST_DOUBLED:
+        asked = 2 * asked
+        found = solve(asked)
+    if found is None:
+        return Verdict(periodic, period) if orbit.has_equal_ends(period) else None
+    if abs(found.multiplier) >= 1.0:
+        return None
+    apart = orbit.distances(found)
+    first, last = apart[: found.period].max(), apart[-found.period :].max()
+    if last > PERIOD_TOLERANCE and (last > MOST_DISTANT or last > first):
+        return None
+    upper = complex(found.multiplier.real, abs(found.multiplier.imag))
+    return Verdict(periodic, found.period, multiplier=upper, is_reached=last <= PERIOD_TOLERANCE)
+
+
+def by_growth(growth: Iterable[float], distances: Floats | None) -> tuple[int, float]:
+    """Judge by how neighbours part: flag of `schema.REGIME`, and the largest Lyapunov exponent or NaN."""
+    spans = iter(growth)
+    grown = list(islice(spans, N_FIRST))
+    if len(grown) == N_FIRST and abs(np.mean(grown)) < CLEAR:
+        if distances is not None and is_torus(distances):
+            return REGIME.index("quasi_periodic"), float(np.mean(grown))
+        grown += islice(spans, N_ALL - N_FIRST)
+        if len(grown) == N_ALL and ZERO < abs(np.mean(grown)) < SURE * standard_error(grown):
+            grown += islice(spans, N_MOST - N_ALL)
+    if len(grown) < N_FIRST or N_FIRST < len(grown) < N_ALL:
+        return REGIME.index("undecided"), math.nan  # the motion next to it cannot go on
+    exponent = float(np.mean(grown))
+    if len(grown) > N_FIRST and abs(exponent) <= max(ZERO, SURE * standard_error(grown)):
+        return REGIME.index("quasi_periodic"), exponent
+    return REGIME.index("chaotic" if exponent > 0.0 else "periodic"), exponent
+
+
+def standard_error(grown: list[float]) -> float:
+    """Standard error of the mean of growths that follow one another by chance."""
+    return float(np.std(grown)) / math.sqrt(len(grown))
+
+
+def cycle_distances(vertical: Floats, horizontal: Floats, samples_per_revolution: int) -> Floats:
+    """Mean square distance between all whole cycles, (n_revolution, n_revolution), m2."""
+    cycles = np.concatenate([s.reshape(-1, samples_per_revolution) for s in (vertical, horizontal)], axis=1)
+    cycles = cycles - cycles.mean(axis=0)
+    product = cycles @ cycles.T
+    square = np.diag(product)
+    distances: Floats = np.maximum(square[:, np.newaxis] + square - 2.0 * product, 0.0)
+    return distances / samples_per_revolution
+
+
+def returns(distances: Floats) -> Floats:
+    """Mean square distance of cycles 1, 2, ... revolutions apart, up to a third of the record, m2."""
+    return np.array([np.diagonal(distances, n).mean() for n in range(1, len(distances) // 3 + 1)])
+
+
+def is_torus(distances: Floats) -> bool:
+    """Whether the cycles lie on a closed curve, along which each revolution takes them by the same share.
+
+    After the revolutions that nearly fill whole rounds of that curve, the cycles are displaced along it by a
+    little, and by twice that little after twice as many; those of chaotic motion return to a neighbourhood,
+    however often, and those of a motion that still settles draw nearer and nearer.
+    """
+    square = returns(distances)
+    n = int(square.argmin()) + 1
+    once, twice = np.diagonal(distances, n), np.diagonal(distances, 2 * n)
+    first, last = np.array_split(once, 2)
+    near = math.sqrt(once.mean() / (distances.sum() / (distances.size - len(distances))))
+    ratio = math.sqrt(twice.mean() / once.mean())
+    is_even = max(first.mean(), last.mean()) < EVEN**2 * min(first.mean(), last.mean())
+    return near < NEAR and TWICE[0] < ratio < TWICE[1] and bool(is_even)

@@ -1,0 +1,273 @@
+"""The direct way through a transient: the periodic motion that a case is on its way to, solved for."""
+
+from __future__ import annotations
+
+from itertools import count
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.measuring.orbit_measures import LONGEST_PERIOD
+from rubhpc.integrate.periodic_motions.known_motions import (
+    HALF,
+    LINEAR,
+    SAME,
+    Approach,
+    KnownMotions,
+    nothing,
+)
+from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
+from rubhpc.integrate.transient import idle_of, pass_revolutions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.marches.march import March
+    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.record import State
+    from rubhpc.study.study import Recording
+
+    Floats = NDArray[np.float64]
+
+FIRST, LONGER = 32, 2.0  # revolutions before the first search, and by what those before the next are more
+WATCHED = 16  # revolutions, at least, in which a case must draw near
+SLOWER = 2  # times the periods that the linear theory needs for that, in which it must have done so
+NEARER = 0.3  # of its distance after one revolution: a return as near as that speaks for a longer period
+MOST_ITERATIONS, LEAST_STEP = 6, 1 / 4  # of Newton's method
+MOST_EVENTS = 24, 8  # in a revolution: of one pair, and more for each further one
+LOOK, N_LOOK = 4, 2  # revolutions after which a case is compared with known motions; looks at the nearest
+FIRST_BESIDE = 64  # revolutions before the first search, where motions are known
+
+
+class Passed(NamedTuple):
+    """A transient that has been passed, or has ended the case."""
+
+    march: EventDrivenMarch  # from which the case goes on
+    reason: str | None  # why it cannot
+    n_revolution: int  # simulated
+    n_step: int  # taken by other marches than that one
+    reached: int | None = None  # number of the place of a known motion, at which the case has arrived
+    found: tuple[PiecewiseMotion, Orbit] | None = None  # the motion that was solved for, where none was known
+
+
+class _Walk:
+    """A case under way, with its motions (2 n,) at the ends of the last revolutions."""
+
+    def __init__(
+        self, march: EventDrivenMarch, start: Callable[[State], March], recording: Recording
+    ) -> None:
+        self.march, self._start, self._recording = march, start, recording
+        self._idle = idle_of(march)
+        self.n_revolution = self.n_step = 0
+        self.passed: list[Floats] = []
+
+    def on(self, n_revolution: int) -> str | None:
+        """Go on, at most to the longest transient, and keep the last motions; returns why the case cannot."""
+        n_revolution = min(n_revolution, self._recording.longest_transient - self.n_revolution)
+        kept = min(n_revolution, LONGEST_PERIOD + 1)
+        if n_revolution > kept and (reason := self._pass(n_revolution - kept)) is not None:
+            return reason
+        self.passed = []
+        for _ in range(kept):
+            if (reason := self._pass(1)) is not None:
+                return reason
+            self.passed.append(self.march.motion())
+        return None
+
+    def repeat(self, period: int) -> tuple[Floats | None, str | None]:
+        """Go on by a period: the motion then, None where the transient ends before, and why it cannot."""
+        if self.n_revolution + period > self._recording.longest_transient:
+            return None, None
+        reason = self._pass(period)
+        return (self.march.motion() if reason is None else None), reason
+
+    def _pass(self, n_revolution: int) -> str | None:
+        self.n_revolution += n_revolution
+        return pass_revolutions(self.march, self._recording, n_revolution, self._idle)
+
+    def begin_at(self, state: State) -> Floats:
+        """Take another state, or the same with tables that may have been filled anew; returns its motion."""
+        self.n_step += self.march.n_step
+        march = self._start(state)
+        assert isinstance(march, EventDrivenMarch)
+        self.march = march
+        return self.march.motion()
+
+    def arrive(self, known: KnownMotions, wanted: int) -> tuple[int | None, str | None]:
+        """Go on to a known motion, or to a number of revolutions: its place, and why the case cannot go on.
+
+        Every four revolutions the case is compared with the nearest motion; it has arrived where it does as
+        the linear theory about that says (`Approach.obeys`) until it has halved its distance, and over four
+        revolutions or more.
+        """
+        while self.n_revolution + LOOK <= min(wanted, self._recording.longest_transient):
+            if (reason := self._pass(LOOK)) is not None:
+                return None, reason
+            number, reason = self._falls_to(known)
+            if number is not None or reason is not None:
+                return number, reason
+        return None, None
+
+    def _falls_to(self, known: KnownMotions) -> tuple[int | None, str | None]:
+        motion = self.march.motion()
+        number = known.nearest(motion)
+        if number is None:
+            return None, None
+        place = known.place(number)
+        apart = motion - place.motion
+        first = place.approach.square(apart)
+        for n_look in count(1):
+            if known.is_at(place, apart):
+                return number, None
+            reached, reason = self.repeat(place.n_period * place.period)
+            if reached is None:
+                return None, reason
+            before, apart = apart, reached - place.motion
+            if not place.approach.obeys(before, apart, place.n_period):
+                return None, None
+            if n_look >= N_LOOK and place.approach.square(apart) <= HALF * first:
+                return number, None
+        raise AssertionError  # the looks never end
+
+    def ended(
+        self,
+        reason: str | None,
+        reached: int | None = None,
+        found: tuple[PiecewiseMotion, Orbit] | None = None,
+    ) -> Passed:
+        return Passed(self.march, reason, self.n_revolution, self.n_step, reached, found)
+
+
+def pass_directly(
+    march: EventDrivenMarch,
+    start: Callable[[State], March],
+    solve_from: Callable[[State], PiecewiseMotion],
+    recording: Recording,
+    known: KnownMotions | None = None,
+) -> Passed:
+    """March until a stable periodic motion is found that the case draws near to; go on from that motion.
+
+    After 32, 64, 128, ... revolutions the periodic motion is solved for from where the case stands, and the
+    case is simulated further to see whether it draws near (`draws_near`). Where it does not, or none is
+    found, it goes on, at the latest to the longest transient. The next search comes 32 revolutions after the
+    last one has failed, or later. Where motions are known, the case is compared with them first
+    (`_Walk.arrive`), and the first one is solved for after 64 revolutions.
+
+    Parameters
+    ----------
+    march : EventDrivenMarch
+        The case at its beginning.
+    start : callable
+        Makes the case's march from a state.
+    solve_from : callable
+        Makes its piecewise motion from a state.
+    known : KnownMotions, optional
+        Motions that the case may reach.
+    """
+    walk, wanted = _Walk(march, start, recording), FIRST_BESIDE if known else FIRST
+    while True:
+        if known is not None:
+            reached, reason = walk.arrive(known, wanted - LONGEST_PERIOD - 1)
+            if reached is not None or reason is not None:
+                return walk.ended(reason, reached)
+        reason = walk.on(wanted - walk.n_revolution)
+        if reason is not None or walk.n_revolution >= recording.longest_transient:
+            return walk.ended(reason)
+        wanted = int(LONGER * walk.n_revolution)
+        state = walk.march.final()
+        found = _search(solve_from, state, walk.passed)
+        motion = walk.begin_at(state)
+        if found is None:
+            continue
+        piecewise, orbit = found
+        force = piecewise.contact_force(orbit.states, orbit.motion)
+        aim = piecewise.march.state_of(orbit.motion, force)
+        is_near, reason = draws_near(walk, piecewise, orbit, motion, wanted - LONGEST_PERIOD)
+        if is_near and known is not None and (same := known.nearest(orbit.motion, SAME)) is not None:
+            return walk.ended(reason, same)
+        if is_near:
+            walk.begin_at(aim)
+        if is_near or reason is not None:
+            return walk.ended(reason, found=found if is_near else None)
+        wanted = max(wanted, walk.n_revolution + FIRST)
+
+
+def draws_near(
+    walk: _Walk, piecewise: PiecewiseMotion, orbit: Orbit, motion: Floats, until: int
+) -> tuple[bool, str | None]:
+    """Simulate a case further: whether it draws near to a stable motion, or why it cannot go on.
+
+    Its distance (`Approach`) is to fall from one look to the next, four revolutions or a period later, to
+    half of what it was and for 16 revolutions or more, in no more than twice the periods that the linear
+    theory needs; and in the last 16 revolutions it is to be at each look where that theory takes it from the
+    one before, to a tenth of its distance. A motion that beats about another one, or only passes by, does
+    not. Where the distance does not fall it is watched anew, until so many revolutions have passed.
+    """
+    approach = Approach(orbit.monodromy, np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n))
+    stride = max(1, LOOK // orbit.period)  # periods from one look to the next
+    onward = np.linalg.matrix_power(orbit.monodromy, stride)
+    least = -(-WATCHED // (stride * orbit.period))
+    there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
+    apart = motion - orbit.motion
+    while walk.n_revolution < until:
+        first = last = approach.square(apart)
+        most = max(least, -(-SLOWER * approach.periods_to(HALF, apart) // stride))
+        n_linear = 0
+        for _ in range(most):
+            if piecewise.size(apart) <= there:
+                return True, None
+            reached, reason = walk.repeat(stride * orbit.period)
+            if reached is None:
+                return False, reason
+            expected = onward @ apart
+            apart = reached - orbit.motion
+            was, last = last, approach.square(apart)
+            n_linear = n_linear + 1 if approach.square(apart - expected) <= LINEAR**2 * was else 0
+            if last <= HALF * first and n_linear >= least:
+                return True, None
+            if last >= was:
+                break
+    return False, None
+
+
+def _search(
+    solve_from: Callable[[State], PiecewiseMotion], state: State, passed: list[Floats]
+) -> tuple[PiecewiseMotion, Orbit] | None:
+    """Return the stable periodic motion next to a state: of one revolution, or of the period of its returns.
+
+    Of two the nearer one. An unstable motion whose disturbances change sides in every period is followed to
+    twice its period.
+    """
+    try:
+        piecewise = solve_from(state)
+    except NoClosedForm:
+        return None
+    back = np.array([piecewise.size(passed[-1] - motion) for motion in passed[-2::-1]])
+    nearest = 1 + int(np.argmin(back)) if back.size else 1
+    found: list[tuple[float, Orbit]] = []
+    for period in [1, nearest] if nearest > 1 and back[nearest - 1] <= NEARER * back[0] else [1]:
+        orbit = _solved(piecewise, asked := period)
+        while orbit and orbit.multipliers[0].real < -1.0 and (asked := 2 * asked) <= LONGEST_PERIOD:
+            orbit = _solved(piecewise, asked)
+        if orbit and abs(orbit.multipliers[0]) < 1.0:
+            found.append((piecewise.size(orbit.motion - piecewise.start), orbit))
+    return (piecewise, min(found, key=lambda one: one[0])[1]) if found else None
+
+
+def _solved(piecewise: PiecewiseMotion, period: int) -> Orbit | None:
+    """Periodic motion next to where a piecewise motion begins; None where none is found."""
+    try:
+        return shoot(
+            piecewise,
+            piecewise.start,
+            piecewise.states,
+            period,
+            most_iterations=MOST_ITERATIONS,
+            least_step=LEAST_STEP,
+            most_events=MOST_EVENTS[0] + MOST_EVENTS[1] * (piecewise.q - 1),
+        )
+    except (NoClosedForm, NotConverged):
+        return None

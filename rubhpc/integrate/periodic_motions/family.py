@@ -1,0 +1,216 @@
+"""Cases that differ in one parameter: motions carried from one to the next, derivatives by the parameter."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
+from rubhpc.integrate.marches.event_driven import NoClosedForm
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
+from rubhpc.integrate.periodic_motions.saltation import by_clearance
+from rubhpc.integrate.record import State
+from rubhpc.integrate.setup import ModalSetup, Scheme, prepare
+from rubhpc.rig.reading import with_keys
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+    from rubhpc.integrate.periodic_motions.piecewise_motion import Revolution
+    from rubhpc.rig.rig import Rig
+    from rubhpc.study.contact_keys import Contact
+    from rubhpc.study.tables import Integrator
+
+    Floats = NDArray[np.float64]
+
+SPEEDS, CLEARANCES = ("speed_ratio", "speed"), ("clearance_ratio", "clearance")
+MOST_KEPT = 6  # cases that are kept ready
+DIFFERENCE = 1e-6  # of the range, between the two cases of a derivative
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Operation:
+    """How a rig runs: one of two speeds and one of two clearances are None."""
+
+    rig: Rig
+    speed_ratio: float | None = None
+    speed: float | None = None  # rad/s
+    clearance_ratio: float | None = None
+    clearance: float | None = None  # m
+    friction: float
+    contact: Contact
+    integrator: Integrator
+    samples_per_revolution: int
+
+    def at(self, along: str, value: float) -> Operation:
+        """The same with another value of a parameter."""
+        if along in SPEEDS:
+            return replace(self, speed_ratio=None, speed=None).having(along, value)
+        if along in CLEARANCES:
+            return replace(self, clearance_ratio=None, clearance=None).having(along, value)
+        if along == "friction":
+            return replace(self, friction=value)
+        return replace(self, rig=with_keys(self.rig, {along: value}))
+
+    def having(self, name: str, value: float) -> Operation:
+        """The same with another number."""
+        changed: dict[str, Any] = {name: value}
+        return replace(self, **changed)
+
+
+class Family:
+    """Cases along one parameter.
+
+    Parameters
+    ----------
+    along : str
+        speed_ratio, speed, clearance_ratio, clearance, friction or a key of the rig.
+    span : float
+        Of the parameter; the smallest change of interest is small beside it.
+    """
+
+    def __init__(self, operation: Operation, along: str, span: float) -> None:
+        """Take the case that is varied."""
+        self.along, self.span = along, span
+        self._operation = operation
+        self._models: OrderedDict[int, tuple[Rig, Model]] = OrderedDict()
+        self._frequency: tuple[Model, float] | None = None
+        self._setups: OrderedDict[tuple[int, float], ModalSetup] = OrderedDict()
+        self._cases: OrderedDict[float, PiecewiseMotion] = OrderedDict()
+
+    def at(self, value: float) -> PiecewiseMotion:
+        """The case at a value of the parameter.
+
+        Raises
+        ------
+        Unfollowed
+            It has no closed form.
+        InputError
+            There is no such case.
+        """
+        if value not in self._cases:
+            setup, clearance, friction = self.settings(value)
+            try:
+                found = PiecewiseMotion(setup, clearance, friction, State.at_rest(setup.model))
+            except NoClosedForm:
+                raise Unfollowed("contacts open and close without end, or in too many combinations") from None
+            self._cases[value] = found
+            if len(self._cases) > MOST_KEPT:
+                self._forget(self._cases.popitem(last=False)[1])
+        self._cases.move_to_end(value)
+        return self._cases[value]
+
+    def settings(self, value: float) -> tuple[ModalSetup, float, float]:
+        """Set-up, clearance (m) and friction at a value of the parameter."""
+        case = self._operation.at(self.along, value)
+        model = self._model(case.rig)
+        spin = case.speed
+        if spin is None:
+            assert case.speed_ratio is not None
+            spin = case.speed_ratio * self._first_frequency(model)
+        clearance = case.clearance
+        if clearance is None:
+            assert case.clearance_ratio is not None
+            clearance = case.clearance_ratio * contact_free_amplitude(model, spin)
+        for stator in model.stators:
+            if clearance + stator.clearance_offset <= 0:
+                problem = f"{clearance:g} m and a stator's clearance_offset leave no gap"
+                raise InputError(f"{self.along}: {value:g}: {problem}; take a range without it")
+        return self._setup(case, model, spin), clearance, case.friction
+
+    def carry(self, motion: Floats, before: PiecewiseMotion, after: PiecewiseMotion) -> Floats:
+        """A motion (2 n,) of one case in the coordinates of another."""
+        old, new = before.setup, after.setup
+        if old.reduced.basis is new.reduced.basis or (
+            np.array_equal(old.reduced.basis, new.reduced.basis)
+            and np.array_equal(old.model.sag, new.model.sag)
+        ):
+            return motion
+        if old.reduced.basis.shape[0] != new.reduced.basis.shape[0]:
+            raise InputError(
+                f"{self.along}: changes the number of degrees of freedom, so one motion cannot start the next"
+            )
+        displacement, velocity = old.reduced.basis @ motion.reshape(2, -1)[:, :, None]
+        shift = np.zeros_like(displacement)
+        shift[: old.model.sag.size, 0] = old.model.sag - new.model.sag
+        project = new.reduced.project
+        return np.concatenate([project @ (displacement + shift), project @ velocity])[:, 0]
+
+    def derivative(
+        self, value: float, motion: Floats, states: int, revolutions: list[Revolution], phase: float
+    ) -> Floats:
+        """Derivative (2 n,) by the parameter of how far a motion is from closing, its beginning held.
+
+        By the clearance it is exact; by another parameter the difference of two flow maps.
+        """
+        here = self.at(value)
+        if self.along in CLEARANCES:
+            return self._clearance_rate(here) * by_clearance(here, revolutions)
+        step = DIFFERENCE * self.span
+        there = self.at(value + step)
+        begun = self.carry(motion, here, there)
+        ended = flow(there, begun, states, len(revolutions), phase)[-1].end
+        defect = self.carry(ended, there, here) - self.carry(begun, there, here)
+        return (defect - (revolutions[-1].end - motion)) / step
+
+    def _forget(self, case: PiecewiseMotion) -> None:
+        """Free what a set-up that is shared holds of one friction."""
+        if self.along == "friction":
+            case.setup.forget(float(case.bodies.friction[0]))
+
+    def _clearance_rate(self, here: PiecewiseMotion) -> float:
+        """Metres of clearance for a unit of the parameter."""
+        if self.along == "clearance":
+            return 1.0
+        return contact_free_amplitude(here.setup.model, here.setup.spin)
+
+    def _first_frequency(self, model: Model) -> float:
+        """Lowest lateral natural frequency of a model, rad/s, found once."""
+        if self._frequency is None or self._frequency[0] is not model:
+            self._frequency = model, first_lateral_frequency(model)
+        return self._frequency[1]
+
+    def _model(self, rig: Rig) -> Model:
+        if id(rig) not in self._models:
+            self._models[id(rig)] = rig, assemble(rig)
+            if len(self._models) > MOST_KEPT:
+                self._models.popitem(last=False)
+        return self._models[id(rig)][1]
+
+    def _setup(self, case: Operation, model: Model, spin: float) -> ModalSetup:
+        key = id(case.rig), spin
+        if key not in self._setups:
+            setup = prepare(
+                case.rig,
+                spin,
+                contact=case.contact,
+                integrator=case.integrator,
+                samples_per_revolution=case.samples_per_revolution,
+                model=model,
+            )
+            if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
+                raise InputError(
+                    f"{self.along}: branches need motion in closed form between events; take method modal, "
+                    "normal fixed, and friction_law sliding or coulomb"
+                )
+            self._setups[key] = setup
+            if len(self._setups) > MOST_KEPT:
+                self._setups.popitem(last=False)
+        return self._setups[key]
+
+
+def flow(
+    piecewise: PiecewiseMotion, motion: Floats, states: int, period: int, phase: float
+) -> list[Revolution]:
+    """Follow a motion (2 n,) for some revolutions from an angle of the shaft, given in revolutions."""
+    found: list[Revolution] = []
+    for _ in range(period):
+        found.append(piecewise.revolve(motion, states, phase=phase))
+        motion, states = found[-1].end, found[-1].states
+    return found

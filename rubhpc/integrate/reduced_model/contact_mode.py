@@ -1,0 +1,251 @@
+"""Motion of a reduced model with one set of contacts closed, in closed form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import null_space
+
+from rubhpc.errors import InputError
+from rubhpc.integrate.reduced_model.coupling import coupled_rows
+from rubhpc.integrate.reduced_model.repeated_exponents import real_ones, separate
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
+
+    Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
+    Solved = dict[bytes, tuple[Complexes, Complexes, Complexes]]  # parts, by the bytes of their matrices
+
+WORST_CONDITION = 1e11  # of the eigenvectors; beyond it their sum loses its digits, and they are set apart
+SMALL = 64  # states of a part that is kept
+
+
+class KeptParts(dict[bytes, "tuple[Complexes, Complexes, Complexes]"]):
+    """Parts as they are known to `modes_of`, to which it adds those that it solves."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ContactMode:
+    """Motion with one set of pairs closed: `x = Re(motion @ z)`, x (2 n,) displacements, then velocities.
+
+    To the m modes come the unbalance response, z = exp(i angle), and the clearances of the q pairs, z in m.
+    """
+
+    mask: int
+    exponent: Complexes  # (m + 1 + q,), 1/s
+    motion: Complexes  # (2 n, m + 1 + q)
+    enter: Complexes  # (m, 2 n)
+    take_off: Complexes  # (2 + q, m), of the unbalance response, times cosine and sine; of unit clearances
+    switch: Complexes  # (q, m + 1 + q), gap of an open pair or force of a closed one
+
+    @property
+    def n_eigenmode(self) -> int:
+        """How many of the coordinates are eigenmodes, m."""
+        return len(self.enter)
+
+    @property
+    def drift(self) -> Floats:
+        """How fast coordinates grow linearly, their unit per second: none does here."""
+        return np.zeros(self.exponent.size)
+
+
+def solve_contact_mode(
+    reduced: ReducedModel,
+    gap_jacobian: Floats,
+    force_direction: Floats,
+    mask: int,
+    known: Solved | None = None,
+) -> ContactMode:
+    """Solve the linear system with the pairs of `mask` closed.
+
+    With J the gap Jacobian and F the contact-force directions of the closed pairs, closed gaps confine the
+    motion to `x = x0 + T y` with `J T = 0`; the contact forces drop out of the equations projected on L with
+    `L^T F^T = 0`, and follow from the accelerations of the gaps being zero (the constraint of Eq. 18 of the
+    paper, differentiated twice).
+
+    Raises
+    ------
+    InputError
+        Where eigenvectors coincide (rigid-body motion, exactly critical damping).
+    """
+    n, q = reduced.stiffness.shape[0], gap_jacobian.shape[0]
+    closed = np.array([i for i in range(q) if mask >> i & 1], dtype=int)
+    rate, force = gap_jacobian[closed], force_direction[closed].T
+    tangent, project, system = confine(reduced, rate, force)
+    offset = np.zeros((q, n))  # displacement that closes a unit clearance
+    if closed.size:
+        offset[closed] = -np.linalg.pinv(rate).T
+    n_free = tangent.shape[1]
+    exponent, shape, inverse = modes_of(system, known)
+    phasor = reduced.force[0] - 1j * reduced.force[1]
+    lower = np.concatenate([np.zeros(n_free), project @ phasor])
+    parts = _parts(system) if q > 1 else [np.arange(2 * n_free)]
+    response = np.zeros(2 * n_free, dtype=np.complex128)
+    for rows in parts:
+        if np.any(lower[rows] != 0.0):
+            turned = 1j * reduced.spin * np.eye(rows.size) - system[np.ix_(rows, rows)]
+            response[rows] = np.linalg.solve(turned, lower[rows])
+    constant = np.zeros((q, 2 * n_free))
+    if closed.size:
+        load = -project @ reduced.stiffness @ offset[closed].T
+        loads = np.vstack([np.zeros_like(load), load])
+        for rows in parts:
+            if np.any(loads[rows] != 0.0):
+                constant[np.ix_(closed, rows)] = -np.linalg.solve(system[np.ix_(rows, rows)], loads[rows]).T
+    expand = np.zeros((2 * n, 2 * n_free))
+    expand[:n, :n_free] = expand[n:, n_free:] = tangent
+    still = constant @ expand.T + np.hstack([offset, np.zeros((q, n))])  # (q, 2 n)
+    motion = np.hstack([expand @ shape, (expand @ response)[:, None], still.T])
+    clear = np.hstack([np.zeros((q, exponent.size + 1)), np.eye(q)])
+    switch = gap_jacobian @ motion[:n] + clear
+    if closed.size:
+        reaction = np.linalg.solve(rate @ force, rate)
+        switch[closed] = reaction @ (np.hstack([reduced.stiffness, reduced.damping]) @ motion)
+        switch[closed, exponent.size] -= reaction @ phasor
+    entry = constant + np.hstack([offset @ tangent, np.zeros((q, n_free))])
+    return ContactMode(
+        mask=mask,
+        exponent=np.concatenate([exponent, [1j * reduced.spin], np.zeros(q)]),
+        motion=motion,
+        enter=inverse @ expand.T,
+        take_off=np.vstack([inverse @ response.real, -inverse @ response.imag, entry @ inverse.T]),
+        switch=switch,
+    )
+
+
+def count_coordinates(reduced: ReducedModel, gap_jacobian: Floats, force_direction: Floats, mask: int) -> int:
+    """Count the coordinates of the contact mode with the pairs of `mask` closed, m + 1 + q."""
+    closed = [i for i in range(len(gap_jacobian)) if mask >> i & 1]
+    _, _, system = confine(reduced, gap_jacobian[closed], force_direction[closed].T)
+    n_mode = 0
+    for rows in _parts(system):
+        exponent = np.linalg.eigvals(system[np.ix_(rows, rows)]).astype(np.complex128)
+        n_mode += int(np.count_nonzero(_kept(exponent)[1]))
+    return n_mode + 1 + len(gap_jacobian)
+
+
+def confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats, Floats, Floats]:
+    """Motions that keep gaps closed T (n, n_free), projection that no contact force passes, and the system.
+
+    `rate` (r, n) is the gap Jacobian of the closed pairs and `force` (n, r) their contact-force directions;
+    the system (2 n_free, 2 n_free) is that of the coordinates y and their rates.
+    """
+    n = reduced.stiffness.shape[0]
+    if not len(rate):
+        whole = np.eye(n)
+        free = np.block([[np.zeros((n, n)), whole], [-reduced.stiffness, -reduced.damping]])
+        return whole, whole, free
+    tangent, left = _null_space(rate), _null_space(force.T)
+    n_free = tangent.shape[1]
+    project = np.asarray(np.linalg.solve(left.T @ tangent, left.T), dtype=np.float64)
+    system: Floats = np.block(
+        [
+            [np.zeros((n_free, n_free)), np.eye(n_free)],
+            [-project @ reduced.stiffness @ tangent, -project @ reduced.damping @ tangent],
+        ]
+    )
+    return tangent, project, system
+
+
+def _null_space(rows: Floats) -> Floats:
+    """Orthonormal columns that `rows` (r, n) take to zero; coordinates unseen by them stay as they are."""
+    seen = np.flatnonzero(np.any(rows != 0.0, axis=0))
+    unseen = np.flatnonzero(np.all(rows == 0.0, axis=0))
+    inside = null_space(rows[:, seen]) if seen.size else np.zeros((0, 0))
+    columns = np.zeros((rows.shape[1], inside.shape[1] + unseen.size))
+    columns[seen, : inside.shape[1]] = inside
+    columns[unseen, np.arange(inside.shape[1], columns.shape[1])] = 1.0
+    return columns
+
+
+def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Complexes, Complexes]:
+    """Exponents, shapes and inverse shapes of a first-order system; one of each conjugate pair, doubled.
+
+    What nothing couples is solved by itself: of a ring of stators only those that touch move with the rotor.
+    Parts among those `known`, such as open stators, are not solved again; `KeptParts` keeps the others.
+    """
+    n_state = len(system)
+    exponents: list[Complexes] = [np.zeros(0, dtype=np.complex128)]  # a mass on a rigid wall has no modes
+    shapes: list[Complexes] = [np.zeros((n_state, 0), dtype=np.complex128)]
+    inverses: list[Complexes] = [np.zeros((0, n_state), dtype=np.complex128)]
+    for rows in _parts(system):
+        part = system[np.ix_(rows, rows)]
+        solved = known.get(part.tobytes()) if known else None
+        exponent, shape, inverse = solved = solved or solve_part(part)
+        if isinstance(known, KeptParts):
+            known[part.tobytes()] = solved
+        wide, tall = np.zeros((2, n_state, exponent.size), dtype=np.complex128)
+        wide[rows], tall[rows] = shape, inverse.T
+        exponents.append(exponent)
+        shapes.append(wide)
+        inverses.append(tall.T)
+    return np.concatenate(exponents), np.hstack(shapes), np.vstack(inverses)
+
+
+def solve_part(part: Floats) -> tuple[Complexes, Complexes, Complexes]:
+    """Exponents, shapes and inverse shapes of a part of a system that nothing couples to the rest.
+
+    Small ones, such as an open stator, which is the same at every speed, are not solved again.
+    """
+    worst = WORST_CONDITION
+    return _recalled(part.tobytes(), worst) if len(part) <= SMALL else _solve_part(part, worst)
+
+
+@lru_cache(maxsize=32)
+def _recalled(part: bytes, worst: float) -> tuple[Complexes, Complexes, Complexes]:
+    """The same of a part (n, n) as bytes."""
+    n = math.isqrt(len(part) // 8)
+    return _solve_part(np.frombuffer(part).reshape(n, n), worst)
+
+
+def _solve_part(part: Floats, worst: float) -> tuple[Complexes, Complexes, Complexes]:
+    exponent, shape = np.linalg.eig(part)
+    inverse = _inverse(shape, worst)
+    if inverse is None and (separated := separate(part)) is not None:
+        exponent, shape, inverse = separated
+    if inverse is None:
+        raise InputError(
+            "[integrator] method: modal cannot separate the modes of this rig, some of which coincide (a "
+            'free body, critical damping); take method = "central-difference"'
+        )
+    is_real, keep = _kept(exponent)
+    weight = np.where(is_real, 1.0, 2.0)
+    return (
+        exponent[keep].astype(np.complex128),
+        (shape * weight)[:, keep].astype(np.complex128),
+        inverse[keep].astype(np.complex128),
+    )
+
+
+def _inverse(shape: Complexes, worst: float) -> Complexes | None:
+    """Inverse of eigenvectors whose condition is not worse; the bound by Frobenius norms is tried first."""
+    try:
+        inverse = np.linalg.inv(shape)
+    except np.linalg.LinAlgError:
+        return None
+    bound = np.linalg.norm(shape) * np.linalg.norm(inverse)
+    return np.asarray(inverse) if bound <= worst or np.linalg.cond(shape) <= worst else None
+
+
+def solve_parts(system: Floats) -> Solved:
+    """All parts of a system, solved: what `modes_of` looks up, by the bytes of their matrices."""
+    parts = (system[np.ix_(rows, rows)] for rows in _parts(system))
+    return {key: solve_part(part) for key, part in {part.tobytes(): part for part in parts}.items()}
+
+
+def _parts(system: Floats) -> list[NDArray[np.int64]]:
+    """Rows of each part of a system that nothing couples to the rest."""
+    return coupled_rows(system != 0.0)
+
+
+def _kept(exponent: Complexes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which exponents of an uncoupled part are real, and which are kept: one of each conjugate pair."""
+    is_real = real_ones(exponent)
+    return is_real, is_real | (exponent.imag > 0.0)

@@ -1,0 +1,58 @@
+"""The contact modes of a reduced model with curved gaps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rubhpc.integrate.reduced_model.curved_tables import motion_rows, tabulate_curved
+from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
+from rubhpc.integrate.reduced_model.mode_tables import TableStack
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
+    from rubhpc.kernels.curved_contact import CurvedTables
+
+
+class CurvedLibrary(ModeLibrary):
+    """Contact modes of one speed and friction, with what curved gaps need of them."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        self._row = motion_rows(args[0], args[1])
+        self._curved: TableStack | None = None
+        super().__init__(*args, **kwargs)
+
+    @property
+    def n_most(self) -> int:
+        """Contact modes that there is room for."""
+        return super().n_most if self._curved is None else min(super().n_most, self._curved.n_most)
+
+    def forget(self) -> None:
+        """Make room: keep no mode but that with every pair open."""
+        if self._curved is not None:
+            self._curved.clear()
+        super().forget()
+
+    def curved_tables(self) -> CurvedTables:
+        """What curved gaps need of all contact modes."""
+        assert self._curved is not None
+        tables: CurvedTables = self._curved.view()
+        return tables
+
+    def _friction_of(self, mode: ContactMode) -> None:
+        """Not counted: its direction is that of the momentary normal."""
+
+    def _tabulate(self, mode: ContactMode) -> None:
+        super()._tabulate(mode)
+        if self._curved is None:
+            self._curved = TableStack(1 + len(self.gap_jacobian), self._most_modes)
+        self._curved.add(
+            tabulate_curved(
+                mode,
+                self.reduced,
+                self._row,
+                (self.gap_jacobian, self.force_direction),
+                width=self.width,
+                tick=self._tick,
+                n_level=self._n_level,
+            )
+        )

@@ -1,0 +1,222 @@
+"""What the tables of a contact mode lack where gaps are curved: `kernels.curved_contact`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.fem.statics import sag_at_stators
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W, rim_sense
+from rubhpc.kernels.curved_contact import ACROSS, ALONG, BENDING, CurvedPairs, CurvedTables
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model, StatorModel
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
+
+    Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
+
+UNBENT = 1e-8  # bending displacement over the largest of a stator, below which it is none
+LONGEST_STEP = 1e-3  # s, of closed contacts
+# Parabolas through values at the beginning, middle and end of a step, by powers of time over its length.
+_PARABOLAS = np.array([[1.0, -3.0, 2.0], [0.0, 4.0, -4.0], [0.0, -1.0, 2.0]])
+
+
+def curved_pairs(
+    reduced: ReducedModel, model: Model, friction: float, clearance: Floats, *, is_round: bool
+) -> CurvedPairs:
+    """Pairs of a case whose gaps are curved; clearance (q,) at rest in m."""
+    row = motion_rows(reduced, model)
+    flat = row.reshape(-1, row.shape[2])
+    sense = rim_sense(reduced.spin)
+    skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
+    return CurvedPairs(
+        row=row,
+        gram=(flat @ flat.T).reshape(*row.shape[:2], *row.shape[:2]),
+        output=_outputs(reduced),
+        resisting=0.5 * (reduced.damping + reduced.damping.T),
+        skew=skew if np.any(skew) else skew[:0],
+        radius=np.array([stator.radius for stator in model.stators]),
+        clearance=clearance,
+        aside=sag_at_stators(model)[1],
+        friction=np.full(clearance.size, sense * friction),
+        stiffness=np.array(
+            [_stiffness(stator, row[i, ALONG], reduced) for i, stator in enumerate(model.stators)]
+        ),
+        leverage=_leverage(row, reduced),
+        is_round=is_round,
+        sense=sense,
+    )
+
+
+def motion_rows(reduced: ReducedModel, model: Model) -> Floats:
+    """Motions of each pair with the reduced coordinates, (q, 3 + b, n), as `CurvedPairs.row` has them."""
+    angle = np.array([stator.angle for stator in model.stators])[:, None]
+    ey, ez = np.cos(angle), np.sin(angle)
+    v, w, torsion, axial, lateral = (reduced.degree[:, a] for a in (V, W, TORSION, AXIAL, LATERAL))
+    bending = [_bending(stator, reduced, model, i) for i, stator in enumerate(model.stators)]
+    n_bending = max(len(rows) for rows in bending)
+    rows = np.zeros((len(bending), BENDING + n_bending + 1, v.shape[1]))
+    rows[:, ALONG], rows[:, ACROSS] = axial - ey * v - ez * w, lateral + ez * v - ey * w
+    for i, those in enumerate(bending):
+        rows[i, BENDING : BENDING + len(those)] = those
+    rows[:, -1] = torsion
+    return rows
+
+
+def _bending(stator: StatorModel, reduced: ReducedModel, model: Model, i: int) -> Floats:
+    """Displacements (b, n) whose squares add up to twice the foreshortening of a stator."""
+    if stator.squared_slope is None:
+        return np.zeros((0, reduced.stiffness.shape[0]))
+    first = model.stator_start[i]
+    basis = reduced.basis[first : first + stator.body.n_dof]
+    square, shape = np.linalg.eigh(stator.squared_slope)
+    _, size, turn = np.linalg.svd((np.sqrt(np.maximum(square, 0.0)) * shape).T @ basis, full_matrices=False)
+    keep = size > UNBENT * size.max()
+    rows: Floats = size[keep, None] * turn[keep]
+    return rows
+
+
+def _stiffness(stator: StatorModel, along: Floats, reduced: ReducedModel) -> float:
+    """Static stiffness of a stator's tip along its axis, N/m; on a rigid wall that of the rotor."""
+    if stator.axial_compliance > 0.0:
+        return 1.0 / stator.axial_compliance
+    return float(1.0 / (along @ np.linalg.solve(reduced.stiffness, along)))
+
+
+def _leverage(row: Floats, reduced: ReducedModel) -> Floats:
+    """Bending displacements where a static lateral force moves the tip by 1 m, (q, b)."""
+    shape = np.linalg.solve(reduced.stiffness, row[:, ACROSS].T)  # (n, q)
+    leverage = np.zeros((len(row), row.shape[1] - BENDING - 1))
+    for i, those in enumerate(row):
+        moved = those @ shape[:, i]
+        leverage[i] = np.abs(moved[BENDING:-1]) / moved[ACROSS] if moved[ACROSS] > 0.0 else 0.0
+    return leverage
+
+
+def tabulate_curved(
+    mode: ContactMode,
+    reduced: ReducedModel,
+    row: Floats,
+    directions: tuple[Floats, Floats],
+    *,
+    width: int,
+    tick: float,
+    n_level: int,
+) -> CurvedTables:
+    """Tables of one mode, (1, ...) each, its coordinates padded to `width`.
+
+    Parameters
+    ----------
+    row : (q, 3 + b, n)
+        `motion_rows`.
+    directions : (q, n), (q, n)
+        Gap Jacobian Q and contact-force directions P with the fixed normal. `E = P (Q P)^-1` moves the gaps
+        of the closed pairs and, projected as contact forces are, nothing else.
+    n_level : int
+        As in `mode_library.ModeLibrary`.
+    """
+    n, q, end = reduced.stiffness.shape[0], len(row), mode.exponent.size
+    closed = [i for i in range(q) if mode.mask >> i & 1]
+    exponent = np.zeros(width, dtype=complex)
+    exponent[:end] = mode.exponent
+    motion = np.zeros((2 * n, width), dtype=complex)
+    motion[:, :end] = mode.motion
+    force = np.zeros(width, dtype=complex)
+    force[mode.n_eigenmode] = 1.0
+    phasor = reduced.force[0] - 1j * reduced.force[1]
+    free = -reduced.stiffness @ motion[:n] - reduced.damping @ motion[n:] + np.outer(phasor, force)
+    rate, along = directions[0][closed], directions[1][closed].T
+    shift = np.zeros((q, n))
+    if closed:
+        shift[closed] = np.linalg.solve((rate @ along).T, along.T)
+    elastic, damped = reduced.stiffness @ shift.T, reduced.damping @ shift.T
+    d = row.shape[1] - 1
+    flat = row[:, :d]
+    read = np.concatenate([flat @ motion[:n], row @ motion[n:], flat @ free], axis=1)
+    project = np.eye(n) - shift[closed].T @ rate
+    load = np.zeros((q, d + 2, width), dtype=complex)
+    entry = mode.enter[:, n:] @ project
+    for i in closed:
+        columns = [elastic[:, i], damped[:, i], *flat[i]]
+        load[i, :, : mode.n_eigenmode] = (entry @ np.array(columns).T).T
+    n_level = min(n_level, max(1, int(np.log2(LONGEST_STEP / tick))))
+    weight = np.array([_weights(exponent, tick * 2.0**level) for level in range(n_level)])
+    growth = np.exp(np.maximum(exponent.real, 0.0) * tick * 2.0 ** (n_level - 1))
+    inverse = np.divide(1.0, exponent, out=np.zeros_like(exponent), where=exponent != 0.0)
+    reach = np.zeros((n_level, 2, 3, read.shape[1], d + 2))
+    if q == 1 and closed:
+        reach = np.einsum("rm,lakm,jm->lakrj", read[0], weight, load[0], optimize=True).real
+    table = CurvedTables(
+        read_re=read.real,
+        read_im=read.imag,
+        bound=np.abs(flat @ motion[:n]) * np.abs(exponent) ** 2 * growth,
+        shift=shift,
+        moved=row @ shift.T,
+        accel=flat @ elastic,
+        accel_rate=flat @ damped,
+        load_re=load.real,
+        load_im=load.imag,
+        weight_re=weight.real,
+        weight_im=weight.imag,
+        reach=reach,
+        half_re=np.exp(0.5 * exponent * tick).real,
+        half_im=np.exp(0.5 * exponent * tick).imag,
+        inverse_re=inverse.real,
+        inverse_im=inverse.imag,
+    )
+    fields: list[Any] = [np.array(field[None], order="C") for field in table]
+    return CurvedTables(*fields)
+
+
+def _outputs(reduced: ReducedModel) -> Floats:
+    """Rows of outputs, as `kernels.contact_modes` numbers them, of displacements and their derivatives."""
+    still = np.zeros_like(reduced.output[:1])
+    rows = [[one, 0 * one, 0 * one] for one in reduced.output]
+    rows += [[0 * one, one, 0 * one] for one in reduced.output]
+    rows.append([still[0], still[0], reduced.output[2]])
+    places = [degree[[AXIAL, LATERAL]] for degree in reduced.degree] + list(reduced.carrier)
+    for axial, lateral in places:
+        rows += [[axial, 0 * axial, 0 * axial], [lateral, 0 * lateral, 0 * lateral]]
+        rows.append([0 * lateral, lateral, 0 * lateral])
+    rows += [list(one) for one in np.swapaxes(reduced.probe, 0, 1)]
+    return np.ascontiguousarray(np.swapaxes(np.array(rows), 0, 1))
+
+
+def _weights(exponent: Complexes, step: float) -> Complexes:
+    """Response in the middle and at the end of a step to loads at its three nodes, (2, 3, m), s.
+
+    That of a coordinate with the exponent l to the load (s / h)^k is `h c^(k+1) k! phi_(k+1)(c l h)` at the
+    time c h.
+    """
+    weights = np.zeros((2, 3, exponent.size), dtype=complex)
+    for a, share in enumerate((0.5, 1.0)):
+        phi = phi_functions(share * step * exponent)
+        for power, factorial in enumerate((1.0, 1.0, 2.0)):
+            term = step * share ** (power + 1) * factorial * phi[power]
+            weights[a] += np.outer(_PARABOLAS[:, power], term)
+    return weights
+
+
+def phi_functions(x: Complexes) -> Complexes:
+    """phi_1, phi_2, phi_3 (3, m): `phi_k = (phi_(k-1) - 1 / (k - 1)!) / x`, phi_0 the exponential."""
+    phi = np.zeros((3, x.size), dtype=complex)
+    is_small = np.abs(x) < 1.0
+    small, large = x[is_small], x[~is_small]
+    for k in range(3):
+        term = np.full(small.shape, 1.0 / float(np.prod(np.arange(1.0, k + 2))), dtype=complex)
+        total = term.copy()
+        for j in range(1, 20):
+            term = term * small / (k + 1 + j)
+            total += term
+        phi[k, is_small] = total
+    before, inverse_factorial = np.exp(large), 1.0
+    for k in range(3):
+        before = (before - inverse_factorial) / large
+        phi[k, ~is_small] = before
+        inverse_factorial /= k + 1
+    return phi

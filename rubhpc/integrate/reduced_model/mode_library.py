@@ -1,0 +1,269 @@
+"""The contact modes of a reduced model, solved and tabulated when the event-driven march first meets them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.reduced_model.contact_mode import ContactMode, count_coordinates, solve_contact_mode
+from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, solve_friction_mode
+from rubhpc.integrate.reduced_model.mode_tables import MOST_MODES, TableStack, tabulate
+from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
+from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
+from rubhpc.kernels.friction_states import FORWARD
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+    from rubhpc.integrate.reduced_model.contact_mode import Solved
+    from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
+    from rubhpc.kernels import contact_modes as kernel
+
+    Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
+
+LANES = 8  # coordinates are padded to whole vectors
+# Coordinates that a set of several contacts may have beyond any single one. The width is settled before the
+# first case: that of the tables decides in which order sums are taken, and so the last bits of every case.
+SPARE = 8
+MOST_FRICTION_MODES = 1024  # sets of states of one speed and friction: up to four for each of closed pairs
+
+
+class ModeLibrary:
+    """Contact modes of one speed and friction, solved when first met and shared by all cases.
+
+    Parameters
+    ----------
+    opened : ContactMode
+        That with every pair open, which friction does not change.
+    known : Solved
+        The parts of the open set.
+    tick : float, s
+    sample_level, n_level : int
+        2^sample_level ticks are the interval of samples; exponentials are tabulated over 1, 2, ...,
+        2^(n_level - 1) ticks.
+    """
+
+    def __init__(
+        self,
+        reduced: ReducedModel,
+        model: Model,
+        friction: float,
+        *,
+        opened: ContactMode,
+        known: Solved,
+        tick: float,
+        sample_level: int,
+        n_level: int,
+    ) -> None:
+        """Start with every pair open; of one pair also with it closed."""
+        self.reduced = reduced
+        self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
+        self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
+        self._opened, self._known = opened, known
+        q = len(self.gap_jacobian)
+        self.first_masks = [0] if q > 1 else [0, self._closed]
+        modes = [self._solved(mask) for mask in self.first_masks]
+        self.width = self._width([mode.exponent.size for mode in modes])
+        self._tables = TableStack(1 + q, self._most_modes)
+        self.masks = [mode.mask for mode in modes]
+        self._exponents: dict[int, tuple[Floats, Floats]] = {}
+        for mode in modes:
+            self._tabulate(mode)
+
+    @property
+    def n_most(self) -> int:
+        """Contact modes that there is room for."""
+        return self._tables.n_most
+
+    @property
+    def is_full(self) -> bool:
+        """Whether there is no room for another contact mode."""
+        return len(self.masks) >= self.n_most
+
+    def add(self, mask: int) -> bool:
+        """Solve the mode with these pairs closed; returns whether the tables are wide enough for it."""
+        mode = self._solved(mask)
+        if mode.exponent.size > self.width:
+            return False
+        self.masks.append(mask)
+        self._tabulate(mode)
+        return True
+
+    def forget(self) -> None:
+        """Make room: keep no mode but that with every pair open."""
+        self._tables.clear()
+        self._exponents.clear()
+        self.masks = [0]
+        self._tabulate(self._opened)
+
+    def tables(self) -> kernel.ModeTables:
+        """All contact modes as arrays."""
+        tables: kernel.ModeTables = self._tables.view()
+        return tables
+
+    def exponents(self, mask: int) -> tuple[Floats, Floats]:
+        """Of the coordinates of a mode, 1/s: (2, m), real and imaginary, and the drift (m,) of those of 0."""
+        return self._exponents[mask]
+
+    _most_modes = MOST_MODES
+    _closed = 1  # set of one pair that is closed
+
+    def _width(self, sizes: list[int]) -> int:
+        """Width of tables for modes of these sizes and any set that is met later."""
+        return padded_width(max(sizes), len(self.gap_jacobian))
+
+    def _solved(self, mask: int) -> ContactMode:
+        if mask == 0:
+            return self._opened
+        return solve_contact_mode(self.reduced, self.gap_jacobian, self.force_direction, mask, self._known)
+
+    def _slip_rows(self) -> Floats:
+        """Slip speed with the motion of each pair that the switch functions do not hold."""
+        return self.slip
+
+    def _friction_of(self, mode: ContactMode) -> Complexes | None:
+        """Friction forces on the motion with each coordinate of a mode (n, m), N; None: not counted."""
+        closed = [i for i in range(len(self.gap_jacobian)) if mode.mask >> i & 1]
+        friction: Complexes = (self.force_direction - self.gap_jacobian)[closed].T @ mode.switch[closed]
+        return friction
+
+    def _tabulate(self, mode: ContactMode) -> None:
+        n_blank = self.width - mode.exponent.size
+        exponent = np.pad(np.stack([mode.exponent.real, mode.exponent.imag]), ((0, 0), (0, n_blank)))
+        self._exponents[mode.mask] = exponent, np.pad(mode.drift, (0, n_blank))
+        self._tables.add(self._tables_of(mode, self.reduced))
+
+    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
+        """Tables of one mode."""
+        return tabulate(
+            mode,
+            reduced,
+            self._slip_rows(),
+            friction=self._friction_of(mode),
+            width=self.width,
+            tick=self._tick,
+            sample_level=self._sample_level,
+            n_level=self._n_level,
+        )
+
+
+class PenaltyLibrary(ModeLibrary):
+    """Contact modes of pairs that press, by spring and damper, or are lifted; masks hold q bits for each.
+
+    What dampers take and springs hold is counted with the loss by damping.
+    """
+
+    def __init__(
+        self,
+        reduced: ReducedModel,
+        model: Model,
+        friction: float,
+        *,
+        penalty: Penalty,
+        opened: ContactMode,
+        known: Solved,
+        tick: float,
+        sample_level: int,
+        n_level: int,
+    ) -> None:
+        """Start as `ModeLibrary` does."""
+        self._penalty = penalty
+        super().__init__(
+            reduced,
+            model,
+            friction,
+            opened=opened,
+            known=known,
+            tick=tick,
+            sample_level=sample_level,
+            n_level=n_level,
+        )
+
+    def _solved(self, mask: int) -> ContactMode:
+        return solve_penalty_mode(self.reduced, self._penalty, self._opened, mask, self._known)
+
+    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
+        tables = super()._tables_of(mode, self._penalty.damped(reduced, mode.mask))
+        tables.loss[0] += self._penalty.stored_energy(mode, self.width)
+        return tables
+
+
+class FrictionLibrary(ModeLibrary):
+    """Contact modes of pairs that slide in either sense or stick; masks hold two bits a pair.
+
+    Under a penalty they hold a third, and its springs and dampers are counted as in `PenaltyLibrary`.
+    """
+
+    _most_modes = MOST_FRICTION_MODES
+
+    def __init__(
+        self,
+        reduced: ReducedModel,
+        model: Model,
+        pairs: FrictionPairs,
+        *,
+        opened: FrictionMode,
+        known: Solved,
+        tick: float,
+        sample_level: int,
+        n_level: int,
+    ) -> None:
+        """Start as `ModeLibrary` does, with one pair sliding forward."""
+        self._pairs = pairs
+        super().__init__(
+            reduced,
+            model,
+            pairs.friction,
+            opened=opened,
+            known=known,
+            tick=tick,
+            sample_level=sample_level,
+            n_level=n_level,
+        )
+
+    _closed = FORWARD
+
+    def _width(self, sizes: list[int]) -> int:
+        return -(-(max(sizes) + SPARE) // LANES) * LANES
+
+    def _solved(self, mask: int) -> ContactMode:
+        if mask == 0:
+            return self._opened
+        return solve_friction_mode(self.reduced, self._pairs, mask, self._known)
+
+    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
+        if not self._pairs.stiffness:
+            return super()._tables_of(mode, reduced)
+        tables = super()._tables_of(mode, self._pairs.damped(reduced, mode.mask))
+        tables.loss[0] += self._pairs.stored_energy(mode, self.width)
+        return tables
+
+    def _slip_rows(self) -> Floats:
+        return self.slip[:0]
+
+    def _friction_of(self, mode: ContactMode) -> Complexes | None:
+        assert isinstance(mode, FrictionMode)
+        return mode.friction_forces(self._pairs)
+
+
+def padded_width(widest: int, q: int) -> int:
+    """Width of tables for modes of q pairs, up to one of this size; of more pairs the open mode is taken.
+
+    Closing a gap removes a degree of freedom. It adds a coordinate only where a vibration becomes two decays.
+    """
+    return -(-(widest + (SPARE if q > 1 else 0)) // LANES) * LANES
+
+
+def width_without_modes(reduced: ReducedModel, model: Model, friction: float, n_open: int) -> int:
+    """Return the width that the tables of a library would have, which solves no contact mode for it.
+
+    `n_open` is the number of coordinates with every pair open.
+    """
+    gap_jacobian, force_direction, _ = directions(reduced, model, friction)
+    q = len(gap_jacobian)
+    if q > 1:
+        return padded_width(n_open, q)
+    return padded_width(max(n_open, count_coordinates(reduced, gap_jacobian, force_direction, 1)), q)

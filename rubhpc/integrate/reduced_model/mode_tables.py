@@ -1,0 +1,247 @@
+"""A mode as the kernel takes it: its tables, and the room in which those of many contact modes stand."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
+
+from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
+from rubhpc.kernels import contact_modes as kernel
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
+
+    Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
+
+MOST_MODES = 1024  # sets of closed contacts of one speed and friction
+FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
+MOST_BYTES = 2**30  # of their tables
+GONE = -40.0  # exponent of what has died away
+STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
+
+
+class TableStack:
+    """Tables of contact modes of one width, one after the other.
+
+    Attributes
+    ----------
+    n_most : int
+        ModeTables that there is room for: those of every pair closed by itself, and of as many more sets as
+        `n_most` and `MOST_BYTES` allow.
+    """
+
+    def __init__(self, n_least: int, n_most: int = MOST_MODES) -> None:
+        self.n_most = max(n_least, n_most)
+        self._n_least, self._n_filled = n_least, 0
+        self._room: list[Any] = []
+        self._view: Any = None
+
+    def add(self, row: Any) -> None:
+        """Take in the tables of a mode, a named tuple of (1, ...) each."""
+        rows: list[Any] = list(row)
+        if not self._room:
+            n_bytes = sum(field.nbytes for field in rows)
+            self.n_most = max(self._n_least, min(self.n_most, MOST_BYTES // n_bytes))
+            n_room = min(self._n_least, FIRST_ROOM)
+            self._room = [np.empty((n_room, *field.shape[1:]), field.dtype) for field in rows]
+            self._kind = type(row)
+        elif self._n_filled == len(self._room[0]):  # twice the room: most books never need it
+            n_room = min(2 * self._n_filled, self.n_most)
+            self._room = [np.resize(field, (n_room, *field.shape[1:])) for field in self._room]
+        for field, new in zip(self._room, rows, strict=True):
+            field[self._n_filled] = new[0]
+        self._n_filled += 1
+        self._view = None
+
+    def clear(self) -> None:
+        """Give all room back to contact modes to come."""
+        self._n_filled, self._view = 0, None
+
+    def view(self) -> Any:
+        """The tables of all contact modes."""
+        if self._view is None:
+            self._view = self._kind(*(field[: self._n_filled] for field in self._room))
+        return self._view
+
+
+def tabulate(
+    mode: ContactMode,
+    reduced: ReducedModel,
+    slip: Floats,
+    *,
+    friction: Complexes | None = None,
+    width: int,
+    tick: float,
+    sample_level: int,
+    n_level: int,
+) -> kernel.ModeTables:
+    """Tables of one mode, (1, ...) each, its coordinates padded to `width`.
+
+    Parameters
+    ----------
+    slip : (q, n)
+        Slip speed of each pair with the motion; none where the switch functions hold it.
+    friction : (n, m), N, optional
+        Friction forces on the motion with each coordinate; what they take is counted with the damping.
+    tick : float, s
+    sample_level, n_level : int
+        As in `mode_library.ModeLibrary`.
+    """
+    n, m = reduced.stiffness.shape[0], width
+    end, n_filled = mode.exponent.size, len(mode.enter)
+    exponent, used = np.zeros(m, dtype=complex), np.zeros(m, dtype=bool)
+    motion, enter = np.zeros((2, 2 * n, m), dtype=complex)
+    switch = np.zeros((len(mode.switch), m), dtype=complex)
+    take_off = np.zeros((len(mode.take_off), m), dtype=complex)
+    exponent[:end], used[:end] = mode.exponent, True
+    motion[:, :end], switch[:, :end] = mode.motion, mode.switch
+    enter[:, :n_filled], take_off[:, :n_filled] = mode.enter.T, mode.take_off
+    steps = tick * 2.0 ** np.arange(n_level)
+    growth = np.exp(np.maximum(exponent.real, 0.0) * steps[-1])
+    power = np.exp(exponent * steps[:, None]) * used
+    rate = switch * exponent
+    sliding = slip @ motion[n:]
+    growing = Growth()
+    if isinstance(mode, FrictionMode):
+        growing = Growth(
+            np.flatnonzero(mode.growth),
+            mode.growth[mode.growth != 0.0],
+            mode.n_eigenmode + 1 + len(mode.switch) // 2,
+        )
+        rate[:, growing.steady] += switch[:, growing.which] @ growing.speed
+    rubbing = np.zeros((n, m), dtype=complex)
+    if friction is not None:
+        rubbing[:, :end] = friction
+    loss, work, steady_power = _energies(reduced, exponent, motion, rubbing, mode.n_eigenmode, growing)
+    halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q or more, 2, m)
+    row = kernel.ModeTables(
+        mask=np.array(mode.mask),
+        n_eigenmode=np.array(mode.n_eigenmode),
+        switch_re=switch.real,
+        switch_im=switch.imag,
+        rate_re=rate.real,
+        rate_im=rate.imag,
+        bound=np.abs(switch) * np.abs(exponent) ** 2 * growth,
+        pace=np.where(exponent.real * tick * 2**kernel.FORCED_LEVEL < GONE, kernel.DYING, np.abs(exponent)),
+        power_re=power.real,
+        power_im=power.imag,
+        output=_outputs(reduced, exponent, motion, tick * 2.0**sample_level),
+        slip_re=sliding.real,
+        slip_im=sliding.imag,
+        slip_rate_re=(sliding * exponent).real,
+        slip_rate_im=(sliding * exponent).imag,
+        motion_re=motion.real,
+        motion_im=motion.imag,
+        enter_re=enter.real,
+        enter_im=enter.imag,
+        enter_cosine=halves[0],
+        enter_sine=halves[1],
+        enter_constant=halves[2:],
+        loss=loss,
+        work_re=work.real,
+        work_im=work.imag,
+        steady_power=steady_power,
+    )
+    fields: list[Any] = [np.array(field[None], order="C") for field in row]
+    return kernel.ModeTables(*fields)
+
+
+class Growth(NamedTuple):
+    """Coordinates that grow linearly, in a mode in which pairs stick."""
+
+    which: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+    speed: NDArray[np.float64] = np.zeros(0)  # 1/s times their unit
+    steady: int = -1  # the coordinate that is 1
+
+
+def _outputs(reduced: ReducedModel, exponent: Complexes, motion: Complexes, interval: float) -> Floats:
+    """Output rows (`kernels.contact_modes`) at coming samples, `interval` (s) apart: (2 m, samples o)."""
+    n = reduced.stiffness.shape[0]
+    displacement, rate = reduced.output @ motion[:n], reduced.output @ motion[n:]
+    rows = [displacement, rate, rate[2:] * exponent]
+    for degree in reduced.degree:
+        rows += [degree[[AXIAL, LATERAL]] @ motion[:n], degree[[LATERAL]] @ motion[n:]]
+    for carrier in reduced.carrier:  # as axial and lateral
+        rows += [carrier @ motion[:n], carrier[[1]] @ motion[n:]]
+    positions, rates, accelerations = reduced.probe
+    rows.append(positions @ motion[:n] + rates @ motion[n:] + (accelerations @ motion[n:]) * exponent)
+    later = interval * np.arange(kernel.SAMPLES_AT_ONCE)
+    ahead = np.concatenate(rows) * np.exp(exponent * later[:, None])[:, None]  # (sample, o, m)
+    table = ahead.reshape(-1, exponent.size).T
+    return np.concatenate([table.real, -table.imag])
+
+
+def _energies(
+    reduced: ReducedModel,
+    exponent: Complexes,
+    motion: Complexes,
+    friction: Complexes,
+    n_eigenmode: int,
+    growing: Growth,
+) -> tuple[Floats, Complexes, Floats]:
+    """Primitives of the powers of damping and unbalance: (2 m, 2 m), (2, m) and steady (2,), W.
+
+    With the damping counts `friction` (n, m), whose power on the motion is what the drive gives for it less
+    what it turns into heat.
+    Products of two coordinates go as exp((l_k + l_j) t) or exp((l_k + conj l_j) t). What has no primitive
+    among them is steady: that of the unbalance response with itself. Undamped modes have none either,
+    and nothing to lose.
+    """
+    n = reduced.stiffness.shape[0]
+    skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
+    shape, rate = motion[:n], motion[n:]
+    resisting = reduced.damping @ rate + skew @ shape - friction
+    phasor = reduced.force[0] - 1j * reduced.force[1]
+    turning = np.full(exponent.shape, 1j * reduced.spin)
+    forms = []
+    for partner, other in ((resisting, exponent), (resisting.conj(), exponent.conj())):
+        form = _primitive(rate.T @ partner, exponent[:, None] + other)
+        if growing.which.size:
+            _follow_growth(form, rate.T @ partner, exponent, n_eigenmode, growing)
+        forms.append(form)
+    with_itself, with_conjugate = forms
+    loss = 0.5 * np.block(
+        [
+            [(with_itself + with_conjugate).real, (with_conjugate - with_itself).imag],
+            [-(with_itself + with_conjugate).imag, (with_conjugate - with_itself).real],
+        ]
+    )
+    work = 0.5 * np.stack(
+        [
+            _primitive(phasor @ rate, exponent + turning),
+            _primitive(phasor.conj() @ rate, exponent - turning),
+        ]
+    )
+    response = rate[:, n_eigenmode]
+    steady = np.array([response @ resisting[:, n_eigenmode].conj(), response @ phasor.conj()])
+    if growing.which.size:
+        steady[0] += 2.0 * rate[:, growing.steady] @ resisting[:, growing.steady]
+    return 0.5 * (loss + loss.T), work, 0.5 * steady.real
+
+
+def _follow_growth(
+    form: Complexes, power: Complexes, exponent: Complexes, n_eigenmode: int, growing: Growth
+) -> None:
+    """Correct primitives for coordinates that grow: `int z phi = z phi / l - phi' z / l^2`.
+
+    Products of the coordinate that is 1 go as phi / phi' with a clearance, as phi^2 / (2 phi') with phi; that
+    with itself is left to the steady power.
+    """
+    moving, one = slice(n_eigenmode + 1), growing.steady
+    for phi, speed in zip(growing.which, growing.speed, strict=True):
+        form[moving, one] -= speed * power[moving, phi] / exponent[moving] ** 2
+        form[phi, phi] += 0.5 * power[one, phi] / speed
+    first, speed = growing.which[0], growing.speed[0]
+    clearances = slice(n_eigenmode + 1, one)
+    form[first, clearances] += power[one, clearances] / speed
+
+
+def _primitive(power: Complexes, exponent: Complexes) -> Complexes:
+    """Power over its exponent, 1/s; zero where that is zero."""
+    has_one = np.abs(exponent) > STEADY * np.abs(exponent).max()
+    return np.divide(power, exponent, out=np.zeros_like(power), where=has_one)

@@ -1,0 +1,113 @@
+"""Motion of a reduced model with springs and dampers of a penalty in some of its pairs, in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rubhpc.integrate.reduced_model.contact_mode import ContactMode, modes_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.reduced_model.contact_mode import Solved
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
+
+    Floats = NDArray[np.float64]
+
+
+class Penalty(NamedTuple):
+    """The q pairs of a penalty, as reduced coordinates see them."""
+
+    stiffness: float  # N/m
+    damping: float  # N s/m
+    gap_jacobian: Floats  # (q, n)
+    force_direction: Floats  # (q, n), force of a unit contact force, friction included
+
+    def pressed(self, mask: int) -> list[int]:
+        """Pairs that press in a set of states."""
+        return [i for i in range(len(self.gap_jacobian)) if mask >> i & 1]
+
+    def lifted(self, mask: int) -> list[int]:
+        """Pairs whose gap is still overlapped though the damper has ended their force."""
+        q = len(self.gap_jacobian)
+        return [i for i in range(q) if mask >> q + i & 1]
+
+    def damped(self, reduced: ReducedModel, mask: int) -> ReducedModel:
+        """The model with the dampers of the pairs that press; what friction makes of them is no damping."""
+        return damped(reduced, self.damping, self.gap_jacobian[self.pressed(mask)])
+
+    def stored_energy(self, mode: ContactMode, width: int) -> Floats:
+        """Energy of the springs that press, J, as a form of the coordinates of a mode: (2 width, 2 width)."""
+        return stored_energy(self.stiffness, self.gap_jacobian, self.pressed(mode.mask), mode, width)
+
+
+def solve_penalty_mode(
+    reduced: ReducedModel, penalty: Penalty, opened: ContactMode, mask: int, known: Solved | None = None
+) -> ContactMode:
+    """Solve the linear system with the pairs of `mask` pressed; bits from q on are those that are lifted.
+
+    With `Q` the gap Jacobian and `P` the contact-force directions of the pressed pairs, it is that of
+    `K + k P Q` and `C + c P Q` under the load `-k P` of their clearances. The switch function of a pressed
+    pair is its force, of an open one its gap, of a lifted one the tension that its spring and damper would
+    have. `opened` is the mode in which every pair is open.
+    """
+    pressed, lifted = penalty.pressed(mask), penalty.lifted(mask)
+    n, q = reduced.stiffness.shape[0], len(penalty.gap_jacobian)
+    if pressed:
+        rows, directions = penalty.gap_jacobian[pressed], penalty.force_direction[pressed].T
+        stiffness = reduced.stiffness + penalty.stiffness * directions @ rows
+        damping = reduced.damping + penalty.damping * directions @ rows
+        system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
+        exponent, shape, inverse = modes_of(system, known)
+        phasor = reduced.force[0] - 1j * reduced.force[1]
+        turned = 1j * reduced.spin * np.eye(2 * n) - system
+        response = np.linalg.solve(turned, np.concatenate([np.zeros(n), phasor]))
+        still = np.zeros((2 * n, q))
+        still[:n, pressed] = -penalty.stiffness * np.linalg.solve(stiffness, directions)
+        mode = replace(
+            opened,
+            mask=mask,
+            exponent=np.concatenate([exponent, [1j * reduced.spin], np.zeros(q)]),
+            motion=np.hstack([shape, response[:, None], still]),
+            enter=inverse,
+            take_off=np.vstack([inverse @ response.real, -inverse @ response.imag, (inverse @ still).T]),
+        )
+    else:
+        mode = replace(opened, mask=mask)
+    clear = np.hstack([np.zeros((q, mode.exponent.size - q)), np.eye(q)])
+    switch = penalty.gap_jacobian @ mode.motion[:n] + clear
+    tension = penalty.stiffness * switch + penalty.damping * (penalty.gap_jacobian @ mode.motion[n:])
+    switch[pressed], switch[lifted] = -tension[pressed], tension[lifted]
+    return replace(mode, switch=switch)
+
+
+def damped(reduced: ReducedModel, damping: float, along: Floats) -> ReducedModel:
+    """Return the model with dampers (N s/m) along gaps (k, n); what friction makes of them is no damping."""
+    return replace(reduced, damping=reduced.damping + damping * along.T @ along)
+
+
+def stored_energy(
+    stiffness: float, gap_jacobian: Floats, pressed: list[int], mode: ContactMode, width: int
+) -> Floats:
+    """Return the energy of springs (N/m) in the pairs that press, J, as a form of a mode's coordinates.
+
+    It is (2 width, 2 width), for their real and imaginary parts.
+    """
+    form = np.zeros((2 * width, 2 * width))
+    for row in overlap_rows(gap_jacobian, pressed, mode, width):
+        form += 0.5 * stiffness * np.outer(row, row)
+    return form
+
+
+def overlap_rows(gap_jacobian: Floats, pressed: list[int], mode: ContactMode, width: int) -> Floats:
+    """Return the gaps of the pairs that press by the coordinates of a mode, (pressed, 2 width), m."""
+    n = gap_jacobian.shape[1]
+    rows = np.zeros((len(pressed), 2, width))
+    for row, i in zip(rows, pressed, strict=True):
+        gap = gap_jacobian[i] @ mode.motion[:n]
+        gap[mode.n_eigenmode + 1 + i] += 1.0
+        row[0, : gap.size], row[1, : gap.size] = gap.real, -gap.imag
+    return rows.reshape(len(pressed), 2 * width)

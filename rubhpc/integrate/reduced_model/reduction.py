@@ -1,0 +1,221 @@
+"""Galerkin reduction: the lowest modes of each body and residual attachment modes, with unit mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
+from rubhpc.integrate.reduced_model.coupling import coupled_rows
+from rubhpc.integrate.reduced_model.standstill import Modes, at_standstill, parted, seen_degrees
+from rubhpc.integrate.reduced_model.truncation import kept_modes
+from rubhpc.kernels.contact_modes import Reduced
+from rubhpc.kernels.contact_pairs import N_DEGREE, TORSION, V, W, rim_sense
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.free_spin import FreeSpin
+    from rubhpc.fem.model import Model
+    from rubhpc.kernels.laws import Law
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+# Static response to a damper, as a share of the mode that it slows, times sqrt(accuracy), that is left out:
+# the mode's exponent errs by the square.
+LEAST_RESPONSE = 0.1
+UNSEEN = 1e-9  # relative motion or coupling below which a mode is taken for unseen
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReducedModel:
+    """A model at one speed in n reduced coordinates with the identity for a mass matrix.
+
+    Attributes
+    ----------
+    basis : (n_all, n)
+        Degrees of rotor, then stators, for unit coordinates.
+    mass : (n_all, n_all)
+        Mass matrix of the full model.
+    stiffness, damping : (n, n)
+        K and D + spin G.
+    force : (2, n)
+        Cosine and sine part of the unbalance force.
+    degree : (q, 5, n)
+        Each pair's degrees (v, w, torsion, axial, lateral); zero where held.
+    output : (3, n)
+        Vertical, horizontal and torsional displacement of the output node.
+    carrier : (n_place, 2, n)
+        Vertical and horizontal displacement of each carrier, then zero and the rotation of those that turn.
+    probe : (3, n_probe, n)
+        What each probe sees of displacements, velocities and accelerations.
+    """
+
+    spin: float
+    basis: Floats
+    mass: Floats
+    stiffness: Floats
+    damping: Floats
+    force: Floats
+    degree: Floats
+    output: Floats
+    carrier: Floats
+    probe: Floats
+
+    @cached_property
+    def translations(self) -> Floats:
+        """Lateral motion of the output node, then of the rims (`divergence.judged_nodes`), (2 + 2 q, n)."""
+        return np.concatenate([self.output[:2], self.degree[:, [V, W]].reshape(-1, self.degree.shape[2])])
+
+    @cached_property
+    def project(self) -> Floats:
+        """`basis.T @ mass` (n, n_all), which takes a motion to its coordinates."""
+        return self.basis.T @ self.mass
+
+
+def reduce_model(
+    model: Model, spin: float, accuracy: float, free_spin: FreeSpin | None = None
+) -> ReducedModel:
+    """Reduce a model so that contact and outputs are met to the accuracy asked for.
+
+    The basis of each uncoupled part holds its undamped modes at standstill that `truncation.kept_modes`
+    chooses, and residual attachment modes: the static responses of the others to a unit force on each degree
+    that contact or outputs see, or on those together that a probe sees, and to what dampers and cross-coupled
+    springs draw from the modes kept. Gyroscopic and damping terms are then projected. Modes that nothing sees
+    are left out.
+
+    Parameters
+    ----------
+    spin : float, rad/s
+    accuracy : float
+        Relative, of each signal and force (`truncation.modal_error`); on the packaged rig 1e-3 keeps
+        waveforms to about 1e-4.
+    free_spin : FreeSpin, optional
+        Where a drive turns the rotor: contacts then see rotations about the mean of rotor and drive.
+
+    Raises
+    ------
+    InputError
+        Where nothing holds a body: its constant response, on which the modal form of closed contacts rests,
+        does not exist.
+    """
+    mass, damping, stiffness, force = whole_system(model, spin)
+    degree, output, carrier = degrees_of(model), output_degrees(model), carrier_degrees(model)
+    standstill = at_standstill(model)
+    are_kept = kept_modes(model, spin, accuracy)
+    modes = [parted(part, is_kept) for part, is_kept in zip(standstill.parts, are_kept, strict=True)]
+    symmetric, seen = standstill.stiffness, seen_degrees(model)
+    kept = np.hstack([those.kept for those in modes])
+    frequency = np.concatenate([those.kept_frequency for those in modes])
+    drawn = np.hstack([0.5 * (damping + damping.T) @ kept, (stiffness - symmetric) @ (kept / frequency)])
+    least = LEAST_RESPONSE * np.sqrt(accuracy)
+    patterns = model.probe_patterns
+    basis = np.hstack([kept, *(_attachment_modes(those, seen, patterns, drawn, least) for those in modes)])
+    stiffness, damping = basis.T @ stiffness @ basis, basis.T @ damping @ basis
+    keep = np.flatnonzero(_visible(np.vstack([basis[seen], patterns.T @ basis]), stiffness, damping))
+    basis, pick = basis[:, keep], np.ix_(keep, keep)
+    at_contacts = np.where((degree >= 0)[:, :, None], basis[np.maximum(degree, 0)], 0.0)
+    if free_spin is not None:
+        at_contacts[:, TORSION] -= free_spin.share @ basis[: free_spin.share.size]
+    return ReducedModel(
+        spin=spin,
+        basis=basis,
+        mass=mass,
+        stiffness=stiffness[pick],
+        damping=damping[pick],
+        force=force @ basis,
+        degree=at_contacts,
+        output=np.where((output >= 0)[:, None], basis[np.maximum(output, 0)], 0.0),
+        carrier=np.where((carrier >= 0)[:, :, None], basis[np.maximum(carrier, 0)], 0.0),
+        probe=model.probe_rows @ basis,
+    )
+
+
+def _attachment_modes(modes: Modes, seen: Ints, patterns: Floats, drawn: Floats, least: float) -> Floats:
+    """Residual attachment modes: static responses of the modes not kept, (n_all, n_shape).
+
+    They are orthonormal in the mass, and respond to a unit force on each degree seen, to the `patterns`
+    (n_all, n_pattern) of forces and to those combinations of the forces `drawn` (n_all, n_force) from modes
+    at unit velocity whose strain energy is over `least`^2 of that mode's. Proportional damping draws none: it
+    does not couple modes.
+    """
+    if not modes.rest_frequency.size:
+        return modes.rest
+    response = modes.rest.T / modes.rest_frequency[:, np.newaxis]  # its square is twice the strain energy
+    turn, size, _ = np.linalg.svd(response @ drawn, full_matrices=False)
+    shape = (
+        np.hstack([response[:, seen], response @ patterns, turn[:, size > least]])
+        / modes.rest_frequency[:, np.newaxis]
+    )
+    length = np.linalg.norm(shape, axis=0)
+    shape = shape[:, length > 0.0] / length[length > 0.0]
+    size, mix = np.linalg.eigh(shape.T @ shape)
+    independent = size > 1e-8 * size[-1]
+    mixed: Floats = modes.rest @ (shape @ mix[:, independent] / np.sqrt(size[independent]))
+    return mixed
+
+
+def _visible(seen: Floats, stiffness: Floats, damping: Floats) -> NDArray[np.bool_]:
+    """Coordinates that move a seen degree, or that K or C couple to one that does."""
+    scale = np.sqrt(np.maximum(np.abs(np.diag(stiffness)), 1.0))
+    couples = np.abs(stiffness) > UNSEEN * np.outer(scale, scale)
+    couples |= np.abs(damping) > UNSEEN * np.sqrt(np.outer(scale, scale))
+    largest = np.abs(seen).max(axis=1, keepdims=True)
+    moves = np.any(np.abs(seen) > UNSEEN * np.maximum(largest, np.finfo(float).tiny), axis=0)
+    is_visible = np.zeros(len(couples), dtype=bool)
+    for rows in coupled_rows(couples):
+        is_visible[rows] = moves[rows].any()
+    return is_visible
+
+
+def kernel_bodies(
+    reduced: ReducedModel,
+    model: Model,
+    friction: float,
+    clearance: Floats,
+    law: Law,
+    displacement_limit: float,
+) -> Reduced:
+    """Return the reduced bodies of a case as kernels take them; clearance (q,) and limit in m."""
+    gap_jacobian, force_direction, slip = directions(reduced, model, friction)
+    radius = np.array([stator.radius for stator in model.stators])
+    return Reduced(
+        stiffness=reduced.stiffness,
+        damping=reduced.damping,
+        force_cosine=reduced.force[0].copy(),
+        force_sine=reduced.force[1].copy(),
+        gap_jacobian=gap_jacobian,
+        force_direction=force_direction,
+        delassus=gap_jacobian @ force_direction.T,
+        friction=np.full(clearance.size, friction),
+        radius=radius,
+        rim_speed=radius * abs(reduced.spin),
+        slip=slip,
+        restitution=law.restitution,
+        spring=law.stiffness,
+        damper=law.damping,
+        clearance=clearance,
+        translations=reduced.translations,
+        displacement_limit=displacement_limit,
+    )
+
+
+def directions(reduced: ReducedModel, model: Model, friction: float) -> tuple[Floats, Floats, Floats]:
+    """Rate of each gap, force of a unit contact, and slip, each (q, n), for the fixed normal.
+
+    With e the stator's axis and t = x_hat x e: the gap is `clearance + axial - e . (v, w)`; the disc feels
+    `-e - mu t` and `-mu r_d` in torsion, the tip the opposite (paper, Eqs. 4, 8-10, 19), with mu signed as
+    the spin; the slip speed is `sign(spin) (r_d (spin + thx') + t . (vA - vB))`.
+    """
+    angle = np.array([stator.angle for stator in model.stators])
+    radius = np.array([stator.radius for stator in model.stators])
+    ey, ez = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    v, w, torsion, axial, lateral = (reduced.degree[:, a] for a in range(N_DEGREE))
+    gap_jacobian = axial - ey * v - ez * w
+    along = lateral + ez * v - ey * w - radius[:, None] * torsion
+    sense = rim_sense(reduced.spin)
+    return gap_jacobian, gap_jacobian + sense * friction * along, -sense * along

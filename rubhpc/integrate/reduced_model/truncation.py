@@ -1,0 +1,170 @@
+"""How much of a motion lies in the modes that a reduced model leaves out, and which modes it has to keep."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rubhpc.integrate.packing import degrees_of, output_degrees, whole_system
+from rubhpc.integrate.reduced_model.standstill import at_standstill, completed, cutoff_frequency, modes_below
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+
+    Floats = NDArray[np.float64]
+    Bools = NDArray[np.bool_]
+
+MARGIN = 5.0  # estimates without it were up to 5.5 times too small: a case has many contacts, not one
+REBOUNDS = 3.0  # where modes are added, how much closer: a body that rebounds many times multiplies an error
+MOST_MODES = 400  # kept for the sake of the estimate; `cutoff_frequency` may ask for more
+
+
+class Ringing(NamedTuple):
+    """How strongly the n modes ring after a contact, in r signals and gaps."""
+
+    share: Floats  # (r, n), square of each mode's ring, less what its decay takes, over the sum for all modes
+    impact: float  # share of the closing momentum that the heaviest tip's own mass takes up at once
+
+
+def kept_modes(model: Model, spin: float, accuracy: float) -> list[Bools]:
+    """Which modes of each part are kept: those up to `cutoff_frequency`, and those that ring too much.
+
+    Where the estimated error (`modal_error`) without the modes above is beyond the accuracy, those with the
+    largest share in any signal or force are kept too, until it is within a third of the accuracy. All modes
+    are kept where a tip's own mass takes up more than the accuracy of the closing momentum: its impacts
+    excite modes of any frequency. At most MOST_MODES are kept for these reasons.
+    """
+    parts = at_standstill(model).parts
+    cutoff = cutoff_frequency(model, spin, accuracy)
+    are_kept = [modes_below(part, cutoff) for part in parts]
+    is_kept = np.concatenate(are_kept)
+    if is_kept.all():
+        return are_kept
+    ringing = ringing_of(model, spin)
+    is_struck = ringing.impact > accuracy
+    if not is_struck and modal_error(model, spin, are_kept) <= accuracy:
+        return are_kept
+    above = np.flatnonzero(~is_kept)
+    above = above[np.argsort(ringing.share[:, above].max(axis=0), kind="stable")]  # the least share first
+    lost = np.cumsum(ringing.share[:, above], axis=1).max(axis=0)
+    n_out = 0 if is_struck else np.count_nonzero(lost <= (accuracy / (REBOUNDS * MARGIN)) ** 2)
+    is_kept[above[max(n_out, is_kept.size - MOST_MODES) :]] = True
+    ends = np.cumsum([part.frequency.size for part in parts])[:-1]
+    return [completed(part, these) for part, these in zip(parts, np.split(is_kept, ends), strict=True)]
+
+
+def modal_error(model: Model, spin: float, are_kept: list[Bools]) -> float:
+    """Estimate the largest error of a signal or a force, as a share of it, by the modes left out.
+
+    A contact force is taken for a pulse at the contact frequency `w_c` (`standstill.Standstill`), with the
+    spectrum `G(w) = min(1, (w_c / w)^2 + b w_c / w + s)`. At touch the tip's own mass gives up the share s
+    of the closing momentum at once, and the force rises to that of a wave in the stator, b of its later peak.
+    A mode of frequency w whose place of contact moves by b, and whose place of a signal by a, rings with the
+    displacement `a b G(w) / w` there, and opens and closes the gap with the velocity `b^2 G(w)`; friction, as
+    large as the normal force, is a second force of that kind. A ring
+    counts as long as it lasts, over half a period of `w_c` at most: what is damped at once is followed by the
+    static shapes that stand for it. What it drives through dampers and gyroscopic terms rings with it
+    (`carried`). The error is the root of the sum of squares over the modes left out, over
+    that of all modes, times a margin.
+
+    Parameters
+    ----------
+    spin : float, rad/s
+    are_kept : list of (n,) bool
+        Of each part, the modes kept.
+
+    Returns
+    -------
+    float
+        0 where all modes are kept.
+    """
+    is_out = ~np.concatenate(are_kept)
+    if not is_out.any():
+        return 0.0
+    return MARGIN * float(np.sqrt((ringing_of(model, spin).share @ is_out).max()))
+
+
+def sufficient_accuracy(model: Model, spin: float) -> float:
+    """Accuracy, a power of ten, that puts `cutoff_frequency` above all modes, whatever their number."""
+    highest = max(float(part.frequency[-1]) for part in at_standstill(model).parts)
+    accuracy = 1e-3
+    while cutoff_frequency(model, spin, accuracy) < highest:
+        accuracy *= 0.1
+    return accuracy
+
+
+@lru_cache(maxsize=4)
+def ringing_of(model: Model, spin: float) -> Ringing:
+    """How strongly the modes of a model ring after contacts of any stator."""
+    standstill = at_standstill(model)
+    frequency = np.concatenate([part.frequency for part in standstill.parts])
+    mode = np.hstack([part.mode for part in standstill.parts])
+    drag = mode.T @ whole_system(model, spin)[1] @ mode
+    decay = np.maximum(0.5 * np.diag(drag), 0.0)  # 1/s, of each mode
+    lasting = 1.0 / (1.0 + np.pi * decay / standstill.contact_frequency)
+    signals = [mode[row] for row in output_degrees(model) if row >= 0]
+    rungs: list[Floats] = []
+    impact = 0.0
+    for stator, degree in zip(model.stators, degrees_of(model), strict=True):
+        v, w, twist, axial, lateral = (mode[row] if row >= 0 else np.zeros(frequency.size) for row in degree)
+        ey, ez = np.cos(stator.angle), np.sin(stator.angle)
+        across = ey * v + ez * w
+        impact = max(impact, impact_share(across, axial, frequency))
+        pulse = pulse_spectrum(across, axial, frequency, standstill.contact_frequency)
+        rung = np.array([*signals, axial, lateral]) * pulse / frequency
+        rungs.append(np.vstack([(across**2 + axial**2) * pulse, rung * (axial - across)]))
+        along = lateral + ez * v - ey * w - stator.radius * twist
+        rungs.append(np.vstack([np.zeros(frequency.size), rung * along]))
+    square = np.vstack(rungs) ** 2
+    square += square @ carried(drag, frequency) ** 2
+    square = square.reshape(len(model.stators), 2, -1, frequency.size).sum(axis=1).reshape(-1, frequency.size)
+    whole = square.sum(axis=1)
+    seen = whole > 0.0
+    return Ringing((square * lasting**2)[seen] / whole[seen, np.newaxis], impact)
+
+
+def carried(drag: Floats, frequency: Floats) -> Floats:
+    """How far a ring of each mode (row) moves the other modes (column), (n, n), relative to itself.
+
+    A mode of frequency w that moves at v forces another, of frequency w', by `-c v`, where c is their entry
+    of `drag` (n, n), 1/s. The other moves by `c w / |w'^2 - w^2|` of it, and in resonance as far. Above all
+    these are modes of the two planes, which gyroscopic terms couple.
+    """
+    pull = np.abs(drag.T) * frequency[:, np.newaxis]
+    apart = np.abs(frequency[:, np.newaxis] ** 2 - frequency**2)
+    np.fill_diagonal(pull, 0.0)
+    return np.divide(pull, apart + pull, out=np.zeros_like(pull), where=pull > 0.0)
+
+
+def pulse_spectrum(across: Floats, axial: Floats, frequency: Floats, contact_frequency: float) -> Floats:
+    """Spectrum (n,) of a contact force at the frequencies of the modes, relative to a slow one.
+
+    Parameters
+    ----------
+    across, axial : (n,)
+        What each mode moves the rotor at the place of contact, and the stator's tip, along the gap.
+    frequency : (n,), rad/s
+    contact_frequency : float, rad/s
+    """
+    ratio = contact_frequency / frequency
+    # A bar of mass m and stiffness k, hit at v, resists by v sqrt(k m) at first, later by v sqrt(k m_rotor);
+    # the inertia of its static shape is m / 3.
+    waves = max(static_inertia(axial, frequency) - 1.0 / float(axial @ axial), 0.0)
+    step = np.sqrt(3.0 * waves / static_inertia(across, frequency))
+    share = impact_share(across, axial, frequency)
+    return np.asarray(np.minimum(1.0, ratio**2 + step * ratio + share))
+
+
+def impact_share(across: Floats, axial: Floats, frequency: Floats) -> float:
+    """Share of the closing momentum that the tip's own mass takes up at once, by its modes (n,)."""
+    return float(1.0 / (1.0 + static_inertia(across, frequency) * (axial @ axial)))
+
+
+def static_inertia(moved: Floats, frequency: Floats) -> float:
+    """Inertia, kg, of the static shape under a force at the place that the modes move by `moved` (n,)."""
+    response = moved / frequency**2
+    return float((response @ response) / (moved @ response) ** 2) if np.any(response) else np.inf

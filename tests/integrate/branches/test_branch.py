@@ -1,0 +1,138 @@
+"""Branches on the packaged rig: derivatives, events, points that are motions, and refusals."""
+
+import numpy as np
+import pytest
+
+import rubhpc
+from rubhpc.errors import InputError
+from rubhpc.integrate.branches.point import Branching
+from rubhpc.integrate.initial_state import fit_to_gaps
+from rubhpc.integrate.periodic_motions.family import Family, Operation, flow
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+from rubhpc.study.contact_keys import Contact
+from rubhpc.study.tables import Integrator
+
+CASE = {"speed_ratio": 0.75, "friction": 0.3}
+ALONG = {"along": "clearance", "start": "100 um", "stop": "124 um", "largest_step": "4 um", "keep": ()}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return rubhpc.branch("mokhtar2017", period=2, **ALONG, **CASE)
+
+
+def contact_free_amplitude():
+    """Amplitude of the gap without contact, of the reduced model; cubics between steps err by 1.5e-8."""
+    setup, *_ = family_of("clearance", 1e-5).settings(1e-3)
+    bodies, spin = PiecewiseMotion(setup, 1e-3, 0.3, rubhpc.State.at_rest(setup.model)).bodies, setup.spin
+    dynamic = bodies.stiffness - spin**2 * np.eye(len(bodies.stiffness)) + 1j * spin * bodies.damping
+    phasor = np.linalg.solve(dynamic, bodies.force_cosine - 1j * bodies.force_sine)
+    return abs((bodies.gap_jacobian @ phasor)[0])
+
+
+def family_of(along, span):
+    return Family(
+        Operation(
+            rig=rubhpc.read_rig("mokhtar2017"), friction=0.3, speed_ratio=0.75, clearance=1e-4,
+            contact=Contact(), integrator=Integrator(), samples_per_revolution=256,
+        ),
+        along, span,
+    )  # fmt: skip
+
+
+def test_branches_end_where_the_contact_free_motion_grazes(found):
+    twice, once, other = found
+    assert [branch.period for branch in found] == [2, 1, 2]
+    assert [name for name, _ in twice.events()] == ["grazing", "grazing", "period_doubling"]
+    assert once.events()[-1] == ("grazing", pytest.approx(contact_free_amplitude(), rel=3e-8))
+    doubled = [value for name, value in once.events() if name == "period_doubling"]
+    assert [name for name, _ in other.events()] == ["period_doubling"]
+    assert (other.values.max(), twice.values.max()) == pytest.approx(doubled, rel=1e-8)
+    assert [branch.points[k].touches for branch, k in ((twice, 0), (once, 0), (once, -1))] == [2, 1, 0]
+
+
+def test_points_are_periodic_motions(found):
+    for branch in found[:2]:
+        for point in branch.points[:: len(branch.points) // 3]:
+            motion = rubhpc.periodic(
+                "mokhtar2017",
+                clearance=point.value,
+                period=branch.period,
+                initial=point.state,
+                keep=(),
+                **CASE,
+            )
+            assert (motion.iterations, motion.is_stable) == (0, point.is_stable)
+            assert motion.multipliers[0] == pytest.approx(point.multipliers[0], abs=1e-6)
+
+
+def test_stability_changes_at_events_alone(found):
+    for branch in found:
+        changes = np.flatnonzero(np.diff(branch.is_stable))
+        for k in changes:
+            assert {branch.points[k].event, branch.points[k + 1].event} != {"none"}
+
+
+@pytest.mark.long
+def test_a_branch_between_two_doublings_is_followed_once():
+    """P2 begins at a doubling right behind a grazing, has a fold and meets P1 at another doubling."""
+    once, twice = rubhpc.branch(
+        "mokhtar2017", along="speed_ratio", start=0.713, stop=0.752, clearance="100 um", friction=0.3,
+        largest_step=0.008, keep=(),
+    )  # fmt: skip
+    doubled = [value for name, value in once.events() if name == "period_doubling"]
+    assert len(doubled) == 2
+    names, values = zip(*twice.events(), strict=True)
+    assert names == ("period_doubling", "grazing", "grazing", "fold", "period_doubling")
+    assert values[::4] == pytest.approx(doubled, rel=1e-8)
+    assert values[3] == max(twice.values)
+
+
+def test_dataset_has_a_value_a_point(found):
+    data = found[1].to_dataset()
+    assert dict(data.sizes)["point"] == len(found[1].points)
+    assert np.array_equal(data.stability.values.astype(bool), found[1].is_stable)
+    assert data.clearance.values == pytest.approx(found[1].values)
+    moduli = np.hypot(data.multiplier_real, data.multiplier_imag)
+    assert data.largest_multiplier.values == pytest.approx(moduli[:, 0].values)
+    assert data.event.values.max() == 5
+
+
+@pytest.mark.parametrize("along", ["clearance", "clearance_ratio"])
+def test_derivative_by_the_clearance_is_that_of_two_flows(along):
+    family = family_of(along, 0.1 if along == "clearance_ratio" else 1e-5)
+    motion = rubhpc.periodic("mokhtar2017", clearance="100 um", period=2, keep=(), **CASE)
+    unit = motion.record.contact_free_amplitude if along == "clearance_ratio" else 1.0
+    value = 1e-4 / unit
+    setup, clearance, friction = family.settings(value)
+    state = fit_to_gaps(motion.state, setup, clearance)
+    begun = PiecewiseMotion(setup, clearance, friction, state)
+    point = Branching(family, 1.0).begin(value, begun.start, begun.states, 2)
+    exact = family.derivative(value, point.motion, point.states, point.revolutions, point.phase)
+    step = 1e-10 / unit
+    up, down = (
+        flow(family.at(value + sign * step), point.motion, point.states, 2, point.phase)[-1].end
+        for sign in (1, -1)
+    )
+    expected = (up - down) / (2 * step)
+    assert exact == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"period": 65}, "period: 65 is out of range"),
+        ({"sweeps": -1}, "sweeps: -1 is out of range; it must be at least 0"),
+        ({"along": "speed", "start": -1.0, "stop": 1.0}, "contains 0, which is not a valid speed"),
+        ({"along": "frction"}, "along: .*unknown axis; did you mean friction"),
+        ({"stop": "100 um"}, "stop: 100 um is the start too"),
+        ({"largest_step": "-1 um"}, "largest_step: -1 um is out of range"),
+        ({"clearance": 1e-4}, "clearance: is what varies"),
+        ({"start": "1 kg"}, "branch: start: "),
+        ({"normal": "updated"}, "branches need motion in closed form"),
+    ],
+)
+def test_bad_arguments_are_refused(arguments, text):
+    with pytest.raises(InputError, match=text) as caught:
+        rubhpc.branch("mokhtar2017", **CASE | ALONG | arguments)
+    assert "\n" not in str(caught.value)

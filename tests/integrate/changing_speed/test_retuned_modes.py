@@ -1,0 +1,144 @@
+"""Tables tuned to a speed are those made anew for it; matrices are held where that changes little."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from trial_rig import trial_rig
+
+from rubhpc.case_arguments import case_of, read_probes
+from rubhpc.integrate.changing_speed.held_matrices import RESPONSE, held_range
+from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
+from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
+from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction_mode
+from rubhpc.integrate.reduced_model.mode_tables import tabulate
+from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
+from rubhpc.integrate.reduced_model.reduction import directions
+from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK
+
+
+def setup(q):
+    case = {"speed": 200.0, "clearance": "100 um", "friction": 0.2}
+    probe = {"name": "a", "node": 1, "angle": 0.3, "quantity": "acceleration"}
+    probes = read_probes("test", [probe])
+    return case_of(
+        "test", trial_rig(q), case, samples_per_revolution=64, initial={"from": "rest"}, probes=probes
+    ).setup
+
+
+class Sliding:
+    """Gaps closed by multipliers, steady sliding."""
+
+    kind, masks = RetunedLibrary, {1: (0, 1), 3: (0, 2, 5)}
+
+    def keys(self, base):
+        return {}
+
+    def tables(self, library, reduced, base, mask, levels):
+        mode = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, mask)
+        return tabulate(mode, reduced, library.slip, friction=library._friction_of(mode), **levels)
+
+
+STATES = {
+    1: (0, FORWARD, BACKWARD, STUCK),
+    3: (0, mask_of([STUCK, OPEN, FORWARD]), mask_of([STUCK, BACKWARD, STUCK])),
+}
+
+
+class Sticking:
+    """Pairs that slide in either sense or stick."""
+
+    kind = RetunedFrictionLibrary
+    masks = STATES
+
+    def pairs(self, base, spin):
+        pairs = replace(base.friction_pairs(0.2), static_ratio=1.4)
+        return replace(pairs, rim_speed=pairs.rim_speed * spin / base.spin)
+
+    def keys(self, base):
+        return {"pairs": self.pairs(base, base.spin)}
+
+    def tables(self, library, reduced, base, mask, levels):
+        pairs = self.pairs(base, reduced.spin)
+        mode = solve_friction_mode(reduced, pairs, mask)
+        return tabulate(mode, reduced, library.slip[:0], friction=mode.friction_forces(pairs), **levels)
+
+
+class Springs:
+    """Pairs that press, by spring and damper, or are lifted."""
+
+    kind, masks = RetunedPenaltyLibrary, {1: (0, 1, 2), 3: (0, 0b001_101, 0b011)}
+
+    def keys(self, base):
+        gap, force, _ = directions(base.reduced, base.model, 0.2)
+        return {"penalty": Penalty(1e6, 50.0, gap, force)}
+
+    def tables(self, library, reduced, base, mask, levels):
+        penalty = self.keys(base)["penalty"]
+        opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
+        mode = solve_penalty_mode(reduced, penalty, opened, mask)
+        damped, friction = penalty.damped(reduced, mask), library._friction_of(mode)
+        tables = tabulate(mode, damped, library.slip, friction=friction, **levels)
+        tables.loss[0] += penalty.stored_energy(mode, library.width)
+        return tables
+
+
+@pytest.mark.parametrize("q", [1, 3])
+@pytest.mark.parametrize("law", [Sliding(), Sticking(), Springs()], ids=lambda law: type(law).__name__)
+def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
+    base, masks = setup(q), law.masks[q]
+    phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
+    levels = {"sample_level": base.sample_level, "n_level": base._n_level}
+    library = law.kind(
+        base.reduced,
+        base.model,
+        0.2,
+        phasor=phasor,
+        known={},
+        tick=base.tick,
+        **levels,
+        **law.keys(base),
+    )
+    for mask in masks:
+        library.add(mask)
+    library.tune(170.0, 0.5 + 0.3j, base.tick)
+    for mask in masks:  # nothing is left of the speed between
+        library.add(mask)
+    spin, tick = 231.0, 0.9 * base.tick
+    factor = (spin**2 - 40.0j) * np.exp(0.7j)
+    library.tune(spin, factor, tick)
+    assert [mask for mask in library.masks if mask >= 0] == [0]  # others wait until they are met
+    force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
+    reduced = replace(base.reduced, spin=spin, force=force)
+    levels |= {"width": library.width, "tick": tick}
+    for mask in masks:
+        library.add(mask)
+        found, place = library.tables(), library.masks.index(mask)
+        expected = law.tables(library, reduced, base, mask, levels)
+        for name in expected._fields:
+            values, anew = getattr(found, name)[place], getattr(expected, name)[0]
+            largest = np.abs(anew).max(initial=0.0)
+            assert np.abs(values - anew).max(initial=0.0) <= 1e-9 * largest, name
+
+
+def test_matrices_are_held_while_the_response_errs_little():
+    """A tilting disc without coupling: its exponents move by half of Ip/It a unit of speed at standstill."""
+    stiffness, damping = np.eye(2) * 400.0**2, np.eye(2) * 2.0 * 0.02 * 400.0
+    gyroscopic = 0.1 * np.array([[0.0, 1.0], [-1.0, 0.0]])
+
+    def found(speed, acceleration):
+        drift = np.zeros((2, 2)), gyroscopic
+        return held_range(stiffness, damping + speed * gyroscopic, drift, speed, acceleration)
+
+    def response(speed, held):
+        matrix = stiffness - speed**2 * np.eye(2) + 1j * speed * (damping + held * gyroscopic)
+        return np.linalg.solve(matrix, [1.0, -1j])
+
+    for speed in (100.0, 250.0, 370.0, 415.0, 600.0):
+        half = found(speed, 1e-3)
+        for at in (speed - half, speed + half):
+            exact = response(at, at)
+            assert np.abs(response(at, speed) - exact).max() < 1.5 * RESPONSE * np.abs(exact).max()
+    assert found(415.0, 1e-3) < 0.2 * found(600.0, 1e-3)
+    assert found(415.0, 1e3) > found(415.0, 1e-3)  # a fast passage leaves no time to respond

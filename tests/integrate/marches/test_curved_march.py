@@ -1,0 +1,196 @@
+"""Curved gaps from event to event: their order, what they must agree with, bent stators."""
+
+import math
+
+import numpy as np
+import pytest
+from bent_stator import solve, squared_slope
+from scipy.integrate import quad
+from test_contact_stepping_march import CLOSE, MOTIONS, RUB, distance
+from trial_rig import trial_rig
+
+from rubhpc import InputError, simulate
+from rubhpc.fem.beam import stator_foreshortening
+from rubhpc.integrate import case
+from rubhpc.integrate.marches import curved as curved_march
+from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
+from rubhpc.integrate.reduced_model import curved_tables
+from rubhpc.integrate.setup import Scheme
+from rubhpc.rig.reading import with_keys
+from rubhpc.rig.stators import LumpedStator, Stator
+
+UPDATED = RUB | {"normal": "updated"}
+SLENDER = {"height": 0.003, "geometry": "second_order"}  # bends by a twentieth of its length
+
+
+def test_phi_functions_are_the_integrals_that_define_them():
+    x = np.array([0.0, 1e-9, -0.3 + 0.4j, 0.999, 1.001j, -20.0, 3.0 - 7.0j])
+    found = curved_tables.phi_functions(x)
+    for k, factorial in enumerate((1.0, 1.0, 2.0)):
+        for value, given in zip(found[k], x, strict=True):
+            real, imaginary = (
+                quad(lambda s, z=given, k=k, part=part: part(np.exp(z * (1 - s)) * s**k), 0, 1, epsabs=1e-14)
+                for part in (np.real, np.imag)
+            )
+            assert value == pytest.approx(complex(real[0], imaginary[0]) / factorial, rel=1e-12, abs=1e-15)
+
+
+def test_foreshortening_is_the_integral_of_the_squared_slope():
+    (stator,) = trial_rig(1, height=0.02).stator  # deep, so that shear counts
+    lateral = [3 * node + i for node in range(1, stator.elements + 1) for i in (1, 2)]
+    found = stator_foreshortening(stator)
+    expected = squared_slope(stator)
+    assert found[np.ix_(lateral, lateral)] == pytest.approx(expected, rel=1e-12, abs=1e-12 * expected.max())
+    assert not found[0::3].any()
+
+
+@pytest.mark.parametrize(("n_stator", "given"), [(1, RUB), (3, CLOSE)])
+def test_short_steps_come_to_the_curved_motion_as_they_are_halved(monkeypatch, n_stator, given):
+    rig, given = trial_rig(n_stator), given | {"normal": "updated", "accuracy": 1e-5}
+    found = simulate(rig, **given)
+    assert found.contact_impulse.min() > 0.0
+    assert found.left_closed_form == 0
+    monkeypatch.setitem(case.MARCHES, Scheme.CURVED, ContactSteppingMarch)
+    steps = [simulate(rig, **given, step=step) for step in ("1 us", "0.5 us")]
+    error = [distance(record, found) for record in steps]
+    assert error[1] < 5e-4
+    assert error[0] / error[1] == pytest.approx(4.0, rel=0.3)
+    force = steps[1].peak_contact_force
+    assert found.peak_contact_force == pytest.approx(force, rel=1e-3)
+    assert found.friction_work == pytest.approx(steps[1].friction_work, rel=1e-4)
+    assert found.minimum_slip_speed == pytest.approx(steps[1].minimum_slip_speed, rel=3e-4)
+    assert found.torsion_acceleration == pytest.approx(
+        steps[1].torsion_acceleration, rel=0, abs=0.02 * abs(found.torsion_acceleration).max()
+    )
+
+
+@pytest.mark.parametrize("geometry", ["linear", pytest.param("second_order", marks=pytest.mark.long)])
+def test_error_falls_with_the_tolerance_and_steps_rise_with_its_fourth_root(monkeypatch, geometry):
+    """A shaft that rests on its stator, so that no event ends a step; the modes are the same throughout."""
+    keys = {"rotor.gravity": 9.81, "stator.angle": math.pi, "rotor.unbalance.mass": 5e-4}
+    rig = with_keys(trial_rig(1), keys | {"stator.geometry": geometry})
+    given = {"speed": 170.0, "clearance": "20 um", "friction": 0.4, "normal": "updated"}
+    given |= {"transient": 1, "revolutions": 1, "samples_per_revolution": 16}
+    records = []
+    for tolerance in (1e-9, 1e-3, 1e-7):
+        monkeypatch.setattr(curved_march, "LOAD_TOLERANCE", tolerance / 1e-9)
+        records.append(simulate(rig, **given, accuracy=1e-9))
+    known, coarse, fine = records
+    assert known.contact_fraction[0] == pytest.approx(1.0)
+    assert distance(coarse, known) < 2e-5
+    assert distance(coarse, known) / distance(fine, known) > 1e3
+    assert fine.steps < 1e4**0.25 * coarse.steps
+
+
+def test_error_is_controlled():
+    """Against a tolerance a thousand times tighter, with the same modes: all are kept."""
+    rig = trial_rig(1)
+    known = simulate(rig, **UPDATED, accuracy=1e-9)
+    assert known.energy_residual < 1e-7
+    for accuracy, most in ((1e-6, 2e-7), (1e-5, 1e-6), (1e-3, 1e-5)):
+        found = simulate(rig, **UPDATED, accuracy=accuracy)
+        assert distance(found, known) < most
+        assert found.energy_residual < 1e-7
+
+
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+def test_bent_stator_moves_as_all_degrees_do_in_short_steps(normal):
+    rig = trial_rig(1, **SLENDER)
+    given = {"speed": 170.0, "friction": 0.4, "transient": 0, "revolutions": 1, "clearance": 60e-6}
+    found = simulate(rig, **given, normal=normal, samples_per_revolution=64, accuracy=1e-5)
+    linear = simulate(
+        with_keys(rig, {"stator.geometry": "linear"}), **given, normal=normal, samples_per_revolution=64
+    )
+    assert found.tip_deflection_ratio[0] > 0.01
+    assert linear.peak_contact_force > 1.2 * found.peak_contact_force
+    known = solve(rig, 170.0, 60e-6, 0.4, 1, 64, 1e-6, is_round=normal == "updated")
+    for name in MOTIONS:
+        value, most = np.squeeze(getattr(found, name)), abs(known[name]).max()
+        share = 4e-3 if name == "stator_axial" else 1e-3  # its force alternates from step to step
+        assert value == pytest.approx(known[name], rel=0, abs=share * most), name
+    force = known["contact_force"]
+    assert found.contact_force[0] == pytest.approx(force, rel=0, abs=4e-3 * force.max())
+
+
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+@pytest.mark.parametrize("geometry", ["linear", "second_order"])
+def test_foreshortening_ratio_is_of_what_the_gap_leaves_out(normal, geometry):
+    record = simulate(trial_rig(1, geometry=geometry), **(RUB | {"revolutions": 1}), normal=normal)
+    deflection = 0.04 * record.tip_deflection_ratio[0]
+    compression = record.peak_contact_force[0] * 0.04 / (3e9 * 25e-6)
+    left_out = (0.6 / 0.04 if geometry == "linear" else 0.0) + (0.5 / 0.06 if normal == "fixed" else 0.0)
+    assert deflection > 1e-4
+    assert record.foreshortening_ratio[0] == pytest.approx(left_out * deflection**2 / compression, rel=1e-9)
+
+
+def test_bent_stator_needs_what_it_needs():
+    rig = trial_rig(1, geometry="second_order")
+    for given in ({"method": "central-difference"}, {"law": "penalty", "stiffness": 1e8}):
+        with pytest.raises(InputError, match="geometry: second_order needs"):
+            simulate(rig, **RUB, **given)
+    with pytest.raises(InputError, match="friction_law"):
+        simulate(rig, **RUB, friction_law="coulomb")
+    for given in ({"lateral": False}, {"carrier": "casing"}):
+        with pytest.raises(InputError, match="geometry"):
+            Stator(node=1, length=0.04, width=0.005, height=0.005, youngs_modulus=3e9, density=1e3,
+                   geometry="second_order", **given)  # fmt: skip
+    with pytest.raises(TypeError):
+        LumpedStator(node=1, rigid=True, geometry="second_order")
+
+
+@pytest.mark.parametrize("n_stator", [1, 3])
+def test_closed_gaps_are_closed_and_forces_press(n_stator):
+    """Curved gaps from the samples, in the complex plane: none penetrates by more than rounding."""
+    rig = trial_rig(n_stator)
+    record = simulate(
+        rig, **(CLOSE | {"revolutions": 1}), normal="updated", samples_per_revolution=4096, keep=("waveform",)
+    )
+    axis = np.exp(1j * np.array([stator.angle for stator in rig.stator]))[:, np.newaxis]
+    tip = (0.06 + 40e-6 + record.stator_axial + 1j * record.stator_lateral) * axis
+    gap = abs(tip - (record.vertical + 1j * record.horizontal)) - 0.06
+    assert gap.min() >= -1e-12
+    assert record.contact_force.min() >= 0.0
+    # In contact from this sample to the next: closed at both ends.
+    held = (record.contact_force[:, :-1] > 0.0) & (record.contact_force[:, 1:] > 0.0)
+    before = np.roll(held, 1, axis=1) & held
+    assert np.count_nonzero(before) > 50
+    assert np.median(abs(gap[:, :-1][before])) <= 1e-12
+
+
+def test_without_lateral_freedom_normals_turn_with_the_disc_alone():
+    rig = trial_rig(2, lateral=False)
+    given = CLOSE | {"normal": "updated"}
+    found = simulate(rig, **given)
+    known = simulate(rig, **given, method="central-difference", step="0.25 us")
+    assert distance(found, known, MOTIONS[:4]) < 2e-4
+    assert not found.stator_lateral.any()
+
+
+def test_reversed_spin_mirrors_the_motion():
+    """Upright stator, and bearings that are not coupled, with the unbalance on the mirror's axis."""
+    rig = with_keys(trial_rig(1), {"stator.angle": 0.0, "rotor.unbalance.phase": 0.0})
+    forward, backward = (
+        simulate(rig, **(RUB | {"speed": speed}), normal="updated") for speed in (170.0, -170.0)
+    )
+    for name, sign in (("vertical", 1), ("stator_axial", 1), ("contact_force", 1), ("horizontal", -1)):
+        one, other = getattr(backward, name), sign * getattr(forward, name)
+        assert one == pytest.approx(other, rel=0, abs=1e-8 * abs(other).max()), name
+    assert backward.torsion == pytest.approx(-forward.torsion, rel=0, abs=1e-8 * abs(forward.torsion).max())
+    assert backward.friction_work == pytest.approx(forward.friction_work)
+
+
+def test_run_goes_on_amid_a_contact():
+    rig = trial_rig(2)
+    for phase in np.linspace(5.5, 5.5 + 2 * np.pi, 24):  # the first or second is held
+        turned = with_keys(rig, {"rotor.unbalance.phase": phase})
+        first = simulate(turned, **(UPDATED | {"revolutions": 1, "accuracy": 1e-6}))
+        if first.final.contact_force.max() > 1.0:
+            break
+    assert first.final.contact_force.max() > 1.0
+    whole = simulate(turned, **UPDATED, accuracy=1e-6)
+    second = simulate(turned, **(UPDATED | {"revolutions": 1, "accuracy": 1e-6}), initial=first.final)
+    for name in MOTIONS:
+        expected = getattr(whole, name)[..., 256:]
+        assert getattr(second, name) == pytest.approx(expected, rel=0, abs=1e-7 * abs(expected).max()), name
+    counts = first.contacts_per_revolution + second.contacts_per_revolution
+    assert counts == pytest.approx(2 * whole.contacts_per_revolution)

@@ -1,0 +1,398 @@
+"""Whole cases by the exact modal integrator: what must hold to rounding, and what happens at its edges."""
+
+import math
+import re
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from trial_rig import trial_rig, turn
+
+from rubhpc import State, read_rig, simulate
+from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.response import steady_response
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.marches import event_driven as event_driven_march
+from rubhpc.integrate.marches import march
+from rubhpc.integrate.marches.march import NO_FORCES
+from rubhpc.integrate.measuring.divergence import energy_limit
+from rubhpc.integrate.neighbour_motions import NeighbourMotions
+from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
+from rubhpc.integrate.setup import prepare
+from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
+from rubhpc.recent import forget
+from rubhpc.rig.parts import Torsion
+from rubhpc.rig.reading import with_keys
+from rubhpc.rig.rig import Rig
+from rubhpc.rig.stators import LumpedStator
+from rubhpc.schema import DIVERGED, DONE, SCHEMES
+from rubhpc.study.study import Contact, Integrator, Recording
+
+SPEED = 170.0
+RUB = {"speed": SPEED, "clearance": "80 um", "friction": 0.2, "transient": 1, "revolutions": 2}
+CLOSE = RUB | {"clearance": "40 um"}  # three stators are all met, two at a time
+MOTIONS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral")
+COUNTED = ("contacts_per_revolution", "contact_fraction", "contact_impulse", "peak_contact_force")
+
+
+def check_close(found, expected, share, names=MOTIONS):
+    for name in names:
+        one, other = getattr(found, name), getattr(expected, name)
+        assert one == pytest.approx(other, rel=0, abs=share * abs(other).max()), name
+
+
+@pytest.mark.parametrize("n_stator", [1, 3])
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+def test_shorter_kernel_calls_change_nothing_but_rounding(monkeypatch, n_stator, normal):
+    usual = simulate(trial_rig(n_stator), normal=normal, **CLOSE)
+    monkeypatch.setattr(march, "LONGEST_CALL", 1e-9)  # calls of a sample from the second on
+    pieces = simulate(trial_rig(n_stator), normal=normal, **CLOSE)
+    assert usual.contact_impulse.min() > 0
+    check_close(pieces, usual, 1e-9)
+    for name in (*COUNTED, "friction_work", "minimum_slip_speed", "tip_deflection_ratio"):
+        assert getattr(pieces, name) == pytest.approx(getattr(usual, name), rel=1e-7), name
+    assert pieces.peak_to_peak_vertical == pytest.approx(usual.peak_to_peak_vertical, rel=1e-9)
+    assert pieces.energy_residual == pytest.approx(usual.energy_residual, rel=1e-3)
+
+
+def test_same_case_is_the_same_to_the_last_bit():
+    once, again = (simulate(trial_rig(2), **RUB) for _ in range(2))
+    for name in once.signals:
+        assert np.array_equal(getattr(once, name), getattr(again, name))
+
+
+def test_case_does_not_depend_on_those_before_it():
+    """Cases of one speed and friction share their tables, and other cases meet other sets of contacts."""
+    rig, recording = trial_rig(3), Recording(transient=1, revolutions=2)
+
+    def alone(*clearances):
+        setup = prepare(rig, SPEED, contact=Contact(), integrator=Integrator(), samples_per_revolution=256)
+        return [run_case(setup, clearance=c, friction=0.2, recording=recording) for c in clearances][-1]
+
+    after, fresh = alone(30e-6, 60e-6, 40e-6), alone(40e-6)
+    for name in after.signals:
+        assert np.array_equal(getattr(after, name), getattr(fresh, name)), name
+    assert after.contact_impulse.tolist() == fresh.contact_impulse.tolist()
+
+
+def test_sets_are_made_anew_where_there_is_no_room_for_all(monkeypatch):
+    """What is forgotten and met again is tabulated to the same numbers."""
+    usual = simulate(trial_rig(3), **CLOSE)
+    monkeypatch.setattr(ModeLibrary, "_most_modes", 4)
+    monkeypatch.setattr(event_driven_march, "MOST_REFILLS", 1000)
+    made = []
+    add = ModeLibrary.add
+
+    def counted(book, mask):
+        made.append(mask)
+        return add(book, mask)
+
+    monkeypatch.setattr(ModeLibrary, "add", counted)
+    forget()
+    crowded = simulate(trial_rig(3), **CLOSE)
+    assert len(made) > len(set(made))
+    check_close(crowded, usual, 1e-9)
+    assert crowded.peak_contact_force == pytest.approx(usual.peak_contact_force, rel=1e-7)
+
+
+def test_neighbours_do_not_depend_on_what_is_forgotten(monkeypatch):
+    """Not even their last bits: other cases, which other ranks compute, fill the same tables."""
+    monkeypatch.setattr(event_driven_march, "MOST_REFILLS", 1000)
+    ratios = []
+    for most in (1024, 4):
+        monkeypatch.setattr(ModeLibrary, "_most_modes", most)
+        setup = prepare(
+            trial_rig(3), SPEED, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
+        )
+        march = event_driven_march.EventDrivenMarch(setup, 40e-6, 0.2, State.at_rest(setup.model), None)
+        neighbours = NeighbourMotions(march)
+        ratios.append([neighbours.part(1) for _ in range(6)])
+    assert None not in ratios[0]
+    assert ratios[0] == ratios[1]
+
+
+def test_sets_of_contacts_are_met_as_they_come():
+    """With three stators some touch together, and no set but the singles is tabulated at the start."""
+    record = simulate(trial_rig(3), **CLOSE)
+    touching = record.contact_force > 0.0
+    assert (touching.sum(axis=0) == 2).mean() > 0.05
+    assert record.energy_residual < 1e-4
+
+
+@pytest.mark.parametrize("too_many", ["sets", "events"])
+def test_endless_events_are_left_to_short_steps(monkeypatch, too_many):
+    """More sets of contacts, or more events, than allowed: the case is done in steps, to the same answer."""
+    exact = simulate(trial_rig(3), **CLOSE)
+    if too_many == "sets":
+        monkeypatch.setattr(ModeLibrary, "_most_modes", 4)
+        monkeypatch.setattr(event_driven_march, "MOST_REFILLS", 1)
+    else:
+        monkeypatch.setattr(event_driven_march, "advance", lambda *_: CONTACT_UNSOLVED)
+    stepped = simulate(trial_rig(3), step="0.25 us", **CLOSE)
+    assert stepped.status == DONE
+    assert (SCHEMES[exact.scheme], exact.left_closed_form) == ("event_driven", 0)
+    assert (SCHEMES[stepped.scheme], stepped.left_closed_form) == ("contact_stepping", 1)
+    assert stepped.steps > 10 * exact.steps
+    check_close(stepped, exact, 1e-3)  # first order in the step
+    assert stepped.contact_impulse == pytest.approx(exact.contact_impulse, rel=2e-3)
+    assert stepped.contacts_per_revolution == pytest.approx(exact.contacts_per_revolution, abs=0.51)
+
+
+def test_free_motion_is_the_steady_response():
+    """Out of reach nothing is left to err: the orbit is the full model's steady response (L11)."""
+    rig = read_rig("mokhtar2017")
+    model = assemble(rig)
+    record = simulate(rig, speed=150.0, clearance="3 mm", transient=200, revolutions=2)
+    response = steady_response(model, 150.0)
+    turned = np.exp(2j * np.pi * np.arange(512) / 256)
+    for name, degree in (("vertical", "v"), ("horizontal", "w")):
+        known = (response[model.rotor.index(model.output_node, degree)] * turned).real
+        assert getattr(record, name) == pytest.approx(known, abs=1e-8 * abs(known).max())
+    assert record.contact_impulse[0] == record.peak_contact_force[0] == record.contact_fraction[0] == 0.0
+    assert record.regime == 0
+
+
+@pytest.mark.parametrize("spin", [SPEED, -SPEED])
+@pytest.mark.parametrize("share", [0.9999, 1.0001])
+def test_no_touch_is_missed_and_none_is_made_up(spin, share):
+    """A grazing orbit reaches 12 nm past the rim for a hundredth of a turn, or misses it by as much."""
+    rig = trial_rig(1)
+    model = assemble(rig)
+    response = steady_response(model, spin)
+    start = replace(
+        State.at_rest(model), rotor_displacement=response.real, rotor_velocity=(1j * spin * response).real
+    )
+    axis = np.exp(1j * model.stators[0].angle)
+    v, w = (response[model.rotor.index(3, name)] for name in ("v", "w"))
+    reach = abs(v * axis.real + w * axis.imag)  # of the orbit towards the stator
+    record = simulate(
+        rig, speed=spin, clearance=share * reach, friction=0.1, transient=0, revolutions=2, initial=start
+    )
+    if share > 1:
+        assert record.contact_impulse[0] == 0.0
+        assert record.contacts_per_revolution[0] == 0.0
+        assert record.steps < 1000
+    else:
+        assert record.contacts_per_revolution[0] >= 0.5
+        assert 0.0 < record.contact_fraction[0] < 0.05
+        assert 0.0 < record.peak_contact_force[0] < 1.0
+
+
+def test_clearance_ratio_just_below_one_touches():
+    """In the steady state of the packaged rig, whose orbit is a circle."""
+    kept = {"transient": 150, "revolutions": 4, "keep": ()}
+    below, above = (
+        simulate("mokhtar2017", speed_ratio=0.75, clearance_ratio=ratio, **kept) for ratio in (0.9999, 1.0001)
+    )
+    assert below.contact_impulse[0] > 0.0
+    # On the way from rest the orbit overshoots and touches; 150 revolutions later that is forgotten.
+    assert above.contact_impulse[0] == 0.0
+
+
+@pytest.mark.parametrize("n_sample", [16, 20, 64, 1024, 4096])
+def test_measures_do_not_depend_on_the_samples(n_sample):
+    rig = read_rig("mokhtar2017")
+    given = {"speed_ratio": 0.75, "clearance": "84 um", "transient": 2, "revolutions": 2}
+    usual = simulate(rig, **given)
+    record = simulate(rig, samples_per_revolution=n_sample, **given)
+    common = math.gcd(n_sample, 256)
+    for name in MOTIONS:
+        one, other = (getattr(r, name)[..., :: n // common] for r, n in ((record, n_sample), (usual, 256)))
+        assert one == pytest.approx(other, rel=0, abs=1e-6 * abs(other).max()), name
+    for name in (*COUNTED, "contact_duration", "friction_work", "minimum_slip_speed"):
+        assert getattr(record, name) == pytest.approx(getattr(usual, name), rel=1e-3), name
+    if n_sample >= 64:
+        assert record.peak_to_peak_vertical == pytest.approx(usual.peak_to_peak_vertical, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("rig", "speed", "clearance", "friction"),
+    [
+        (trial_rig(1), SPEED, "80 um", 0.0),
+        (trial_rig(2, cross=1e5), -190.0, "80 um", 0.3),
+        (trial_rig(2, lateral=False), SPEED, "60 um", 0.3),
+        (trial_rig(1), 900.0, "60 um", 0.3),
+        (with_keys(read_rig("mokhtar2017"), {"stator.clearance_offset": -83.99e-6}), 148.7, "84 um", 0.3),
+        (with_keys(read_rig("mokhtar2017"), {"stator.clearance_offset": 1e-3}), 148.7, "84 um", 0.3),
+    ],
+    ids=["no friction", "cross-coupled, reversed", "no lateral", "fast", "almost no gap", "out of reach"],
+)
+def test_unusual_cases_agree_with_the_central_difference(rig, speed, clearance, friction):
+    given = {"speed": speed, "clearance": clearance, "friction": friction, "transient": 0, "revolutions": 2}
+    found = simulate(rig, **given)
+    known = simulate(rig, **given, method="central-difference", step="0.5 us")
+    for name in MOTIONS:
+        one, other = getattr(found, name), getattr(known, name)
+        # Micrometres and microradians: what is nothing to one scheme is 1e-16 of them to the other.
+        assert one == pytest.approx(other, rel=0, abs=1e-3 * abs(other).max() + 1e-15), name
+    assert found.contacts_per_revolution == pytest.approx(known.contacts_per_revolution)
+    for name in ("contact_impulse", "contact_duration", "friction_work"):
+        assert getattr(found, name) == pytest.approx(getattr(known, name), rel=1e-3), name
+    assert found.minimum_slip_speed == pytest.approx(known.minimum_slip_speed, rel=0.01, nan_ok=True)
+
+
+@pytest.mark.parametrize("clearance", ["84 um", "100 um"])
+def test_energy_balances_in_the_steady_state(clearance):
+    record = simulate("mokhtar2017", speed_ratio=0.75, clearance=clearance, keep=())
+    assert record.period in (1, 2)
+    assert record.energy_residual < 1e-4
+
+
+def test_energy_residual_shows_damping_that_does_not_act(monkeypatch):
+    """The residual can fail: the loss taken for a hundredth more than it is."""
+    given = {"speed_ratio": 0.75, "clearance": "84 um", "transient": 60, "revolutions": 8, "keep": ()}
+    sound = simulate("mokhtar2017", **given)
+    usual = ModeLibrary.tables
+
+    def overdone(book):
+        tables = usual(book)
+        return tables._replace(loss=1.01 * tables.loss, steady_power=tables.steady_power * [1.01, 1.0])
+
+    monkeypatch.setattr(ModeLibrary, "tables", overdone)
+    assert simulate("mokhtar2017", **given).energy_residual > 10 * sound.energy_residual
+
+
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+def test_dry_whip_diverges_and_says_so(normal):
+    rig = read_rig("mokhtar2017")
+    around = tuple(replace(rig.stator[0], angle=2 * math.pi * i / 3, lateral=False) for i in range(3))
+    record = simulate(
+        replace(rig, stator=around),
+        speed=148.7,
+        clearance="20 um",
+        friction=0.8,
+        normal=normal,
+        transient=1,
+        revolutions=40,
+    )
+    assert record.status == DIVERGED
+    passed = r"the displacement of the rotor at node 8 passed 0.08 m|the mechanical energy passed 716 J, .*"
+    assert re.fullmatch(rf"({passed}|{NO_FORCES}) in revolution \d+", record.reason)
+    assert np.isnan(record.vertical[-1])
+    assert np.isnan(record.peak_contact_force).all()
+    assert record.period == -1
+    assert record.steps > 0
+
+
+METHODS = ({"method": "modal"}, {"method": "central-difference", "step": "2 us"})
+
+
+@pytest.mark.parametrize("transient", [0, 10])
+def test_both_integrators_name_what_diverged_and_keep_the_record_until_then(transient):
+    """Cross-coupled bearings feed forward whirl; a case that diverges in its transient is recorded too."""
+    rig = with_keys(read_rig("mokhtar2017"), {"rotor.bearing.kyz": 3e5, "rotor.bearing.kzy": -3e5})
+    case = {"speed": 300.0, "clearance": "100 um", "transient": transient, "revolutions": 6}
+    modal, stepped = (simulate(rig, **case, **method) for method in METHODS)
+    for record in (modal, stepped):
+        assert record.reason == "the displacement of the rotor at node 8 passed 0.08 m in revolution 5"
+        assert SCHEMES[record.scheme] == ("event_driven" if record is modal else "central_difference")
+        assert record.transient_revolutions == 0
+        is_kept = np.isfinite(record.vertical)
+        n_kept = int(np.argmin(is_kept))
+        assert 4 * 256 < n_kept < 5 * 256
+        assert not is_kept[n_kept:].any()
+        assert np.isfinite(record.contact_force[0, :n_kept]).all()
+        assert np.abs(record.vertical[:n_kept]).max() <= 0.08
+        assert np.isfinite(record.section_vertical).tolist() == [True] * 5 + [False]
+        assert np.isnan(record.spectrum_vertical).all()
+        assert np.isnan(record.peak_contact_force).all()
+    whirl = stepped.vertical[: 3 * 256]
+    assert modal.vertical[: 3 * 256] == pytest.approx(whirl, abs=0.01 * np.abs(whirl).max())
+
+
+def test_tip_that_bends_far_is_no_divergence():
+    """Tips that move by 0.18 m and orbits of 0.3 mm: friction drags a stator as soft as rubber along."""
+    limp = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": 1e7})
+    case = {"speed": 300.0, "clearance": "1 um", "friction": 0.9, "transient": 0, "revolutions": 3}
+    for method in METHODS:
+        record = simulate(limp, **case, **method)
+        assert record.status == DONE
+        assert record.tip_deflection_ratio[0] > 0.08 / 0.04
+        assert np.hypot(record.vertical, record.horizontal).max() < 1e-3
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_energy_without_bound_is_a_divergence_though_the_rotor_hardly_moves(monkeypatch, method):
+    """The limit is that of the rotor at its displacement limit; here it is lowered."""
+    monkeypatch.setattr("rubhpc.integrate.setup.energy_limit", lambda *_: 1e-4)
+    case = {"speed": 300.0, "clearance": "100 um", "transient": 0, "revolutions": 2}
+    record = simulate("mokhtar2017", **case, **method)
+    assert record.reason.startswith("the mechanical energy passed 0.0001 J")
+
+
+def test_energy_limit_is_that_of_the_rotor_at_its_displacement_limit():
+    """A static force that bends the shaft so far does half its work, and the whirl adds kinetic energy."""
+    model = assemble(read_rig("mokhtar2017"))
+    row = model.rotor.index(8, "v")
+    force = np.zeros(model.rotor.n_dof)
+    force[row] = 1.0
+    shape = np.linalg.solve(model.rotor.stiffness, force)
+    force_there = 0.08 / shape[row]
+    assert energy_limit(model, 0.0, 0.08) == pytest.approx(0.5 * 0.08 * force_there)
+    disc_alone = 0.5 * 2.646 * (300.0 * 0.08) ** 2
+    gained = energy_limit(model, 300.0, 0.08) - energy_limit(model, 0.0, 0.08)
+    assert disc_alone < gained < 1.6 * disc_alone  # and the shaft of 1.96 kg, of which half moves less
+
+
+def test_free_twist_is_refused_with_the_mend():
+    rig = trial_rig(1)
+    free = replace(rig, rotor=replace(rig.rotor, torsion=Torsion(free=True)))
+    with pytest.raises(InputError, match='method = "central-difference"'):
+        simulate(free, **RUB)
+    assert simulate(free, **RUB, method="central-difference", step="2 us").status == DONE
+
+
+@pytest.mark.parametrize("is_touching", [False, True])
+def test_run_goes_on_from_its_final_state(is_touching):
+    """Also amid a contact: two runs of a revolution are one of two, and no contact is counted twice."""
+    rig, given = trial_rig(2), RUB | {"transient": 0}
+    for phase in np.linspace(0, 2 * math.pi, 24):
+        turned = with_keys(rig, {"rotor.unbalance.phase": phase})
+        first = simulate(turned, **(given | {"revolutions": 1}))
+        if (first.final.contact_force.max() > 1.0) == is_touching:
+            break
+    assert (first.final.contact_force.max() > 1.0) == is_touching
+    whole = simulate(turned, **given)
+    second = simulate(turned, **(given | {"revolutions": 1}), initial=first.final)
+    for name in MOTIONS:
+        expected = getattr(whole, name)[..., 256:]
+        assert getattr(second, name) == pytest.approx(expected, rel=0, abs=1e-7 * abs(expected).max()), name
+    counts = first.contacts_per_revolution + second.contacts_per_revolution
+    assert counts == pytest.approx(2 * whole.contacts_per_revolution)
+    impulse = first.contact_impulse + second.contact_impulse
+    assert impulse == pytest.approx(2 * whole.contact_impulse, rel=1e-6)
+    assert first.contact_force.mean() * turn(SPEED) == pytest.approx(first.contact_impulse.mean(), rel=1e-3)
+
+
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+def test_signals_are_answered_however_long_a_revolution_lasts(normal):
+    """A mass that bounces for ever off a wall, 200 times a second, and a sample every 100 s."""
+
+    asked = []
+
+    def check():
+        asked.append(time.perf_counter())
+        if len(asked) == 4:
+            raise KeyboardInterrupt
+
+    wall = LumpedStator(node=1, rigid=True, radius=1.0)
+    setup = prepare(
+        Rig.from_matrices([[1.0]], None, [[4e5]], degrees=[(1, "v")], stators=[wall]),
+        turn(1600.0),
+        contact=Contact(normal=normal, restitution=1.0),
+        integrator=Integrator(),
+        samples_per_revolution=16,
+    )
+    thrown = replace(State.at_rest(setup.model), rotor_velocity=np.array([0.1]))
+    with pytest.raises(KeyboardInterrupt):
+        run_case(
+            setup,
+            clearance=1e-5,
+            friction=0.0,
+            recording=Recording(transient=0, revolutions=1, samples_per_revolution=16),
+            initial=thrown,
+            check=check,
+        )
+    assert max(np.diff(asked[1:])) < 5.0  # 0.1 s where nothing else runs

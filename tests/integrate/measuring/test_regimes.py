@@ -1,0 +1,242 @@
+"""Regimes of orbits whose kind is known, from their cycles and from how neighbours part."""
+
+import math
+from itertools import repeat
+
+import numpy as np
+import pytest
+
+from rubhpc.integrate.measuring.regimes import Solution, cycle_distances, is_torus, regime
+from rubhpc.schema import REGIME
+
+SAMPLES, REVOLUTIONS = 64, 64
+TURN = 2 * math.pi * np.arange(REVOLUTIONS * SAMPLES) / SAMPLES
+GOLDEN = (math.sqrt(5) - 1) / 2
+
+
+def torus(order, amount=0.2):
+    """Forward whirl with a part of some other order."""
+    return np.exp(1j * TURN) + amount * np.exp(1j * order * TURN + 0.4j)
+
+
+def swollen(sizes):
+    """Forward whirl on a circle of another size each revolution."""
+    return np.exp(1j * TURN) * (1 + 0.2 * np.repeat(sizes, SAMPLES))
+
+
+def logistic(rate):
+    """The logistic map, 100 iterations after its beginning."""
+    sizes = [0.3]
+    for _ in range(100 + REVOLUTIONS - 1):
+        sizes.append(rate * sizes[-1] * (1 - sizes[-1]))
+    return sizes[-REVOLUTIONS:]
+
+
+def settling(share):
+    """A spiral into a periodic orbit, with an order of its own."""
+    return np.exp(1j * TURN) + 0.5 * np.exp((1j * GOLDEN + math.log(share) / (2 * math.pi)) * TURN)
+
+
+def unread():
+    """Growth that nobody may ask for."""
+    raise AssertionError
+    yield
+
+
+def of(whirl, growth, *, period=0, is_contact=True):
+    verdict = regime(whirl.real, whirl.imag, SAMPLES, period=period, is_contact=is_contact, growth=growth)
+    return REGIME[verdict.flag], verdict.exponent
+
+
+@pytest.mark.parametrize("period", [0, 1, 16])
+def test_without_contact_nothing_else_counts(period):
+    found = of(swollen(logistic(4.0)), unread(), period=period, is_contact=False)
+    assert found == ("no_contact", pytest.approx(math.nan, nan_ok=True))
+
+
+def test_period_makes_a_motion_periodic_at_no_cost():
+    name, exponent = of(torus(1 / 3), unread(), period=3)
+    assert name == "periodic"
+    assert math.isnan(exponent)
+
+
+def test_period_beyond_sixteen_is_one_too():
+    name, exponent = of(torus(8 / 21), unread())
+    assert name == "periodic"
+    assert math.isnan(exponent)
+
+
+def test_orders_without_common_period_are_a_torus_at_the_first_look():
+    growth = iter([0.03, -0.03] * 8)  # as many spans as are read at first
+    name, exponent = of(torus(GOLDEN), growth)
+    assert name == "quasi_periodic"
+    assert exponent == pytest.approx(0.0, abs=1e-15)
+    assert next(growth, None) is None
+
+
+@pytest.mark.parametrize("order", [GOLDEN, math.sqrt(2), math.sqrt(3), math.e, 1 / math.pi, 2**0.25])
+@pytest.mark.parametrize("amount", [0.05, 0.5, 2.0])
+def test_cycles_of_two_orders_lie_on_a_torus(order, amount):
+    whirl = torus(order, amount)
+    assert is_torus(cycle_distances(whirl.real, whirl.imag, SAMPLES))
+
+
+@pytest.mark.parametrize("rate", [3.6, 3.65, 3.7, 3.8, 3.9, 4.0])
+def test_cycles_of_chaos_lie_on_none(rate):
+    """At 3.6 in two narrow bands, to which each second revolution returns."""
+    whirl = swollen(logistic(rate))
+    assert not is_torus(cycle_distances(whirl.real, whirl.imag, SAMPLES))
+
+
+@pytest.mark.parametrize("share", [0.9, 0.95, 0.98])
+def test_cycles_that_settle_lie_on_none(share):
+    whirl = settling(share)
+    assert not is_torus(cycle_distances(whirl.real, whirl.imag, SAMPLES))
+
+
+@pytest.mark.parametrize("rate", [3.7, 4.0])
+def test_motion_whose_neighbours_part_is_chaotic(rate):
+    """The exponent of the logistic map is the mean logarithm of its slope; ln 2 at 4."""
+    sizes = np.array(logistic(rate))
+    slopes = np.log(np.abs(rate * (1 - 2 * sizes)))
+    name, exponent = of(swollen(sizes), slopes)
+    assert name == "chaotic"
+    assert exponent == pytest.approx(slopes[:16].mean())
+    assert exponent == pytest.approx(math.log(2) if rate == 4.0 else 0.35, abs=0.2)
+
+
+def test_motion_whose_neighbours_close_up_is_periodic():
+    assert of(settling(0.95), repeat(math.log(0.95))) == ("periodic", pytest.approx(math.log(0.95)))
+
+
+@pytest.mark.parametrize(
+    ("rate", "expected"), [(0.02, "chaotic"), (-0.02, "periodic"), (0.005, "quasi_periodic")]
+)
+def test_slow_growth_is_looked_at_four_times_as_long(rate, expected):
+    growth = iter([rate] * 65)
+    assert of(swollen(logistic(3.8)), growth) == (expected, pytest.approx(rate))
+    assert len(list(growth)) == 1
+
+
+def test_short_record_stays_undecided():
+    whirl = torus(GOLDEN)[: 15 * SAMPLES]
+    name, exponent = of(whirl, unread())
+    assert name == "undecided"
+    assert math.isnan(exponent)
+
+
+def test_growth_that_chance_may_have_made_is_none():
+    """Of +-0.4 about 0.02 the mean over 64 spans errs by 0.05, over 256 by 0.025."""
+    growth = iter([0.42, -0.38] * 200)
+    assert of(swollen(logistic(3.8)), growth) == ("quasi_periodic", pytest.approx(0.02))
+    assert len(list(growth)) == 400 - 256
+    growth = iter([0.48, -0.32] * 200)
+    assert of(swollen(logistic(3.8)), growth)[0] == "chaotic"
+
+
+@pytest.mark.parametrize("revolutions", [16, 31])
+@pytest.mark.parametrize(
+    ("rate", "expected", "n_read"),
+    [(0.3, "chaotic", 16), (-0.3, "periodic", 16), (0.0, "quasi_periodic", 64), (0.03, "chaotic", 64)],
+)
+def test_of_a_record_that_tells_no_torus_the_growth_decides(revolutions, rate, expected, n_read):
+    growth = iter([rate] * 100)
+    whirl = torus(GOLDEN)[: revolutions * SAMPLES]
+    assert of(whirl, growth) == (expected, pytest.approx(rate))
+    assert len(list(growth)) == 100 - n_read
+
+
+def test_motion_next_to_one_that_runs_away_stays_undecided():
+    name, exponent = of(swollen(logistic(4.0)), iter([0.3] * 5))
+    assert name == "undecided"
+    assert math.isnan(exponent)
+
+
+def closing(period, multiplier, whirl, shift=0.0):
+    """Solver that finds the motion of these cycles, `shift` (of the whirl's size) apart from its section."""
+    section = whirl[::SAMPLES][-period:] + shift
+    return lambda asked: Solution(period, multiplier, np.column_stack([section.real, section.imag]))
+
+
+def judged(whirl, solve, *, period=3, growth=None):
+    verdict = regime(
+        whirl.real,
+        whirl.imag,
+        SAMPLES,
+        period=period,
+        is_contact=True,
+        growth=unread() if growth is None else growth,
+        solve=solve,
+    )
+    return REGIME[verdict.flag], verdict
+
+
+def test_record_that_agrees_with_a_stable_solution_is_periodic():
+    whirl = torus(1 / 3)
+    name, verdict = judged(whirl, closing(3, 0.3 - 0.4j, whirl))
+    assert (name, verdict.period, verdict.is_reached) == ("periodic", 3, True)
+    assert verdict.multiplier == 0.3 + 0.4j
+    assert math.isnan(verdict.exponent)
+
+
+def test_period_is_that_of_the_solution():
+    """What looks like six revolutions within 1 % is one of three."""
+    whirl = torus(1 / 3)
+    assert judged(whirl, closing(3, 0.9, whirl), period=6)[1].period == 3
+
+
+def test_orbit_that_drifts_along_a_torus_is_not_periodic():
+    """What it looks like for neighbouring cycles is an unstable motion inside."""
+    whirl = torus(1 / 3 + 1e-4)
+    name, verdict = judged(whirl, closing(3, 1.02j, whirl), growth=iter([0.0] * 64))
+    assert (name, verdict.period) == ("quasi_periodic", 0)
+    assert math.isnan(abs(verdict.multiplier))
+
+
+def test_weak_chaos_is_not_periodic_for_a_tolerance():
+    whirl = torus(1 / 3)
+    for solve in (lambda asked: None, closing(3, 1.1, whirl)):
+        name, verdict = judged(whirl, solve, growth=iter([0.1] * 16))
+        assert (name, verdict.period, verdict.exponent) == ("chaotic", 0, pytest.approx(0.1))
+
+
+def test_another_motion_proves_nothing():
+    whirl = torus(1 / 3)
+    name, verdict = judged(whirl, closing(3, 0.5, whirl, shift=0.5), growth=iter([0.1] * 16))
+    assert (name, verdict.period) == ("chaotic", 0)
+
+
+def test_record_that_draws_near_is_periodic_but_has_not_settled():
+    decay = np.exp(-TURN / (2 * math.pi * 40))  # to 0.2 within the record
+    steady = np.exp(1j * TURN)
+    name, verdict = judged(steady * (1 + 0.2 * decay), closing(1, 0.98, steady), period=1)
+    assert (name, verdict.period, verdict.is_reached) == ("periodic", 1, False)
+
+
+def test_motion_that_has_doubled_its_period_is_followed():
+    whirl, asked = torus(1 / 2, amount=0.004), []
+
+    def solve(period):
+        asked.append(period)
+        return closing(period, -1.2 if period == 1 else 0.7, whirl)(period)
+
+    assert judged(whirl, solve, period=1)[1].period == 2
+    assert asked == [1, 2]
+    asked.clear()
+    name, _ = judged(
+        whirl, lambda n: asked.append(n) or closing(1, -1.2, whirl)(n), period=1, growth=iter([])
+    )
+    assert name == "undecided"
+    assert asked == [1, 2, 4, 8, 16, 32]
+
+
+def test_without_a_solution_the_growth_has_the_last_word():
+    whirl = torus(1 / 3)
+    name, verdict = judged(whirl, lambda asked: None, growth=iter([-0.1] * 16))
+    assert (name, verdict.period, verdict.exponent) == ("periodic", 3, pytest.approx(-0.1))
+
+
+def test_short_record_with_a_period_and_no_solution_is_what_it_looks_like():
+    whirl = torus(1 / 3)[: 8 * SAMPLES]
+    name, verdict = judged(whirl, lambda asked: None)
+    assert (name, verdict.period) == ("periodic", 3)

@@ -1,0 +1,125 @@
+"""Motions that had settled before their record, and others that had not: signals of known kind, then rubs."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rubhpc import simulate
+from rubhpc.integrate.measuring.orbit_measures import period
+from rubhpc.integrate.measuring.settling import UNKNOWN, halves, settled
+
+SAMPLES, REVOLUTIONS = 32, 64
+TURN = 2 * math.pi * np.arange(REVOLUTIONS * SAMPLES) / SAMPLES
+CIRCLE = np.exp(1j * TURN)
+GOLDEN = (math.sqrt(5) - 1) / 2
+AGE = np.arange(REVOLUTIONS * SAMPLES) / SAMPLES  # revolutions
+
+
+def decay(half_life):
+    """Share left after each sample, `half_life` in revolutions."""
+    return 0.5 ** (AGE / half_life)
+
+
+def steps(sizes):
+    """One value for each revolution."""
+    return np.repeat(sizes, SAMPLES)
+
+
+def logistic(rate, start, n=REVOLUTIONS):
+    """The logistic map, 100 iterations after its beginning."""
+    sizes = [start]
+    for _ in range(100 + n - 1):
+        sizes.append(rate * sizes[-1] * (1 - sizes[-1]))
+    return np.array(sizes[-n:])
+
+
+def of(whirl, *, torsion=None, impulse=None, is_contact=True):
+    """Flag of an orbit, with as steady an impulse as its amplitude is."""
+    n = whirl.size // SAMPLES
+    if impulse is None:
+        impulse = np.abs(whirl).reshape(n, SAMPLES).mean(axis=1)[np.newaxis]
+    motion = np.stack([whirl.real, whirl.imag, np.zeros(whirl.size) if torsion is None else torsion])
+    return settled(
+        motion, impulse, SAMPLES, period=period(whirl.real, whirl.imag, SAMPLES), is_contact=is_contact
+    )
+
+
+STEADY = {
+    "period 1": CIRCLE,
+    "period 3": CIRCLE + 0.4 * np.exp(1j * TURN / 3),
+    "torus": CIRCLE + 0.3 * np.exp(1j * GOLDEN * TURN),
+    "torus of a slow beat": CIRCLE + 0.3 * np.exp(1.05j * TURN),
+    "period 1 by a weak torus": CIRCLE + 0.006 * np.exp(1j * GOLDEN * TURN),
+    "period 20": CIRCLE + 0.3 * np.exp(1.05j * TURN) + 0.1 * np.exp(2.1j * TURN),
+    **{f"chaos from {x}": CIRCLE * (1 + steps(logistic(4.0, x))) for x in np.linspace(0.1, 0.9, 9)},
+}
+MOVING = {
+    **{f"decay, half-life {n}": CIRCLE * (1 + 0.6 * decay(n)) for n in (4, 10, 30, 100)},
+    "slow decay, period 1 from cycle to cycle": CIRCLE * (1 + 0.1 * decay(40)),
+    "torus that shrinks": CIRCLE + 0.3 * decay(20) * np.exp(1j * GOLDEN * TURN),
+    "torus that grows": CIRCLE + 0.02 / decay(15) * np.exp(1j * GOLDEN * TURN),
+    "torus that drifts": CIRCLE * (1 + AGE / REVOLUTIONS) + 0.1 * np.exp(1j * GOLDEN * TURN),
+    "chaos that drifts": CIRCLE * (1 + 0.2 * steps(logistic(4.0, 0.3)) + 3 * AGE / REVOLUTIONS),
+    "orbit whose centre drifts": CIRCLE + 0.5 * AGE / REVOLUTIONS,
+}
+
+
+@pytest.mark.parametrize("name", STEADY)
+def test_a_steady_motion_has_settled(name):
+    assert of(STEADY[name]) == 1
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_a_motion_that_still_changes_has_not(name):
+    assert of(MOVING[name]) == 0
+
+
+def test_small_changes_do_not_count():
+    assert of(CIRCLE * (1 + 0.009 * decay(10))) == 1
+    assert of(CIRCLE * (1 + 0.02 * decay(10))) == 0
+
+
+def test_torsion_and_impulse_count_as_the_orbit_does():
+    assert of(CIRCLE, torsion=0.5 * np.sin(TURN)) == 1
+    assert of(CIRCLE, torsion=0.5 * decay(10) * np.sin(TURN)) == 0
+    fading = decay(10)[::SAMPLES]
+    assert of(CIRCLE, impulse=np.stack([np.ones(REVOLUTIONS), 1 + 0.001 * fading])) == 1
+    assert of(CIRCLE, impulse=np.stack([np.ones(REVOLUTIONS), 1 + fading])) == 0
+    begins = (AGE[::SAMPLES] >= REVOLUTIONS / 2).astype(float)  # a contact in the second half alone
+    assert of(STEADY["torus"], impulse=begins[np.newaxis]) == 0
+
+
+def test_without_contact_only_a_periodic_motion_has_settled():
+    assert of(CIRCLE, is_contact=False) == 1
+    assert of(STEADY["torus"], is_contact=False) == 0
+
+
+def test_a_short_record_shows_it_only_of_periodic_motions():
+    short = slice(0, 12 * SAMPLES)
+    assert of(CIRCLE[short]) == 1
+    assert of(MOVING["slow decay, period 1 from cycle to cycle"][short]) == 0
+    assert of(STEADY["torus"][short]) == UNKNOWN
+    assert of(CIRCLE[:SAMPLES]) == UNKNOWN
+
+
+def test_halves_of_what_is_known():
+    shift, deviation = halves(np.arange(64.0)[:, np.newaxis])
+    assert shift == pytest.approx(32.0)
+    assert deviation == pytest.approx((np.arange(32.0).std(ddof=1),) * 2)
+    assert shift / deviation[0] == pytest.approx(math.sqrt(12), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("case", "transient", "flag"),
+    [
+        ({"speed_ratio": 0.75, "clearance": "84 um"}, 120, 1),  # period 1
+        ({"speed_ratio": 0.75, "clearance": "84 um"}, 0, 0),
+        ({"speed_ratio": 2.0, "clearance": "1 mm"}, 120, 1),  # no contact
+        ({"speed_ratio": 2.0, "clearance": "1 mm"}, 2, 0),
+        ({"speed_ratio": 2.3, "clearance_ratio": 0.8}, 120, 1),  # chaos
+    ],
+)
+def test_packaged_cases(case, transient, flag):
+    record = simulate("mokhtar2017", **case, transient=transient, samples_per_revolution=64, keep=())
+    assert record.settled == flag

@@ -1,0 +1,106 @@
+"""Derivatives of a revolution by its beginning: finite differences, determinants, exact zeros."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from trial_rig import trial_rig
+
+from rubhpc import LumpedStator
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+from rubhpc.integrate.periodic_motions.saltation import monodromy, saltate
+from rubhpc.integrate.setup import prepare
+from rubhpc.rig.reading import read_rig, with_keys
+from rubhpc.study.study import Contact, Integrator, Recording
+
+PAPER = read_rig("mokhtar2017")
+SPRINGS = LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)
+RING = replace(PAPER, stator=(SPRINGS,))
+OVERHUNG = with_keys(PAPER, {"rotor.bearing.2.node": 5})
+HEAVY = with_keys(trial_rig(2), {"rotor.gravity": "9.81 m/s^2"})
+SLIDING = Contact()
+COULOMB = Contact(friction_law="coulomb", static_friction_ratio=1.3)
+
+
+def motion_of(rig, ratio, clearance_ratio, friction, contact=SLIDING, transient=20):
+    model = assemble(rig)
+    spin = ratio * first_lateral_frequency(model)
+    clearance = clearance_ratio * contact_free_amplitude(model, spin)
+    setup = prepare(
+        rig, spin, contact=contact, integrator=Integrator(), samples_per_revolution=64, model=model
+    )
+    record = run_case(
+        setup,
+        clearance=clearance,
+        friction=friction,
+        recording=Recording(transient=transient, revolutions=1, samples_per_revolution=64, keep=()),
+    )
+    return PiecewiseMotion(setup, clearance, friction, record.final)
+
+
+def differences(motion, motions, states, step=1e-7):
+    """Derivative of a revolution's end by its beginning, column by column."""
+    columns = []
+    for k in range(2 * motion.n):
+        change = np.zeros(2 * motion.n)
+        change[k] = step * motion.size(motions) / (motion.setup.spin if k < motion.n else 1.0)
+        ahead, behind = (motion.revolve(motions + sign * change, states).end for sign in (1, -1))
+        columns.append((ahead - behind) / (2 * change[k]))
+    return np.array(columns).T
+
+
+CASES = {
+    "one stator": (PAPER, 1.7, 0.7, 0.3, SLIDING),
+    "three stators": (trial_rig(3), 1.3, 0.8, 0.1, SLIDING),
+    "ring, always in contact": (RING, 1.2, 0.6, 0.05, SLIDING),
+    "backward spin": (trial_rig(2), -1.3, 0.7, 0.2, SLIDING),
+    "restitution": (PAPER, 1.7, 0.7, 0.3, Contact(restitution=0.5)),
+    "overhung": (OVERHUNG, 0.9, 0.5, 0.2, SLIDING),
+    "gravity": (HEAVY, 1.2, 0.7, 0.2, SLIDING),
+    "slip": (trial_rig(2), 0.15, 0.4, 0.4, COULOMB),
+    "stick": (trial_rig(2), 1.7, 0.5, 1.0, COULOMB),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_derivative_is_that_of_finite_differences(name):
+    motion = motion_of(*CASES[name])
+    revolution = motion.revolve(motion.start, motion.states)
+    assert len(revolution.pieces) > 1
+    found = monodromy(motion, [revolution])
+    scale = np.repeat([motion.setup.spin, 1.0], motion.n)
+    error = (found - differences(motion, motion.start, motion.states)) * scale[:, None] / scale
+    size = found * scale[:, None] / scale
+    assert np.abs(error).max() < 1e-6 * np.abs(size).max()
+
+
+def test_stick_is_among_the_cases():
+    motion = motion_of(*CASES["stick"])
+    kinds = {
+        kind
+        for piece in motion.revolve(motion.start, motion.states).pieces
+        if piece.crossing
+        for _, kind in motion.what_changes(piece)
+    }
+    assert kinds >= {"touch", "release", "stick", "slip"}
+
+
+@pytest.mark.parametrize("name", ["one stator", "three stators", "ring, always in contact"])
+def test_what_an_inelastic_touch_stops_is_forgotten(name):
+    """A gap that closes for good leaves nothing of two coordinates: two multipliers are zero."""
+    motion = motion_of(*CASES[name])
+    found = np.linalg.svd(monodromy(motion, [motion.revolve(motion.start, motion.states)]), compute_uv=False)
+    assert np.count_nonzero(found < 1e-13 * found[0]) >= 2
+
+
+def test_release_changes_nothing():
+    motion = motion_of(PAPER, 1.7, 0.7, 0.3)
+    pieces = motion.revolve(motion.start, motion.states).pieces
+    release = next(i for i, piece in enumerate(pieces) if piece.crossing and not piece.touching.size)
+    before, after = motion.rate_ended(pieces[release]), motion.rate_begun(pieces[release + 1])
+    assert after == pytest.approx(before, abs=1e-9 * np.abs(before).max())
+    identity = np.eye(2 * motion.n)
+    assert np.array_equal(saltate(motion, pieces[release], pieces[release + 1], identity), identity)

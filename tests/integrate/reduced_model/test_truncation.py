@@ -1,0 +1,185 @@
+"""The error by modes left out: what is asked for is met by other rigs than the packaged one."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_rigs import PACKAGED, found_error, random_rig
+
+from rubhpc import simulate
+from rubhpc.fem.assemble import assemble
+from rubhpc.integrate.reduced_model import truncation
+from rubhpc.integrate.reduced_model.standstill import at_standstill, cutoff_frequency, modes_below
+from rubhpc.integrate.reduced_model.truncation import (
+    carried,
+    impact_share,
+    kept_modes,
+    modal_error,
+    pulse_spectrum,
+    static_inertia,
+    sufficient_accuracy,
+)
+from rubhpc.recent import forget
+from rubhpc.rig.reading import with_keys
+from rubhpc.rig.stators import LumpedStator
+
+ALL_MODES = 1e-15  # accuracy
+
+
+def at_node_5(**keys):
+    return replace(PACKAGED, stator=(replace(PACKAGED.stator[0], node=5, **keys),))
+
+
+def lumped(mass, stiffness):
+    return replace(PACKAGED, stator=(LumpedStator(node=8, mass=mass, stiffness=stiffness),))
+
+
+def below(model, spin, accuracy=1e-3):
+    cutoff = cutoff_frequency(model, spin, accuracy)
+    return [modes_below(part, cutoff) for part in at_standstill(model).parts]
+
+
+def number(are_kept):
+    return sum(np.count_nonzero(is_kept) for is_kept in are_kept)
+
+
+@pytest.mark.parametrize(
+    ("rig", "case", "before"),
+    [
+        # Friction on the shaft itself makes its twist ring: 36 % off with the modes below the cutoff alone.
+        (at_node_5(radius=0.01, youngs_modulus=3e10), {"speed_ratio": 1.1, "clearance": "100 um"}, 0.3),
+        # A heavy stator rebounds many times: 8 % off in six revolutions, 80 % in ten.
+        (lumped(0.92, 3.9e5), {"speed_ratio": 1.9, "clearance": "70 um"}, 0.05),
+        (at_node_5(radius=0.06), {"speed_ratio": 1.1, "clearance": "60 um"}, 5e-3),
+        (lumped(0.05, 3.9e5), {"speed_ratio": 1.9, "clearance": "70 um"}, 3e-3),
+    ],
+)
+def test_rigs_that_need_more_modes_get_them(rig, case, before, monkeypatch):
+    case = case | {"transient": 0, "revolutions": 6}
+    exact, record = simulate(rig, **case, accuracy=ALL_MODES), simulate(rig, **case)
+    assert found_error(record, exact) < 1e-3
+    assert exact.modal_error == 0.0
+    assert record.modal_error < 1e-3
+    assert record.remark == ""
+    monkeypatch.setattr("rubhpc.integrate.reduced_model.reduction.kept_modes", below)
+    forget()
+    assert found_error(simulate(rig, **case), exact) > before
+
+
+def test_forces_of_a_heavy_stator_are_those_of_all_modes():
+    """Fewer modes gave 15.8 N where all give 42.1 N, apart from the impulses of its impacts."""
+    case = {"speed_ratio": 1.9, "clearance": "70 um", "transient": 0, "revolutions": 10}
+    record, exact = (simulate(lumped(0.92, 3.9e5), **case, **keys) for keys in ({}, {"accuracy": ALL_MODES}))
+    assert record.peak_contact_force == pytest.approx(exact.peak_contact_force, rel=1e-3)
+    assert found_error(record, exact) < 1e-3
+    assert exact.peak_contact_force[0] > exact.contact_force.max() > 1000.0  # impulses are part of both
+
+
+@pytest.mark.parametrize(
+    ("modulus", "case"),
+    [
+        (3e9, {"speed_ratio": 1.1, "clearance": "100 um"}),
+        (3e10, {"speed_ratio": 3.5, "clearance": "74 um"}),
+        (3e9, {"speed_ratio": 6.0, "clearance": "60 um"}),
+    ],
+)
+def test_packaged_rig_is_as_accurate_as_asked_with_the_modes_below_the_cutoff(modulus, case):
+    rig = with_keys(PACKAGED, {"stator.youngs_modulus": modulus})
+    record = simulate(rig, **case, transient=0, revolutions=10)
+    exact = simulate(rig, **case, transient=0, revolutions=10, accuracy=ALL_MODES)
+    assert found_error(record, exact) < record.modal_error < 1e-3
+    assert record.remark == ""
+    model = assemble(rig)
+    for spin in (120.0, 400.0, 1200.0):
+        assert number(kept_modes(model, spin, 1e-3)) == number(below(model, spin))
+
+
+@pytest.mark.parametrize("seed", [0, 11, 21, 25, 37])
+def test_random_rigs_are_as_accurate_as_asked(seed):
+    """Beams and masses on and off the disc; tests/validation/test_modal_accuracy.py has many more."""
+    rig, case = random_rig(seed)
+    record = simulate(rig, **case, transient=0, revolutions=4)
+    exact = simulate(rig, **case, transient=0, revolutions=4, accuracy=ALL_MODES)
+    assert np.sum(exact.contact_impulse) > 0.0
+    assert found_error(record, exact) < 1e-3
+    assert record.modal_error <= 1e-3
+
+
+def test_more_modes_are_kept_as_more_is_asked():
+    model = assemble(at_node_5(radius=0.01, youngs_modulus=3e10))
+    kept = [kept_modes(model, 220.0, accuracy) for accuracy in (1e-2, 1e-3, 1e-4, 1e-5, ALL_MODES)]
+    count = [number(are_kept) for are_kept in kept]
+    assert count == sorted(count)
+    assert count[0] < count[-1] == sum(part.frequency.size for part in at_standstill(model).parts)
+    errors = [modal_error(model, 220.0, are_kept) for are_kept in kept]
+    assert errors == sorted(errors, reverse=True)
+    assert all(error <= asked for error, asked in zip(errors, (1e-2, 1e-3, 1e-4, 1e-5, 0.0), strict=True))
+
+
+def test_modes_of_both_planes_are_kept_together():
+    """A vertical mode rings, and gyroscopic terms carry its ring over to the horizontal one."""
+    model = assemble(at_node_5(radius=0.01, youngs_modulus=3e9))
+    planes = [part for part in at_standstill(model).parts if len(part.frequency) > 20]
+    kept = [
+        is_kept
+        for part, is_kept in zip(at_standstill(model).parts, kept_modes(model, 400.0, 1e-3), strict=True)
+        if len(part.frequency) > 20
+    ]
+    assert len(planes) == 2
+    assert planes[0].frequency == pytest.approx(planes[1].frequency, rel=1e-9)
+    low = planes[0].frequency < 0.3 * planes[0].frequency[-1]
+    assert np.array_equal(kept[0][low], kept[1][low])
+
+
+def test_number_of_modes_is_bounded_and_the_rest_is_reported(monkeypatch):
+    monkeypatch.setattr(truncation, "MOST_MODES", 30)
+    monkeypatch.setattr("rubhpc.integrate.setup.MOST_MODES", 30)
+    rig = at_node_5(radius=0.01, youngs_modulus=3e10)
+    case = {"speed_ratio": 1.1, "clearance": "100 um", "transient": 0, "revolutions": 2}
+    record = simulate(rig, **case)
+    assert record.modal_error > 1e-3
+    assert "it needs more than 30 modes" in record.remark
+    assert "keeps all" in record.remark
+    model, spin = assemble(rig), record.spin_speed
+    assert number(kept_modes(model, spin, 1e-3)) == 30
+    accuracy = sufficient_accuracy(model, spin)
+    assert f"accuracy = {accuracy:.0e}" in record.remark
+    assert simulate(rig, **case, accuracy=accuracy).modal_error == 0.0
+
+
+def test_rigid_wall_keeps_all_modes():
+    wall = replace(PACKAGED, stator=(LumpedStator(node=8, rigid=True),))
+    model = assemble(wall)
+    kept = kept_modes(model, 200.0, 1e-3)
+    assert all(is_kept.all() for is_kept in kept)
+    assert modal_error(model, 200.0, kept) == 0.0
+
+
+def test_impact_is_shared_by_the_masses():
+    """A mass of 1 kg on a spring, hit by one of 3 kg, takes a quarter of the momentum at once."""
+    rotor, tip = np.array([1 / math.sqrt(3.0), 0.0]), np.array([0.0, 1.0])
+    frequency = np.array([10.0, 50.0])
+    assert impact_share(rotor, tip, frequency) == pytest.approx(0.25)
+    assert pulse_spectrum(rotor, tip, frequency, 1e-6) == pytest.approx([0.25, 0.25])
+
+
+def test_bar_answers_an_impact_with_its_wave():
+    """Clamped bar of 1 kg, hit by 400 kg: its static shape has 1/3 kg, its wave sqrt(1 / 400) of the peak."""
+    k = np.arange(2000) + 0.5
+    bar, frequency = np.full(k.size, math.sqrt(2.0)), np.pi * k
+    assert static_inertia(bar, frequency) == pytest.approx(1 / 3, rel=1e-3)
+    rotor = np.zeros(k.size + 1)
+    rotor[-1] = 1 / 20
+    axial, frequency = np.append(bar, 0.0), np.append(frequency, 1e-3)
+    found = pulse_spectrum(rotor, axial, frequency, 0.05)[1500] - impact_share(rotor, axial, frequency)
+    assert found == pytest.approx(math.sqrt(1 / 400) * 0.05 / frequency[1500], rel=0.01)
+
+
+def test_ring_is_carried_in_full_in_resonance_and_little_far_from_it():
+    drag = np.array([[0.0, 3.0, 0.02], [-3.0, 0.0, 0.0], [0.02, 0.0, 0.0]])
+    share = carried(drag, np.array([100.0, 100.0, 300.0]))
+    assert share[0, 1] == share[1, 0] == pytest.approx(1.0)
+    assert share[0, 2] == pytest.approx(0.02 * 100.0 / (300.0**2 - 100.0**2), rel=1e-4)
+    assert share[1, 2] == 0.0
+    assert np.all(np.diag(share) == 0.0)
