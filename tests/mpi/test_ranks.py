@@ -108,7 +108,7 @@ def test_no_rank_outlives_the_daemon_that_started_it(tmp_path):
     assert job.returncode != 0
     began = time.monotonic()
     while ranks := [p for number, p in processes_of(study).items() if number >= 0]:
-        assert time.monotonic() - began < 3, ranks
+        assert time.monotonic() - began < 10, ranks  # 2 s alone; they would run on for minutes
         time.sleep(0.05)
 
 
@@ -143,7 +143,7 @@ def test_a_rank_that_is_killed_ends_the_job_and_the_next_run_completes(tmp_path,
     wait_for_a_case(job, store)
     began = time.monotonic()
     kill_rank(rank, store)
-    job.communicate(timeout=5)
+    job.communicate(timeout=10)
     print(f"\n{launcher.name}: rank {rank} killed, the job ended after {time.monotonic() - began:.1f} s")
     assert job.returncode != 0
     assert not verify(store)
