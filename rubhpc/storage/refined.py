@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from rubhpc.schema import FAILED, INFERRED, MISSING
-from rubhpc.study.levels import Levels, Results
+from rubhpc.study.edges import Results
+from rubhpc.study.levels import Levels
 from rubhpc.study.refine import levels_of
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.journal import Entry
     from rubhpc.storage.manifest import Manifest
+    from rubhpc.study.edges import Edges
     from rubhpc.study.levels import Asked
 
 
@@ -53,6 +55,8 @@ class Refinement:
         self._kind = records.dtype
         self._held = {name: records[name].copy() for name, _ in self._by}
         self._flat: NDArray[np.int64] | None = None  # cases of a box, by their number in the grid
+        self._edges: Edges | None = None
+        self._fresh: list[NDArray[np.int64]] = []  # cases entered since edges were followed
 
     @property
     def refined(self) -> tuple[int, ...]:
@@ -72,10 +76,13 @@ class Refinement:
         part._flat = flat.ravel()
         part._status, part._is_known = self._status[part._flat], self._is_known[part._flat]
         part._held = {name: held[part._flat] for name, held in self._held.items()}
+        part._edges, part._fresh = None, []
         return part
 
     def enter(self, entries: Sequence[Entry]) -> None:
         """Add what has been computed since."""
+        if not entries:
+            return
         flat = np.array([entry.flat for entry in entries], np.int64)
         places = flat if self._flat is None else np.searchsorted(self._flat, flat)
         for entry, place in zip(entries, places.tolist(), strict=True):
@@ -85,9 +92,28 @@ class Refinement:
                 record = np.frombuffer(entry.measures, self._kind)[0]
                 for name, _ in self._by:
                     self._held[name][place] = record[name]
+        self._fresh.append(places)
 
     def asked(self) -> Asked:
-        """Return the cases that are asked for, as far as results decide."""
+        """Return the cases that are certain to be computed, as far as results decide."""
+        asked = self._levels.asked(self._results())
+        self._edges = asked.edges
+        self._fresh.clear()
+        return asked
+
+    def missing(self) -> NDArray[np.bool_]:
+        """Return the cases that are asked for and not known, (n_case,), or those of the box."""
+        if self._edges is None:
+            asked = self.asked().cases
+        else:  # nothing but edges is left, and what has been entered since decides the rest of them
+            fresh = np.concatenate([np.zeros(0, np.int64), *self._fresh])
+            self._fresh.clear()
+            asked = self._edges.asked
+            self._edges.follow(self._results(), fresh[self._is_known[fresh] & asked.ravel()[fresh]])
+        missing: NDArray[np.bool_] = asked.ravel() & ~self._is_known
+        return missing
+
+    def _results(self) -> Results:
         shape = self._levels.shape
         results = Results(
             is_known=self._is_known.reshape(shape),
@@ -102,12 +128,7 @@ class Refinement:
                     results.values.append((values.astype(np.float64), share))
                 else:
                     results.classes.append(values)
-        return self._levels.asked(results)
-
-    def missing(self) -> NDArray[np.bool_]:
-        """Return the cases that are asked for and not known, (n_case,), or those of the box."""
-        missing: NDArray[np.bool_] = self.asked().cases.ravel() & ~self._is_known
-        return missing
+        return results
 
 
 def status_of(

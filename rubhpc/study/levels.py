@@ -10,54 +10,49 @@ Halving one axis at a time makes maps of rub cheap: their regions are bands alon
 one case wide is followed along its length by as few cases as a wide one.
 
 Decisions come from the results of the cases that were asked for, level by level, and from nothing else:
-neither ranks nor kills nor what else a store holds change them.
+neither ranks nor kills nor what else a store holds change them. A case is decided as soon as the few on which
+its decision rests are, so that no level waits for the whole of the one before.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+
+from rubhpc.study.edges import Edges, differ, span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
+    from rubhpc.study.edges import Results
+
 # Share of the middles that are computed, as long as no result says it, fitted to two maps of 1620 and 20 000
 # cases: along the first axis times the root of the distance between neighbours, as a share of the axis.
 _FIRST, _LATER = 1.6, 0.22
 
 
-@dataclass(frozen=True, kw_only=True)
-class Results:
-    """What is known of the cases of a grid, as far as it decides what is refined.
+class Asked(NamedTuple):
+    """What is certain of the cases that a grid asks for.
 
     Attributes
     ----------
-    is_known : (*grid) bool
-        Cases that have an outcome.
-    is_failed : (*grid) bool
-        Those of them that have none to compare: their surroundings are computed.
-    classes : list of (*grid) int
-        Flags.
-    values : list of ((*grid) float, float)
-        Measures, and the share of the larger one by which neighbours may differ.
+    cases : (*grid) bool
+        Those that are asked for whatever the missing ones turn out to be.
+    is_all : bool
+        Whether these are all, and known.
+    n_expected : int
+        About how many there will be.
+    edges : Edges or None
+        Where the axes have all their values; None as long as a missing case may ask for others between them.
     """
-
-    is_known: NDArray[np.bool_]
-    is_failed: NDArray[np.bool_]
-    classes: list[NDArray[Any]] = field(default_factory=list)
-    values: list[tuple[NDArray[np.float64], float]] = field(default_factory=list)
-
-
-class Asked(NamedTuple):
-    """The cases that are asked for, (*grid), whether these are all, and about how many there will be."""
 
     cases: NDArray[np.bool_]
     is_all: bool
     n_expected: int
+    edges: Edges | None
 
 
 class Levels:
@@ -79,40 +74,42 @@ class Levels:
         self.coarse = coarse
 
     def asked(self, results: Results) -> Asked:
-        """Return the cases that are to be computed, as results decide: up to a level that lacks any."""
+        """Return the cases that are certain to be computed.
+
+        A case is decided as soon as the four on which its decision rests are, wherever on the grid others
+        are missing. What is certain stays so when more is known, and is the same in the end, whatever the
+        order of results.
+        """
         asked = np.zeros(self.shape, bool)
-        known = [results.is_failed, *results.classes, *(values for values, _ in results.values)]
-        tolerances = [0.0] * (1 + len(results.classes)) + [share for _, share in results.values]
+        known, tolerances = results.compared()
         nodes = self._first()
         here = self._at(nodes)
         asked[here] = True
-        if not results.is_known[here].all():
-            return Asked(asked, False, self._expected(asked, 0))
+        is_final = results.is_known[here]  # whether what is held will not change on this level
         held = [values[here] for values in known]
+        is_unsure = np.zeros(is_final.shape, bool)  # whether it may still be asked for on this level
+        n_expected = None if is_final.all() else self._expected(asked, 0)
         for number, (axis, fine) in enumerate(self._halvings(), 1):
-            is_open = self._differ(held, tolerances, axis)
-            is_open = _with_neighbours(is_open, axis)
-            touched = _touched(is_open, axis, nodes[axis], fine)
+            before, after = is_final[span(axis, None, -1)], is_final[span(axis, 1, None)]
+            is_open = differ(held, tolerances, axis) & before & after
+            touched = _touched(_with_neighbours(is_open, axis), axis, nodes[axis], fine)
+            is_unsure = _touched(_with_neighbours(~(before & after), axis), axis, nodes[axis], fine)
             held = [_between(values, axis, nodes[axis], fine) for values in held]
             nodes = {**nodes, axis: fine}
             here = self._at(nodes)
             asked[here] |= touched
             asked_here = asked[here]
-            if not results.is_known[here][asked_here].all():
-                return Asked(asked, False, self._expected(asked, number))
+            is_unsure &= ~asked_here
+            is_final = np.where(asked_here, results.is_known[here], ~is_unsure)
+            if n_expected is None and not is_final.all():
+                n_expected = self._expected(asked, number)
             held = [np.where(asked_here, v[here], h) for v, h in zip(known, held, strict=True)]
-        while True:
-            beside = np.zeros(self.shape, bool)
-            for axis in self.refined:
-                is_open = self._differ(held, tolerances, axis)
-                beside[_span(axis, None, -1)] |= is_open
-                beside[_span(axis, 1, None)] |= is_open
-            if not (beside & ~asked).any():
-                return Asked(asked, True, int(asked.sum()))
-            asked |= beside
-            if not results.is_known[asked].all():
-                return Asked(asked, False, int(asked.sum()))
-            held = [np.where(asked, v, h) for v, h in zip(known, held, strict=True)]
+        edges = Edges(self.refined, results, asked, is_final, held)
+        edges.follow(results, np.flatnonzero(edges.asked & results.is_known))
+        is_all = bool(is_final.all() and results.is_known[edges.asked].all())
+        if n_expected is None:
+            n_expected = int(edges.asked.sum())
+        return Asked(edges.asked, is_all, n_expected, None if is_unsure.any() else edges)
 
     def filled(self, values: NDArray[Any], is_computed: NDArray[np.bool_]) -> NDArray[Any]:
         """Return values, (*grid, ...), with those that are not computed inferred from their neighbours.
@@ -175,36 +172,16 @@ class Levels:
         """The cases of a level as an index of arrays over the grid."""
         return np.ix_(*(nodes.get(axis, np.arange(n)) for axis, n in enumerate(self.shape)))
 
-    @staticmethod
-    def _differ(held: list[NDArray[Any]], tolerances: list[float], axis: int) -> NDArray[np.bool_]:
-        """Whether neighbours along an axis differ; first in `held` are failures, which agree with none."""
-        failed, *rest = held
-        one, other = _span(axis, None, -1), _span(axis, 1, None)
-        found: NDArray[np.bool_] = failed[one] | failed[other]
-        for values, tolerance in zip(rest, tolerances[1:], strict=True):
-            a, b = values[one], values[other]
-            if values.dtype.kind != "f":
-                found |= a != b
-                continue
-            is_same = np.abs(a - b) <= tolerance * np.maximum(np.abs(a), np.abs(b))  # of NaN, false
-            found |= ~is_same & ~(np.isnan(a) & np.isnan(b))
-        return found
-
 
 def _every(n: int, step: int) -> NDArray[np.int64]:
     return np.unique(np.append(np.arange(0, n, step), n - 1))
 
 
-def _span(axis: int, start: int | None, stop: int | None) -> tuple[slice, ...]:
-    """All along the axes before one, and a part of it."""
-    return (*[slice(None)] * axis, slice(start, stop))
-
-
 def _with_neighbours(marked: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
     """What is marked, and what comes before or after it along an axis."""
     wide = marked.copy()
-    wide[_span(axis, 1, None)] |= marked[_span(axis, None, -1)]
-    wide[_span(axis, None, -1)] |= marked[_span(axis, 1, None)]
+    wide[span(axis, 1, None)] |= marked[span(axis, None, -1)]
+    wide[span(axis, None, -1)] |= marked[span(axis, 1, None)]
     return wide
 
 

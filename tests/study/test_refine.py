@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rubhpc.errors import InputError
-from rubhpc.study.levels import Levels, Results
+from rubhpc.study.edges import Results
+from rubhpc.study.levels import Levels
 from rubhpc.study.study import read_study
 
 BASE = """
@@ -139,6 +140,55 @@ def test_what_else_is_known_changes_no_decision():
     others = np.random.default_rng(1).random(truth.shape) < 0.3
     among, _ = refined(truth, levels, known=others)
     assert (alone == among).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_order_of_results_changes_nothing(seed):
+    """Results come a few at a time: what is certain stays, and is in the end what the rule says."""
+    rng = np.random.default_rng(seed)
+    truth = disc((23, 14), rng.uniform(0, 14, 2), 5.0) + 2 * disc((23, 14), rng.uniform(0, 14, 2), 3.0)
+    truth[rng.integers(23), rng.integers(14)] = 3
+    axes = (seed % 2, 1 - seed % 2)
+    levels = Levels(truth.shape, axes, 4)
+    known, before, n_round = np.zeros(truth.shape, bool), np.zeros(truth.shape, bool), 0
+    edges, fresh = None, np.zeros(0, np.int64)
+    while True:
+        results = Results(
+            is_known=known, is_failed=np.zeros(truth.shape, bool), classes=[np.where(known, truth, -1)]
+        )
+        asked = levels.asked(results)
+        assert not (before & ~asked.cases).any()
+        if edges is not None:
+            edges.follow(results, fresh)
+            assert (edges.asked == asked.cases).all()
+        edges = asked.edges
+        if asked.is_all:
+            break
+        before, n_round = asked.cases.copy(), n_round + 1
+        waiting = np.flatnonzero(asked.cases & ~known)
+        fresh = rng.choice(waiting, min(len(waiting), int(rng.integers(1, 9))), replace=False)
+        known.flat[fresh] = True
+    assert edges is not None
+    assert (asked.cases == by_hand(truth, axes, 4)).all()
+
+
+def test_what_does_not_depend_on_a_missing_case_is_asked_for():
+    """One case of the first level is missing: the map is decided but for the three steps around it."""
+    truth = disc((65, 65), (20, 20), 8.6)
+    levels = Levels(truth.shape, (0, 1), 8)
+    whole, n_level = refined(truth, levels)
+    known, n_round = np.zeros(truth.shape, bool), 0
+    while n_round < n_level:
+        asked = levels.asked(
+            Results(
+                is_known=known, is_failed=np.zeros(truth.shape, bool), classes=[np.where(known, truth, -1)]
+            )
+        )
+        known, n_round = asked.cases.copy(), n_round + 1
+        known[56, 56] = False
+    assert not asked.is_all
+    assert asked.edges is None
+    assert (asked.cases == whole).all()
 
 
 def test_a_measure_is_refined_where_it_changes_by_more_than_its_share():
