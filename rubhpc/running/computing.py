@@ -1,4 +1,4 @@
-"""One rank's share of a run: it claims blocks and computes them; of a refined map, level by level."""
+"""One rank's share of a run: it claims blocks and computes them, one after another."""
 
 from __future__ import annotations
 
@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.running.job import next_level
-from rubhpc.running.pool import Totals
+from rubhpc.running.pool import Totals, together
 from rubhpc.running.progress import Progress
-from rubhpc.running.slabs import find_slabs, work_through
 from rubhpc.running.watchdog import Watchdog
 from rubhpc.running.worker import Worker
-from rubhpc.schema import MISSING
 from rubhpc.storage.disk import disk_errors, flush_to_disk
 from rubhpc.storage.in_progress import InProgress
 from rubhpc.storage.resume import missing_share
@@ -29,14 +26,10 @@ if TYPE_CHECKING:
     from rubhpc.running.beginning import RunRequest
     from rubhpc.running.job import Job
     from rubhpc.running.pool import Pool
-    from rubhpc.running.slabs import Slab
     from rubhpc.storage.journal import Entry
-    from rubhpc.storage.refined import Refinement
     from rubhpc.study.cases import Block
 
 _PACKING_GAP = 600.0  # s between packings while a run is on; one takes 5 s for a million cases
-_PATIENCE = 2.0  # s of work on a slab that a kill may cost: its blocks get more cases on the next level
-_SLABS = 2  # of a refined map, to a rank: with fewer they are computed together, level by level
 
 
 class Computing:
@@ -55,45 +48,25 @@ class Computing:
         self._grid = CaseGrid(job.study, chunk=job.chunk)
         self._sequences = self._grid.sequences()
         self._store = Store(job.study.output)
-        self._entered: list[Entry] = []  # on this level
-        self._n_claim = 0
+        self._n_claim = 0  # in this round
+        self._n_claimed = 0  # by all ranks, in the rounds before
+        self._entered: list[Entry] = []  # of a refined map, since the last round
         self._sums = Totals()  # of all ranks, as this one last saw them
         self._unsynced: list[Path] = []
         self._next_packing = time.monotonic() + _PACKING_GAP
-        self._slabs = self._find_slabs()
-
-    @property
-    def has_slabs(self) -> bool:
-        """Whether a refined map has enough slabs for all ranks."""
-        return bool(self._slabs)
-
-    def compute_slabs(self) -> None:
-        """Compute slabs of a refined map through all their levels, until one rank finds none left.
-
-        The others then store what they have; what is left of their slabs is computed together, by levels.
-        """
-        job, n_slab = self._job, len(self._slabs)
-        assert job.refinement is not None
-        progress = self._progress_of_slabs(job.refinement)
-        job.missing[:] = False
-        with progress, self._worker("rank", progress) as worker:
-            worker.patience = _PATIENCE
-            worker.is_wanted_elsewhere = lambda: self._sums.claimed > n_slab or self._is_over(self._sums)
-            for number in self._numbers(n_slab):
-                work_through(self._slabs[number], job.refinement, worker)
-                worker.store_held()
-                self._pack_for_readers()
-        if self._stopping.reason:
-            self._pool.add(Totals(stop=1))
 
     def compute(self) -> None:
+        """Compute all that is missing, together with all ranks."""
+        together(self._pool, self._compute_blocks)
+        if self._job.suspect and not self._stopping.look():
+            together(self._pool, self.try_suspects)
+
+    def _compute_blocks(self) -> None:
         """Compute blocks until there are none left."""
         pool, job = self._pool, self._job
         sequences = [self._sequences[i] for i in job.pending]
         quiet = self._request.quiet or pool.rank > 0
-        # Journals of a later level count after those of an earlier one.
-        kind = f"rank_{job.level:02d}_" if job.level else "rank"
-        with self._progress(sequences, quiet=quiet) as progress, self._worker(kind, progress) as worker:
+        with self._progress(sequences, quiet=quiet) as progress, self._worker("rank", progress) as worker:
             for block in self._claimed(sequences):
                 worker.work(block)
                 worker.attend()
@@ -108,7 +81,7 @@ class Computing:
         """
         job = self._job = replace(self._job, ledger=self._store.replay(with_measures=False))
         blocks = {block.start: (n, block) for n, sequence in enumerate(self._sequences) for block in sequence}
-        with self._worker("tail") as worker:
+        with self._worker(self._kind_of_tail()) as worker:
             for flat in sorted(job.suspect, key=lambda i: job.suspect[i]):
                 n_sequence, block = blocks[self._store.start_of(flat)]
                 is_mine = n_sequence % self._pool.size == self._pool.rank  # a block has one writer
@@ -116,18 +89,9 @@ class Computing:
                     worker.missing = np.arange(self._grid.n_case) == flat
                     worker.work(block)
 
-    def advance(self) -> bool:
-        """Go on to the next level of a refined map, together with all ranks; whether there is one."""
-        if self._job.refinement is None:
-            return False
-        is_over = bool(self._stopping.look()) or self._is_over(self._pool.totals())
-        found = self._pool.gather((self._entered, self._n_claim, is_over))
-        entries = [entry for entered, _, _ in found for entry in entered]
-        following = next_level(self._job, self._grid, self._sequences, entries, sum(n for _, n, _ in found))
-        if following is None or any(is_over for _, _, is_over in found):
-            return False
-        self._job, self._entered, self._n_claim = following, [], 0
-        return True
+    def _kind_of_tail(self) -> str:
+        """Kind of the journals of cases that come last: they count after the others."""
+        return "tail"
 
     def sync(self) -> None:
         """Return once all that this rank has stored would survive a power failure."""
@@ -151,7 +115,7 @@ class Computing:
         while not self._stopping.look():
             sums = self._sums = self._pool.claim()
             self._n_claim += 1
-            number = sums.claimed - self._job.n_claimed
+            number = sums.claimed - self._n_claimed
             if number >= n or self._is_over(sums):
                 return
             yield number
@@ -172,23 +136,12 @@ class Computing:
     def _report(self, increment: Totals) -> None:
         self._sums = self._pool.add(increment)
 
-    def _find_slabs(self) -> list[Slab]:
-        """Slabs that are not complete; none where ranks would soon find none, or cases have killed ranks."""
-        job, refinement = self._job, self._job.refinement
-        if refinement is None or job.suspect:
-            return []
-        blocks = [block for sequence in self._sequences for block in sequence]
-        slabs = find_slabs(blocks, self._grid.shape, refinement.refined)
-        if len(slabs) < _SLABS * self._pool.size:
-            return []
-        return [slab for slab in slabs if refinement.within(slab.window).missing().any()]
-
     @contextmanager
     def _worker(self, kind: str, progress: Progress | None = None) -> Iterator[Worker]:
         """A worker with its journal and its in-progress record.
 
-        At its end all is on the disk; on a level of a refined map it only survives this process, lest the
-        other ranks wait for the disk (`sync`).
+        At its end all is on the disk; of a refined map it only survives this process, lest the other
+        ranks wait for the disk (`sync`).
         """
         job, pool, store = self._job, self._pool, self._store
 
@@ -227,33 +180,11 @@ class Computing:
     def _progress(self, sequences: list[list[Block]], *, quiet: bool) -> Progress:
         job = self._job
         is_missing = job.missing.reshape(self._grid.shape)
-        n_missing = int(job.missing.sum())
-        is_refined = job.refinement is not None
-        n_known = int((job.ledger.status != MISSING).sum())
-        n_case = n_missing + n_known if is_refined else int(job.share.sum())
+        n_case = int(job.share.sum())
         cost = sum(
             block.cost * missing_share(block, is_missing) for sequence in sequences for block in sequence
         )
-        return self._shown(n_case, cost, n_case - n_missing, quiet=quiet, is_level=is_refined)
+        return self._shown(n_case, cost, n_case - int(job.missing.sum()), quiet=quiet)
 
-    def _progress_of_slabs(self, refinement: Refinement) -> Progress:
-        """That of all levels, whose cases are known roughly."""
-        job = self._job
-        n_known = int((job.ledger.status != MISSING).sum())
-        n_case = max(refinement.asked().n_expected, n_known + int(job.missing.sum()))
-        all_cost = sum(block.cost for sequence in self._sequences for block in sequence)
-        cost = all_cost * (n_case - n_known) / self._grid.n_case
-        return self._shown(n_case, cost, n_known, quiet=self._request.quiet or self._pool.rank > 0)
-
-    def _shown(
-        self, n_case: int, cost: float, n_done: int, *, quiet: bool, is_level: bool = False
-    ) -> Progress:
-        return Progress(
-            n_case,
-            cost,
-            n_done=n_done,
-            quiet=quiet,
-            has_bar=not self._pool.is_launched,
-            level=self._job.level + 1 if is_level else None,
-            before=self._pool.totals(),
-        )
+    def _shown(self, n_case: int, cost: float, n_done: int, *, quiet: bool) -> Progress:
+        return Progress(n_case, cost, n_done=n_done, quiet=quiet, has_bar=not self._pool.is_launched)

@@ -16,7 +16,8 @@ from rubhpc.running.computing import Computing
 from rubhpc.running.crash import crash
 from rubhpc.running.finish import finish_part, finish_run
 from rubhpc.running.job import prepare_job
-from rubhpc.running.pool import Pool, RankLost, Totals, connect
+from rubhpc.running.pool import Pool, RankLost, connect, together
+from rubhpc.running.refining import Refining
 from rubhpc.running.stopping import Stopping
 from rubhpc.running.workers import start_workers
 from rubhpc.schema import MISSING
@@ -200,21 +201,13 @@ def _round(request: RunRequest, pool: Pool, began: float) -> Summary:
     job = pool.from_first(lambda: prepare_job(request, pool.size))
     request.token = job.token
     if job.part is None:
-        _together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=False))
-    computing = Computing(job, pool, request)
-    is_left = True
-    if computing.has_slabs:
-        _together(pool, computing.compute_slabs)
-        is_left = computing.advance()
-    while is_left:
-        _together(pool, computing.compute)
-        if job.suspect and not request.stopping.look():
-            _together(pool, computing.try_suspects)
-        is_left = computing.advance()
-    _together(pool, computing.sync)
+        together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=False))
+    computing = (Computing if job.refinement is None else Refining)(job, pool, request)
+    computing.compute()
+    together(pool, computing.sync)
     reason = next((reason for reason in pool.gather(request.stopping.verdict) if reason), "")
     if not reason and job.part is None:
-        _together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=True))
+        together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=True))
     finish = finish_run if job.part is None else finish_part
     summary = pool.from_first(lambda: finish(job, request, pool.totals().n_case, _clock() - began))
     n_missing = summary.counts[MISSING]
@@ -224,21 +217,6 @@ def _round(request: RunRequest, pool: Pool, began: float) -> Summary:
             "run the same command again"
         )
     return summary
-
-
-def _together(pool: Pool, work: Callable[[], None]) -> None:
-    """Do this rank's part; what keeps any rank from its store is raised on all."""
-    error = None
-    try:
-        work()
-    except RankLost:
-        raise
-    except RubError as trouble:
-        pool.add(Totals(stop=1))
-        error = trouble
-    for other in pool.gather(error):
-        if other is not None:
-            raise other
 
 
 def _pack_blocks(job: Job, pool: Pool, stopping: Stopping, *, is_end: bool) -> None:

@@ -48,7 +48,7 @@ class Job:
     share : (n_case,) bool
         Cases of the part; all without one.
     missing : (n_case,) bool
-        Cases of it to be computed, but for the suspect ones; of a refined map those of one level.
+        Cases of it to be computed, but for the suspect ones; of a refined map those that are known so far.
     pending : (n,) int
         Positions in `CaseGrid.sequences()` of those that hold one.
     suspect : dict
@@ -57,11 +57,7 @@ class Job:
     token : str
         Of the lock on the store.
     refinement : Refinement, optional
-        Of a refined map, what its next level depends on.
-    level : int
-        How many levels have been computed in this run.
-    n_claimed : int
-        Sequences that were claimed on the levels before.
+        Of a refined map, what decides which further cases it needs.
     """
 
     study: Study
@@ -75,8 +71,6 @@ class Job:
     suspect: dict[int, int]
     token: str
     refinement: Refinement | None = None
-    level: int = 0
-    n_claimed: int = 0
 
 
 def prepare_job(request: RunRequest, n_rank: int) -> Job:
@@ -135,47 +129,17 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
     )
 
 
-def next_level(
-    job: Job, grid: CaseGrid, sequences: Sequences, entries: list[Entry], n_claimed: int
-) -> Job | None:
-    """The next level of a refined map, from what all ranks have entered; None where there is none."""
-    refinement = job.refinement
-    assert refinement is not None
-    refinement.enter(entries)
-    for entry in entries:
-        job.ledger.status[entry.flat], job.ledger.checksum[entry.flat] = entry.status, entry.checksum
-    missing = refinement.missing()
-    if not missing.any() or (missing & job.missing).any():  # or some of this level have not been computed
-        return None
-    return replace(
-        job,
-        missing=missing,
-        pending=find_pending(grid, sequences, missing),
-        suspect={},
-        level=job.level + 1,
-        n_claimed=job.n_claimed + n_claimed,
-    )
-
-
 def find_pending(grid: CaseGrid, sequences: Sequences, missing: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Positions of the sequences that hold a missing case; of a refined map those with most cases first."""
+    """Positions of the sequences that hold a missing case."""
     starts = [np.arange(0, n, c) for n, c in zip(grid.shape, grid.chunk, strict=True)]
     counts = missing.reshape(grid.shape).astype(np.int32)
     for axis, at in enumerate(starts):
         counts = np.add.reduceat(counts, at, axis=axis)
-    n_missing = np.array(
-        [
-            sum(
-                int(counts[tuple(s // c for s, c in zip(b.start, grid.chunk, strict=True))]) for b in sequence
-            )
-            for sequence in sequences
-        ],
-        dtype=np.int64,
-    )
-    pending = np.flatnonzero(n_missing)
-    if grid.study.refine is not None:
-        pending = pending[np.argsort(-n_missing[pending], kind="stable")]
-    return pending
+    is_pending = [
+        any(counts[tuple(s // c for s, c in zip(b.start, grid.chunk, strict=True))] for b in sequence)
+        for sequence in sequences
+    ]
+    return np.flatnonzero(is_pending)
 
 
 def _fail_killers(

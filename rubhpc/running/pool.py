@@ -11,7 +11,7 @@ import sys
 import time
 import warnings
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -246,6 +246,23 @@ class Ranks:
             if error.Get_error_class() in lost:
                 raise RankLost("a rank was lost; run the same command again") from None
             raise
+
+
+def together(pool: Pool, work: Callable[[], T]) -> list[T]:
+    """Do this rank's part, and return what all return; what keeps any from its store is raised on all."""
+    result: tuple[T | None, RubError | None] = (None, None)
+    try:
+        result = (work(), None)
+    except RankLost:
+        raise
+    except RubError as error:
+        pool.add(Totals(stop=1))
+        result = (None, error)
+    found = pool.gather(result)
+    for _, trouble in found:
+        if trouble is not None:
+            raise trouble
+    return cast("list[T]", [value for value, _ in found])
 
 
 def connect() -> Pool:

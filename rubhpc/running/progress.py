@@ -34,10 +34,6 @@ class Progress:
     has_bar : bool
         Draw a bar, where the output is a terminal. Under a launcher it is none: Open MPI's pretends to be one
         even when it writes to a file.
-    level : int, optional
-        Number of the level of a refined map, whose cases are those up to this level.
-    before : Totals, optional
-        Sums at its beginning.
     """
 
     def __init__(
@@ -48,10 +44,7 @@ class Progress:
         n_done: int,
         quiet: bool,
         has_bar: bool,
-        level: int | None = None,
-        before: Totals | None = None,
     ) -> None:
-        self._level, self._before = level, before
         self._n_case, self._cost, self._n_done = n_case, max(cost, 1.0), n_done
         self._quiet = quiet or n_done == n_case
         self._has_bar = has_bar and sys.stdout.isatty()
@@ -75,8 +68,7 @@ class Progress:
             self._bar.start()
             self._bar.add_task("", total=self._n_case, completed=self._n_done, rest="")
         else:
-            level = "" if self._level is None else f"level {self._level}: "
-            print(f"{level}{self._n_done}/{self._n_case} cases are there; computing the rest", flush=True)
+            print(f"{self._n_done}/{self._n_case} cases are there; computing the rest", flush=True)
         return self
 
     def __exit__(
@@ -85,14 +77,20 @@ class Progress:
         if self._bar is not None:
             self._bar.stop()
 
+    def expect(self, n_case: int) -> None:
+        """Take the number of cases of a refined map as it is now foreseen."""
+        if n_case > self._n_done:
+            self._cost *= (n_case - self._n_done) / max(self._n_case - self._n_done, 1)
+            self._n_case = n_case
+            if self._bar is not None:
+                self._bar.update(self._bar.task_ids[0], total=n_case)
+
     def update(self, sums: Totals) -> None:
         """Show the sums of all ranks, unless that was done a moment ago."""
         now = time.monotonic()
         if self._quiet or now - self._shown < (_REDRAW if self._has_bar else self._gap):
             return
         self._shown = now
-        if self._before is not None:
-            sums = type(sums)(*(all_of - earlier for all_of, earlier in zip(sums, self._before, strict=True)))
         n_ended = self._n_done + sums.n_case
         if self._bar is None:
             print(f"{n_ended}/{self._n_case} cases; {self._rest(sums)}", flush=True)

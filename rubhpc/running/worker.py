@@ -18,6 +18,7 @@ from rubhpc.running.case_rows import packed_measures, put_any
 from rubhpc.running.case_setup import operation_of, set_up
 from rubhpc.running.initial_states import InitialState, InitialStates
 from rubhpc.running.pool import Totals
+from rubhpc.running.rounds import Pieces, lines_of
 from rubhpc.running.stopping import Stopped
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
 from rubhpc.storage.disk import disk_errors, flush_to_disk
@@ -26,7 +27,7 @@ from rubhpc.storage.store import case_checksum
 from rubhpc.study.drive_law import DriveLaw
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -68,7 +69,9 @@ class Worker:
     attend : callable
         Called several times a second while a case is computed.
     entered : list of Entry
-        Of a refined map, what this rank has journalled.
+        Of a refined map, what this rank has computed of whole blocks, or found damaged.
+    pieces : Pieces
+        What it has computed of blocks that it shares with other ranks.
     say : callable
         Called with what a case that takes long has come to.
     is_wanted_elsewhere : callable
@@ -92,6 +95,7 @@ class Worker:
         self._setups: OrderedDict[tuple[int, float, Contact, float], tuple[Rig, Setup]] = OrderedDict()
         self._initial_states = InitialStates(self.grid, self.store, self.ledger, self._repair)
         self.entered: list[Entry] = []
+        self.pieces = Pieces()
         self.say: Callable[[str], None] = lambda _: None
         self.is_wanted_elsewhere: Callable[[], bool] = lambda: False
         self.patience = 0.0
@@ -101,8 +105,10 @@ class Worker:
         self._next_sync = time.monotonic() + _SYNC_GAP
         self._seconds, self._cost = 0.0, 0.0
 
-    def work(self, block: Block) -> None:
+    def work(self, block: Block, *, is_shared: bool = False) -> None:
         """Compute, store and journal what is missing of a block; what is finished when a stop comes is kept.
+
+        Of a block that is shared with other ranks nothing is read, and what is computed is held (`pieces`).
 
         In a continuation a case starts from the final state of its predecessor, in this block or another.
 
@@ -116,7 +122,13 @@ class Worker:
         if not self.stopping.fits(cost * self._pace):
             return
         wanted = self.missing[flat]
-        data, damaged = self._kept(block, flat, wanted)
+        if is_shared:
+            data = self.pieces.rows(block.start) or self.store.blank_block(block.start)
+            for values in data.values():
+                values[wanted] = np.nan
+            damaged = np.zeros_like(wanted)
+        else:
+            data, damaged = self._kept(block.start, flat, wanted)
         wanted |= damaged
         entries: list[Entry] = []
         places = np.flatnonzero(wanted).tolist()
@@ -150,22 +162,48 @@ class Worker:
             )
             if self.is_wanted_elsewhere():
                 break
-        if entries:
-            lost = set(flat[damaged].tolist()) - {entry.flat for entry in entries}
-            entries += [Entry(i, self.store.manifest.case_id(i), MISSING) for i in lost]
+        if entries and is_shared:
+            self.pieces.hold(block.start, data, entries)
+        elif entries:
+            entries += self._lost(flat[damaged], entries)
             if self.grid.study.refine is not None:
                 self.entered += entries
-            for entry in entries:
-                self.ledger.status[entry.flat] = entry.status
-                self.ledger.checksum[entry.flat] = entry.checksum
+            self.ledger.enter(lines_of(entries))
             self._initial_states.remember(flat, data)
             held = self._held.get(block.start)
             self._held[block.start] = data, entries if held is None else held[1] + entries
-            if time.monotonic() - self._stored >= self.patience:
+            if self.is_due:
                 self.store_held()
+
+    @property
+    def is_due(self) -> bool:
+        """Whether patience is over with what is held back."""
+        return time.monotonic() - self._stored >= self.patience
+
+    def store_pieces(self, starts: Iterable[tuple[int, ...]]) -> None:
+        """Add the cases held of shared blocks to what is stored of them, while no other rank does."""
+        for start in starts:
+            flat = self.store.flat(start)
+            rows, entries = self.pieces.take(start)
+            wanted = np.isin(flat, [entry.flat for entry in entries])
+            data, damaged = self._kept(start, flat, wanted)
+            for name, values in data.items():
+                values[wanted] = rows[name][wanted]
+            lost = self._lost(flat[damaged], entries)
+            self.entered += lost
+            self.ledger.enter(lines_of(entries + lost))
+            self._held[start] = data, entries + lost
+        self.store_held()
+
+    def _lost(self, damaged: NDArray[np.int64], entries: list[Entry]) -> list[Entry]:
+        """That damaged cases are missing, but for those that have been computed again."""
+        lost = set(damaged.tolist()) - {entry.flat for entry in entries}
+        return [Entry(flat, self.store.manifest.case_id(flat), MISSING) for flat in lost]
 
     def store_held(self) -> None:
         """Store and journal the blocks that are held back."""
+        if not self._held:
+            return
         for start, (data, entries) in self._held.items():
             self.store.write_block(start, data)
             with disk_errors(self.store.path):
@@ -202,18 +240,18 @@ class Worker:
         return self._seconds / self._cost if self._cost else 0.0
 
     def _kept(
-        self, block: Block, flat: NDArray[np.int64], wanted: NDArray[np.bool_]
+        self, start: tuple[int, ...], flat: NDArray[np.int64], wanted: NDArray[np.bool_]
     ) -> tuple[Arrays, NDArray[np.bool_]]:
         """Arrays of the block with the cases that are there already, and which of those are damaged."""
         damaged = np.zeros_like(wanted)
-        if block.start in self._held:
-            return self._held[block.start][0], damaged
-        data = self.store.empty_block(block.start)
+        if start in self._held:
+            return self._held[start][0], damaged
+        data = self.store.empty_block(start)
         status = self.ledger.status[flat]
         kept = np.flatnonzero(~wanted & ((status == DONE) | (status == DIVERGED)))
         if not len(kept):
             return data, damaged
-        stored = self.store.read_block(block.start)
+        stored = self.store.read_block(start)
         for i_case in kept.tolist():
             if stored is None or case_checksum(stored, i_case) != self.ledger.checksum[flat[i_case]]:
                 damaged[i_case] = True

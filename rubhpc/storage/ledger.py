@@ -17,6 +17,7 @@ from rubhpc.storage.journal import journals
 from rubhpc.storage.measures import blank_records, converted
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -62,6 +63,11 @@ class Ledger:
     damaged_cases: set[int] = field(default_factory=set)
     n_lines: Counter[int] = field(default_factory=Counter)
     state: str = ""
+
+    def enter(self, lines: Iterable[tuple[int, int, int]]) -> None:
+        """Take the flat index, status and checksum of cases."""
+        for flat, status, checksum in lines:
+            self.status[flat], self.checksum[flat] = status, checksum
 
     @property
     def n_recent(self) -> int:

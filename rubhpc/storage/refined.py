@@ -56,6 +56,7 @@ class Refinement:
         self._held = {name: records[name].copy() for name, _ in self._by}
         self._flat: NDArray[np.int64] | None = None  # cases of a box, by their number in the grid
         self._edges: Edges | None = None
+        self._n_expected = 0
         self._fresh: list[NDArray[np.int64]] = []  # cases entered since edges were followed
 
     @property
@@ -99,7 +100,13 @@ class Refinement:
         asked = self._levels.asked(self._results())
         self._edges = asked.edges
         self._fresh.clear()
+        self._n_expected = asked.n_expected
         return asked
+
+    @property
+    def n_expected(self) -> int:
+        """About how many cases will be computed, as `missing` has last found."""
+        return self._n_expected if self._edges is None else int(self._edges.asked.sum())
 
     def missing(self) -> NDArray[np.bool_]:
         """Return the cases that are asked for and not known, (n_case,), or those of the box."""

@@ -209,10 +209,16 @@ class Store:
 
     def empty_block(self, start: tuple[int, ...]) -> dict[str, NDArray[Any]]:
         """Arrays of a block in which every case is missing, (n_case of it, ...) each."""
+        block = self.blank_block(start)
+        for values in block.values():
+            values[...] = np.nan
+        return block
+
+    def blank_block(self, start: tuple[int, ...]) -> dict[str, NDArray[Any]]:
+        """Arrays of a block, (n_case of it, ...) each, that hold nothing yet and take no memory before."""
         n_case = math.prod(w.stop - w.start for w in self.window(start))
         return {
-            v.name: np.full((n_case, *self.manifest.extent(v)), np.nan, v.dtype)
-            for v in self.manifest.variables
+            v.name: np.empty((n_case, *self.manifest.extent(v)), v.dtype) for v in self.manifest.variables
         }
 
     def read_block(self, start: tuple[int, ...]) -> dict[str, NDArray[Any]] | None:

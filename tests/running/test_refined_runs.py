@@ -8,15 +8,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from running import shards, stored_bytes, write_study
+from simulated_ranks import Simulation
 from stub_physics import Physics, record
 
 from postproc.store.live import open_live
 from postproc.store.open import open_store
 from rubhpc.errors import InputError, StoppedEarly
-from rubhpc.running import case_setup, computing, driver, job, worker
+from rubhpc.running import case_setup, driver, job, refining, worker
 from rubhpc.running.driver import run
 from rubhpc.running.plan import make_plan
-from rubhpc.running.pool import Alone
 from rubhpc.running.stopping import Stopping
 from rubhpc.schema import DONE, FAILED, INFERRED, MISSING, REGIME
 from rubhpc.storage.status import read_status
@@ -300,7 +300,7 @@ def slabs_of(folder, name="slabs"):
 def by_levels(tmp_path, physics, monkeypatch):
     """The map of `slabs_of` as it is computed level by level, and its cases."""
     with monkeypatch.context() as patch:
-        patch.setattr(computing, "_SLABS", 10**9)
+        patch.setattr(refining, "_SLABS", 10**9)
         study = slabs_of(tmp_path, "levels")
         run(study, quiet=True)
     n_case, physics.n_case = physics.n_case, 0
@@ -316,38 +316,43 @@ def test_a_slab_is_computed_with_one_set_up_and_as_by_levels(tmp_path, physics, 
     assert (stored_bytes(study.output), physics.n_case) == by_levels
 
 
-@pytest.mark.parametrize("n_alone", [1, 40])
-def test_slabs_are_left_to_all_when_another_rank_finds_none(
-    tmp_path, physics, monkeypatch, by_levels, n_alone
-):
-    claims = []
+def on_ranks(study, physics, n_rank, duration=lambda _: 1.0):
+    """Run a study on ranks whose cases last as long as `duration` says of their friction; what happened."""
+    simulation = Simulation(n_rank)
+    plain = physics.run_case
 
-    class WithAnother(Alone):
-        """As if another rank claimed all slabs that are left, and one more."""
+    def run_case(setup, *, friction, **rest):
+        simulation.last(duration(friction))
+        return plain(setup, friction=friction, **rest)
 
-        n_other = 0
+    def work(pool):
+        return driver._run_in(
+            pool, lambda: study, Stopping(), retry_failed=False, accept_version=False, quiet=True
+        )
 
-        def claim(self):
-            claims.append(physics.n_case)
-            return super().claim()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(worker, "run_case", run_case)
+        simulation.run(work)
+    return simulation
 
-        def add(self, increment):
-            if physics.n_case == n_alone and not self.n_other:
-                self.n_other = 11 - int(self._sums[0])
-                self._sums[0] += self.n_other
-            return super().add(increment)
 
-        def gather(self, value):
-            if not isinstance(value, tuple):
-                return [value]
-            n_other, self.n_other = self.n_other, 0
-            return [value, ([], n_other, False)]
+def uneven(friction):
+    """Seconds of a case: three of the 17 values of the friction take ten times as long."""
+    return 10.0 if round(20 * friction) % 7 == 0 else 1.0
 
-    monkeypatch.setattr(driver, "connect", WithAnother)
-    study = slabs_of(tmp_path)
-    run(study, quiet=True)
-    assert n_alone in claims  # no further case was computed before
-    assert (stored_bytes(study.output), physics.n_case) == by_levels
+
+@pytest.mark.parametrize(("n_rank", "keep"), [(2, '["section"]'), (8, '["section"]'), (3, "[]")])
+def test_no_rank_waits_for_more_than_a_case(tmp_path, physics, n_rank, keep):
+    """Where all axes are refined: once a rank has found nothing left no case begins before all have met."""
+    whole = study_of(tmp_path, "whole", keep=keep)
+    run(whole, quiet=True)
+    n_case, physics.n_case = physics.n_case, 0
+    study = study_of(tmp_path, keep=keep)
+    happened = on_ranks(study, physics, n_rank, uneven)
+    assert physics.n_case == n_case
+    assert stored_bytes(study.output) == stored_bytes(whole.output)
+    assert all(n_begun == 0 for _, _, n_begun in happened.waits)
+    assert max(end - came for came, end, _ in happened.waits) <= 10.0
 
 
 @pytest.mark.parametrize("moments", [(1,), (60, 20, 9)])
@@ -377,10 +382,10 @@ def test_blocks_of_a_slab_are_written_once_where_cases_are_short(tmp_path, physi
         write(store, start, data)
 
     monkeypatch.setattr(Store, "write_block", note)
-    monkeypatch.setattr(computing, "_PATIENCE", 1e9)
+    monkeypatch.setattr(refining, "_PATIENCE", 1e9)
     run(slabs_of(tmp_path), quiet=True)
     assert len(written) == len(set(written)) > 10
     written.clear()
-    monkeypatch.setattr(computing, "_PATIENCE", 0.0)
+    monkeypatch.setattr(refining, "_PATIENCE", 0.0)
     run(slabs_of(tmp_path, "at_once"), quiet=True)
     assert len(written) > len(set(written))

@@ -1,0 +1,175 @@
+"""One rank's share of a refined map: slabs, which need no other rank, and rounds, after which all meet."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
+
+from rubhpc.running.computing import Computing
+from rubhpc.running.pool import Totals, together
+from rubhpc.running.rounds import Blocks, News, lines_of, turns_of
+from rubhpc.running.slabs import find_slabs, work_through
+from rubhpc.schema import MISSING
+
+if TYPE_CHECKING:
+    from rubhpc.running.beginning import RunRequest
+    from rubhpc.running.job import Job
+    from rubhpc.running.pool import Pool
+    from rubhpc.running.progress import Progress
+    from rubhpc.running.rounds import Lines, Unit
+    from rubhpc.running.slabs import Slab
+    from rubhpc.running.worker import Worker
+    from rubhpc.storage.refined import Refinement
+
+_PATIENCE = 2.0  # s of work on a refined map a kill may cost: its blocks get more cases later
+_SLABS = 2  # to a rank: with fewer they are computed together, in rounds
+
+
+class Refining(Computing):
+    """What a rank computes of a refined map.
+
+    Parameters
+    ----------
+    job : Job
+    pool : Pool
+    request : RunRequest
+    """
+
+    def __init__(self, job: Job, pool: Pool, request: RunRequest) -> None:
+        super().__init__(job, pool, request)
+        self._n_journal = 0
+        self._has_ended = False
+
+    def compute(self) -> None:
+        """Compute what the map asks for, together with all ranks: slabs, then in rounds what is left."""
+        refinement = self._job.refinement
+        assert refinement is not None
+        slabs = self._find_slabs()
+        with self._progress_of(refinement) as progress:
+            self._job.missing[:] = False
+            if slabs:
+                together(self._pool, lambda: self._compute_slabs(slabs, refinement, progress))
+            is_left = True
+            while is_left:
+                is_left = self._compute_rounds(refinement, progress)
+                if not is_left and self._job.suspect and not self._has_ended:
+                    together(self._pool, self.try_suspects)
+                    self._job = replace(self._job, suspect={})
+                    is_left = True
+
+    def _compute_slabs(self, slabs: list[Slab], refinement: Refinement, progress: Progress) -> None:
+        """Compute slabs through all their levels, until one rank finds none left.
+
+        The others then store what they have; what is left of their slabs is computed together, in rounds.
+        """
+        with self._worker(self._next_kind(), progress) as worker:
+            worker.patience = _PATIENCE
+            worker.is_wanted_elsewhere = lambda: self._is_wanted(len(slabs))
+            for number in self._numbers(len(slabs)):
+                work_through(slabs[number], refinement, worker)
+                worker.store_held()
+                self._pack_for_readers()
+        if self._stopping.reason:
+            self._pool.add(Totals(stop=1))
+
+    def _compute_rounds(self, refinement: Refinement, progress: Progress) -> bool:
+        """Compute in rounds what a map asks for, until nothing is left; whether to go on with new journals.
+
+        Cases that are marked as missing, since their arrays are damaged, need new ones: their next lines
+        count after those of all ranks.
+        """
+        pool, job = self._pool, self._job
+        units: list[Unit] = []
+        with ExitStack() as stack:
+            workers: list[Worker] = []
+            kind = self._next_kind()
+            together(pool, lambda: workers.append(stack.enter_context(self._worker(kind, progress))))
+            worker = workers[0]
+            worker.patience = _PATIENCE
+            while True:
+                news = together(pool, partial(self._round, units, worker))
+                entries = [entry for own in news for entry in own.stored]
+                is_stuck = bool(units) and not entries and not any(own.held for own in news)
+                is_damaged = any(entry.status == MISSING for entry in entries)
+                self._has_ended = is_stuck or any(own.is_over for own in news)
+                self._n_claimed, self._n_claim = self._n_claimed + sum(own.n_claim for own in news), 0
+                job.ledger.enter(lines_of(entries))
+                refinement.enter(entries + [entry for own in news for entry in own.held])
+                missing = refinement.missing()
+                missing[list(job.suspect)] = False
+                units = [] if self._has_ended else self._blocks.units(missing, pool.size)
+                progress.expect(max(refinement.n_expected, int((job.ledger.status != MISSING).sum())))
+                is_due = any(own.is_due for own in news) or any(not unit.is_shared for unit in units)
+                has_pieces = any(own.pieces for own in news)
+                if has_pieces and (is_due or is_damaged or not units):
+                    self._store_pieces([own.pieces for own in news], worker)
+                if is_damaged or not (units or (has_pieces and not self._has_ended)):
+                    worker.store_held()
+                    return is_damaged and not self._has_ended
+
+    def _round(self, units: list[Unit], worker: Worker) -> News:
+        """Compute units until one rank finds none left."""
+        worker.is_wanted_elsewhere = lambda: self._is_wanted(len(units))
+        for number in self._numbers(len(units)):
+            block, places, is_shared = units[number]
+            cases = self._store.flat(block.start)[places]
+            worker.missing[cases] = True
+            worker.work(block, is_shared=is_shared)
+            worker.missing[cases] = False
+            worker.attend()
+            self._pack_for_readers()
+        if self._stopping.reason:
+            self._pool.add(Totals(stop=1))
+        if self._pool.size > 1:
+            worker.store_held()
+        stored, held = list(worker.entered), list(worker.pieces.entered)
+        worker.entered.clear()
+        worker.pieces.entered.clear()
+        is_over = self._is_over(self._pool.totals())
+        return News(stored, held, worker.pieces.listed(), self._n_claim, worker.is_due, is_over)
+
+    def _store_pieces(self, pieces: list[dict[tuple[int, ...], Lines]], worker: Worker) -> None:
+        """Store what all ranks hold of blocks that they share: of one block, one rank after another."""
+        for turn in turns_of(pieces) if self._store.manifest.variables else [pieces]:
+            own = turn[self._pool.rank]
+            together(self._pool, partial(worker.store_pieces, own))
+            for lines in (lines for of_rank in turn for lines in of_rank.values()):
+                self._job.ledger.enter(lines)
+
+    @cached_property
+    def _blocks(self) -> Blocks:
+        return Blocks(self._grid)
+
+    def _is_wanted(self, n: int) -> bool:
+        """Whether a rank has found nothing left of n units, or all are to end."""
+        return self._sums.claimed - self._n_claimed > n or self._is_over(self._sums)
+
+    def _next_kind(self) -> str:
+        """Kind of a refined map's next journals, which count after those before."""
+        self._n_journal += 1
+        return f"rank_{self._n_journal:03d}_" if self._n_journal > 1 else "rank"
+
+    def _kind_of_tail(self) -> str:
+        return self._next_kind()
+
+    def _find_slabs(self) -> list[Slab]:
+        """Slabs that are not complete; none where ranks would soon find none, or cases have killed ranks."""
+        job, refinement = self._job, self._job.refinement
+        if refinement is None or job.suspect:
+            return []
+        blocks = [block for sequence in self._sequences for block in sequence]
+        slabs = find_slabs(blocks, self._grid.shape, refinement.refined)
+        if len(slabs) < _SLABS * self._pool.size:
+            return []
+        return [slab for slab in slabs if refinement.within(slab.window).missing().any()]
+
+    def _progress_of(self, refinement: Refinement) -> Progress:
+        """That of a refined map, whose cases are known roughly."""
+        job = self._job
+        n_known = int((job.ledger.status != MISSING).sum())
+        n_case = max(refinement.n_expected, n_known + int(job.missing.sum()))
+        all_cost = sum(block.cost for sequence in self._sequences for block in sequence)
+        cost = all_cost * (n_case - n_known) / self._grid.n_case
+        return self._shown(n_case, cost, n_known, quiet=self._request.quiet or self._pool.rank > 0)
