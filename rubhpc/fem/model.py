@@ -259,6 +259,12 @@ class Model:
         """First row of each body among all degrees of freedom, and the number of all: (n_body + 1,)."""
         return tuple(accumulate((body.n_dof for body in self.bodies), initial=0))
 
+    @cached_property
+    def output_sag(self) -> NDArray[np.float64]:
+        """Sag of the output node: vertical, horizontal and torsional, (3,), m, m and rad."""
+        rows = (self.rotor.index(self.output_node, name) for name in ("v", "w", "thx"))
+        return np.array([self.sag[row] if row >= 0 else 0.0 for row in rows])
+
     @property
     def n_place(self) -> int:
         """Places whose motion is recorded besides the output node's.

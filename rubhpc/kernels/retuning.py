@@ -22,6 +22,7 @@ from rubhpc.kernels.contact_modes import (
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+SQUARED = 4  # levels of exponentials, of which one is evaluated and the others follow by squaring
 GONE = -40.0  # exponent of what has died away
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
 
@@ -111,12 +112,13 @@ def retune(
         held.row[o, m] = total
     n_output = held.output.shape[0]
     for k in range(end):
+        onward, ahead = np.exp(exponent[k] * interval), 1.0 + 0j
         for later in range(SAMPLES_AT_ONCE):
-            ahead = np.exp(exponent[k] * (interval * later))
             for o in range(n_output):
                 value = ahead * held.row[o, k]
                 tables.output[mode, k, later * n_output + o] = value.real
                 tables.output[mode, width + k, later * n_output + o] = -value.imag
+            ahead *= onward
     _retune_energies(tables, mode, held, x, factor)
 
 
@@ -125,14 +127,16 @@ def _retune_powers(
     tables: ModeTables, mode: int, k: int, exponent: complex, tick: float, n_level: int
 ) -> None:
     """Exponentials of a coordinate, and what bounds and paces have of them."""
+    power = 1.0 + 0j
     for level in range(n_level):
-        power = np.exp(exponent * (tick * 2.0**level))
+        # To square doubles the rounding.
+        power = power * power if level % SQUARED else np.exp(exponent * (tick * 2.0**level))
         tables.power_re[mode, level, k], tables.power_im[mode, level, k] = power.real, power.imag
     size = abs(exponent)
-    growth = np.exp(max(exponent.real, 0.0) * tick * 2.0 ** (n_level - 1))
+    growth = np.exp(exponent.real * tick * 2.0 ** (n_level - 1)) if exponent.real > 0.0 else 1.0
     for i in range(tables.bound.shape[1]):
-        share = np.hypot(tables.switch_re[mode, i, k], tables.switch_im[mode, i, k])
-        tables.bound[mode, i, k] = share * size * size * growth
+        re, im = tables.switch_re[mode, i, k], tables.switch_im[mode, i, k]
+        tables.bound[mode, i, k] = np.sqrt(re * re + im * im) * size * size * growth
     is_gone = exponent.real * tick * 2.0**FORCED_LEVEL < GONE
     tables.pace[mode, k] = DYING if is_gone else size
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 PHYSICS = 15  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
 DIRECT = 1  # transient = "direct"
-CHANGING_SPEED = 1  # run-ups and drives
+CHANGING_SPEED = 2  # run-ups and drives
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 MANY_STATORS = 1  # more than five, whose sets of closed contacts or states may be more than 256
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"

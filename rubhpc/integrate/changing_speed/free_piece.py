@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rubhpc.integrate.changing_speed.passing import Passed, Passing, state_at
 from rubhpc.integrate.changing_speed.piece_setup import Pieces
-from rubhpc.integrate.changing_speed.run_up import Passed, pass_piece
 from rubhpc.integrate.measuring.measures import new_accumulator
 from rubhpc.integrate.start import start_of
 from rubhpc.kernels.accumulators import (
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.study.drive_law import DriveLaw
@@ -62,15 +64,15 @@ class Spin:
     ) -> None:
         assert fastest.free_spin is not None
         model = fastest.model
-        self._drive, self._initial, self._check = drive, initial, check
-        self._clearance, self._friction = clearance, friction
-        self._pieces = Pieces(fastest)
+        self._drive, self._initial, self._clearance = drive, initial, clearance
+        self._pieces, self._passing = Pieces(fastest), Passing(clearance, friction, check)
         self._free = fastest.free_spin
         self._gyroscopic = model.rotor.gyroscopic
         self._phasor = model.unbalance_cosine - 1j * model.unbalance_sine
         self.speed, self.time = drive.start, 0.0
         self._brake = 0.0  # N m, mean of the last piece
-        self._begun: State | None = None
+        self._begun: State | Place | None = None
+        self._setup: PieceSetup | None = None  # of the last piece
         # The contact forces of the piece before, and how long it took, s.
         self._earlier = new_accumulator(len(model.stators), model.n_place), 0.0
 
@@ -78,7 +80,8 @@ class Spin:
     def state(self) -> State:
         """The motion reached."""
         assert self._begun is not None
-        return self._begun
+        assert self._setup is not None
+        return state_at(self._begun, self._setup)
 
     def take(self, at: int, length: int, per_revolution: int, *, is_fixed: bool) -> Taken | None:
         """Take a piece from sample `at`; None where it is too long, or the spin does not get so far.
@@ -99,16 +102,16 @@ class Spin:
             if not is_fixed and abs(acceleration) * duration**2 > 12.0 * LAG and length > 1:
                 return None
             torque = self._mean_torque(end_speed)
-            setup = self._pieces.setup(mean, acceleration, first, duration, torque)
+            setup = self._setup = self._pieces.setup(mean, acceleration, first, duration, torque)
             if self._begun is None:
                 start = self._initial
                 self._begun = start_of(start, setup, self._clearance) if isinstance(start, Initial) else start
-            case = setup, length, self._clearance, self._friction, self._begun, self._earlier, self._check
-            passed = pass_piece(*case, is_balanced=True)
+            passed = self._passing.take(setup, length, self._begun, self._earlier, is_balanced=True)
             if passed.reason:
                 return self._taken(passed, acceleration, length, per_revolution, torque, np.zeros(6))
             flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)
-            before, after = self._momentum(self._begun, first), self._momentum(passed.final, last)
+            before = self._momentum(state_at(self._begun, setup), first)
+            after = self._momentum(state_at(passed.end, setup), last)
             turning = acceleration * 0.5 * duration * (before[1] + after[1])
             given = torque * turned + turning - flows[UNBALANCE_WORK] - flows[DRIVE_WORK]
             change = self._change(given, sum(before), sum(after))
@@ -141,7 +144,7 @@ class Spin:
             return None
         self.time += duration
         self._brake = torque - inertia * change / duration
-        self._begun = passed.final
+        self._begun = passed.end
         self._earlier = passed.accumulators[-1], duration
         return found
 

@@ -1,7 +1,8 @@
-"""Over which speeds the matrices of a run-up may keep their values."""
+"""Over which speeds and accelerations the matrices of a run-up may keep their values."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,15 +12,24 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-WIDEST, NARROWEST = 0.16, 0.00125  # half of the range over the speed
+WIDEST, NARROWEST = 0.5, 0.00125  # half of the range over the speed
+WIDEST_TABULATED = 0.16  # the same where bearings follow a table, not a straight line
+ACCELERATION_SHARE = 0.25  # of these errors, by the acceleration
 RESPONSE = 3e-3  # relative error of the response to unbalance by a mode whose exponent is held
 RINGING = 2e-3  # relative error of an exponent
 
 
 def held_range(
-    stiffness: Floats, damping: Floats, drift: tuple[Floats, Floats], speed: float, acceleration: float
-) -> float:
-    """Half of the range of speeds over which matrices may be held, rad/s.
+    stiffness: Floats,
+    damping: Floats,
+    drift: tuple[Floats, Floats],
+    speed: float,
+    acceleration: float,
+    *,
+    momentum: Floats | None = None,
+    widest: float = WIDEST,
+) -> tuple[float, float]:
+    """Half of the ranges of speeds, rad/s, and of accelerations, rad/s^2, over which matrices may be held.
 
     Held at their values in the middle of it, they shift the exponent l of a mode by `l' h` at its ends, with
     `l' = w A' v` by the left and right eigenvectors of the system A. The response to the unbalance, `exp(i
@@ -33,19 +43,27 @@ def held_range(
     drift : two of (n, n)
         Change of stiffness and damping with the speed, per rad/s.
     speed, acceleration : float, rad/s, rad/s^2
+    momentum : (n, n), optional
+        Change of the stiffness with the acceleration, per rad/s^2.
+    widest : float
+        Half of the widest range over the speed.
     """
     n = len(stiffness)
     system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
     exponent, shape = np.linalg.eig(system)
-    change = np.vstack([np.zeros((n, 2 * n)), -np.hstack(drift)])
-    shift = np.abs(np.einsum("ka,ab,bk->k", np.linalg.inv(shape), change, shape, optimize=True))
-    half = WIDEST * speed
-    while half > NARROWEST * speed:
+    against = np.linalg.inv(shape)[:, n:]
+    shift = np.abs(np.einsum("ka,ab,bk->k", against, np.hstack(drift), shape, optimize=True))
+    half = widest * speed
+    while True:
         excited = np.clip(np.abs(exponent.imag), speed - half, speed + half)
         distance = np.hypot(exponent.real, np.abs(exponent.imag) - excited)
         distance = np.maximum(distance, abs(acceleration) / half)
         allowed = np.minimum(RESPONSE * distance, RINGING * np.abs(exponent))
-        if np.all(shift * half <= allowed):
+        if half <= NARROWEST * speed or np.all(shift * half <= allowed):
             break
         half *= 0.5
-    return half
+    if momentum is None:
+        return half, math.inf
+    turned = np.abs(np.einsum("ka,ab,bk->k", against, momentum, shape[:n], optimize=True))
+    reached = np.divide(allowed, turned, out=np.full(allowed.shape, math.inf), where=turned > 0.0)
+    return half, ACCELERATION_SHARE * float(reached.min())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -11,9 +12,10 @@ import numpy as np
 from rubhpc.fem.assemble import model_at
 from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.statics import sag_under
-from rubhpc.integrate.changing_speed.held_matrices import held_range
+from rubhpc.integrate.changing_speed.held_matrices import WIDEST, WIDEST_TABULATED, held_range
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
 from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
 from rubhpc.integrate.packing import whole_system
 from rubhpc.integrate.reduced_model.contact_mode import KeptParts
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
@@ -36,28 +38,38 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 R = TypeVar("R", bound=RetunedLibrary)
+D = TypeVar("D")
 SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the speed is taken
-ACCELERATION_STEP = 0.005  # of the square of the speed: a change of `phi'' G` below it is left out
+MOST_HELD = 4  # matrices kept, of a spin that swings between them
 
 
 class HeldMatrices:
     """Matrices at a speed, rad/s, and an acceleration, rad/s^2, and what has been solved of them."""
 
+    template: PieceSetup  # of which a piece has another speed
+
     def __init__(
-        self, model: Model, reduced: ReducedModel, phasor: Complexes, reach: float, acceleration: float
+        self,
+        model: Model,
+        reduced: ReducedModel,
+        phasor: Complexes,
+        acceleration: float,
+        reach: tuple[float, float],
+        sample_level: int,
     ) -> None:
         self.model, self.reduced = model, reduced
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
         self.kept = KeptParts()
         self.bodies: dict[float, Reduced] = {}  # of each friction, but for what a piece changes
+        self.sample_level = sample_level  # of the lowest speed
         self._phasor, self._reach, self._acceleration = phasor, reach, acceleration
-        self._libraries: dict[tuple[str, float, int, int], RetunedLibrary] = {}
+        self._libraries: dict[tuple[str, float], RetunedLibrary] = {}
         self._pairs: dict[float, FrictionPairs] = {}
 
     def serve(self, speed: float, acceleration: float) -> bool:
         """Whether a piece may use them."""
-        is_near = abs(speed - self.reduced.spin) <= self._reach
-        return is_near and abs(acceleration - self._acceleration) <= ACCELERATION_STEP * speed**2
+        far, changed = self._reach
+        return abs(speed - self.reduced.spin) <= far and abs(acceleration - self._acceleration) <= changed
 
     def driven(self, torque: float, acceleration: float) -> Model:
         """The model with the sag under a drive's torque, N m, at an acceleration, rad/s^2."""
@@ -68,7 +80,7 @@ class HeldMatrices:
         self, kind: type[R], piece: PieceSetup, friction: float, make: Callable[[], dict[str, Any]]
     ) -> R:
         """Contact modes of a friction, tuned to a piece; `make` gives what this kind of library asks for."""
-        key = kind.__name__, friction, piece.sample_level, piece.n_level
+        key = kind.__name__, friction
         if key not in self._libraries:
             self._libraries[key] = kind(
                 self.reduced,
@@ -105,6 +117,11 @@ class PieceSetup(ModalSetup):
     def energy_limit(self) -> float:
         """Mechanical energy, J, beyond which a motion has diverged."""
         return self.most_energy
+
+    @cached_property
+    def sample_level(self) -> int:
+        """2^sample_level ticks are the interval of samples, at all speeds of the same matrices."""
+        return self.held.sample_level
 
     @property
     def n_level(self) -> int:
@@ -153,16 +170,15 @@ class PieceSetup(ModalSetup):
         return replace(pairs, rim_speed=radius * abs(self.spin))
 
     def friction_library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction whose slip may turn; with a penalty besides, solved for this piece."""
-        if self.law.stiffness:
-            return super().friction_library(friction)
+        """Contact modes of a friction whose slip may turn."""
 
         def pairs() -> dict[str, Any]:
             radius = np.array([stator.radius for stator in self.model.stators])
             rim_speed = radius * abs(self.held.reduced.spin)
             return {"pairs": replace(self.friction_pairs(friction), rim_speed=rim_speed)}
 
-        return self.held.tuned(RetunedFrictionLibrary, self, friction, pairs)
+        kind = RetunedSoftFrictionLibrary if self.law.stiffness else RetunedFrictionLibrary
+        return self.held.tuned(kind, self, friction, pairs)
 
 
 class Pieces:
@@ -175,7 +191,7 @@ class Pieces:
     def __init__(self, fastest: ModalSetup) -> None:
         self._fastest = fastest
         self._basis = fastest.reduced.basis
-        self._held: HeldMatrices | None = None
+        self._held: list[HeldMatrices] = []  # the latest first
         model = fastest.model
         rotor = model.rotor
         self._inertia = rotor.mass @ unit_rotation(rotor)
@@ -193,43 +209,56 @@ class Pieces:
 
         `torque` (N m) is that of the drive of a free spin.
         """
-        held, fastest = self._held, self._fastest
-        if held is None or not held.serve(speed, acceleration):
-            held = self._held = self._hold(speed, acceleration)
+        held, fastest = self._find(speed, acceleration), self._fastest
         lag = acceleration * duration**2 / 12.0
-        factor = (speed**2 - 1j * acceleration) * complex(np.exp(1j * (angle - lag)))
+        factor = (speed**2 - 1j * acceleration) * cmath.exp(1j * (angle - lag))
         phasor = self._phasor * factor
-        reduced = replace(held.reduced, spin=speed, force=np.stack([phasor.real, -phasor.imag]))
-        for name in ("translations", "project"):  # which need no computing anew
-            reduced.__dict__[name] = getattr(held.reduced, name)
-        return PieceSetup(
-            scheme=fastest.scheme,
-            model=held.model if fastest.free_spin is None else held.driven(torque, acceleration),
-            reduced=reduced,
+        force = np.empty((2, phasor.size))
+        force[0], force[1] = phasor.real, -phasor.imag
+        model = held.model if fastest.free_spin is None else held.driven(torque, acceleration)
+        return _with(
+            held.template,
+            model=model,
+            reduced=_with(held.reduced, spin=speed, force=force),
             spin=speed,
-            step=fastest.step,
-            contact_step=fastest.contact_step,
-            samples_per_revolution=fastest.samples_per_revolution,
-            is_updated=fastest.is_updated,
-            law=fastest.law,
-            displacement_limit=fastest.displacement_limit,
-            held=held,
             factor=factor,
-            most_energy=fastest.energy_limit,
+            _curved_libraries={},  # which are of this speed alone
+            _open_tables={},
         )
+
+    def _find(self, speed: float, acceleration: float) -> HeldMatrices:
+        """Matrices that may be held at a speed and an acceleration."""
+        for i, held in enumerate(self._held):
+            if held.serve(speed, acceleration):
+                if i:
+                    self._held.insert(0, self._held.pop(i))
+                return held
+        found = self._hold(speed, acceleration)
+        self._held = [found, *self._held[: MOST_HELD - 1]]
+        return found
 
     def _hold(self, speed: float, acceleration: float) -> HeldMatrices:
         """Matrices for a speed at the near end of the range over which they may be held.
 
         That of a free spin, which may turn back, is in the middle of the range.
         """
-        free = self._fastest.free_spin
+        fastest, free = self._fastest, self._fastest.free_spin
         model, damping, stiffness = self._matrices(speed, acceleration)
         _, next_damping, next_stiffness = self._matrices(speed * (1.0 + SPEED_STEP), acceleration)
         step = SPEED_STEP * speed
         drift = (next_stiffness - stiffness) / step, (next_damping - damping) / step
-        reach = held_range(stiffness, damping, drift, speed, acceleration)
+        reach, swing = held_range(
+            stiffness,
+            damping,
+            drift,
+            speed,
+            acceleration,
+            momentum=self._momentum,
+            widest=WIDEST_TABULATED if fastest.model.rotor.tabulated_speeds else WIDEST,
+        )
         if free is None:
+            if acceleration > 0.0:  # no farther than the law goes
+                reach = min(reach, max(0.5 * (fastest.spin - speed), 0.0))
             speed += np.sign(acceleration) * reach
             model, damping, stiffness = self._matrices(speed, acceleration)
             model = _sagging(model, sag_under(model.rotor, model.load - acceleration * self._inertia))
@@ -237,14 +266,34 @@ class Pieces:
             model = _sagging(model, sag_under(model.rotor, model.load))
         phasor = self._phasor * speed**2
         reduced = replace(
-            self._fastest.reduced,
+            fastest.reduced,
             spin=speed,
             stiffness=stiffness,
             damping=damping,
             force=np.stack([phasor.real, -phasor.imag]),
         )
+        for name in ("translations", "project"):  # which need no computing anew
+            reduced.__dict__[name] = getattr(fastest.reduced, name)
         near_end = reach * (1.0 + 1e-9)  # rounding apart
-        held = HeldMatrices(model, reduced, self._phasor, near_end, acceleration)
+        slowest = replace(fastest, spin=abs(speed) - reach)
+        ranges = near_end, swing
+        held = HeldMatrices(model, reduced, self._phasor, acceleration, ranges, slowest.sample_level)
+        held.template = PieceSetup(
+            scheme=fastest.scheme,
+            model=model,
+            reduced=reduced,
+            spin=speed,
+            step=fastest.step,
+            contact_step=fastest.contact_step,
+            samples_per_revolution=fastest.samples_per_revolution,
+            is_updated=fastest.is_updated,
+            law=fastest.law,
+            accuracy=fastest.accuracy,
+            displacement_limit=fastest.displacement_limit,
+            held=held,
+            factor=complex(speed**2),
+            most_energy=fastest.energy_limit,
+        )
         if free is not None:
             held.twist = sag_under(model.rotor, -free.share)
             held.lean = sag_under(model.rotor, -0.5 * model.rotor.gyroscopic @ model.sag)
@@ -258,6 +307,13 @@ class Pieces:
         _, damping, stiffness, _ = whole_system(model, speed)
         stiffness = self._basis.T @ stiffness @ self._basis + acceleration * self._momentum
         return model, self._basis.T @ damping @ self._basis, stiffness
+
+
+def _with(instance: D, **values: Any) -> D:
+    """The same with other values, and with what has been computed of it: `replace` at a tenth of its time."""
+    other = object.__new__(type(instance))
+    other.__dict__.update(instance.__dict__, **values)
+    return other
 
 
 def _sagging(model: Model, sag: Floats) -> Model:

@@ -12,7 +12,7 @@ from rubhpc.integrate.reduced_model.contact_mode import confine
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, solve_friction_mode, states_of
 from rubhpc.integrate.reduced_model.mode_library import LANES, MOST_FRICTION_MODES, SPARE
 from rubhpc.integrate.reduced_model.penalty_mode import overlap_rows, solve_penalty_mode
-from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK
+from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, lifted_place
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
@@ -76,16 +76,14 @@ class RetunedPenaltyLibrary(RetunedLibrary):
             return
         m, n = self._held[place].is_pair.size, self.slip.shape[1]
         gap = self.gap_jacobian[self._penalty.pressed(self._mask_of(place))]
+        both = slice(m, None, self.width)  # its real and imaginary part, which the kernel has filled anew
         rows[:, m] = gap @ tables.motion_re[place, :n, m]
         rows[:, self.width + m] = -(gap @ tables.motion_im[place, :n, m])
-        stored = 0.5 * self._penalty.stiffness * rows.T
         loss = tables.loss[place]
-        for k in (m, self.width + m):  # which the kernel has filled anew
-            form = stored @ rows[:, k]
-            loss[k] += form
-            loss[:, k] += form
-        both = [m, self.width + m]
-        loss[np.ix_(both, both)] -= stored[both] @ rows[:, both]
+        form = (0.5 * self._penalty.stiffness * rows[:, both].T) @ rows
+        loss[both] += form
+        loss[:, both] += form.T
+        loss[both, both] -= form[:, both]
 
     def _mask_of(self, place: int) -> int:
         return next(mask for mask, known in self._place.items() if known == place)
@@ -141,10 +139,14 @@ class RetunedFrictionLibrary(RetunedLibrary):
         states = np.array(states_of(mode.mask, q))
         closed, stuck = np.flatnonzero(states != OPEN), np.flatnonzero(states == STUCK)
         sense = np.where(states == STUCK, 0.0, np.where(states == BACKWARD, -1.0, 1.0))[closed]
-        along_rim = pairs.friction_direction
-        rows = np.vstack([pairs.gap_jacobian[closed], along_rim[stuck]])
+        along_rim, held = pairs.friction_direction, closed[:0] if pairs.stiffness else closed
+        rows = np.vstack([pairs.gap_jacobian[held], along_rim[stuck]])
         pressed = pairs.gap_jacobian[closed] + pairs.friction * sense[:, None] * along_rim[closed]
-        force = np.vstack([pressed, along_rim[stuck]]).T
+        force = np.vstack([pressed[: held.size], along_rim[stuck]]).T
+        stiffness, damping = reduced.stiffness, reduced.damping
+        if pairs.stiffness:
+            along = pressed.T @ pairs.gap_jacobian[closed]
+            stiffness, damping = stiffness + pairs.stiffness * along, damping + pairs.damping * along
         tangent, project, _ = confine(reduced, rows, force)
         switch, reaction, across = (
             np.zeros((2 * q, 2 * n)),
@@ -154,8 +156,11 @@ class RetunedFrictionLibrary(RetunedLibrary):
         switch[2 * np.flatnonzero(states == OPEN), :n] = pairs.gap_jacobian[states == OPEN]
         if closed.size:
             solved = np.linalg.solve(rows @ force, rows)
-            forces = solved @ np.hstack([reduced.stiffness, reduced.damping])
-            given = solved @ self._phasor
+            forces, given = solved @ np.hstack([stiffness, damping]), solved @ self._phasor
+            if pairs.stiffness:  # springs and dampers press
+                gap = pairs.gap_jacobian[closed]
+                forces = np.vstack([-np.hstack([pairs.stiffness * gap, pairs.damping * gap]), forces])
+                given = np.concatenate([np.zeros(closed.size), given])
             static = pairs.friction * pairs.static_ratio
             for a, i in enumerate(closed):
                 along = along_rim[i]
@@ -169,7 +174,12 @@ class RetunedFrictionLibrary(RetunedLibrary):
                     switch[2 * i], reaction[2 * i] = forces[a], given[a]
                     switch[2 * i + 1, n:] = -sense[a] * along
                     across[:, 2 * i] = sense[a] * pairs.friction * along
-        return Linear(tangent @ (project @ self._phasor), switch, reaction, across, reduced.damping)
+        for i in np.flatnonzero(states == OPEN):
+            if mode.mask >> lifted_place(q, int(i)) & 1:
+                gap = pairs.gap_jacobian[i]
+                switch[2 * i] = np.concatenate([pairs.stiffness * gap, pairs.damping * gap])
+        damping = pairs.damped(reduced, mode.mask).damping
+        return Linear(tangent @ (project @ self._phasor), switch, reaction, across, damping)
 
     def _hold(self, mode: ContactMode) -> HeldMode:
         assert isinstance(mode, FrictionMode)

@@ -18,7 +18,7 @@ from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 from rubhpc.kernels.retuning import HeldMode, retune
 
-NOT_TUNED = -2  # in place of a set of closed pairs
+NOT_TUNED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
@@ -75,6 +75,7 @@ class RetunedLibrary(ModeLibrary):
         """Begin at another speed, rad/s, with the unbalance at unit speed times `factor`: with pairs open."""
         self._spin, self._factor, self._tick = spin, factor, tick
         self.masks = [NOT_TUNED] * len(self._held)
+        self.tables().mask[:] = NOT_TUNED
         self.add(0)
 
     def add(self, mask: int) -> bool:
@@ -93,7 +94,7 @@ class RetunedLibrary(ModeLibrary):
         self._before(place, tables)
         retune(tables, place, self._held[place], self._spin, self._factor, self._tick, interval)
         self._after(place, tables)
-        self.masks[place] = mask
+        self.masks[place] = tables.mask[place] = mask
         return True
 
     def forget(self) -> None:

@@ -11,18 +11,15 @@ alternates. The error falls with the square of the piece.
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.case import march_of
+from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.piece_setup import Pieces
 from rubhpc.integrate.changing_speed.turns import Turns
-from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
-from rubhpc.integrate.marches.event_driven import NoClosedForm
-from rubhpc.integrate.measuring.measures import add_sag, empty_samples, following_accumulator, new_accumulator
+from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
 from rubhpc.integrate.record import State
 from rubhpc.integrate.start import start_of
 from rubhpc.study.initial import Initial
@@ -33,7 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator
     from rubhpc.study.speed_law import SpeedLaw
@@ -108,18 +105,17 @@ def integrate_run_up(
     begins, _, _ = law.at_angle(2.0 * np.pi * np.arange(n + 1))
     whole = empty_samples(model.n_place, n * per_revolution, model.n_probe).whole
     gathered = Turns(n, model)
-    pieces = Pieces(fastest)
-    state = initial if isinstance(initial, State) else None
+    pieces, passing = Pieces(fastest), Passing(clearance, friction, check)
+    reached: State | Place | None = initial if isinstance(initial, State) else None
     n_step, reason, n_done, before = 0, "", n, 0.0
     earlier = new_accumulator(n_stator, model.n_place)
     for i, (first, last) in enumerate(itertools.pairwise(cuts)):
         duration = times[i + 1] - times[i]
         setup = pieces.setup((angles[i + 1] - angles[i]) / duration, accelerations[i], angles[i], duration)
-        if state is None:
-            state = start_of(initial, setup, clearance) if isinstance(initial, Initial) else initial
-        case = setup, last - first, clearance, friction, state, (earlier, before), check
-        passed = pass_piece(*case)
-        state, earlier, before = passed.final, passed.accumulators[-1], duration
+        if reached is None:
+            reached = start_of(initial, setup, clearance) if isinstance(initial, Initial) else initial
+        passed = passing.take(setup, last - first, reached, (earlier, before))
+        reached, earlier, before = passed.end, passed.accumulators[-1], duration
         n_step += passed.n_step
         whole[:, first:last] = passed.whole
         for turn, accumulator in enumerate(passed.accumulators, first // per_revolution):
@@ -128,7 +124,7 @@ def integrate_run_up(
             n_done = first // per_revolution + len(passed.accumulators) - 1
             reason = f"{passed.reason} in revolution {n_done + 1}"
             break
-    assert state is not None  # a law has a whole revolution at least
+    assert reached is not None  # a law has a whole revolution at least
     turns = np.diff(begins)[:n_done]
     return RunUp(
         reason=reason,
@@ -140,58 +136,5 @@ def integrate_run_up(
         friction_work=gathered.friction_work[:n_done],
         together=gathered.together,
         n_step=n_step,
-        final=state,
+        final=state_at(reached, setup),
     )
-
-
-class Passed(NamedTuple):
-    """What a piece has yielded."""
-
-    whole: Floats  # (n_row, n_sample)
-    accumulators: list[Accumulator]  # of each revolution in it, or of the part of one that it is
-    n_step: int
-    final: State
-    gained: float  # mechanical energy, J; NaN where it was not asked for
-    reason: str  # why it could not go on, or ""
-
-
-def pass_piece(
-    setup: PieceSetup,
-    n_sample: int,
-    clearance: float,
-    friction: float,
-    state: State,
-    earlier: tuple[Accumulator, float],
-    check: Callable[[], None] | None,
-    *,
-    is_balanced: bool = False,
-) -> Passed:
-    """Take one piece; `earlier` holds the contact forces of the piece before, and how long that took, s.
-
-    `is_balanced`: its energies are asked for.
-    """
-    if check is not None:
-        check()
-    model = setup.model
-    stride = min(n_sample, setup.samples_per_revolution)
-    for kind in (march_of(setup.scheme, setup), ContactSteppingMarch):
-        samples = empty_samples(model.n_place, n_sample, model.n_probe)
-        accumulators: list[Accumulator] = []
-        reason = None
-        try:
-            march = kind(setup, clearance, friction, state, check)
-            before = march.energy() if is_balanced else math.nan
-            for first in range(0, n_sample, stride):
-                follows = (accumulators[-1], 0.0) if accumulators else earlier
-                accumulator = following_accumulator(*follows)
-                accumulator.is_touching[:] = march.touching()
-                accumulators.append(accumulator)
-                reason = march.advance(first, first + stride, samples, accumulator, is_recorded=True)
-                if reason is not None:
-                    break
-        except NoClosedForm:  # contacts that chatter: short steps need no events
-            continue
-        add_sag(samples, accumulators[0], model)
-        gained = march.energy() - before if is_balanced else math.nan
-        return Passed(samples.whole, accumulators, march.n_step, march.final(), gained, reason or "")
-    raise AssertionError  # short steps always go on

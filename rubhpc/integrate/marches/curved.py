@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.record import State
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.setup import ModalSetup
@@ -48,9 +49,26 @@ class CurvedMarch(EventDrivenMarch):
         self._force = initial.contact_force.copy()
         self._is_bent = any(stator.squared_slope is not None for stator in setup.model.stators)
         super().__init__(setup, clearance, friction, initial, check)
+        self._take_pairs()
+
+    def begin(self, setup: ModalSetup, place: Place) -> None:
+        """Begin anew at another speed in the same reduced coordinates, from where a march has come."""
+        before, self._force = self._setup, place.contact_force.copy()
+        super().begin(setup, place)
+        if setup.reduced.stiffness is not before.reduced.stiffness or setup.model is not before.model:
+            self._take_pairs()
+        else:
+            self._make_work()
+
+    def _take_pairs(self) -> None:
+        """Find what curved gaps have of the matrices."""
+        setup = self._setup
         self._pairs = curved_pairs(
-            setup.reduced, setup.model, friction, self._clearance, is_round=setup.is_updated
+            setup.reduced, setup.model, self._coefficient, self._clearance, is_round=setup.is_updated
         )
+        self._make_work()
+
+    def _make_work(self) -> None:
         _, n_row, n = self._pairs.row.shape
         self._work = curved_work(self._clearance.size, n_row, n, self._z.shape[1])
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.measuring.measures import new_accumulator
-from rubhpc.kernels.case_progress import MODE_WANTED, closed_pairs
+from rubhpc.kernels.case_progress import MODE_WANTED
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, find_mode
 from rubhpc.kernels.event_loop import advance, event_work
 from rubhpc.kernels.mode_change import change_contacts
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.record import State
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.setup import ModalSetup
@@ -53,15 +55,29 @@ class EventDrivenMarch(ModalMarch):
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(setup, clearance, friction, initial, check)
         self._event_work = event_work(self._clearance.size)
-        self._library = self._find_library(setup, friction)
+        self._enter_first(initial.contact_force)
+
+    def begin(self, setup: ModalSetup, place: Place) -> None:
+        """Begin anew at another speed in the same reduced coordinates, from where a march has come."""
+        self.n_step, self.sample, self._stride = 0, 0, ALL_SAMPLES
+        self._take(setup)
+        self._motion = place.motion.copy()
+        if place.sag is not setup.model.sag and (moved := place.sag - setup.model.sag).any():
+            n = self.bodies.stiffness.shape[0]
+            self._motion[:n] += setup.reduced.project[:, : moved.size] @ moved
+        self._enter_first(place.contact_force)
+
+    def _enter_first(self, contact_force: Floats) -> None:
+        """Enter the contact mode with which the case begins; forces (q,), N."""
+        self._library = self._find_library(self._setup, self._coefficient)
         self._met = set(self._library.first_masks)  # sets of closed contacts
-        mask = self._first_mask(initial)
+        mask = self._first_mask(contact_force)
         self.find(mask)
         self._start(find_mode(self.tables.mask, mask))
 
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs are closed, (q,)."""
-        return self.closed(closed_pairs(self.progress, self.tables))
+        return self.closed(int(self.tables.mask[self._bare_progress["mode"]]))
 
     def closed(self, mask: int) -> NDArray[np.bool_]:
         """Which pairs are closed in a contact mode, (q,)."""
@@ -116,9 +132,9 @@ class EventDrivenMarch(ModalMarch):
         """Contact modes of the case."""
         return setup.library(friction)
 
-    def _first_mask(self, initial: State) -> int:
+    def _first_mask(self, contact_force: Floats) -> int:
         """Set of the contacts with which the case begins."""
-        return sum(1 << i for i, force in enumerate(initial.contact_force) if force > 0.0)
+        return sum(1 << i for i, force in enumerate(contact_force) if force > 0.0)
 
     def place(self) -> tuple[Progress, Floats]:
         """Where the case stands, and its modal coordinates (2, m)."""
@@ -143,7 +159,8 @@ class EventDrivenMarch(ModalMarch):
             if not self._library.add(mask):
                 raise NoClosedForm
         tables = self._library.tables()
-        unmet = [mode for mode, known in enumerate(self._library.masks) if known not in self._met]
+        met, masks = self._met, self._library.masks
+        unmet = [mode for mode, known in enumerate(masks) if known >= 0 and known not in met]
         if unmet:
             shown = tables.mask.copy()
             shown[unmet] = -1
@@ -175,4 +192,4 @@ class EventDrivenMarch(ModalMarch):
         raise NoClosedForm
 
     def _contact_force(self) -> Floats:
-        return self.forces(self.progress.mode, self._z)
+        return self.forces(self._bare_progress["mode"], self._z)

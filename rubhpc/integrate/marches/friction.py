@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.marches.workspace import empty_workspace
+from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, states_of
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
@@ -29,11 +31,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.record import State
+    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.contact_pairs import Workspace
+    from rubhpc.kernels.friction_events import FrictionWork
 
     Floats = NDArray[np.float64]
 
@@ -60,11 +63,16 @@ class FrictionMarch(EventDrivenMarch):
     ) -> None:
         """Start from `initial`, each pressed pair in the state that its forces give."""
         self._make_steps: Callable[[], ContactSteppingMarch] = lambda: ContactSteppingMarch(
-            setup, clearance, friction, initial, check
+            self._setup, clearance, friction, State.at_rest(self._setup.model), check
         )
         self._steps: ContactSteppingMarch | None = None
         self._n_short = 0  # ticks to be taken in short steps
         super().__init__(setup, clearance, friction, initial, check)
+
+    def begin(self, setup: ModalSetup, place: Place) -> None:
+        """Begin anew at another speed, each pressed pair in the state that its forces give."""
+        self._steps, self._n_short = None, 0
+        super().begin(setup, place)
 
     def closed(self, mask: int) -> NDArray[np.bool_]:
         """Which pairs are closed in a contact mode, (q,)."""
@@ -82,19 +90,24 @@ class FrictionMarch(EventDrivenMarch):
             static=np.full(q, friction * pairs.static_ratio),
             rim_speed=pairs.rim_speed,
         )
+        return setup.friction_library(friction)
+
+    @cached_property
+    def _work(self) -> FrictionWork:
+        """Room for events, and how the forces of pairs act on each other, which is so at any speed."""
+        pairs, q = self._setup.friction_pairs(self._coefficient), self._clearance.size
         gap_jacobian, along = pairs.gap_jacobian, pairs.friction_direction
         solver = empty_workspace(q)
         solver.matrix[:], solver.coupling[:] = gap_jacobian @ gap_jacobian.T, gap_jacobian @ along.T
         solver.tangential[:] = -along @ gap_jacobian.T, -along @ along.T
         self._soften(solver)
-        self._work = friction_work(solver, q, self.bodies.stiffness.shape[0])
-        return setup.friction_library(friction)
+        return friction_work(solver, q, self.bodies.stiffness.shape[0])
 
     def _soften(self, solver: Workspace) -> None:
         """Change how normal forces follow from gaps: here they hold them, and nothing changes."""
 
-    def _first_mask(self, initial: State) -> int:
-        return self._states_after(initial.contact_force > 0.0, 0.0)
+    def _first_mask(self, contact_force: Floats) -> int:
+        return self._states_after(contact_force > 0.0, 0.0)
 
     def _states_after(self, is_pressed: NDArray[np.bool_], angle: float, further: int = 0) -> int:
         """States that go on from the motion, with the shaft at an angle, rad, and some gaps closed.

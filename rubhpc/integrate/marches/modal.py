@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.marches.march import ALL_SAMPLES, March
@@ -28,17 +29,24 @@ from rubhpc.kernels.measuring import recorder
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
+    from rubhpc.fem.model import Model
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Progress
     from rubhpc.kernels.contact_modes import ModeTables
 
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 _BEGUN = new_progress(1)  # to fill one anew takes a hundred times as long
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
+
+
+class Place(NamedTuple):
+    """Where a case stands: what a march at another speed goes on from."""
+
+    motion: Floats  # (2 n,), reduced displacements about the sag, then velocities
+    sag: Floats  # (n_rotor_dof,), m and rad
+    contact_force: Floats  # (q,), N
 
 
 class ModalMarch(March):
@@ -56,9 +64,22 @@ class ModalMarch(March):
     ) -> None:
         """Take the case and its reduced initial motion; it is put into a contact mode by `_start`."""
         super().__init__(check, ALL_SAMPLES, setup.model)
-        self._setup = setup
         offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
-        self._clearance = clearance + offsets - sag_at_stators(setup.model)[0]
+        self._at_rest, self._coefficient = clearance + offsets, friction
+        self._model: Model | None = None  # to which the clearances belong
+        self._take(setup)
+        self._motion = self._reduce(initial)
+        self._recorder = recorder(setup.model.n_place, setup.model.n_probe)
+
+    def reached(self) -> Place:
+        """Where the case stands, for another speed to go on from."""
+        return Place(self.motion().copy(), self._setup.model.sag, self._contact_force())
+
+    def _take(self, setup: ModalSetup) -> None:
+        """Count time from 0, at the speed of a set-up."""
+        if self._model is not setup.model:
+            self._model, self._clearance = setup.model, self._at_rest - sag_at_stators(setup.model)[0]
+        self._setup = setup
         turn = setup.interval * setup.samples_per_revolution
         self.clock = Clock(
             spin=setup.spin,
@@ -69,9 +90,7 @@ class ModalMarch(March):
             contact_level=math.floor(math.log2(min(setup.interval, turn / CONTACT_STEPS) / setup.tick)),
             n_sample=0,
         )
-        self.bodies = setup.bodies(friction, self._clearance)
-        self._motion = self._reduce(initial)
-        self._recorder = recorder(setup.model.n_place, setup.model.n_probe)
+        self.bodies = setup.bodies(self._coefficient, self._clearance)
         records = _BEGUN.copy()
         self.progress: Progress = records[0]
         self._bare_progress = bare(records)[0]  # the same, for kernels
@@ -129,8 +148,7 @@ class ModalMarch(March):
     def _use(self, tables: ModeTables) -> None:
         """Take tables, and coordinates of their width."""
         self.tables = tables
-        self._z = np.zeros((2, tables.switch_re.shape[2]))
-        self._z_next = np.zeros_like(self._z)
+        self._z, self._z_next = np.zeros((2, 2, tables.switch_re.shape[2]))
 
     def _start(self, mode: int) -> None:
         """Begin in a contact mode of the tables, at the shaft's angle 0."""
@@ -163,11 +181,11 @@ class ModalMarch(March):
         limit, motion = setup.displacement_limit, self._motion
         if not is_at_event:
             motion = self.motion()
-        seen = setup.reduced.translations @ motion[: self.bodies.stiffness.shape[0]]
-        if (accumulator.highest >= accumulator.lowest).any():  # a sample was taken
-            reached = np.maximum(accumulator.highest[:2], -accumulator.lowest[:2])
-            seen[:2] = np.maximum(np.abs(seen[:2]), reached)
-        if not (np.abs(seen) <= limit).all():
+        seen = np.abs(setup.reduced.translations @ motion[: self.bodies.stiffness.shape[0]])
+        (highest, aside, _), (lowest, other, _) = accumulator.highest.tolist(), accumulator.lowest.tolist()
+        if highest >= lowest:  # a sample was taken
+            seen[:2] = np.maximum(seen[:2], [max(highest, -lowest), max(aside, -other)])
+        if not seen.max() <= limit:
             return displacement_reason(setup.model, seen, limit)
         if not is_at_event and not self._energy_of(motion) <= setup.energy_limit:
             return energy_reason(setup.energy_limit)

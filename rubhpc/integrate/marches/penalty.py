@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.record import State
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.setup import ModalSetup
 
@@ -34,5 +33,5 @@ class PenaltyMarch(EventDrivenMarch):
             raise NoClosedForm
         return setup.penalty_library(friction)
 
-    def _first_mask(self, initial: State) -> int:
+    def _first_mask(self, contact_force: Floats) -> int:
         return int(pressed_pairs(self.bodies, self._motion))

@@ -14,8 +14,9 @@ from rubhpc.kernels.soft_friction_events import change_soft_states
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.record import State
     from rubhpc.kernels.contact_pairs import Workspace
+
+    Floats = NDArray[np.float64]
 
 
 class PenaltyFrictionMarch(FrictionMarch):
@@ -34,7 +35,7 @@ class PenaltyFrictionMarch(FrictionMarch):
         """A normal force is what it is, whatever others do to its gap."""
         solver.matrix[:], solver.coupling[:] = np.eye(len(solver.matrix)), 0.0
 
-    def _first_mask(self, initial: State) -> int:
+    def _first_mask(self, contact_force: Floats) -> int:
         return self._states_after(np.zeros(self._clearance.size, dtype=np.bool_), 0.0)
 
     def _states_after(self, is_pressed: NDArray[np.bool_], angle: float, further: int = 0) -> int:

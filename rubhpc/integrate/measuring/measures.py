@@ -10,7 +10,6 @@ import numpy as np
 from rubhpc.integrate.measuring.orbit_measures import period, whirl_ratio
 from rubhpc.integrate.measuring.regimes import regime
 from rubhpc.integrate.measuring.settling import settled
-from rubhpc.integrate.packing import output_degrees
 from rubhpc.integrate.record import Record, State
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
@@ -121,11 +120,10 @@ def add_sag(samples: Samples, accumulator: Accumulator, model: Model) -> None:
         return
     if model.probe is not None:
         samples.probe[:] += model.probe.constant[:, np.newaxis]
-    for k, row in enumerate(output_degrees(model)):
-        sag = model.sag[row] if row >= 0 else 0.0
-        samples.rotor[k] += sag
-        accumulator.highest[k] += sag
-        accumulator.lowest[k] += sag
+    sag = model.output_sag
+    samples.rotor[:3] += sag[:, np.newaxis]
+    accumulator.highest[:] += sag
+    accumulator.lowest[:] += sag
 
 
 def samples_within(samples: Samples, n_taken: int, limit: float) -> int:

@@ -10,12 +10,13 @@ from rubhpc.case_arguments import case_of, read_probes
 from rubhpc.integrate.changing_speed.held_matrices import RESPONSE, held_range
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
 from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_tables import tabulate
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
 from rubhpc.integrate.reduced_model.reduction import directions
-from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK
+from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, lifted_place
 
 
 def setup(q):
@@ -84,8 +85,29 @@ class Springs:
         return tables
 
 
+class StickingSprings(Sticking):
+    """Friction with stick where springs and dampers press; the last bits are those of lifted pairs."""
+
+    kind = RetunedSoftFrictionLibrary
+    masks = STATES | {1: (*STATES[1], 1 << lifted_place(1, 0))}
+
+    def pairs(self, base, spin):
+        return replace(super().pairs(base, spin), stiffness=1e6, damping=50.0)
+
+    def tables(self, library, reduced, base, mask, levels):
+        pairs = self.pairs(base, reduced.spin)
+        mode = solve_friction_mode(reduced, pairs, mask)
+        damped, friction = pairs.damped(reduced, mask), mode.friction_forces(pairs)
+        tables = tabulate(mode, damped, library.slip[:0], friction=friction, **levels)
+        tables.loss[0] += pairs.stored_energy(mode, library.width)
+        return tables
+
+
+LAWS = Sliding(), Sticking(), Springs(), StickingSprings()
+
+
 @pytest.mark.parametrize("q", [1, 3])
-@pytest.mark.parametrize("law", [Sliding(), Sticking(), Springs()], ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
 def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
     base, masks = setup(q), law.masks[q]
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
@@ -129,7 +151,7 @@ def test_matrices_are_held_while_the_response_errs_little():
 
     def found(speed, acceleration):
         drift = np.zeros((2, 2)), gyroscopic
-        return held_range(stiffness, damping + speed * gyroscopic, drift, speed, acceleration)
+        return held_range(stiffness, damping + speed * gyroscopic, drift, speed, acceleration)[0]
 
     def response(speed, held):
         matrix = stiffness - speed**2 * np.eye(2) + 1j * speed * (damping + held * gyroscopic)

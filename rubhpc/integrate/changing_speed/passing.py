@@ -1,0 +1,112 @@
+"""A case that is taken piece after piece, each at its own speed, by one march."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.integrate.case import march_of
+from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.marches.modal import ModalMarch, Place
+from rubhpc.integrate.measuring.measures import add_sag, empty_samples, following_accumulator
+from rubhpc.integrate.record import State
+from rubhpc.kernels.accumulators import Accumulator  # noqa: TC001 - of a NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+
+Floats = NDArray[np.float64]
+
+
+class Passed(NamedTuple):
+    """What a piece has yielded."""
+
+    whole: Floats  # (n_row, n_sample)
+    accumulators: list[Accumulator]  # of each revolution in it, or of the part of one that it is
+    n_step: int
+    end: Place
+    gained: float  # mechanical energy, J; NaN where it was not asked for
+    reason: str  # why it could not go on, or ""
+
+
+class Passing:
+    """What takes the pieces of a case: one march that begins anew at each of their speeds."""
+
+    def __init__(self, clearance: float, friction: float, check: Callable[[], None] | None) -> None:
+        self._case = clearance, friction
+        self._check = check
+        self._march: EventDrivenMarch | None = None
+
+    def take(
+        self,
+        setup: PieceSetup,
+        n_sample: int,
+        begun: State | Place,
+        earlier: tuple[Accumulator, float],
+        *,
+        is_balanced: bool = False,
+    ) -> Passed:
+        """Take one piece; `earlier` holds the contact forces before it, and how long ago they began, s.
+
+        `is_balanced`: its energies are asked for.
+        """
+        if self._check is not None:
+            self._check()
+        try:
+            return self._pass(self._begin(setup, begun), setup, n_sample, earlier, is_balanced)
+        except NoClosedForm:  # contacts that chatter: short steps need no events
+            self._march = None
+            steps = ContactSteppingMarch(setup, *self._case, state_at(begun, setup), self._check)
+            return self._pass(steps, setup, n_sample, earlier, is_balanced)
+
+    def _begin(self, setup: PieceSetup, begun: State | Place) -> ModalMarch:
+        """The march that stands where a piece begins."""
+        march = self._march
+        if march is not None and isinstance(begun, Place):
+            march.begin(setup, begun)
+            return march
+        made = march_of(setup.scheme, setup)(setup, *self._case, state_at(begun, setup), self._check)
+        assert isinstance(made, ModalMarch)
+        if isinstance(made, EventDrivenMarch):
+            self._march = made
+        return made
+
+    def _pass(
+        self,
+        march: ModalMarch,
+        setup: PieceSetup,
+        n_sample: int,
+        earlier: tuple[Accumulator, float],
+        is_balanced: bool,
+    ) -> Passed:
+        model = setup.model
+        samples = empty_samples(model.n_place, n_sample, model.n_probe)
+        before = march.energy() if is_balanced else math.nan
+        accumulators: list[Accumulator] = []
+        stride, reason = min(n_sample, setup.samples_per_revolution), None
+        for first in range(0, n_sample, stride):
+            follows = (accumulators[-1], 0.0) if accumulators else earlier
+            accumulator = following_accumulator(*follows)
+            accumulator.is_touching[:] = march.touching()
+            accumulators.append(accumulator)
+            reason = march.advance(first, first + stride, samples, accumulator, is_recorded=True)
+            if reason is not None:
+                break
+        add_sag(samples, accumulators[0], model)
+        gained = march.energy() - before if is_balanced else math.nan
+        return Passed(samples.whole, accumulators, march.n_step, march.reached(), gained, reason or "")
+
+
+def state_at(begun: State | Place, setup: PieceSetup) -> State:
+    """The motion where a piece begins, in the degrees of its bodies."""
+    if isinstance(begun, State):
+        return begun
+    displacement, velocity = (setup.reduced.basis @ begun.motion.reshape(2, -1).T).T.copy()
+    displacement[: begun.sag.size] += begun.sag
+    return State.of_bodies(setup.model, displacement, velocity, begun.contact_force)
