@@ -168,14 +168,14 @@ class Computing:
                 self._report,
                 attend,
             )
-            worker.entered = self._entered
+            worker.held.entered = self._entered
             if progress is not None:
                 worker.say = progress.say
             yield worker
             if job.refinement is None:
-                worker.sync()
+                worker.held.sync()
             else:
-                self._unsynced += worker.take_unsynced()
+                self._unsynced += worker.held.take_unsynced()
 
     def _progress(self, sequences: list[list[Block]], *, quiet: bool) -> Progress:
         job = self._job

@@ -65,11 +65,11 @@ class Refining(Computing):
         The others then store what they have; what is left of their slabs is computed together, in rounds.
         """
         with self._worker(self._next_kind(), progress) as worker:
-            worker.patience = _PATIENCE
+            worker.held.patience = _PATIENCE
             worker.is_wanted_elsewhere = lambda: self._is_wanted(len(slabs))
             for number in self._numbers(len(slabs)):
                 work_through(slabs[number], refinement, worker)
-                worker.store_held()
+                worker.held.store()
                 self._pack_for_readers()
         if self._stopping.reason:
             self._pool.add(Totals(stop=1))
@@ -87,7 +87,7 @@ class Refining(Computing):
             kind = self._next_kind()
             together(pool, lambda: workers.append(stack.enter_context(self._worker(kind, progress))))
             worker = workers[0]
-            worker.patience = _PATIENCE
+            worker.held.patience = _PATIENCE
             while True:
                 news = together(pool, partial(self._round, units, worker))
                 entries = [entry for own in news for entry in own.stored]
@@ -106,7 +106,7 @@ class Refining(Computing):
                 if has_pieces and (is_due or is_damaged or not units):
                     self._store_pieces([own.pieces for own in news], worker)
                 if is_damaged or not (units or (has_pieces and not self._has_ended)):
-                    worker.store_held()
+                    worker.held.store()
                     return is_damaged and not self._has_ended
 
     def _round(self, units: list[Unit], worker: Worker) -> News:
@@ -123,18 +123,18 @@ class Refining(Computing):
         if self._stopping.reason:
             self._pool.add(Totals(stop=1))
         if self._pool.size > 1:
-            worker.store_held()
-        stored, held = list(worker.entered), list(worker.pieces.entered)
-        worker.entered.clear()
-        worker.pieces.entered.clear()
+            worker.held.store()
+        stored, held = list(worker.held.entered), list(worker.held.pieces.entered)
+        worker.held.entered.clear()
+        worker.held.pieces.entered.clear()
         is_over = self._is_over(self._pool.totals())
-        return News(stored, held, worker.pieces.listed(), self._n_claim, worker.is_due, is_over)
+        return News(stored, held, worker.held.pieces.listed(), self._n_claim, worker.held.is_due, is_over)
 
     def _store_pieces(self, pieces: list[dict[tuple[int, ...], Lines]], worker: Worker) -> None:
         """Store what all ranks hold of blocks that they share: of one block, one rank after another."""
         for turn in turns_of(pieces) if self._store.manifest.variables else [pieces]:
             own = turn[self._pool.rank]
-            together(self._pool, partial(worker.store_pieces, own))
+            together(self._pool, partial(worker.held.store_pieces, own))
             for lines in (lines for of_rank in turn for lines in of_rank.values()):
                 self._job.ledger.enter(lines)
 

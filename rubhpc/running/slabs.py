@@ -70,7 +70,7 @@ def work_through(slab: Slab, refinement: Refinement, worker: Worker) -> bool:
     own = refinement.within(slab.window)
     missing = own.missing()
     while missing.any():
-        n_before = len(worker.entered)
+        n_before = len(worker.held.entered)
         for block, marked in slab.parts(missing):
             flat = worker.store.flat(block.start)
             worker.missing[flat] = marked
@@ -79,7 +79,7 @@ def work_through(slab: Slab, refinement: Refinement, worker: Worker) -> bool:
             if worker.is_wanted_elsewhere():
                 return False
             worker.attend()
-        own.enter(worker.entered[n_before:])
+        own.enter(worker.held.entered[n_before:])
         following = own.missing()
         if (following & missing).any():  # some of this level have not been computed
             return False

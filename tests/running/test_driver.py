@@ -26,6 +26,7 @@ from rubhpc.schema import (
     FAILED,
     MISSING,
 )
+from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
@@ -283,7 +284,7 @@ def test_a_disk_that_fills_up_keeps_what_is_there(physics, study, monkeypatch):
         nonlocal n_block
         n_block += 1
         if n_block == 3:
-            with worker.disk_errors(self.path):
+            with disk_errors(self.path):
                 raise OSError(28, "No space left on device")
         write_block(self, *arguments)
 

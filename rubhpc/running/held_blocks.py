@@ -1,0 +1,169 @@
+"""Blocks between computing and the store: read, held back while more of their cases may come, written."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc.running.rounds import Pieces, lines_of
+from rubhpc.schema import DIVERGED, DONE, MISSING
+from rubhpc.storage.disk import disk_errors, flush_to_disk
+from rubhpc.storage.journal import Entry
+from rubhpc.storage.store import case_checksum
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from rubhpc.storage.journal import Journal
+    from rubhpc.storage.ledger import Ledger
+    from rubhpc.storage.store import Store
+
+    Arrays = dict[str, NDArray[Any]]
+    Start = tuple[int, ...]
+
+# Seconds between syncs, at least, and times what the last took: slow disks cost 2 %.
+_SYNC_GAP, _SYNC_SHARE = 1.0, 50.0
+
+
+class HeldBlocks:
+    """The blocks of a rank that are not stored yet.
+
+    Parameters
+    ----------
+    store : Store
+    ledger : Ledger
+    journal : Journal
+    is_refined : bool
+        Whether to keep a list of what is entered, for the decisions of a refined map.
+
+    Attributes
+    ----------
+    patience : float
+        Seconds for which finished blocks may be held back, since more of their cases may come.
+    entered : list of Entry
+        Of a refined map, what this rank has computed of whole blocks, or found damaged.
+    pieces : Pieces
+        What it has computed of blocks that it shares with other ranks.
+    """
+
+    def __init__(self, store: Store, ledger: Ledger, journal: Journal, *, is_refined: bool) -> None:
+        self._store, self._ledger, self._journal, self._is_refined = store, ledger, journal, is_refined
+        self.patience = 0.0
+        self.entered: list[Entry] = []
+        self.pieces = Pieces()
+        self._held: dict[Start, tuple[Arrays, list[Entry]]] = {}
+        self._stored = time.monotonic()
+        self._unsynced: list[Path] = []
+        self._next_sync = self._stored + _SYNC_GAP
+
+    @property
+    def is_due(self) -> bool:
+        """Whether patience is over with what is held back."""
+        return time.monotonic() - self._stored >= self.patience
+
+    def read(
+        self, start: Start, flat: NDArray[np.int64], wanted: NDArray[np.bool_]
+    ) -> tuple[Arrays, NDArray[np.bool_]]:
+        """Arrays of a block with the cases that are there already, and which of those are damaged.
+
+        Parameters
+        ----------
+        flat : (n,) int
+            Cases of the block.
+        wanted : (n,) bool
+            Those that are about to be computed.
+        """
+        damaged = np.zeros_like(wanted)
+        if start in self._held:
+            return self._held[start][0], damaged
+        data = self._store.empty_block(start)
+        status = self._ledger.status[flat]
+        kept = np.flatnonzero(~wanted & ((status == DONE) | (status == DIVERGED)))
+        if not len(kept):
+            return data, damaged
+        stored = self._store.read_block(start)
+        for i_case in kept.tolist():
+            if stored is None or case_checksum(stored, i_case) != self._ledger.checksum[flat[i_case]]:
+                damaged[i_case] = True
+                continue
+            for name, values in stored.items():
+                data[name][i_case] = values[i_case]
+        return data, damaged
+
+    def blank(self, start: Start, wanted: NDArray[np.bool_]) -> Arrays:
+        """Arrays of a shared block, in which the cases that are about to be computed are missing."""
+        data = self.pieces.rows(start) or self._store.blank_block(start)
+        for values in data.values():
+            values[wanted] = np.nan
+        return data
+
+    def hold(self, start: Start, data: Arrays, entries: list[Entry], damaged: NDArray[np.int64]) -> None:
+        """Hold a block with further cases; damaged ones, by flat index, that are not among them are missing.
+
+        It is stored when patience is over, together with the others.
+        """
+        self._add(start, data, entries, damaged)
+        if self.is_due:
+            self.store()
+
+    def store(self) -> None:
+        """Store and journal the blocks that are held back, but for pieces."""
+        if not self._held:
+            return
+        for start, (data, entries) in self._held.items():
+            self._store.write_block(start, data)
+            with disk_errors(self._store.path):
+                self._journal.write(entries)
+            self._unsynced += self._store.chunk_files(start)
+        self._held.clear()
+        self._stored = time.monotonic()
+        if self._stored > self._next_sync:
+            self.sync()
+
+    def store_pieces(self, starts: Iterable[Start]) -> None:
+        """Add the cases held of shared blocks to what is stored of them, while no other rank does."""
+        for start in starts:
+            flat = self._store.flat(start)
+            rows, entries = self.pieces.take(start)
+            wanted = np.isin(flat, [entry.flat for entry in entries])
+            data, damaged = self.read(start, flat, wanted)
+            for name, values in data.items():
+                values[wanted] = rows[name][wanted]
+            n_before = len(self.entered)
+            self._add(start, data, entries, flat[damaged])
+            del self.entered[n_before : n_before + len(entries)]  # those that were computed are known
+        self.store()
+
+    def sync(self) -> None:
+        """Return once what has been stored would survive a power failure, the arrays before their lines.
+
+        A process that is killed loses nothing without it.
+        """
+        began = time.monotonic()
+        with disk_errors(self._store.path):
+            for path in self._unsynced:
+                flush_to_disk(path)
+            self._journal.sync()
+        self._unsynced.clear()
+        ended = time.monotonic()
+        self._next_sync = ended + max(_SYNC_GAP, _SYNC_SHARE * (ended - began))
+
+    def take_unsynced(self) -> list[Path]:
+        """Return the files that `sync` would write to the disk, arrays before the journal, once."""
+        unsynced = [*self._unsynced, *([self._journal.path] if self._journal.is_begun else [])]
+        self._unsynced.clear()
+        return unsynced
+
+    def _add(self, start: Start, data: Arrays, entries: list[Entry], damaged: NDArray[np.int64]) -> None:
+        lost = set(damaged.tolist()) - {entry.flat for entry in entries}
+        entries = entries + [Entry(flat, self._store.manifest.case_id(flat), MISSING) for flat in lost]
+        if self._is_refined:
+            self.entered += entries
+        self._ledger.enter(lines_of(entries))
+        held = self._held.get(start)
+        self._held[start] = data, entries if held is None else held[1] + entries
