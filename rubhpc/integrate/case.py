@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.integrate.ahead import compile_ahead
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
 from rubhpc.integrate.lyapunov import Marches, growth
@@ -97,6 +98,7 @@ def run_case(
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
     """
     began = time.perf_counter() - seconds_compiling()
+    compile_ahead(setup)
     if isinstance(initial, State):
         state = fit_to_gaps(initial, setup, clearance)
     else:

@@ -11,6 +11,7 @@ from rubhpc.integrate.lyapunov import N_ALIGNING
 from rubhpc.integrate.marches.event_driven import NoClosedForm
 from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
 from rubhpc.integrate.measuring.regimes import N_MOST
+from rubhpc.kernels._jit import plain
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -99,14 +100,14 @@ class NeighbourMotions:
         """
         march, pair = self._march, self._pair
         masks = [
-            closed_pairs(progress, march.tables) if progress.wanted < 0 else int(progress.wanted)
+            plain(closed_pairs)(progress, march.tables) if progress.wanted < 0 else int(progress.wanted)
             for progress in pair.progress
         ]
         if not march.has_met(masks):
             for progress, z, motion in zip(pair.progress, pair.z, pair.motion, strict=True):
                 if progress.wanted < 0:
                     motion[:] = march.motion_of(progress, z)
-                    ask_for(progress, closed_pairs(progress, march.tables))
+                    ask_for(progress, plain(closed_pairs)(progress, march.tables))
         standing = [i for i, progress in enumerate(pair.progress) if progress.wanted < 0]
         for i in sorted(range(2), key=standing.count):  # room for what is wanted is made first
             march.find(masks[i])

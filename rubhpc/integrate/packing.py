@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from rubhpc.fem.statics import sag_at_stators
+from rubhpc.kernels._jit import plain
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, N_DEGREE, TORSION, Pairs, V, W, rim_sense
 from rubhpc.kernels.laws import FRICTION_LAWS, MULTIPLIER, Law
 from rubhpc.kernels.linear import Linear
@@ -209,7 +210,7 @@ def pairs_of(
         radius=np.array([stator.radius for stator in model.stators]),
         clearance=np.array([clearance + stator.clearance_offset for stator in model.stators]) - nearer,
         aside=aside,
-        friction=np.full(angle.size, rim_sense(spin) * friction),
+        friction=np.full(angle.size, plain(rim_sense)(spin) * friction),
         compliance=compliance,
         is_updated=is_updated,
         law=law,

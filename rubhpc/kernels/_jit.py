@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
+import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +15,7 @@ from typing import Any, TypeVar
 import numba
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.compiler import Flags as NumbaFlags
 from numba.core.compiler_lock import global_compiler_lock
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -56,13 +58,14 @@ class Compilation:
         self._depth = 0
 
     @contextmanager
-    def of(self, name: str, folder: Path) -> Iterator[None]:
+    def of(self, name: str, lock: Path) -> Iterator[None]:
         """Around the compilation of a kernel, and of all that it calls; one process at a time."""
         with global_compiler_lock, ExitStack() as held:
             if self._depth == 0:
                 self.began(name)
                 began = time.perf_counter()
-                held.enter_context(_alone_in(folder))
+                _drop_old(lock.parent)
+            held.enter_context(_alone_with(lock))
             self._depth += 1
             try:
                 yield
@@ -76,15 +79,23 @@ compilation = Compilation()
 
 
 @contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
-    """Wait until no other process compiles into a folder: they would repeat, or spoil, each other's work."""
+def _alone_with(lock: Path) -> Iterator[None]:
+    """Wait until no other process compiles a kernel: it would repeat the work.
+
+    A process waits for a kernel while it compiles what calls it, never the other way round.
+    """
     with ExitStack() as held:
         with suppress(OSError):  # a folder that cannot be written, or a file system without locks
-            folder.mkdir(parents=True, exist_ok=True)
-            _drop_old(folder)
-            lock = held.enter_context((folder / "lock").open("w"))
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            fcntl.flock(held.enter_context(lock.open("w")), fcntl.LOCK_EX)
         yield
+
+
+def _wait_for(lock: Path) -> None:
+    """Wait for a process that compiles a kernel, if there is one."""
+    if lock.exists():
+        with _alone_with(lock):
+            pass
 
 
 def _drop_old(folder: Path) -> None:
@@ -106,6 +117,7 @@ def _stamped(compiled: Any) -> Any:
     if cache is None or file is None:  # nothing is compiled under NUMBA_DISABLE_JIT
         return compiled
     folder = Path(file._cache_path) / f"kernels-{_SOURCES[:16]}"
+    compiled.lock = folder / f"{file._index_name}.lock"
     cache._cache_path = file._cache_path = str(folder)
     file._index_path = str(folder / file._index_name)
     file._source_stamp = _SOURCES
@@ -114,11 +126,50 @@ def _stamped(compiled: Any) -> Any:
     def compile_once(signature: Any) -> Any:
         if tuple(signature) in compiled.overloads or _is_cached(compiled, signature):
             return compile_or_load(signature)
-        with compilation.of(compiled.py_func.__name__, folder):
+        with compilation.of(compiled.py_func.__name__, compiled.lock):
             return compile_or_load(signature)
 
     compiled.compile = compile_once
     return compiled
+
+
+class Flags(NumbaFlags):
+    """The same flags, which compare only what is set and have their hash at hand.
+
+    Numba looks up each call that it types by the flags, and reads all of some 35 options for each hash and
+    comparison: a tenth of the time of a compilation. The class bears numba's name, which is in the names of
+    what is compiled.
+    """
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return _HASH
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, NumbaFlags):
+            return NotImplemented
+        ours, theirs = self._values, other._values
+        return bool(
+            ours == theirs
+            or all(getattr(self, name) == getattr(other, name) for name in ours.keys() | theirs.keys())
+        )
+
+
+_HASH = hash(NumbaFlags())  # of the names of the options, as numba has it
+
+
+def _quick(compiled: Any) -> Any:
+    """Give a kernel flags that are compared quickly."""
+    if hasattr(compiled, "_compiler"):  # not under NUMBA_DISABLE_JIT
+        compiled._compiler._customize_flags = Flags
+    return compiled
+
+
+def cache_of(kernel: Callable[..., object]) -> Path:
+    """Path of the file that lists what of a kernel is in the cache, if anything is."""
+    cache: Any = getattr(kernel, "_cache", None)
+    return Path(cache._cache_file._index_path) if cache is not None else Path(os.devnull)
 
 
 def _is_cached(compiled: Any, signature: Any) -> bool:
@@ -164,13 +215,15 @@ def _of_kernels(compiled: Any, flags: dict[str, Any]) -> Any:
     """
     if not hasattr(compiled, "overloads"):  # under NUMBA_DISABLE_JIT
         return compiled
-    inner = numba.njit(
+    linked = numba.njit(
         **{**flags, "cache": False, "no_cpython_wrapper": True}, pipeline_class=_LinkedCompiler
-    )(compiled.py_func)
+    )
+    inner = _quick(linked(compiled.py_func))
     template_of = compiled.get_call_template
 
     def get_call_template(args: Any, kws: Any) -> Any:
         _, folded = compiled.fold_argument_types(args, kws)
+        _wait_for(compiled.lock)
         is_wrapped = tuple(folded) in compiled.overloads or _is_cached(compiled, folded)
         return template_of(args, kws) if is_wrapped else inner.get_call_template(args, kws)
 
@@ -183,13 +236,22 @@ def _of_kernels(compiled: Any, flags: dict[str, Any]) -> Any:
 
 
 def _compiled(function: F, flags: dict[str, Any]) -> F:
-    found: F = _of_kernels(_stamped(numba.njit(**flags)(function)), flags)
+    found: F = _of_kernels(_stamped(_quick(numba.njit(**flags)(function))), flags)
     return found
 
 
 def _inlined(function: F, flags: dict[str, Any]) -> F:
-    found: F = _stamped(numba.njit(inline="always", **flags)(function))
+    found: F = _stamped(_quick(numba.njit(inline="always", **flags)(function)))
     return found
+
+
+def plain(kernel: F) -> F:
+    """Return the Python function of a kernel that Python asks now and then, to compile nothing for that.
+
+    For what compares and looks up; the last bits of products and sums are those of compiled code.
+    """
+    function: F = getattr(kernel, "py_func", kernel)
+    return function
 
 
 def jit(function: F) -> F:

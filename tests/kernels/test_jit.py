@@ -1,12 +1,16 @@
 """Compiled kernels: their cache on disk, and the flags that keep numbers honest."""
 
+import fcntl
 import math
 import shutil
 import subprocess
 import sys
+import threading
+from itertools import product
 
 import pytest
 from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Flags
 from running import ROOT, environment
 
 from rubhpc.kernels import _jit
@@ -112,6 +116,37 @@ def test_what_only_kernels_call_gets_no_machine_code(monkeypatch):
     assert quadrupled(1.5) == 6.0
     assert "quadrupled" in made
     assert "doubled" not in made
+
+
+def test_a_caller_waits_for_what_another_process_compiles():
+    with doubled.lock.open("w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        waiting = threading.Thread(target=_jit._wait_for, args=(doubled.lock,))
+        waiting.start()
+        waiting.join(0.05)
+        assert waiting.is_alive()
+    waiting.join(60)
+    assert not waiting.is_alive()
+
+
+def test_flags_of_kernels_are_equal_where_those_of_numba_are():
+    def flags_of(kind):
+        for nrt, fastmath in product((None, False, True), (None, {"contract"}, {"contract", "nsz"})):
+            made = kind()
+            if nrt is not None:
+                made.nrt = nrt  # False is the default: set or not, it is the same
+            if fastmath is not None:
+                made.fastmath = fastmath
+            yield made
+
+    ours, theirs = list(flags_of(_jit.Flags)), list(flags_of(Flags))
+    expected = [[a == b for b in theirs] for a in theirs]
+    assert sum(map(sum, expected)) > len(theirs)
+    for others in (ours, theirs):
+        assert [[a == b for b in others] for a in ours] == expected
+    assert {hash(flags) for flags in ours} == {hash(flags) for flags in theirs}
+    assert ours[5].get_mangle_string() == theirs[5].get_mangle_string()
+    assert type(quadrupled._compiler._customize_flags(Flags())) is _jit.Flags
 
 
 @_jit.jit

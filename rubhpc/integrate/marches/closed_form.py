@@ -9,6 +9,7 @@ from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.marches.penalty import PenaltyMarch
 from rubhpc.integrate.marches.penalty_friction import PenaltyFrictionMarch
+from rubhpc.kernels._jit import plain
 from rubhpc.kernels.laws import is_penalty, is_set_valued
 
 if TYPE_CHECKING:
@@ -21,11 +22,12 @@ _MARCHES: WeakKeyDictionary[ModalSetup, type[EventDrivenMarch]] = WeakKeyDiction
 def closed_form_march(setup: ModalSetup) -> type[EventDrivenMarch]:
     """Return the march whose pairs have the states of a set-up's law."""
     if setup not in _MARCHES:
-        _MARCHES[setup] = _march_of(setup.law)  # to ask a kernel takes as long as a revolution
+        _MARCHES[setup] = _march_of(setup.law)
     return _MARCHES[setup]
 
 
 def _march_of(law: Law) -> type[EventDrivenMarch]:
-    if is_set_valued(law):
-        return PenaltyFrictionMarch if is_penalty(law) else FrictionMarch
-    return PenaltyMarch if is_penalty(law) else EventDrivenMarch
+    is_soft = plain(is_penalty)(law)
+    if plain(is_set_valued)(law):
+        return PenaltyFrictionMarch if is_soft else FrictionMarch
+    return PenaltyMarch if is_soft else EventDrivenMarch

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.measuring.measures import new_accumulator
 from rubhpc.kernels.case_progress import MODE_WANTED
-from rubhpc.kernels.contact_modes import FORCED_LEVEL, find_mode
+from rubhpc.kernels.contact_modes import FORCED_LEVEL
 from rubhpc.kernels.event_loop import advance, event_work
 from rubhpc.kernels.mode_change import change_contacts
 
@@ -43,6 +43,7 @@ class EventDrivenMarch(ModalMarch):
     """A case that goes from one contact mode to another; `NoClosedForm` leaves it to contact stepping."""
 
     has_closed_form = True  # of its closed contacts
+    take_change: ClassVar[Callable[..., int]] = staticmethod(change_contacts)  # kernel that takes an event
 
     def __init__(
         self,
@@ -73,7 +74,7 @@ class EventDrivenMarch(ModalMarch):
         self._met = set(self._library.first_masks)  # sets of closed contacts
         mask = self._first_mask(contact_force)
         self.find(mask)
-        self._start(find_mode(self.tables.mask, mask))
+        self._start(int(np.flatnonzero(self.tables.mask == mask)[0]))
 
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs are closed, (q,)."""
@@ -102,7 +103,7 @@ class EventDrivenMarch(ModalMarch):
         `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft.
         """
         return int(
-            change_contacts(
+            self.take_change(
                 self.bodies,
                 mask,
                 crossing,

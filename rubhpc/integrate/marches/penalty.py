@@ -20,9 +20,11 @@ if TYPE_CHECKING:
 class PenaltyMarch(EventDrivenMarch):
     """A case whose pairs are open, press, or are lifted: overlapped still, and without a force."""
 
+    take_change = staticmethod(change_pressed)
+
     def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
         """Take an event, which leaves `motion` (2 n,) as it is; returns the states that go on."""
-        return int(change_pressed(self.bodies, mask, crossing, motion))
+        return int(self.take_change(self.bodies, mask, crossing, motion))
 
     def opened(self, mask: int) -> NDArray[np.bool_]:
         """Which pairs are open, and not lifted, (q,)."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.event_driven import NoClosedForm
+from rubhpc.kernels._jit import plain
 from rubhpc.kernels.case_progress import closed_pairs
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.flow import next_event
@@ -126,7 +127,7 @@ class PiecewiseMotion:
 
     def __init__(self, setup: ModalSetup, clearance: float, friction: float, initial: State) -> None:
         """Take a case in closed form; `NoClosedForm` where it has none."""
-        self.has_states = is_set_valued(setup.law)
+        self.has_states = plain(is_set_valued)(setup.law)
         self.march = closed_form_march(setup)(setup, clearance, friction, initial, None)
         self.setup = setup
         self.turn = setup.interval * setup.samples_per_revolution
@@ -141,7 +142,7 @@ class PiecewiseMotion:
             self._tables.power_re.shape[1] - 1, int(math.log2(self.turn / STEPS_PER_REVOLUTION / clock.tick))
         )
         self.start = self.march.motion_of(*self.march.place())
-        self.states = closed_pairs(self.march.progress, self._tables)
+        self.states = plain(closed_pairs)(self.march.progress, self._tables)
 
     def size(self, motion: Floats) -> float:
         """Root of v'v + spin^2 u'u of a reduced motion (2 n,), in which the mass matrix is the identity."""

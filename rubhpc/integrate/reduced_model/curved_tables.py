@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.fem.statics import sag_at_stators
+from rubhpc.kernels._jit import plain
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W, rim_sense
 from rubhpc.kernels.curved_contact import ACROSS, ALONG, BENDING, CurvedPairs, CurvedTables
 
@@ -32,7 +33,7 @@ def curved_pairs(
     """Pairs of a case whose gaps are curved; clearance (q,) at rest in m."""
     row = motion_rows(reduced, model)
     flat = row.reshape(-1, row.shape[2])
-    sense = rim_sense(reduced.spin)
+    sense = plain(rim_sense)(reduced.spin)
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
     return CurvedPairs(
         row=row,

@@ -12,6 +12,7 @@ from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.integrate.reduced_model.standstill import Modes, at_standstill, parted, seen_degrees
 from rubhpc.integrate.reduced_model.truncation import kept_modes
+from rubhpc.kernels._jit import plain
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.contact_pairs import N_DEGREE, TORSION, V, W, rim_sense
 
@@ -217,5 +218,5 @@ def directions(reduced: ReducedModel, model: Model, friction: float) -> tuple[Fl
     v, w, torsion, axial, lateral = (reduced.degree[:, a] for a in range(N_DEGREE))
     gap_jacobian = axial - ey * v - ez * w
     along = lateral + ez * v - ey * w - radius[:, None] * torsion
-    sense = rim_sense(reduced.spin)
+    sense = plain(rim_sense)(reduced.spin)
     return gap_jacobian, gap_jacobian + sense * friction * along, -sense * along

@@ -1,0 +1,108 @@
+"""A second process that compiles what a case needs last, while the first one compiles what it needs first.
+
+They meet in the cache on the disk: what one has compiled, or is compiling, the other loads. The kernels that
+follow a motion for the proof of its period do not need those that march through transient and record, but
+share the events with them.
+"""
+
+from __future__ import annotations
+
+import atexit
+import fcntl
+import os
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numba
+
+from rubhpc.integrate.marches.closed_form import closed_form_march
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+from rubhpc.integrate.record import State
+from rubhpc.integrate.setup import ModalSetup, Scheme, prepare
+from rubhpc.kernels._jit import cache_of, plain
+from rubhpc.kernels.flow import next_event
+from rubhpc.kernels.laws import FRICTION_LAWS, is_penalty
+from rubhpc.rig.reading import read_rig
+from rubhpc.study.study import Contact, Integrator
+from rubhpc.threads import VARIABLES
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.setup import Setup
+
+_asked: set[type] = set()  # marches
+_SOFT = {"law": "penalty", "stiffness": 1e8, "damping": 0.0}
+
+
+def compile_ahead(setup: Setup) -> None:
+    """Have the kernels of periodic motions compiled beside this process, if any cache lacks them.
+
+    One process a cache does so at a time, and none where there is one processor or no interpreter to start.
+    What it does not do is compiled here when it is needed.
+    """
+    if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
+        return
+    march = closed_form_march(setup)
+    if march in _asked:
+        return
+    _asked.add(march)
+    is_known = all(cache_of(kernel).exists() for kernel in (next_event, march.take_change))
+    if not is_known and len(os.sched_getaffinity(0)) > 1 and Path(sys.executable).stem.startswith("python"):
+        with suppress(OSError):  # the lock of another, or no room for a process
+            _start(FRICTION_LAWS[setup.law.friction_law], is_soft=plain(is_penalty)(setup.law))
+
+
+def _start(friction_law: str, *, is_soft: bool) -> None:
+    """Start the process; it holds the lock, and ends with this one, which holds its input."""
+    path = cache_of(next_event).parent / "ahead.lock"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        folder = str(Path(__file__).parents[2])
+        known = os.environ.get("PYTHONPATH")
+        environment = {
+            **os.environ,
+            **dict.fromkeys(VARIABLES, "1"),
+            "PYTHONPATH": folder if known is None else f"{folder}{os.pathsep}{known}",
+            "NUMBA_CACHE_DIR": numba.config.CACHE_DIR,  # type: ignore[attr-defined]
+        }
+        started = subprocess.Popen(
+            [sys.executable, "-P", "-m", __name__, friction_law, *(["soft"] if is_soft else [])],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+            pass_fds=[lock.fileno()],
+        )
+    atexit.register(_end, started)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Leave no process behind; half a kernel is in no cache."""
+    process.kill()
+    process.communicate()
+
+
+def _compile(friction_law: str, *, is_soft: bool) -> None:
+    """Compile what takes an event, then what finds the next one, on a rotor that touches nothing."""
+    contact = Contact(friction_law=friction_law, **(_SOFT if is_soft else {}))  # type: ignore[arg-type]
+    setup = prepare(
+        read_rig("mokhtar2017"), 150.0, contact=contact, integrator=Integrator(), samples_per_revolution=32
+    )
+    assert isinstance(setup, ModalSetup)
+    motion = PiecewiseMotion(setup, 1.0, 0.3, State.at_rest(setup.model))
+    motion.march.change(motion.states, 1, 0.0, motion.start.copy())
+    motion.revolve(motion.start, motion.states)
+
+
+def _end_with_parent() -> None:
+    sys.stdin.buffer.read()
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    _compile(sys.argv[1], is_soft="soft" in sys.argv[2:])
