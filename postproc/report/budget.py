@@ -95,8 +95,7 @@ def _load_records(page: Page, load: Load, room: float) -> None:
     pilots = spread(done, _PILOTS)
     margin = 1.0 if pilots == done else 1.05  # the pilots give an estimate of the size
     for level in LEVELS:
-        # One by one: around cases far apart, `records` would read much that nobody asks for.
-        tried = {flat: cases.record(flat, level) for flat in pilots}
+        tried = dict(cases.records(pilots, level))
         each = margin * sum(map(text_size, tried.values())) / len(pilots)
         if each * len(done) <= room:
             break

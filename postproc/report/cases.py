@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from postproc.report.detail import Detail
 
 _READ_AT_ONCE = 64_000_000  # bytes
+_SPARSE = 16  # cases read for each that is asked for, beyond which they are read one by one
 _MOVED = re.compile(r"stator(\.\d+)?\.(angle|clearance_offset|node)")
 
 
@@ -53,12 +54,15 @@ class Cases:
         return self._pack(case.compute(), detail)
 
     def records(self, flats: Iterable[int], detail: Detail) -> Iterator[tuple[int, bytes]]:
-        """Yield cases with their flat index; what lies in one chunk of the store is read at once."""
+        """Yield cases with their flat index; those close to one another in the store are read at once."""
         blocks: dict[tuple[int, ...], list[int]] = {}
         for flat in flats:
             corner = tuple(i // n for i, n in zip(self._place(flat), self._window, strict=True))
             blocks.setdefault(corner, []).append(flat)
         for corner, members in blocks.items():
+            if math.prod(self._window) > _SPARSE * len(members):
+                yield from ((flat, self.record(flat, detail)) for flat in members)
+                continue
             start = [c * n for c, n in zip(corner, self._window, strict=True)]
             window = {a: slice(s, s + n) for a, s, n in zip(self._axes, start, self._window, strict=True)}
             block = self._arrays.isel(window).compute()

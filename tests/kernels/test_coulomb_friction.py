@@ -4,17 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from kernel_case import KernelCase
 from scipy.optimize import linprog
 from trial_rig import trial_rig
 
-from rubhpc.integrate.marches.workspace import workspace
 from rubhpc.kernels.central_difference import FINISHED
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact_forces import fill_residual, solve_contact
-from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs
 from rubhpc.kernels.laws import COULOMB as COULOMB_LAW
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.kernels.lemke import solve_lemke
@@ -22,92 +17,6 @@ from rubhpc.rig.reading import with_keys
 
 COULOMB = MULTIPLIER._replace(friction_law=COULOMB_LAW)
 STEP, SPIN, RADIUS = 1e-6, 150.0, 0.06  # s, rad/s, m
-
-
-@st.composite
-def problems(draw):
-    """Pairs at any angles, with any symmetric compliance, some of which penetrate in the step."""
-    q = draw(st.integers(1, 4))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    root = rng.normal(size=(5 * q, 5 * q))
-    compliance = 1e-9 * (root @ root.T / (5 * q) + np.eye(5 * q))
-    rows = np.arange(q * N_DEGREE).reshape(q, N_DEGREE)
-    angle = rng.uniform(0, 2 * math.pi, q)
-    pairs = Pairs(
-        row=rows,
-        block=np.zeros_like(rows),
-        axis_y=np.cos(angle),
-        axis_z=np.sin(angle),
-        radius=np.full(q, RADIUS),
-        clearance=np.full(q, 1e-4),
-        aside=np.zeros(q),
-        friction=np.full(q, draw(st.sampled_from([0.0, 0.1, 0.4])) * draw(st.sampled_from([1.0, -1.0]))),
-        compliance=compliance.reshape(q, 5, q, 5),
-        is_updated=draw(st.booleans()),
-        law=COULOMB,
-    )
-    end = rng.normal(scale=2e-4, size=(q, 5))
-    # Slips of a step, of either sense, from what friction can stop to what it cannot.
-    start = end - rng.normal(scale=draw(st.sampled_from([1e-7, 1e-6, 1e-5])), size=(q, 5))
-    spin = draw(st.sampled_from([0.0, SPIN, -SPIN]))
-    return pairs, start, end, spin
-
-
-def gaps(pairs, at):
-    """Gaps (q,) with the degrees `at` (q, 5), and the unit vectors from disc to tip in the plane y + i z."""
-    axis = pairs.axis_y + 1j * pairs.axis_z
-    line = (pairs.radius + pairs.clearance + at[:, 3] + 1j * at[:, 4]) * axis - (at[:, 0] + 1j * at[:, 1])
-    if pairs.is_updated:
-        return abs(line) - pairs.radius, line / abs(line)
-    return (line * axis.conj()).real - pairs.radius, axis
-
-
-def slips(pairs, normal, moved, spin):
-    """Way of the rim over the tips (q,) for motions `moved` (q, 5) of their degrees in a step."""
-    axis = pairs.axis_y + 1j * pairs.axis_z
-    apart = moved[:, 0] + 1j * moved[:, 1] - (moved[:, 3] + 1j * moved[:, 4]) * axis
-    return pairs.radius * (moved[:, 2] + STEP * spin) + (apart * (1j * normal).conj()).real
-
-
-@settings(max_examples=300, deadline=None)
-@given(problems())
-def test_forces_keep_to_coulombs_law(problem):
-    pairs, start, end, spin = problem
-    work = workspace(pairs, STEP)
-    free, normal = gaps(pairs, end)
-    work.at[:], work.now[:], work.gap[:] = end, start, free
-    work.rate[:] = (end - start) / STEP  # slips turn round in the step only where the forces turn them
-    assert solve_contact(pairs, work, STEP, spin) == np.count_nonzero(work.force)
-    pivots, residual, moved = work.solution
-    assert residual <= 1e-9 * moved + 1e-13
-    assert (pivots > 0) == work.force.any()
-    force, friction = work.force, work.traction
-    along = -normal * force - 1j * normal * friction  # on the disc
-    on_tip = -along * (pairs.axis_y - 1j * pairs.axis_z)
-    loads = np.stack([along.real, along.imag, -RADIUS * friction, on_tip.real, on_tip.imag], axis=1)
-    at = end + np.einsum("iajb,jb->ia", pairs.compliance, loads)
-    gap, slip = gaps(pairs, at)[0], slips(pairs, normal, at - start, spin)
-    before = slips(pairs, normal, end - start, spin)
-    assert (force >= 0.0).all()
-    assert gap.min() >= -2e-13
-    assert abs(gap * force).max() <= 2e-13 * max(force.max(), 1.0)
-    bound = abs(pairs.friction) * force
-    assert (abs(friction) <= bound * (1 + 1e-9)).all()
-    for i in np.flatnonzero(bound > 0.0):
-        tiny = 1e-10 * (abs(before).max() + abs(slip).max())
-        if friction[i] * (before[i] + slip[i]) < -1e-9 * bound[i] * abs(before).max():
-            raise AssertionError("friction feeds energy in")
-        if abs(friction[i]) < bound[i] * (1 - 1e-9):
-            turned = before[i] * (before[i] + slip[i]) < 0 or friction[i] == 0.0
-            assert abs(slip[i]) <= tiny or turned
-        else:
-            assert slip[i] * friction[i] >= -tiny * bound[i]
-    if bound.any():  # a friction that is not the law's shows
-        i = int(bound.argmax())
-        friction[i] -= 0.1 * math.copysign(bound[i], friction[i])
-        fill_residual(pairs, work)
-        give = np.abs(work.tangential[1]).diagonal()[i]
-        assert work.solution[1] >= 0.05 * give * bound[i]
 
 
 def test_complementarity_with_a_zero_diagonal_is_solved():
