@@ -24,7 +24,7 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import ModalSetup, Scheme, prepare
 from rubhpc.kernels._jit import cache_of, plain
-from rubhpc.kernels.flow import next_event
+from rubhpc.kernels.flow import follow_piece
 from rubhpc.kernels.laws import FRICTION_LAWS, is_penalty
 from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import Contact, Integrator
@@ -49,7 +49,7 @@ def compile_ahead(setup: Setup) -> None:
     if march in _asked:
         return
     _asked.add(march)
-    is_known = all(cache_of(kernel).exists() for kernel in (next_event, march.take_change))
+    is_known = all(cache_of(kernel).exists() for kernel in (follow_piece, march.take_change))
     if not is_known and len(os.sched_getaffinity(0)) > 1 and Path(sys.executable).stem.startswith("python"):
         with suppress(OSError):  # the lock of another, or no room for a process
             _start(FRICTION_LAWS[setup.law.friction_law], is_soft=plain(is_penalty)(setup.law))
@@ -57,7 +57,7 @@ def compile_ahead(setup: Setup) -> None:
 
 def _start(friction_law: str, *, is_soft: bool) -> None:
     """Start the process; it holds the lock, and ends with this one, which holds its input."""
-    path = cache_of(next_event).parent / "ahead.lock"
+    path = cache_of(follow_piece).parent / "ahead.lock"
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

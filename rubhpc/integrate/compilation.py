@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _PARTS = {
     "advance_by_steps": "for contact in short steps",
     "advance_curved": "for curved gaps",
-    "next_event": "for periodic motions",
+    "follow_piece": "for periodic motions",
     "part": "for neighbouring motions, which distinguish chaos from order",
 }
 _announced: set[str] = set()

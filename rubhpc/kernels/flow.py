@@ -2,33 +2,165 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.case_progress import NONE
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, bounded, dot, floor_log2, propagate
 from rubhpc.kernels.cubics import turning_value
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 MOST_REFINEMENTS = 30  # Newton steps to a root; two or three are taken
 SAME_TIME = 1e-14  # s, within which switch functions vanish together
 
 
-@jit_sum
+class PieceTables(NamedTuple):
+    """A contact mode as a piece is followed in it: m coordinates, n reduced degrees, s switch functions."""
+
+    switch_re: Floats  # (s, m), switch functions of the coordinates, real part of the product
+    switch_im: Floats
+    rate_re: Floats  # (s, m), of their rates
+    rate_im: Floats
+    bound: Floats  # (s, m), of their second derivatives
+    power_re: Floats  # (levels, m), exponentials over 2^level ticks
+    power_im: Floats
+    exponent: Floats  # (2, m), 1/s, real and imaginary
+    drift: Floats  # (m,), growth of coordinates that grow linearly, their unit per second
+    floor: Floats  # (s,), below which a switch function is negative; -inf for one that is not looked at
+    kind: Ints  # (s,), row of the least values that it counts for, or NONE
+    enter_re: Floats  # (2 n, m), coordinates of a unit motion
+    enter_im: Floats
+    offset: Floats  # (2, 3, m), coordinates besides: times cosine and sine of the shaft's angle, and constant
+    shape_re: Floats  # (2 n, m), motion of unit coordinates
+    shape_im: Floats
+    translations: Floats  # (r, n), displacements that none may pass the limit with
+    displacement_limit: float  # m
+
+
+class PieceRoom(NamedTuple):
+    """Where a piece is worked out."""
+
+    switch: Floats  # (4, s), switch functions and their rates before and after a step
+    roots: Floats  # (s,)
+    ahead: Floats  # (2, m)
+
+
+def piece_room(n_switch: int, width: int) -> PieceRoom:
+    """Room for pieces of as many switch functions and coordinates."""
+    return PieceRoom(np.zeros((4, n_switch)), np.zeros(n_switch), np.zeros((2, width)))
+
+
+BEFORE, RATE_BEGUN, RATE_ENDED, GRADIENT = range(4)  # rows of the motions of a piece
+
+
+@jit_lean_sum
+def follow_piece(
+    tables: PieceTables,
+    room: PieceRoom,
+    motion: Floats,
+    begin: float,
+    spin: float,
+    tick: float,
+    search_level: int,
+    longest_level: int,
+    duration: float,
+    coordinates: Floats,
+    motions: Floats,
+    rates: Floats,
+    least: Floats,
+) -> tuple[float, int]:
+    """Follow a motion in a contact mode until a switch function falls below its floor, or for `duration`.
+
+    Steps are chosen as by `event_loop.advance`; within the last tick the root is found by Newton's method
+    with the exponentials themselves.
+
+    Parameters
+    ----------
+    motion : (2 n,)
+        Reduced displacements and velocities at the beginning, `begin` (s) after the shaft's angle 0.
+    spin : float, rad/s
+    tick, duration : float, s
+    search_level, longest_level : int
+        Steps up to 2^level ticks need no bound; none is longer than 2^longest_level.
+    coordinates : (2, 2, m)
+        Filled in: coordinates at the beginning, and at the end.
+    motions : (4, 2 n)
+        Filled in: motion at the end before the event, its rate at the beginning and at the end, and the
+        gradient of the first switch function that vanishes by the motion (as it is where none does).
+    rates : (s,)
+        Filled in: of the switch functions at the end.
+    least : (2, q)
+        Smallest value of the switch functions of each kind and pair where they turn; lowered in place.
+
+    Returns
+    -------
+    float
+        Time passed, s.
+    int
+        Bits of the switch functions that vanish; 0 where `duration` has passed; -1 at an event beyond the
+        limit of displacements.
+    """
+    entered, ended = coordinates[0], coordinates[1]
+    cosine, sine = np.cos(spin * begin), np.sin(spin * begin)
+    for part in range(2):
+        rows = tables.enter_re if part == 0 else tables.enter_im
+        target, offset = entered[part], tables.offset[part]
+        for k in range(target.size):
+            target[k] = offset[0, k] * cosine + offset[1, k] * sine + offset[2, k]
+        for row in range(motion.size):
+            value = motion[row]
+            source = rows[row]
+            for k in range(target.size):
+                target[k] += source[k] * value
+    time, crossing = next_event(
+        tables, room, tick, search_level, longest_level, duration, entered, ended, least
+    )
+    shape_re, shape_im = tables.shape_re, tables.shape_im
+    for row in range(motion.size):
+        motions[BEFORE, row] = dot(shape_re[row], shape_im[row], ended[0], ended[1])
+    for place in range(2):
+        z, change = coordinates[place], room.ahead
+        for k in range(z.shape[1]):
+            growth, turning = tables.exponent[0, k], tables.exponent[1, k]
+            change[0, k] = growth * z[0, k] - turning * z[1, k] + tables.drift[k]
+            change[1, k] = growth * z[1, k] + turning * z[0, k]
+        for row in range(motion.size):
+            motions[RATE_BEGUN + place, row] = dot(shape_re[row], shape_im[row], change[0], change[1])
+    for j in range(rates.size):
+        rates[j] = dot(tables.rate_re[j], tables.rate_im[j], ended[0], ended[1])
+    if crossing != 0:
+        for row in range(tables.translations.shape[0]):
+            seen = 0.0
+            for k in range(tables.translations.shape[1]):
+                seen += tables.translations[row, k] * motions[BEFORE, k]
+            if not abs(seen) <= tables.displacement_limit:
+                return time, int(np.int64(-1))
+        first = lowest_bit(crossing)
+        for row in range(motion.size):
+            motions[GRADIENT, row] = dot(
+                tables.switch_re[first], tables.switch_im[first], tables.enter_re[row], tables.enter_im[row]
+            )
+    return time, crossing
+
+
+@jit_inline_sum
+def lowest_bit(bits: int) -> int:
+    """Index of the lowest bit of a number that is not 0."""
+    j = 0
+    while (bits >> j) & 1 == 0:
+        j += 1
+    return j
+
+
+@jit_inline_sum
 def next_event(
-    mode: int,
-    switch_re: Floats,
-    switch_im: Floats,
-    rate_re: Floats,
-    rate_im: Floats,
-    bound: Floats,
-    power_re: Floats,
-    power_im: Floats,
-    exponent: Floats,
-    drift: Floats,
-    floor: Floats,
+    tables: PieceTables,
+    room: PieceRoom,
     tick: float,
     search_level: int,
     longest_level: int,
@@ -37,43 +169,22 @@ def next_event(
     z: Floats,
     least: Floats,
 ) -> tuple[float, int]:
-    """Follow a contact mode until a switch function falls below its floor, for `duration` at most.
-
-    Steps are chosen as by `event_loop.advance`; within the last tick the root is found by Newton's method
-    with the exponentials themselves.
-
-    Parameters
-    ----------
-    switch_re, ..., power_im : (p, ...)
-        Tables of all modes (`contact_modes.ModeTables`); `mode` is the one to follow.
-    exponent : (2, m), 1/s
-        Of the coordinates, real and imaginary.
-    drift : (m,), 1/s
-        Growth of coordinates that grow linearly, times their unit.
-    floor : (n_switch,)
-        Below which a switch function is negative; -inf for one that is not looked at.
-    tick, duration : float, s
-    search_level, longest_level : int
-        Steps up to 2^level ticks need no bound; none is longer than 2^longest_level.
-    z_entered, z : (2, m)
-        Coordinates at the beginning, and, filled in, at the end.
-    least : (n_switch,)
-        Smallest value of each switch function where it turns; lowered in place.
-
-    Returns
-    -------
-    float
-        Time passed, s.
-    int
-        Bits of the switch functions that vanish; 0 where `duration` has passed.
-    """
-    n_switch, m = switch_re.shape[1], z.shape[1]
-    now, now_rate = np.zeros(n_switch), np.zeros(n_switch)
-    then, then_rate = np.zeros(n_switch), np.zeros(n_switch)
-    ahead = np.zeros((2, m))
+    """Find the first event after coordinates (2, m) were `z_entered`: `follow_piece`; `z` is filled in."""
+    switch_re, switch_im, rate_re, rate_im = (
+        tables.switch_re,
+        tables.switch_im,
+        tables.rate_re,
+        tables.rate_im,
+    )
+    bound, floor, exponent, drift = tables.bound, tables.floor, tables.exponent, tables.drift
+    power_re, power_im = tables.power_re, tables.power_im
+    n_switch, m = floor.size, z.shape[1]
+    now, now_rate, then, then_rate = room.switch[0], room.switch[1], room.switch[2], room.switch[3]
+    ahead = room.ahead
+    stride = n_switch // least.shape[1]
     for k in range(m):
         z[0, k], z[1, k] = z_entered[0, k], z_entered[1, k]
-    read_switches(mode, switch_re, switch_im, rate_re, rate_im, floor, z, now, now_rate)
+    read_switches(switch_re, switch_im, rate_re, rate_im, floor, z, now, now_rate)
     n_tick = int(duration / tick)
     passed, halving = 0, NONE
     is_forced = below(now, floor) != 0
@@ -93,45 +204,34 @@ def next_event(
                 free = np.inf
                 for j in range(n_switch):
                     if floor[j] > -np.inf:
-                        b = bounded(bound[mode, j], z[0], z[1])
+                        b = bounded(bound[j], z[0], z[1])
                         free = min(free, positive_time(now[j], now_rate[j], b))
                 while level > search_level and (1 << level) * tick > free:
                     level -= 1
             step = (1 << level) * tick
-            propagate(power_re[mode, level], power_im[mode, level], z[0], z[1], ahead[0], ahead[1])
+            propagate(power_re[level], power_im[level], z[0], z[1], ahead[0], ahead[1])
             for k in range(m):
                 ahead[0, k] += drift[k] * step
-        read_switches(mode, switch_re, switch_im, rate_re, rate_im, floor, ahead, then, then_rate)
-        crossing = 0 if is_forced else below(then, floor)
+        read_switches(switch_re, switch_im, rate_re, rate_im, floor, ahead, then, then_rate)
+        crossing = int(np.int64(0))  # no literal: callers are compiled for one type
+        if not is_forced:
+            crossing = below(then, floor)
         if crossing != 0 and level > 0 and not is_last:
             halving = level - 1
             continue
         if crossing != 0:
-            return refine(
-                mode,
-                switch_re,
-                switch_im,
-                rate_re,
-                rate_im,
-                exponent,
-                drift,
-                crossing,
-                passed * tick,
-                min(duration, (passed + 1) * tick),
-                tick,
-                z_entered,
-                z,
-            )
+            first, last = passed * tick, min(duration, (passed + 1) * tick)
+            return refine(tables, room.roots, crossing, first, last, tick, z_entered, z)
         for j in range(n_switch):
             if floor[j] > -np.inf and now_rate[j] < 0.0 and then_rate[j] > 0.0:
                 value = turning_value(now[j], now_rate[j], then[j], then_rate[j], step)
-                if value > -floor[j]:  # a gap that has just opened is zero but for rounding
-                    least[j] = min(least[j], value)
+                if tables.kind[j] >= 0 and value > -floor[j]:  # a gap just opened is zero but for rounding
+                    least[tables.kind[j], j // stride] = min(least[tables.kind[j], j // stride], value)
             now[j], now_rate[j] = then[j], then_rate[j]
         for k in range(m):
             z[0, k], z[1, k] = ahead[0, k], ahead[1, k]
         if is_last:
-            return duration, int(np.int64(0))
+            return duration, crossing
         passed += 1 << level
         is_forced = False
         halving = max(halving - 1, NONE)
@@ -147,9 +247,8 @@ def positive_time(value: float, rate: float, bend: float) -> float:
     return -value / rate if rate < 0.0 else np.inf
 
 
-@jit_sum
+@jit_lean_sum
 def read_switches(
-    mode: int,
     switch_re: Floats,
     switch_im: Floats,
     rate_re: Floats,
@@ -162,8 +261,8 @@ def read_switches(
     """Switch functions (n_switch,) that are looked at, and their rates."""
     for j in range(value.size):
         if floor[j] > -np.inf:
-            value[j] = dot(switch_re[mode, j], switch_im[mode, j], z[0], z[1])
-            rate[j] = dot(rate_re[mode, j], rate_im[mode, j], z[0], z[1])
+            value[j] = dot(switch_re[j], switch_im[j], z[0], z[1])
+            rate[j] = dot(rate_re[j], rate_im[j], z[0], z[1])
 
 
 @jit_inline_sum
@@ -176,7 +275,7 @@ def below(value: Floats, floor: Floats) -> int:
     return crossing
 
 
-@jit_sum
+@jit_lean_sum
 def move(exponent: Floats, drift: Floats, time: float, z_entered: Floats, z: Floats) -> None:
     """Coordinates (2, m) a time (s) after they were `z_entered`."""
     for k in range(z.shape[1]):
@@ -187,15 +286,10 @@ def move(exponent: Floats, drift: Floats, time: float, z_entered: Floats, z: Flo
         z[1, k] = re * z_entered[1, k] + im * z_entered[0, k]
 
 
-@jit_sum
+@jit_lean_sum
 def refine(
-    mode: int,
-    switch_re: Floats,
-    switch_im: Floats,
-    rate_re: Floats,
-    rate_im: Floats,
-    exponent: Floats,
-    drift: Floats,
+    tables: PieceTables,
+    roots: Floats,
     crossing: int,
     first: float,
     last: float,
@@ -207,17 +301,20 @@ def refine(
 
     A function that falls slowly may have passed zero some ticks before it is below its floor.
     """
+    exponent, drift = tables.exponent, tables.drift
+    switch_re, switch_im = tables.switch_re, tables.switch_im
+    rate_re, rate_im = tables.rate_re, tables.rate_im
     earliest = max(0.0, first - (1 << FORCED_LEVEL) * tick)
-    roots = np.full(switch_re.shape[1], np.inf)
     found = np.inf
     for j in range(roots.size):
+        roots[j] = np.inf
         if (crossing >> j) & 1 == 0:
             continue
         time, change = first, np.inf
         for _ in range(MOST_REFINEMENTS):
             move(exponent, drift, time, z_entered, z)
-            value = dot(switch_re[mode, j], switch_im[mode, j], z[0], z[1])
-            rate = dot(rate_re[mode, j], rate_im[mode, j], z[0], z[1])
+            value = dot(switch_re[j], switch_im[j], z[0], z[1])
+            rate = dot(rate_re[j], rate_im[j], z[0], z[1])
             if not rate < 0.0:
                 time = last
                 break

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 PHYSICS = 15  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
+MODAL = 1  # method = "modal": last digits of multipliers
 DIRECT = 1  # transient = "direct"
 CHANGING_SPEED = 2  # run-ups and drives
 SOFT_FRICTION = 1  # a penalty with set-valued friction
@@ -30,6 +31,7 @@ def physics_of(study: Study) -> int:
     is_soft = "penalty" in _laws(study, "law") and _laws(study, "friction_law") != {"sliding"}
     return (
         PHYSICS
+        + MODAL * (study.integrator.method == "modal")
         + DIRECT * study.recording.is_transient_direct
         + CHANGING_SPEED * bool(study.run_up or study.drive)
         + SOFT_FRICTION * is_soft

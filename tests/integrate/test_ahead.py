@@ -9,7 +9,7 @@ import pytest
 import rubhpc
 from rubhpc.integrate import ahead
 from rubhpc.integrate.setup import prepare
-from rubhpc.kernels.flow import next_event
+from rubhpc.kernels.flow import follow_piece
 from rubhpc.kernels.mode_change import change_contacts
 from rubhpc.study.study import Contact, Integrator
 
@@ -78,8 +78,8 @@ def test_what_it_compiles(monkeypatch, friction_law):
     """Both kernels are called that a proof calls."""
     called = []
     monkeypatch.setattr(
-        "rubhpc.integrate.periodic_motions.piecewise_motion.next_event",
-        lambda *arguments: (called.append("next_event"), next_event(*arguments))[1],
+        "rubhpc.integrate.periodic_motions.piecewise_motion.follow_piece",
+        lambda *arguments: (called.append("follow_piece"), follow_piece(*arguments))[1],
     )
     march = ahead.closed_form_march(setup_of(friction_law=friction_law))
     take_change = march.take_change
@@ -89,7 +89,7 @@ def test_what_it_compiles(monkeypatch, friction_law):
         staticmethod(lambda *arguments: (called.append("change"), take_change(*arguments))[1]),
     )
     ahead._compile(friction_law, is_soft=False)
-    assert {"change", "next_event"} == set(called)
+    assert {"change", "follow_piece"} == set(called)
     assert (take_change is change_contacts) == (friction_law == "sliding")
 
 

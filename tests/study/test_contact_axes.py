@@ -68,7 +68,8 @@ def test_each_case_takes_its_own_contact(tmp_path):
     ],
 )
 def test_a_version_of_some_laws_is_that_of_the_studies_that_take_them(tmp_path, axes, contact, further):
-    assert identity.physics_of(study_of(tmp_path, axes, contact)) == identity.PHYSICS + further
+    plain = identity.PHYSICS + identity.MODAL
+    assert identity.physics_of(study_of(tmp_path, axes, contact)) == plain + further
 
 
 def test_quantities_are_axes_in_si_units(tmp_path):

@@ -63,9 +63,7 @@ def test_periodic_motion_and_its_monodromy_are_those_of_all_degrees_of_freedom(
         direction = random.standard_normal(2 * n) * scale
         if closed:  # neighbours that keep the closed gaps closed
             mode = piecewise.mode(piecewise.states)
-            direction = mode.shape_re @ (direction @ mode.enter_re) - mode.shape_im @ (
-                direction @ mode.enter_im
-            )
+            direction = mode.propagator(0.0) @ direction
         step = 1e-6 * size / piecewise.size(direction) * direction
         ahead, _ = follow(start + step)
         behind, _ = follow(start - step)

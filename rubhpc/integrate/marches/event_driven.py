@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -96,6 +96,11 @@ class EventDrivenMarch(ModalMarch):
     def exponents(self, mask: int) -> tuple[Floats, Floats]:
         """Exponents of the coordinates of a contact mode and their drift (`ModeLibrary.exponents`)."""
         return self._library.exponents(mask)
+
+    @property
+    def derived(self) -> dict[int, Any]:
+        """What is kept of the contact modes as long as their tables are (`ModeLibrary.derived`)."""
+        return self._library.derived
 
     def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
         """Take an event: `motion` (2 n,) after it, in place, and the contact mode that goes on, or -1.

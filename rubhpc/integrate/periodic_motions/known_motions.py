@@ -54,6 +54,7 @@ class Approach:
     def __init__(self, monodromy: Floats, energy: Floats) -> None:
         """Sum the energies, twice as many periods at a time."""
         self._monodromy = monodromy
+        self._powers = [monodromy]  # over 1, 2, 4, ... periods
         power, form = monodromy, np.diag(energy)
         for _ in range(MOST_SQUARINGS):
             more = power.T @ form @ power
@@ -61,6 +62,7 @@ class Approach:
             if np.abs(more).max() <= np.finfo(float).eps * np.abs(form).max():
                 break
             power = power @ power
+            self._powers.append(power)
         self._form = form
 
     def square(self, apart: Floats) -> float:
@@ -69,12 +71,14 @@ class Approach:
 
     def periods_to(self, share: float, apart: Floats) -> int:
         """Periods until the linear theory leaves no more than a share of the square."""
-        least = share * self.square(apart)
-        for n_period in range(MOST_PERIODS):
-            if self.square(apart) <= least:
-                return n_period
-            apart = self._monodromy @ apart
-        return MOST_PERIODS
+        least, n_period = share * self.square(apart), 0
+        if self.square(apart) <= least:
+            return 0
+        for k in range(len(self._powers) - 1, -1, -1):  # the square falls in every period
+            moved = self._powers[k] @ apart
+            if n_period + (1 << k) < MOST_PERIODS and self.square(moved) > least:
+                apart, n_period = moved, n_period + (1 << k)
+        return n_period + 1
 
     def obeys(self, before: Floats, after: Floats, n_period: int) -> bool:
         """Whether the distance (2 n,) some periods later is what the linear theory says, and falls like that.

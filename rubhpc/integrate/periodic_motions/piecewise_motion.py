@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -11,12 +12,12 @@ from numpy.typing import NDArray
 
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.event_driven import NoClosedForm
+from rubhpc.integrate.marches.friction import FrictionMarch
+from rubhpc.integrate.periodic_motions.piece_mode import Mode, mode_of
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.case_progress import closed_pairs
-from rubhpc.kernels.event_steps import GAP_TOLERANCE
-from rubhpc.kernels.flow import next_event
+from rubhpc.kernels.flow import BEFORE, GRADIENT, RATE_BEGUN, RATE_ENDED, follow_piece, piece_room
 from rubhpc.kernels.friction_states import STUCK, state_of
-from rubhpc.kernels.laws import is_set_valued
 
 if TYPE_CHECKING:
     from rubhpc.integrate.record import State
@@ -35,7 +36,7 @@ class Unfollowed(Exception):  # noqa: N818 - a state of the motion, never seen b
 
 
 class Piece(NamedTuple):
-    """Motion in one contact mode, m coordinates, n reduced degrees.
+    """Motion in one contact mode, n reduced degrees.
 
     Attributes
     ----------
@@ -45,10 +46,14 @@ class Piece(NamedTuple):
         Since the shaft passed its angle 0, and until the event or the end of the revolution.
     crossing : int
         Bits of the switch functions that vanish at the end; 0 where the revolution ends.
-    begun, ended : (2, m)
-        Coordinates at the beginning, and at the end before the event.
+    rate_begun, rate_ended : (2 n,)
+        Rate of the motion at the beginning, and at the end before the event.
     before, after : (2 n,)
         Reduced displacements and velocities at the end, before and after the event.
+    gradient : (2 n,)
+        Of the first switch function that vanishes, by the motion; of no meaning where none does.
+    switch_rate : float
+        Its rate, its unit per second.
     touching, approach : (k,)
         Pairs whose gaps close at the end, and their speeds of approach, m/s.
     states_after : int
@@ -59,31 +64,15 @@ class Piece(NamedTuple):
     begin: float
     duration: float
     crossing: int
-    begun: Floats
-    ended: Floats
+    rate_begun: Floats
+    rate_ended: Floats
     before: Floats
+    gradient: Floats
+    switch_rate: float
     touching: NDArray[np.int64]
     approach: Floats
     after: Floats
     states_after: int
-
-
-class Mode(NamedTuple):
-    """A contact mode as pieces need it: m coordinates, n reduced degrees."""
-
-    place: int  # in the tables
-    is_closed: NDArray[np.bool_]  # (q,)
-    is_open: NDArray[np.bool_]  # (q,), watched for its gap
-    floor: Floats  # (n_switch,), below which a switch function is negative
-    exponent: Floats  # (2, m), 1/s, real and imaginary
-    drift: Floats  # (m,), 1/s
-    shape_re: Floats  # (2 n, m), motion of unit coordinates
-    shape_im: Floats
-    enter_re: Floats  # (2 n, m), coordinates of a unit motion
-    enter_im: Floats
-    steady: Floats  # (2, m), coordinates of no motion at all, but for those of the unbalance response
-    cosine: Floats  # (2, m), to be added times the cosine of the shaft's angle
-    sine: Floats  # (2, m), times its sine
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,22 +116,38 @@ class PiecewiseMotion:
 
     def __init__(self, setup: ModalSetup, clearance: float, friction: float, initial: State) -> None:
         """Take a case in closed form; `NoClosedForm` where it has none."""
-        self.has_states = plain(is_set_valued)(setup.law)
-        self.march = closed_form_march(setup)(setup, clearance, friction, initial, None)
+        march = closed_form_march(setup)
+        self.has_states = issubclass(march, FrictionMarch)
+        self.march = march(setup, clearance, friction, initial, None)
         self.setup = setup
         self.turn = setup.interval * setup.samples_per_revolution
         self.bodies = self.march.bodies
         self.n, self.q = self.bodies.stiffness.shape[0], len(setup.model.stators)
         self.rim_speed = np.array([stator.radius for stator in setup.model.stators]) * abs(setup.spin)
         self.n_switch = self.march.tables.switch_re.shape[1]
+        self.impacts: dict[bytes, tuple[Floats, Floats]] = {}  # those met (`saltation.Impact`)
         self._modes: dict[int, Mode] = {}
-        self._tables = self.march.tables
+        self._take_tables()
         clock = self.march.clock
         self._longest = min(
             self._tables.power_re.shape[1] - 1, int(math.log2(self.turn / STEPS_PER_REVOLUTION / clock.tick))
         )
         self.start = self.march.motion_of(*self.march.place())
         self.states = plain(closed_pairs)(self.march.progress, self._tables)
+
+    @cached_property
+    def force_of_change(self) -> Floats:
+        """Impulses of the pairs (q or 2 q, n), with their tractions under set-valued friction.
+
+        They are those behind a change of the velocities, the shortest where several are.
+        """
+        bodies = self.bodies
+        if self.has_states:
+            both = np.concatenate([bodies.gap_jacobian, -bodies.slip])
+            return np.asarray(np.linalg.pinv(both.T, rcond=1e-12))
+        if self.q == 1:
+            return np.asarray(bodies.gap_jacobian / bodies.delassus)
+        return np.asarray(np.linalg.pinv(bodies.delassus, rcond=1e-12) @ bodies.gap_jacobian)
 
     def size(self, motion: Floats) -> float:
         """Root of v'v + spin^2 u'u of a reduced motion (2 n,), in which the mass matrix is the identity."""
@@ -164,17 +169,16 @@ class PiecewiseMotion:
                 except NoClosedForm:
                     raise Unfollowed("more sets of closed contacts than can be tabulated") from None
             if self.march.tables is not self._tables:  # rows may have been given to other modes
-                self._modes.clear()
-                self._tables = self.march.tables
-            self._modes[states] = self._read(states)
+                self._take_tables()
+            self._modes[states] = mode_of(self.march, states)
         return self._modes[states]
 
     def enter(self, mode: Mode, time: float, motion: Floats) -> Floats:
         """Coordinates (2, m) in a contact mode of a motion (2 n,) at a time, s, after the angle 0."""
-        angle = self.setup.spin * time
-        z = math.cos(angle) * mode.cosine + math.sin(angle) * mode.sine + mode.steady
-        z[0] += motion @ mode.enter_re
-        z[1] += motion @ mode.enter_im
+        angle, tables = self.setup.spin * time, mode.tables
+        z = np.array([math.cos(angle), math.sin(angle), 1.0]) @ tables.offset
+        z[0] += motion @ tables.enter_re
+        z[1] += motion @ tables.enter_im
         return z
 
     def revolve(
@@ -203,42 +207,31 @@ class PiecewiseMotion:
         pieces: list[Piece] = []
         time, clock = phase * self.turn, self.march.clock
         stop = (phase + share) * self.turn
-        least_gap, least_force = np.full((2, self.q), np.inf)
+        least = np.full((2, self.q), np.inf)
         while True:
             mode = self.mode(states)
-            tables = self._tables
-            begun, z = self.enter(mode, time, motion), np.empty_like(mode.exponent)
-            turned = np.full(self.n_switch, np.inf)
-            duration, crossing = next_event(
-                mode.place,
-                tables.switch_re,
-                tables.switch_im,
-                tables.rate_re,
-                tables.rate_im,
-                tables.bound,
-                tables.power_re,
-                tables.power_im,
-                mode.exponent,
-                mode.drift,
-                mode.floor,
+            motions, rates = np.empty((4, motion.size)), np.empty(self.n_switch)
+            duration, crossing = follow_piece(
+                mode.tables,
+                self._room,
+                motion,
+                time,
+                self.setup.spin,
                 clock.tick,
                 clock.search_level,
                 self._longest,
                 stop - time,
-                begun,
-                z,
-                turned,
+                self._coordinates,
+                motions,
+                rates,
+                least,
             )
-            if turned.min() < np.inf:
-                lowest = turned[:: self.n_switch // self.q]
-                least_gap = np.where(mode.is_open, np.minimum(least_gap, lowest), least_gap)
-                least_force = np.where(mode.is_closed, np.minimum(least_force, lowest), least_force)
-            before = mode.shape_re @ z[0] - mode.shape_im @ z[1]
+            before = motions[BEFORE]
             touching, approach, after, states_after = NO_PAIR, NO_SPEED, before, states
+            if crossing < 0:
+                raise Unfollowed(f"a displacement passes {self.setup.displacement_limit:.3g} m")
             if crossing:
-                if self.march.is_beyond(before):
-                    raise Unfollowed(f"a displacement passes {self.setup.displacement_limit:.3g} m")
-                touching, approach = self._touch(mode, crossing, z)
+                touching, approach = self._touch(mode, crossing, rates)
                 after = before.copy()
                 angle = self.setup.spin * (time + duration)
                 states_after = self.march.change(states, crossing, angle, after)
@@ -250,9 +243,11 @@ class PiecewiseMotion:
                     begin=time,
                     duration=duration,
                     crossing=crossing,
-                    begun=begun,
-                    ended=z,
+                    rate_begun=motions[RATE_BEGUN],
+                    rate_ended=motions[RATE_ENDED],
                     before=before,
+                    gradient=motions[GRADIENT],
+                    switch_rate=float(rates[first_of(crossing)]) if crossing else math.nan,
                     touching=touching,
                     approach=approach,
                     after=after,
@@ -262,7 +257,7 @@ class PiecewiseMotion:
             time, motion, states = time + duration, after, states_after
             if not crossing:
                 return Revolution(
-                    pieces=pieces, end=motion, states=states, least_gap=least_gap, least_force=least_force
+                    pieces=pieces, end=motion, states=states, least_gap=least[0], least_force=least[1]
                 )
             if len(pieces) > most_events:
                 raise Unfollowed(f"more than {most_events} events in a revolution")
@@ -273,38 +268,14 @@ class PiecewiseMotion:
         force = self.march.forces(mode.place, self.enter(mode, 0.0, motion))
         return np.where(mode.is_closed, np.maximum(force, np.finfo(float).tiny), 0.0)
 
-    def gradient(self, mode: Mode, crossing: int) -> Floats:
-        """Gradient (2 n,) by the motion of the first switch function that vanishes."""
-        j = first_of(crossing)
-        re, im = self._tables.switch_re[mode.place, j], self._tables.switch_im[mode.place, j]
-        return np.asarray(mode.enter_re @ re - mode.enter_im @ im)
-
     def switch(self, mode: Mode, crossing: int, re: Floats, im: Floats) -> float:
         """First switch function that vanishes, of coordinates (m,), real and imaginary."""
         j = first_of(crossing)
-        return float(self._tables.switch_re[mode.place, j] @ re - self._tables.switch_im[mode.place, j] @ im)
+        return float(mode.tables.switch_re[j] @ re - mode.tables.switch_im[j] @ im)
 
-    def rate_begun(self, piece: Piece) -> Floats:
-        """Rate (2 n,) of the motion at the beginning of a piece."""
-        return rate_of(self.mode(piece.states), piece.begun)
-
-    def rate_ended(self, piece: Piece) -> Floats:
-        """Rate (2 n,) of the motion at the end of a piece, before the event."""
-        return rate_of(self.mode(piece.states), piece.ended)
-
-    def switch_rate(self, piece: Piece) -> float:
-        """Rate of the first switch function that vanishes at the end of a piece, its unit per second."""
-        mode, j = self.mode(piece.states), first_of(piece.crossing)
-        re, im = self._tables.rate_re[mode.place, j], self._tables.rate_im[mode.place, j]
-        return float(re @ piece.ended[0] - im @ piece.ended[1])
-
-    def unit_clearance(self, mode: Mode) -> tuple[Floats, Floats]:
-        """What a clearance greater by 1 m at every pair adds to coordinates (m,), real and imaginary."""
-        first = self._tables.n_eigenmode[mode.place]
-        re, im = -self._tables.enter_constant[mode.place, : self.q].sum(axis=0)
-        re[first], im[first] = 0.0, 0.0
-        re[first + 1 : first + 1 + self.q] = 1.0
-        return re, im
+    def unit_clearance(self, mode: Mode) -> Floats:
+        """What a clearance greater by 1 m at every pair adds to coordinates (2, m)."""
+        return np.asarray(mode.unit_length[: self.q].sum(axis=0))
 
     def what_changes(self, piece: Piece) -> list[tuple[int, Change]]:
         """Pairs that an event at the end of a piece concerns, and what becomes of them."""
@@ -319,53 +290,22 @@ class PiecewiseMotion:
                 found.append((i, "stick" if state_of(piece.states_after, i) == STUCK else "slip"))
         return found
 
-    def _read(self, states: int) -> Mode:
-        """Take a mode from the tables."""
-        place, tables = int(np.flatnonzero(self._tables.mask == states)[0]), self._tables
-        exponent, drift = self.march.exponents(states)
-        is_closed = self.march.closed(states)
-        floor = np.where(is_closed, 0.0, -GAP_TOLERANCE)
-        if self.n_switch > self.q:
-            floor = np.stack([floor, np.where(is_closed, 0.0, -np.inf)], axis=1).ravel()
-        clearance, first = self.bodies.clearance, tables.n_eigenmode[place]
-        steady = -np.tensordot(clearance, tables.enter_constant[place], 1)
-        cosine, sine = -tables.enter_cosine[place], -tables.enter_sine[place]
-        cosine[:, first], sine[:, first], steady[:, first] = (1.0, 0.0), (0.0, 1.0), 0.0
-        steady[0, first + 1 : first + 1 + clearance.size] = clearance
-        return Mode(
-            place=place,
-            is_closed=is_closed,
-            is_open=self.march.opened(states),
-            floor=floor,
-            exponent=exponent,
-            drift=drift,
-            shape_re=tables.motion_re[place],
-            shape_im=tables.motion_im[place],
-            enter_re=tables.enter_re[place],
-            enter_im=tables.enter_im[place],
-            steady=steady,
-            cosine=cosine,
-            sine=sine,
-        )
+    def _take_tables(self) -> None:
+        self._modes.clear()
+        self._tables = self.march.tables
+        width = self._tables.switch_re.shape[2]
+        self._room, self._coordinates = piece_room(self.n_switch, width), np.empty((2, 2, width))
 
-    def _touch(self, mode: Mode, crossing: int, z: Floats) -> tuple[NDArray[np.int64], Floats]:
+    def _touch(self, mode: Mode, crossing: int, rates: Floats) -> tuple[NDArray[np.int64], Floats]:
         """Pairs whose gaps close at an event, and their speeds of approach, m/s."""
-        stride, tables = self.n_switch // self.q, self._tables
+        stride = self.n_switch // self.q
         found = [i for i in range(self.q) if crossing >> stride * i & 1 and mode.is_open[i]]
         if not found:
             return NO_PAIR, NO_SPEED
         pairs = np.array(found)
-        rows = stride * pairs
-        return pairs, tables.rate_im[mode.place, rows] @ z[1] - tables.rate_re[mode.place, rows] @ z[0]
+        return pairs, -rates[stride * pairs]
 
 
 def first_of(crossing: int) -> int:
     """Index of the lowest bit."""
     return (crossing & -crossing).bit_length() - 1
-
-
-def rate_of(mode: Mode, z: Floats) -> Floats:
-    """Rate (2 n,) of the motion with coordinates (2, m)."""
-    growth, turning = mode.exponent
-    re = growth * z[0] - turning * z[1] + mode.drift
-    return np.asarray(mode.shape_re @ re - mode.shape_im @ (growth * z[1] + turning * z[0]))

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.periodic_motions.piecewise_motion import Mode, Piece, PiecewiseMotion, Revolution
+    from rubhpc.integrate.periodic_motions.piecewise_motion import Piece, PiecewiseMotion, Revolution
 
     Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def carried(motion: PiecewiseMotion, revolution: Revolution, columns: Floats | N
     """What becomes of small changes (2 n, k) of a revolution's beginning; by default of all unit ones."""
     for piece, following in pairwise([*revolution.pieces, None]):
         assert piece is not None
-        moved = propagator(motion.mode(piece.states), piece.duration)
+        moved = motion.mode(piece.states).propagator(piece.duration)
         columns = moved if columns is None else moved @ columns
         if following is not None:
             columns = saltate(motion, piece, following, columns)
@@ -57,27 +57,20 @@ def by_clearance(motion: PiecewiseMotion, revolutions: Iterable[Revolution]) -> 
             assert piece is not None
             mode = motion.mode(piece.states)
             clearance_re, clearance_im = motion.unit_clearance(mode)
-            begun_re = moved @ mode.enter_re + clearance_re
-            begun_im = moved @ mode.enter_im + clearance_im
-            size, turn = np.exp(mode.exponent[0] * piece.duration), mode.exponent[1] * piece.duration
+            tables = mode.tables
+            begun_re = moved @ tables.enter_re + clearance_re
+            begun_im = moved @ tables.enter_im + clearance_im
+            size, turn = np.exp(tables.exponent[0] * piece.duration), tables.exponent[1] * piece.duration
             re, im = size * np.cos(turn), size * np.sin(turn)
             z_re, z_im = re * begun_re - im * begun_im, re * begun_im + im * begun_re
-            moved = mode.shape_re @ z_re - mode.shape_im @ z_im
+            moved = tables.shape_re @ z_re - tables.shape_im @ z_im
             if following is None or (not motion.has_states and not piece.touching.size):
                 continue
             impact = Impact(motion, piece)
             switched = motion.switch(mode, piece.crossing, z_re, z_im)
-            jump = motion.rate_begun(following) - impact.apply(motion.rate_ended(piece))
-            moved = impact.apply(moved) + jump * (switched / motion.switch_rate(piece))
+            jump = following.rate_begun - impact.apply(piece.rate_ended)
+            moved = impact.apply(moved) + jump * (switched / piece.switch_rate)
     return moved
-
-
-def propagator(mode: Mode, duration: float) -> Floats:
-    """Derivative (2 n, 2 n) of the motion by that a time (s) before; it keeps closed gaps closed."""
-    size, turn = np.exp(mode.exponent[0] * duration), mode.exponent[1] * duration
-    re, im = size * np.cos(turn), size * np.sin(turn)
-    moved_re, moved_im = mode.shape_re * re - mode.shape_im * im, mode.shape_re * im + mode.shape_im * re
-    return np.asarray(moved_re @ mode.enter_re.T - moved_im @ mode.enter_im.T)
 
 
 def saltate(motion: PiecewiseMotion, piece: Piece, following: Piece, tangent: Floats) -> Floats:
@@ -88,10 +81,9 @@ def saltate(motion: PiecewiseMotion, piece: Piece, following: Piece, tangent: Fl
     """
     if not motion.has_states and not piece.touching.size:
         return tangent  # a release: the forces are continuous
-    gradient = motion.gradient(motion.mode(piece.states), piece.crossing) @ tangent
     impact = Impact(motion, piece)
-    jump = motion.rate_begun(following) - impact.apply(motion.rate_ended(piece))
-    return impact.apply(tangent) + np.multiply.outer(jump, gradient / motion.switch_rate(piece))
+    jump = following.rate_begun - impact.apply(piece.rate_ended)
+    return impact.apply(tangent) + np.multiply.outer(jump, (piece.gradient / piece.switch_rate) @ tangent)
 
 
 class Impact:
@@ -104,40 +96,54 @@ class Impact:
 
     def __init__(self, motion: PiecewiseMotion, piece: Piece) -> None:
         """Find the impulses behind the change of the velocities."""
-        self._n, bodies = motion.n, motion.bodies
+        self._n = motion.n
         change = (piece.after - piece.before)[self._n :]
-        self._direction: Floats | None = None
-        if not piece.touching.size or not change.any():
-            return
-        normal, along = bodies.gap_jacobian, -bodies.slip
-        if motion.has_states:
-            both = np.linalg.lstsq(np.concatenate([normal, along]).T, change, rcond=1e-12)[0]
-            force, traction = np.split(both, 2)
-        elif len(normal) == 1:
-            force = normal @ change / bodies.delassus[0]
-        else:
-            force = np.linalg.lstsq(bodies.delassus, normal @ change, rcond=1e-12)[0]
-        hit = np.flatnonzero(force > NO_IMPULSE * np.abs(force).max())
-        rows = normal[hit]
-        if motion.has_states:
-            share = traction[hit] / force[hit]
-            moved = bodies.slip[hit] @ piece.after[self._n :]
-            held = np.abs(motion.rim_speed[hit] + moved) <= STOPPED * motion.rim_speed[hit]
-            direction = normal[hit] + np.where(held, 0.0, share)[:, None] * along[hit]
-            direction = np.concatenate([direction, along[hit[held]]])
-            stopped = np.concatenate([rows, along[hit[held]]])
-        else:
-            direction, stopped = bodies.force_direction[hit], rows
-        scale = np.ones(len(stopped))
-        has_parted = np.abs(normal[hit] @ piece.after[self._n :]) > AT_REST
-        scale[: hit.size] += np.where(has_parted, bodies.restitution, 0.0)
-        self._direction = direction.T
-        self._gain = np.linalg.solve(stopped @ direction.T, scale[:, None] * stopped)
+        self._gain: Floats | None = None
+        if piece.touching.size and change.any():
+            made = _with_states if motion.has_states else _sliding
+            self._direction, self._gain = made(motion, change, piece.after[self._n :])
 
     def apply(self, columns: Floats) -> Floats:
         """Return columns (2 n, ...) of displacements and velocities after the impact."""
-        if self._direction is None:
+        if self._gain is None:
             return columns
         moved = columns.copy()
         moved[self._n :] -= self._direction @ (self._gain @ columns[self._n :])
         return moved
+
+
+def _sliding(motion: PiecewiseMotion, change: Floats, velocity: Floats) -> tuple[Floats, Floats]:
+    """Directions F and `(R F)^-1 R` of the impulses behind a change (n,) to a velocity (n,), of sliding."""
+    bodies = motion.bodies
+    normal = bodies.gap_jacobian
+    hit = _pressing(motion.force_of_change @ change)
+    has_parted = hit & (np.abs(normal @ velocity) > AT_REST)
+    key = hit.tobytes() + has_parted.tobytes()
+    if key not in motion.impacts:
+        direction, scale = bodies.force_direction[hit].T, 1.0 + bodies.restitution * has_parted[hit]
+        gain = np.asarray(np.linalg.solve(normal[hit] @ direction, scale[:, None] * normal[hit]), np.float64)
+        motion.impacts[key] = direction, gain
+    return motion.impacts[key]
+
+
+def _with_states(motion: PiecewiseMotion, change: Floats, velocity: Floats) -> tuple[Floats, Floats]:
+    """The same under set-valued friction, whose impulses are in proportion or stop a slip."""
+    bodies = motion.bodies
+    normal, along = bodies.gap_jacobian, -bodies.slip
+    force, traction = np.split(motion.force_of_change @ change, 2)
+    hit = np.flatnonzero(_pressing(force))
+    share = traction[hit] / force[hit]
+    moved = bodies.slip[hit] @ velocity
+    held = np.abs(motion.rim_speed[hit] + moved) <= STOPPED * motion.rim_speed[hit]
+    direction = normal[hit] + np.where(held, 0.0, share)[:, None] * along[hit]
+    direction = np.concatenate([direction, along[hit[held]]])
+    stopped = np.concatenate([normal[hit], along[hit[held]]])
+    scale = np.ones(len(stopped))
+    has_parted = np.abs(normal[hit] @ velocity) > AT_REST
+    scale[: hit.size] += np.where(has_parted, bodies.restitution, 0.0)
+    return direction.T, np.linalg.solve(stopped @ direction.T, scale[:, None] * stopped)
+
+
+def _pressing(force: Floats) -> NDArray[np.bool_]:
+    """Pairs with an impulse that is not nothing beside the others'."""
+    return np.asarray(force > NO_IMPULSE * np.abs(force).max())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -70,6 +70,7 @@ class ModeLibrary:
         self._tables = TableStack(1 + q, self._most_modes)
         self.masks = [mode.mask for mode in modes]
         self._exponents: dict[int, tuple[Floats, Floats]] = {}
+        self.derived: dict[int, Any] = {}  # what others make of the modes, by mask
         for mode in modes:
             self._tabulate(mode)
 
@@ -96,6 +97,7 @@ class ModeLibrary:
         """Make room: keep no mode but that with every pair open."""
         self._tables.clear()
         self._exponents.clear()
+        self.derived.clear()
         self.masks = [0]
         self._tabulate(self._opened)
 

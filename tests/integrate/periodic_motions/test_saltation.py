@@ -100,7 +100,7 @@ def test_release_changes_nothing():
     motion = motion_of(PAPER, 1.7, 0.7, 0.3)
     pieces = motion.revolve(motion.start, motion.states).pieces
     release = next(i for i, piece in enumerate(pieces) if piece.crossing and not piece.touching.size)
-    before, after = motion.rate_ended(pieces[release]), motion.rate_begun(pieces[release + 1])
+    before, after = pieces[release].rate_ended, pieces[release + 1].rate_begun
     assert after == pytest.approx(before, abs=1e-9 * np.abs(before).max())
     identity = np.eye(2 * motion.n)
     assert np.array_equal(saltate(motion, pieces[release], pieces[release + 1], identity), identity)

@@ -1,0 +1,122 @@
+"""A contact mode as the pieces of a motion need it: to be followed, and to carry small changes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels.case_progress import NONE
+from rubhpc.kernels.event_steps import GAP_TOLERANCE
+from rubhpc.kernels.flow import PieceTables
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+class Mode(NamedTuple):
+    """A contact mode: q pairs, n reduced degrees, m coordinates of which c move with the motion.
+
+    Attributes
+    ----------
+    place : int
+        In the tables of the march.
+    is_closed, is_open : (q,)
+        Pairs that are closed, and those that are watched for their gap.
+    tables : PieceTables
+        What a piece is followed with.
+    exponent : (c,), 1/s
+    shape : (2 n, c)
+        Motion of unit coordinates, its real part.
+    enter : (2 c, 2 n)
+        Coordinates of a unit motion: their real parts, each with the negative of its imaginary part below.
+    unit_length : (l, 2, m)
+        Coordinates besides for each unit length: the clearances, and a 1 under set-valued friction.
+    """
+
+    place: int
+    is_closed: NDArray[np.bool_]
+    is_open: NDArray[np.bool_]
+    tables: PieceTables
+    exponent: Complexes
+    shape: Complexes
+    enter: Floats
+    unit_length: Floats
+
+    def propagator(self, duration: float) -> Floats:
+        """Derivative (2 n, 2 n) of the motion by that a time (s) before; it keeps closed gaps closed."""
+        moved = self.shape * np.exp(self.exponent * duration)
+        return np.asarray(moved.view(np.float64) @ self.enter)
+
+
+def mode_of(march: EventDrivenMarch, states: int) -> Mode:
+    """Return the mode of a march with pairs in these states, which its tables hold."""
+    if states not in march.derived:
+        march.derived[states] = _read_mode(march, states)
+    mode: Mode = march.derived[states]
+    offset = mode.tables.offset.copy()
+    offset[:, 2] = np.tensordot(march.bodies.clearance, mode.unit_length, 1)
+    followed = mode.tables._replace(
+        offset=offset,
+        translations=march.bodies.translations,
+        displacement_limit=march.bodies.displacement_limit,
+    )
+    return mode._replace(tables=followed)
+
+
+def _read_mode(march: EventDrivenMarch, states: int) -> Mode:
+    """Take a mode from the tables of a march, for no clearance."""
+    tables = march.tables
+    place = int(np.flatnonzero(tables.mask == states)[0])
+    exponent, drift = march.exponents(states)
+    is_closed, is_open = march.closed(states), march.opened(states)
+    floor = np.where(is_closed, 0.0, -GAP_TOLERANCE)
+    kind = np.where(is_open, 0, np.where(is_closed, 1, NONE))
+    if tables.switch_re.shape[1] > is_closed.size:
+        floor = np.stack([floor, np.where(is_closed, 0.0, -np.inf)], axis=1).ravel()
+        kind = np.stack([kind, np.full(kind.size, NONE)], axis=1).ravel()
+    first = tables.n_eigenmode[place]
+    offset = np.zeros((2, 3, tables.switch_re.shape[2]))
+    offset[:, 0], offset[:, 1] = -tables.enter_cosine[place], -tables.enter_sine[place]
+    offset[:, :, first] = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+    unit_length = -tables.enter_constant[place]
+    unit_length[:, :, first] = 0.0
+    for i, length in enumerate(unit_length):
+        length[0, first + 1 + i] = 1.0
+    followed = PieceTables(
+        switch_re=tables.switch_re[place],
+        switch_im=tables.switch_im[place],
+        rate_re=tables.rate_re[place],
+        rate_im=tables.rate_im[place],
+        bound=tables.bound[place],
+        power_re=tables.power_re[place],
+        power_im=tables.power_im[place],
+        exponent=exponent,
+        drift=drift,
+        floor=floor,
+        kind=kind,
+        enter_re=tables.enter_re[place],
+        enter_im=tables.enter_im[place],
+        offset=offset,
+        shape_re=tables.motion_re[place],
+        shape_im=tables.motion_im[place],
+        translations=march.bodies.translations,
+        displacement_limit=march.bodies.displacement_limit,
+    )
+    enter = followed.enter_re + 1j * followed.enter_im
+    moving = np.flatnonzero(enter.any(axis=0))
+    shape = (followed.shape_re + 1j * followed.shape_im)[:, moving]
+    return Mode(
+        place=place,
+        is_closed=is_closed,
+        is_open=is_open,
+        tables=followed,
+        exponent=exponent[0, moving] + 1j * exponent[1, moving],
+        shape=np.ascontiguousarray(shape),
+        enter=np.ascontiguousarray(enter.conj()[:, moving]).view(np.float64).T.copy(),
+        unit_length=unit_length,
+    )
