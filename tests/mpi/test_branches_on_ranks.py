@@ -57,7 +57,7 @@ def test_branches_killed_on_two_ranks_and_resumed_have_the_bytes_of_one_process(
         assert job.poll() is None
     for process in processes_of(study).values():
         process.send_signal(signal.SIGKILL)
-    job.communicate(timeout=10)
+    job.communicate(timeout=60)
     assert 1 <= journalled_cases(store) <= 4
     done = run(study, ranks=2)
     assert done.returncode == 0, done.stderr

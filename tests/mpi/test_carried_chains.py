@@ -44,7 +44,7 @@ def test_chains_that_are_killed_go_on_where_they_were(tmp_path, alone, moments):
             assert job.poll() is None
         for process in processes_of(study).values():
             process.send_signal(signal.SIGKILL)
-        job.communicate(timeout=10)
+        job.communicate(timeout=60)
         assert n_case <= journalled_cases(store) < 16
     done = run(study, ranks=2)
     assert done.returncode == 0, done.stderr

@@ -68,7 +68,7 @@ def test_a_resumed_run_of_other_size_stores_equal_bytes(tmp_path, alone):
         time.sleep(0.02)
         assert job.poll() is None
     job.send_signal(signal.SIGTERM)
-    job.communicate(timeout=10)
+    job.communicate(timeout=60)
     assert job.returncode == 75
     assert 0 < journalled_cases(store) < 12
     done = run(study, ranks=3)
@@ -87,7 +87,7 @@ def test_a_sample_killed_on_its_way_and_resumed_on_two_ranks_stores_equal_bytes(
     job = start(study, ranks=2)
     wait_for_a_case(job, store)
     job.kill()
-    job.communicate(timeout=10)
+    job.communicate(timeout=60)
     for process in processes_of(store).values():
         process.wait(5)
     assert 0 < journalled_cases(store) < 16
@@ -104,7 +104,7 @@ def test_no_rank_outlives_the_daemon_that_started_it(tmp_path):
         assert job.poll() is None
         time.sleep(0.01)
     psutil.Process(processes_of(study)[0].ppid()).kill()
-    job.communicate(timeout=20)
+    job.communicate(timeout=60)
     assert job.returncode != 0
     began = time.monotonic()
     while ranks := [p for number, p in processes_of(study).items() if number >= 0]:
@@ -143,7 +143,7 @@ def test_a_rank_that_is_killed_ends_the_job_and_the_next_run_completes(tmp_path,
     wait_for_a_case(job, store)
     began = time.monotonic()
     kill_rank(rank, store)
-    job.communicate(timeout=10)
+    job.communicate(timeout=60)
     print(f"\n{launcher.name}: rank {rank} killed, the job ended after {time.monotonic() - began:.1f} s")
     assert job.returncode != 0
     assert not verify(store)
