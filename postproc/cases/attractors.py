@@ -31,6 +31,8 @@ TOLERANCE = 0.01  # of the section's size: periodic motions that differ by less 
 SAME_MULTIPLIER = 1e-6  # cases whose largest multipliers differ by less may have one solution
 OF_ONE_SOLUTION = 3.0  # tolerances: records that agree with one solution to 1 % differ by twice that at most
 SPREAD_TOLERANCE = 0.25  # of the same: mean and spread of a section without a period, of a record's length
+LONG_PERIOD = 5  # revolutions: a torus passes slowly by a motion of such a period, or a longer one
+CLOSED = 1e-4  # of the same: a record that closes less well after its period may be of a torus
 SAME_MOTION = 1.0  # of the same: largest change of a motion from one setting to the next
 NO_CONTACT = REGIME.index("no_contact")
 NO_MOTION = 0  # of a case that is not done, or had not settled
@@ -111,9 +113,11 @@ def attractors(store: xr.Dataset, tolerance: float = TOLERANCE) -> xr.DataArray:
     to `OF_ONE_SOLUTION` tolerances (mirrored solutions have the same multipliers). A periodic case without a
     solution is of the nearest of these motions whose section is within the tolerance, if any. Motions without
     a period up to 16, on a torus or chaotic, are compared by mean and standard deviation of their section, to
-    `SPREAD_TOLERANCE`, whatever their regime: a torus may pass for a long period. Two tori of about one place
-    and size count as one motion. Cases are joined by single linkage. The torsion of motions without contact,
-    which dies out, distinguishes none.
+    `SPREAD_TOLERANCE`, whatever their regime. A torus may pass for a long period, where it repeats to within
+    the tolerance of regimes: cases with a period from `LONG_PERIOD` on, of no solution and with a record that
+    closes no better than `CLOSED`, are compared with those. Two tori of about one place and size count as one
+    motion. Cases are joined by single linkage. The torsion of motions without contact, which dies out,
+    distinguishes none.
     """
     require_variables(store, ["regime", "period", *_SECTIONS])
     starts = start_axes(store)
@@ -166,6 +170,8 @@ def _motions_of(setting: xr.Dataset, tolerance: float = TOLERANCE) -> _Motions:
     features: list[Floats] = []
     is_contact = regime != NO_CONTACT
     multiplier = _multipliers(setting)
+    scaled = sections / size[:, np.newaxis]
+    period = _without_tori(period, scaled, is_contact & has_motion, multiplier, tolerance)
     for key in sorted({*zip(is_contact[has_motion].tolist(), period[has_motion].tolist(), strict=True)}):
         members = np.flatnonzero(has_motion & (is_contact == key[0]) & (period == key[1]))
         scaled = sections[members] / size[:, np.newaxis]
@@ -192,6 +198,38 @@ def _features(sections: Floats, period: int, tolerance: float) -> tuple[Floats, 
         return np.sort(sections[:, :, -period:], axis=2).reshape(len(sections), -1), tolerance
     both = np.stack([sections.mean(axis=2), sections.std(axis=2)], axis=2)
     return both.reshape(len(sections), -1), SPREAD_TOLERANCE
+
+
+def _without_tori(
+    period: Ints,
+    sections: Floats,
+    is_contact: NDArray[np.bool_],
+    multiplier: NDArray[np.complex128],
+    tolerance: float,
+) -> Ints:
+    """Return the periods, (n_case,), 0 where a motion in contact may be on a torus that passes for a period.
+
+    Parameters
+    ----------
+    sections : (n_case, n_section, n_point)
+        In units of the sizes of the setting.
+    """
+    found = period.copy()
+    is_solved = np.isfinite(multiplier)
+    n_point = sections.shape[2]
+    for long in np.unique(period[is_contact & (period >= LONG_PERIOD)]).tolist():
+        cases = np.flatnonzero(is_contact & (period == long) & ~is_solved)
+        if not len(cases) or n_point <= long:
+            continue
+        drift = np.abs(sections[cases, :, long:] - sections[cases, :, :-long]).max(axis=(1, 2))
+        cases = cases[drift > CLOSED]
+        solved = np.flatnonzero(is_contact & (period == long) & is_solved)
+        if len(solved) and len(cases):
+            feature, within = _features(sections, long, tolerance)
+            near = [np.abs(feature[i] - feature[solved]).max(axis=1).min() <= within for i in cases]
+            cases = cases[~np.array(near)]
+        found[cases] = 0
+    return found
 
 
 def _multipliers(setting: xr.Dataset) -> NDArray[np.complex128]:

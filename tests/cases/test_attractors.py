@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
-from motions_store import NO_CONTACT, store_of
+from motions_store import NO_CONTACT, PERIODIC, store_of
 from scipy.stats import binom, binomtest
 
 from postproc.cases.attractors import attractors, start_axes
@@ -94,6 +94,38 @@ def test_records_that_agree_with_a_solution_less_well_are_of_it():
     store["largest_multiplier"] = "initial_vertical", np.array([0.5, 0.5, 0.5])
     store["multiplier_angle"] = "initial_vertical", np.zeros(3)
     assert len(set(attractors(store).values)) == 1
+
+
+def test_a_torus_that_passes_slowly_by_a_long_period_is_one_motion():
+    """Its records repeat to 0.3 % after seven revolutions, wherever on the torus they are seen."""
+    kinds = ["torus"] * 6 + ["P1", "free", "P1"]
+    store = store_of(kinds)
+    phase = np.array([0.1, 1.6, 2.2, 3.3, 4.9, 6.1])
+    angle = phase[:, np.newaxis] + (2 * np.pi + 0.003) * 3 / 7 * np.arange(12)
+    store["section_vertical"][:6] = 1e-4 * np.cos(angle)
+    store["section_horizontal"][:6] = 0.7e-4 * np.sin(angle)
+    store["period"][:5] = 7  # of five records, by chance
+    store["regime"][:5] = PERIODIC
+    found = attractors(store).values
+    assert len(set(found[:6])) == 1
+    assert len(set(found)) == 3
+    store["largest_multiplier"] = "initial_vertical", np.where(np.arange(9) == 2, 0.9, np.nan)
+    store["multiplier_angle"] = "initial_vertical", np.zeros(9)
+    with_solution = attractors(store).values  # a motion of that period beside the torus
+    assert len(set(with_solution[[0, 1, 3, 4, 5]])) == 1
+    assert len(set(with_solution)) == 4
+
+
+def test_long_periods_that_close_are_distinguished_by_their_points():
+    """Two motions of period 6, of one mean and spread, without a solution, one of them seen later."""
+    turn = np.arange(12) % 6 * np.pi / 3
+    store = store_of(["P1"] * 3)
+    store["period"][:] = 6
+    for i, angle in enumerate((turn, np.roll(turn, 2), turn + 0.2)):
+        store["section_vertical"][i] = 1e-4 * np.cos(angle)
+        store["section_horizontal"][i] = 1e-4 * np.sin(angle)
+    found = attractors(store).values
+    assert found[0] == found[1] != found[2]
 
 
 def test_inferred_starts_take_the_motion_of_their_surroundings():

@@ -25,6 +25,7 @@ class Simulation:
     """
 
     size: int
+    patience: float = 120.0  # s of this machine
     now: float = 0.0
     n_begun: int = 0
     waits: list[tuple[float, float, int]] = field(default_factory=list)
@@ -59,7 +60,7 @@ class Simulation:
         for thread in threads:
             thread.start()
         for thread in threads:
-            thread.join(120.0)
+            thread.join(self.patience)
             assert errors or not thread.is_alive(), "ranks wait for each other in vain"
         if errors:
             raise errors[0]
@@ -106,7 +107,7 @@ class Simulation:
 
     def _await(self, rank: int) -> None:
         with self._turn:
-            assert self._turn.wait_for(lambda: self._current == rank, 120.0), "no turn came"
+            assert self._turn.wait_for(lambda: self._current == rank, self.patience), "no turn came"
 
 
 class SimulatedRank:
