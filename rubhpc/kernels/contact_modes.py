@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean, jit_lean_sum
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -109,6 +109,26 @@ def propagate(re: Floats, im: Floats, z_re: Floats, z_im: Floats, next_re: Float
         next_im[k] = re[k] * b + im[k] * a
 
 
+@jit_lean
+def add_rows(rows: Floats, value: Floats, target: Floats) -> None:
+    """Add the rows (n, m), times the values (n,), to the target (m,): four at a time, in their order."""
+    n_whole = value.size - value.size % 4
+    for row in range(0, n_whole, 4):
+        first, second, third, fourth = rows[row], rows[row + 1], rows[row + 2], rows[row + 3]
+        a, b, c, d = value[row], value[row + 1], value[row + 2], value[row + 3]
+        for k in range(target.size):
+            total = target[k]
+            total += first[k] * a
+            total += second[k] * b
+            total += third[k] * c
+            total += fourth[k] * d
+            target[k] = total
+    for row in range(n_whole, value.size):
+        last, a = rows[row], value[row]
+        for k in range(target.size):
+            target[k] += last[k] * a
+
+
 @jit_lean_sum
 def enter(
     tables: ModeTables, mode: int, clearance: Floats, cosine: float, sine: float, motion: Floats, z: Floats
@@ -124,11 +144,7 @@ def enter(
             source = tables.enter_constant[mode, i, part]
             for k in range(target.size):
                 target[k] -= source[k] * clearance[i]
-        for row in range(motion.size):
-            value = motion[row]
-            source = rows[row]
-            for k in range(target.size):
-                target[k] += source[k] * value
+        add_rows(rows, motion, target)
     first = tables.n_eigenmode[mode]
     z[0, first], z[1, first] = cosine, sine
     for i in range(clearance.size):

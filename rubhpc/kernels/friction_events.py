@@ -1,4 +1,4 @@
-"""Events under set-valued friction: impacts, and which pairs go on open, sliding or sticking."""
+"""Events under set-valued friction: impacts, what forces hold, and what they bring to rest."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from rubhpc.kernels.accumulators import (
     FRICTION_LOSS,
     IMPACT,
     IMPACT_LOSS,
-    PRESSING,
     Accumulator,
     observe_sense,
     observe_solution,
@@ -128,27 +127,22 @@ def observe_event(problem: int, pivots: int, solver: Workspace, accumulator: Acc
 
 
 @jit_lean_sum
-def change_states(
+def collide(
     reduced: Reduced,
     bodies: FrictionBodies,
     states: int,
     crossing: int,
-    moment: float,
-    cosine: float,
-    sine: float,
-    motion: Floats,
+    velocity: Floats,
     is_recorded: bool,
     work: FrictionWork,
     accumulator: Accumulator,
-) -> int:
-    """Impact, then the states of all pairs that go on; -1 where there are none.
+) -> bool:
+    """Take the impacts of rigid pairs whose gaps close, in a velocity (n,); False where none obey the laws.
 
-    `crossing` has a bit for each switch function that turns negative, two a pair. Impulses obey Coulomb's law
-    with the velocities after them. What goes on follows from the forces of a virtual step of `moment` (s): a
-    pair whose normal force vanishes is open, one whose friction is within its cone sticks.
+    Fills which pairs take part in what goes on: the gap in `work.solver` of any other is infinite.
     """
     q, n = reduced.gap_jacobian.shape
-    velocity, solver = motion[n:], work.solver
+    solver = work.solver
     is_impact = False
     for i in range(q):
         state = state_of(states, i)
@@ -165,29 +159,34 @@ def change_states(
                 is_impact = is_impact or work.rate[i] < 0.0
         elif state == STUCK or first == 0:
             solver.gap[i] = 0.0
-    if is_impact:
-        pivots = solve_event(bodies, work, True)
-        if pivots == UNSOLVED:
-            return -1
-        if is_recorded:
-            observe_event(IMPACT, pivots, solver, accumulator)
-            observe_impacts(bodies, work, accumulator)
-        for i in range(q):
-            if solver.force[i] > 0.0:
-                force, traction = solver.force[i], solver.traction[i]
-                for k in range(n):
-                    velocity[k] += force * reduced.gap_jacobian[i, k] - traction * reduced.slip[i, k]
-                bound = solver.cone[i] * force * (1.0 - ROUNDING)
-                solver.is_sticking[i] = abs(traction) < bound
-    acceleration = work.acceleration
-    for k in range(n):
-        acceleration[k] = (
-            reduced.force_cosine[k] * cosine
-            + reduced.force_sine[k] * sine
-            - product(reduced.stiffness[k], motion[:n])
-            - product(reduced.damping[k], velocity)
-        )
+    if not is_impact:
+        return True
+    pivots = solve_event(bodies, work, True)
+    if pivots == UNSOLVED:
+        return False
+    if is_recorded:
+        observe_event(IMPACT, pivots, solver, accumulator)
+        observe_impacts(bodies, work, accumulator)
     for i in range(q):
+        if solver.force[i] > 0.0:
+            force, traction = solver.force[i], solver.traction[i]
+            for k in range(n):
+                velocity[k] += force * reduced.gap_jacobian[i, k] - traction * reduced.slip[i, k]
+            bound = solver.cone[i] * force * (1.0 - ROUNDING)
+            solver.is_sticking[i] = abs(traction) < bound
+    return True
+
+
+@jit_lean_sum
+def part_pairs(
+    reduced: Reduced, bodies: FrictionBodies, moment: float, velocity: Floats, work: FrictionWork
+) -> None:
+    """Fill what the gaps and slips of rigid pairs do over a `moment` (s) without forces, m/s2.
+
+    Those that part take no part in what goes on.
+    """
+    solver, acceleration = work.solver, work.acceleration
+    for i in range(solver.force.size):
         if solver.gap[i] < np.inf:
             opening = product(reduced.gap_jacobian[i], acceleration)
             rate = product(reduced.gap_jacobian[i], velocity)
@@ -199,27 +198,6 @@ def change_states(
             else:
                 solver.gap[i] = np.inf
         solver.target[i] = 0.0
-    pivots = solve_event(bodies, work, False)
-    if pivots == UNSOLVED:
-        return -1
-    if is_recorded:
-        observe_event(PRESSING, pivots, solver, accumulator)
-    remaining = int(np.int64(0))
-    for i in range(q):
-        if solver.force[i] > 0.0:
-            traction, bound = solver.traction[i], solver.cone[i] * solver.force[i] * (1.0 - ROUNDING)
-            if abs(traction) < bound:
-                found = STUCK
-            elif traction != 0.0:
-                found = FORWARD if traction > 0.0 else BACKWARD
-            else:
-                found = FORWARD if solver.slip[i] >= 0.0 else BACKWARD
-            remaining |= found << (2 * i)
-        elif is_recorded and reduced.restitution > 0.0:
-            has_bounced = state_of(states, i) == OPEN and (crossing >> (2 * i)) & 1 == 1
-            accumulator.n_contact[i] += 1 if has_bounced else 0
-    bring_to_rest(reduced, bodies, remaining, velocity, is_recorded, work, accumulator)
-    return remaining
 
 
 @jit_lean_sum

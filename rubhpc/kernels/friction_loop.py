@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -31,13 +31,10 @@ from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
     ModeTables,
     Reduced,
-    bounded,
-    dot,
-    positive_interval,
     propagate,
 )
+from rubhpc.kernels.event_search import approach_change, change_free_interval, find_change
 from rubhpc.kernels.event_steps import (
-    GAP_TOLERANCE,
     choose_step,
     contact_age,
     end_record,
@@ -49,17 +46,18 @@ from rubhpc.kernels.event_steps import (
     record_touch,
     sample_step,
 )
-from rubhpc.kernels.friction_events import FrictionWork, change_states, observe_states
+from rubhpc.kernels.friction_change import change_states
+from rubhpc.kernels.friction_events import FrictionWork, observe_states
 from rubhpc.kernels.friction_measuring import begin_friction, observe_friction, resolved_friction
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
 from rubhpc.kernels.measuring import Recorder, begin_span
-from rubhpc.kernels.soft_friction_events import change_soft_states
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
 Floats = NDArray[np.float64]
 
+WORTH_ASKING = 4  # of an interval free of events: its last share, in which it is bounded anew
 MOST_EVENTS = 4096  # in a revolution; more are left to short steps
 
 
@@ -101,6 +99,7 @@ def advance_with_friction(
     highest_level = power_re.shape[1] - 1
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
+    free_to = renewed_at = progress.tick  # until when no event can be; from when that is asked anew
     if is_recorded and progress.wanted < 0:
         if progress.energy_from < 0:
             begin_span(tables, z, progress, recorder)
@@ -110,6 +109,7 @@ def advance_with_friction(
         if progress.wanted >= 0:
             if not enter_wanted(tables, reduced.clearance, clock, progress, motion, z):
                 return MODE_WANTED
+            free_to = renewed_at = progress.tick
             if is_recorded:
                 begin_span(tables, z, progress, recorder)
                 begin_friction(tables, bodies, progress.mode, z, z_next, recorder)
@@ -132,12 +132,13 @@ def advance_with_friction(
                 resolved = resolved_friction(tables, mode, z_re, z_im)
                 note_resolved(resolved, clock, highest_level, age, progress)
             longest = min(longest, clock.contact_level, max(age, FORCED_LEVEL), progress.resolved_level)
-        interval_free = 0.0
-        if not is_at_event:
+        if not is_at_event and progress.tick >= renewed_at and progress.tick + (1 << longest) > free_to:
             interval_free = change_free_interval(
                 states, mode, switch_re, switch_im, rate_re, rate_im, bound, z_re, z_im
             )
-        level, is_event_free = choose_step(clock, progress, longest, interval_free)
+            free = int(min(interval_free / clock.tick, 1.0 * (1 << highest_level)))
+            free_to, renewed_at = progress.tick + free, progress.tick + free - free // WORTH_ASKING
+        level, is_event_free = choose_step(clock, progress, longest, (free_to - progress.tick) * clock.tick)
         step = (1 << level) * clock.tick
         propagate(power_re[mode, level], power_im[mode, level], z_re, z_im, next_re, next_im)
         if stuck_pairs(states) != 0:
@@ -149,12 +150,35 @@ def advance_with_friction(
         crossing = int(np.int64(0))
         if not is_event_free:
             crossing = find_change(states, mode, switch_re, switch_im, next_re, next_im)
-        if crossing != 0 and level > 0:
+        if crossing != 0 and level > clock.sample_level:
             progress.halving_level = level - 1
             continue
         if is_sample:
             sample_step(tables, clock, level, z_re, z_im, progress, recorder, samples, accumulator)
-        if crossing != 0:  # an event within the next tick is taken here
+        passed = 1 << level
+        if crossing != 0:
+            passed, crossing = approach_change(tables, bodies, clock, mode, crossing, level, z, z_next)
+        else:
+            for k in range(z_re.size):
+                z_re[k], z_im[k] = next_re[k], next_im[k]
+        if is_recorded and states != 0 and passed > 0:
+            observe_friction(
+                tables,
+                bodies,
+                mode,
+                progress.tick * clock.tick,
+                passed * clock.tick,
+                z_re,
+                z_im,
+                progress.tick >> clock.sample_level,
+                1.0 / interval,
+                recorder,
+                samples,
+                accumulator,
+            )
+        progress.tick += passed
+        progress.halving_level = max(progress.halving_level - 1, NONE)
+        if crossing != 0:  # within the next tick
             outcome = take_change(
                 tables,
                 reduced,
@@ -172,64 +196,6 @@ def advance_with_friction(
             )
             if outcome != UNDER_WAY:
                 return outcome
-            continue
-        for k in range(z_re.size):
-            z_re[k], z_im[k] = next_re[k], next_im[k]
-        if is_recorded and states != 0:
-            observe_friction(
-                tables,
-                bodies,
-                mode,
-                progress.tick * clock.tick,
-                step,
-                z_re,
-                z_im,
-                progress.tick >> clock.sample_level,
-                1.0 / interval,
-                recorder,
-                samples,
-                accumulator,
-            )
-        progress.tick += 1 << level
-        progress.halving_level = max(progress.halving_level - 1, NONE)
-
-
-@jit_inline_sum
-def change_free_interval(
-    states: int,
-    mode: int,
-    switch_re: Floats,
-    switch_im: Floats,
-    rate_re: Floats,
-    rate_im: Floats,
-    bound: Floats,
-    z_re: Floats,
-    z_im: Floats,
-) -> float:
-    """Time, s, before which no switch function (2 q, m) of a set of states can reach zero."""
-    proved = np.inf
-    for j in range(switch_re.shape[1]):
-        if j % 2 == 1 and state_of(states, j // 2) == OPEN:
-            continue
-        s = dot(switch_re[mode, j], switch_im[mode, j], z_re, z_im)
-        rate = dot(rate_re[mode, j], rate_im[mode, j], z_re, z_im)
-        proved = min(proved, positive_interval(s, rate, bounded(bound[mode, j], z_re, z_im)))
-    return proved
-
-
-@jit_inline_sum
-def find_change(
-    states: int, mode: int, switch_re: Floats, switch_im: Floats, z_re: Floats, z_im: Floats
-) -> int:
-    """Bits of the switch functions (2 q, m) of a set of states that are negative."""
-    crossing = int(np.int64(0))
-    for j in range(switch_re.shape[1]):
-        is_open = state_of(states, j // 2) == OPEN
-        if is_open and j % 2 == 1:
-            continue
-        if dot(switch_re[mode, j], switch_im[mode, j], z_re, z_im) < (-GAP_TOLERANCE if is_open else 0.0):
-            crossing |= 1 << j
-    return crossing
 
 
 @jit_lean_sum
@@ -264,34 +230,19 @@ def take_change(
         return DIVERGED
     angle, moment = shaft_angle(clock, progress.tick), (1 << FORCED_LEVEL) * clock.tick
     cosine, sine = np.cos(angle), np.sin(angle)
-    if reduced.spring > 0.0:
-        wanted = change_soft_states(
-            reduced,
-            bodies,
-            states,
-            crossing,
-            moment,
-            cosine,
-            sine,
-            motion,
-            is_recorded,
-            work,
-            accumulator,
-        )
-    else:
-        wanted = change_states(
-            reduced,
-            bodies,
-            states,
-            crossing,
-            moment,
-            cosine,
-            sine,
-            motion,
-            is_recorded,
-            work,
-            accumulator,
-        )
+    wanted = change_states(
+        reduced,
+        bodies,
+        states,
+        crossing,
+        moment,
+        cosine,
+        sine,
+        motion,
+        is_recorded,
+        work,
+        accumulator,
+    )
     if is_recorded:
         for i in range(work.impulse.size):
             record_event(clock, progress, work.impulse, i, samples, accumulator)

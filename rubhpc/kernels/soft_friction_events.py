@@ -1,4 +1,4 @@
-"""Events under set-valued friction and a penalty: which pairs go on open, lifted, sliding or sticking.
+"""Events under set-valued friction and a penalty: which pairs press, and which are lifted.
 
 A spring and a damper give the normal force, so that nothing impacts: motion is continuous, and so are normal
 forces but for the damper's where a gap closes. What a pair sticks with follows from Coulomb's law alone.
@@ -10,12 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_lean_sum
-from rubhpc.kernels.accumulators import PRESSING, Accumulator
-from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.coulomb_friction import ROUNDING
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
-from rubhpc.kernels.friction_events import FrictionWork, bring_to_rest, observe_event, solve_event
+from rubhpc.kernels.friction_events import FrictionWork  # noqa: TC001 - likewise
 from rubhpc.kernels.friction_states import (
     BACKWARD,
     FORWARD,
@@ -32,22 +29,17 @@ Floats = NDArray[np.float64]
 
 
 @jit_lean_sum
-def change_soft_states(
+def press_pairs(
     reduced: Reduced,
     bodies: FrictionBodies,
     states: int,
     crossing: int,
-    moment: float,
-    cosine: float,
-    sine: float,
     motion: Floats,
-    is_recorded: bool,
     work: FrictionWork,
-    accumulator: Accumulator,
 ) -> int:
-    """States of all pairs that go on, as `friction_events.change_states` gives them; -1 where there are none.
+    """Bits of the pairs that are lifted after an event; the forces of those that press go to `work.solver`.
 
-    `work.solver` is that of `soften`: a normal force follows from its own gap alone.
+    The gap of any other is infinite.
     """
     q, n = reduced.gap_jacobian.shape
     velocity, solver = motion[n:], work.solver
@@ -71,32 +63,4 @@ def change_soft_states(
         solver.gap[i], solver.target[i] = np.inf, 0.0
         if is_closed:
             solver.gap[i] = -max(force_of(reduced, i, motion), GAP_TOLERANCE * reduced.spring)
-    acceleration = work.acceleration
-    for k in range(n):
-        acceleration[k] = (
-            reduced.force_cosine[k] * cosine
-            + reduced.force_sine[k] * sine
-            - product(reduced.stiffness[k], motion[:n])
-            - product(reduced.damping[k], velocity)
-        )
-    for i in range(q):
-        solver.slip[i] = work.slip[i] / moment + product(reduced.slip[i], acceleration)
-    pivots = solve_event(bodies, work, False)
-    if pivots == UNSOLVED:
-        return -1
-    if is_recorded:
-        observe_event(PRESSING, pivots, solver, accumulator)
-    remaining = lifted
-    for i in range(q):
-        if solver.gap[i] == np.inf:
-            continue
-        traction, bound = solver.traction[i], solver.cone[i] * solver.force[i] * (1.0 - ROUNDING)
-        if abs(traction) < bound:
-            found = STUCK
-        elif traction != 0.0:
-            found = FORWARD if traction > 0.0 else BACKWARD
-        else:
-            found = FORWARD if solver.slip[i] >= 0.0 else BACKWARD
-        remaining |= found << (2 * i)
-    bring_to_rest(reduced, bodies, remaining, velocity, is_recorded, work, accumulator)
-    return remaining
+    return lifted

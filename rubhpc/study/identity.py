@@ -18,6 +18,7 @@ PHYSICS = 15  # version of the physics: raised whenever a study gives other resu
 MODAL = 1  # method = "modal": last digits of multipliers
 DIRECT = 1  # transient = "direct"
 CHANGING_SPEED = 2  # run-ups and drives
+COULOMB = 1  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 MANY_STATORS = 1  # more than five, whose sets of closed contacts or states may be more than 256
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
@@ -28,12 +29,14 @@ _AXIS = "axis"  # in place of a value that every case sets
 
 def physics_of(study: Study) -> int:
     """Return the version of the physics that a study takes: no other gives the same results."""
-    is_soft = "penalty" in _laws(study, "law") and _laws(study, "friction_law") != {"sliding"}
+    friction_laws = _laws(study, "friction_law")
+    is_soft = "penalty" in _laws(study, "law") and friction_laws != {"sliding"}
     return (
         PHYSICS
         + MODAL * (study.integrator.method == "modal")
         + DIRECT * study.recording.is_transient_direct
         + CHANGING_SPEED * bool(study.run_up or study.drive)
+        + COULOMB * ("coulomb" in friction_laws)
         + SOFT_FRICTION * is_soft
         + MANY_STATORS * (len(study.rig.stator) > 5)
     )

@@ -61,10 +61,11 @@ def test_each_case_takes_its_own_contact(tmp_path):
     ("axes", "contact", "further"),
     [
         ("", 'law = "penalty"\nstiffness = 1e7', 0),
-        ("", 'law = "penalty"\nstiffness = 1e7\nfriction_law = "coulomb"', 1),
-        ('"contact.friction_law" = ["sliding", "coulomb"]', 'law = "penalty"\nstiffness = 1e7', 1),
-        ('"contact.law" = ["lagrange", "penalty"]', 'friction_law = "coulomb"\nstiffness = 1e7', 1),
-        ("", 'friction_law = "coulomb"', 0),
+        ("", 'law = "penalty"\nstiffness = 1e7\nfriction_law = "coulomb"', 2),
+        ('"contact.friction_law" = ["sliding", "coulomb"]', 'law = "penalty"\nstiffness = 1e7', 2),
+        ('"contact.law" = ["lagrange", "penalty"]', 'friction_law = "coulomb"\nstiffness = 1e7', 2),
+        ("", 'friction_law = "coulomb"', 1),
+        ("", 'friction_law = "stribeck"\nstribeck_speed = 1.0\nstatic_friction_ratio = 1.5', 0),
     ],
 )
 def test_a_version_of_some_laws_is_that_of_the_studies_that_take_them(tmp_path, axes, contact, further):

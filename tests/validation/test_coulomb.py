@@ -168,7 +168,7 @@ def test_modal_scheme_stays_in_closed_form_where_the_slip_turns():
     given = {"transient": 30, "revolutions": 2, "friction_law": "coulomb", "keep": ()}
     turned = simulate("mokhtar2017", speed_ratio=1.5, clearance="150 um", **given)
     assert turned.minimum_slip_speed <= 0.0
-    assert turned.steps < 10_000
+    assert turned.steps < 4500  # 5200 where events are searched for by bisection
     assert turned.left_closed_form == 0
     assert turned.energy_residual < 1e-6
 

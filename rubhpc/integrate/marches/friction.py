@@ -22,7 +22,8 @@ from rubhpc.kernels.case_progress import (
     shaft_angle,
 )
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, enter
-from rubhpc.kernels.friction_events import change_states, friction_work
+from rubhpc.kernels.friction_change import change_states
+from rubhpc.kernels.friction_events import friction_work
 from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, MOST_PAIRS, OPEN, STUCK, FrictionBodies
 
@@ -51,7 +52,6 @@ class FrictionMarch(EventDrivenMarch):
     """
 
     most_pairs = MOST_PAIRS
-    take_change = staticmethod(change_states)
 
     def __init__(
         self,
@@ -128,7 +128,7 @@ class FrictionMarch(EventDrivenMarch):
     def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
         """Take an event: `motion` (2 n,) after it, in place, and the states that go on, or -1."""
         return int(
-            self.take_change(
+            change_states(
                 self.bodies,
                 self._friction,
                 mask,

@@ -9,7 +9,6 @@ import numpy as np
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.kernels.friction_states import MOST_SOFT_PAIRS, lifted_place
 from rubhpc.kernels.penalty_events import pressed_pairs
-from rubhpc.kernels.soft_friction_events import change_soft_states
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,7 +22,6 @@ class PenaltyFrictionMarch(FrictionMarch):
     """A case whose pairs open, are lifted, slide in either sense and stick, with springs and dampers."""
 
     most_pairs = MOST_SOFT_PAIRS
-    take_change = staticmethod(change_soft_states)
 
     def opened(self, mask: int) -> NDArray[np.bool_]:
         """Which pairs are open, and not lifted, (q,)."""

@@ -1,0 +1,203 @@
+"""Where an event falls within a step at whose end a switch function is found negative.
+
+A bracket of whole ticks is narrowed by Newton's method on the closed-form switch functions, from a parabola
+through what is known at both ends, and by bisection where that fails. Coordinates at a tick are reached by
+powers of two of ticks, the longest first, so that they are the same whatever was tried before.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels.contact_modes import ModeTables, bounded, dot
+from rubhpc.kernels.event_steps import GAP_TOLERANCE
+from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
+
+if TYPE_CHECKING:
+    from rubhpc.kernels.case_progress import Clock
+
+Floats = NDArray[np.float64]
+
+NEWTON_TRIES = 6  # places tried before the bracket is halved instead
+
+
+@jit_inline_sum
+def change_free_interval(
+    states: int,
+    mode: int,
+    switch_re: Floats,
+    switch_im: Floats,
+    rate_re: Floats,
+    rate_im: Floats,
+    bound: Floats,
+    z_re: Floats,
+    z_im: Floats,
+) -> float:
+    """Time, s, before which no switch function (2 q, m) of a set of states can reach zero."""
+    proved = np.inf
+    for j in range(switch_re.shape[1]):
+        if j % 2 == 1 and state_of(states, j // 2) == OPEN:
+            continue
+        s = dot(switch_re[mode, j], switch_im[mode, j], z_re, z_im)
+        if not s > 0.0:
+            return 0.0
+        rate = dot(rate_re[mode, j], rate_im[mode, j], z_re, z_im)
+        bend = bounded(bound[mode, j], z_re, z_im)
+        # s + s' t - b t^2 / 2 > 0, asked of the interval that the others leave before its end is computed
+        if proved < np.inf and s + proved * (rate - 0.5 * bend * proved) > 0.0:
+            continue
+        if bend > 0.0:
+            proved = min(proved, (rate + np.sqrt(rate * rate + 2.0 * bend * s)) / bend)
+        elif rate < 0.0:
+            proved = min(proved, -s / rate)
+    return proved
+
+
+@jit_inline_sum
+def find_change(
+    states: int, mode: int, switch_re: Floats, switch_im: Floats, z_re: Floats, z_im: Floats
+) -> int:
+    """Bits of the switch functions (2 q, m) of a set of states that are negative."""
+    crossing = int(np.int64(0))
+    for j in range(switch_re.shape[1]):
+        is_open = state_of(states, j // 2) == OPEN
+        if is_open and j % 2 == 1:
+            continue
+        if dot(switch_re[mode, j], switch_im[mode, j], z_re, z_im) < (-GAP_TOLERANCE if is_open else 0.0):
+            crossing |= 1 << j
+    return crossing
+
+
+@jit_lean_sum
+def changes_at(tables: ModeTables, mode: int, z: Floats) -> int:
+    """As `find_change`, for coordinates (2, m)."""
+    return int(find_change(tables.mask[mode], mode, tables.switch_re, tables.switch_im, z[0], z[1]))
+
+
+@jit_inline_sum
+def turn(re: Floats, im: Floats, z: Floats) -> None:
+    """Take modal coordinates (2, m) on by a tabulated step, in place."""
+    for k in range(z.shape[1]):
+        a, b = z[0, k], z[1, k]
+        z[0, k] = re[k] * a - im[k] * b
+        z[1, k] = re[k] * b + im[k] * a
+
+
+@jit_lean_sum
+def move_ticks(
+    tables: ModeTables, bodies: FrictionBodies, mode: int, count: int, tick: float, z: Floats, target: Floats
+) -> None:
+    """Fill `target` (2, m) with the coordinates `count` ticks (s) after `z`."""
+    for k in range(z.shape[1]):
+        target[0, k], target[1, k] = z[0, k], z[1, k]
+    level = 0
+    while count >> (level + 1) > 0:
+        level += 1
+    q = bodies.rim_speed.size
+    states, first = tables.mask[mode], tables.n_eigenmode[mode] + 2 + q
+    while level >= 0:
+        if (count >> level) & 1 == 1:
+            turn(tables.power_re[mode, level], tables.power_im[mode, level], target)
+            if stuck_pairs(states) != 0:
+                for i in range(q):
+                    if state_of(states, i) == STUCK:
+                        target[0, first + i] += bodies.rim_speed[i] * ((1 << level) * tick)
+        level -= 1
+
+
+@jit_lean_sum
+def root_ahead(tables: ModeTables, mode: int, crossing: int, tick: float, z: Floats) -> float:
+    """Ticks (s) to the first root of the switch functions `crossing`, by Newton's method from `z` (2, m).
+
+    -inf where one is not falling.
+    """
+    states = tables.mask[mode]
+    found = np.inf
+    for j in range(tables.switch_re.shape[1]):
+        if (crossing >> j) & 1 == 0:
+            continue
+        value = dot(tables.switch_re[mode, j], tables.switch_im[mode, j], z[0], z[1])
+        value += GAP_TOLERANCE if state_of(states, j // 2) == OPEN else 0.0
+        rate = dot(tables.rate_re[mode, j], tables.rate_im[mode, j], z[0], z[1]) * tick
+        found = min(found, -value / rate if rate < 0.0 else -np.inf)
+    return found
+
+
+@jit_lean_sum
+def root_between(
+    tables: ModeTables, mode: int, crossing: int, count: int, tick: float, z: Floats, end: Floats
+) -> float:
+    """Ticks (s) after `z` (2, m) of the first root, by parabolas through both ends of `count` ticks."""
+    states = tables.mask[mode]
+    found = 1.0 * count
+    for j in range(tables.switch_re.shape[1]):
+        if (crossing >> j) & 1 == 0:
+            continue
+        re, im = tables.switch_re[mode, j], tables.switch_im[mode, j]
+        offset = GAP_TOLERANCE if state_of(states, j // 2) == OPEN else 0.0
+        first, last = dot(re, im, z[0], z[1]) + offset, dot(re, im, end[0], end[1]) + offset
+        if not first > 0.0:
+            return 0.0
+        rate = dot(tables.rate_re[mode, j], tables.rate_im[mode, j], z[0], z[1]) * (tick * count)
+        bend = last - first - rate  # the parabola first + rate x + bend x^2, x from 0 to 1
+        root = np.sqrt(max(rate * rate - 4.0 * bend * first, 0.0))
+        share = 2.0 * first / (root - rate) if rate <= 0.0 else (-rate - root) / (2.0 * bend)
+        found = min(found, share * count)
+    return found
+
+
+@jit_lean_sum
+def approach_change(
+    tables: ModeTables,
+    bodies: FrictionBodies,
+    clock: Clock,
+    mode: int,
+    crossing: int,
+    level: int,
+    z: Floats,
+    work: Floats,
+) -> tuple[int, int]:
+    """Go to the last tick before a switch function is negative, within a step of 2^level ticks.
+
+    Parameters
+    ----------
+    crossing : int
+        Bits of the switch functions that are negative at its end.
+    z : (2, m)
+        Coordinates at its beginning; in place, those at that tick.
+    work : (2, m)
+        Those at its end; overwritten.
+
+    Returns
+    -------
+    int
+        Ticks passed.
+    int
+        Bits of the switch functions that are negative a tick later.
+    """
+    before, after = 0, 1 << level
+    root = root_between(tables, mode, crossing, after, clock.tick, z, work)
+    tried = 0
+    while after - before > 1:
+        tried += 1
+        place = (before + after) // 2
+        if tried <= NEWTON_TRIES and 0.0 <= root < 1.0 * after:
+            place = min(max(int(root), before + 1), after - 1)
+        move_ticks(tables, bodies, mode, place, clock.tick, z, work)
+        found = changes_at(tables, mode, work)
+        if found != 0:
+            after, crossing = place, found
+        else:
+            before = place
+        # Where the root is between this tick and the next one, that is looked at; then this.
+        root = place + root_ahead(tables, mode, crossing, clock.tick, work)
+        if found == 0 and place <= root < place + 1.0:
+            root = place + 1.0
+    move_ticks(tables, bodies, mode, before, clock.tick, z, work)
+    for k in range(z.shape[1]):
+        z[0, k], z[1, k] = work[0, k], work[1, k]
+    return before, crossing

@@ -1,0 +1,94 @@
+"""An event under set-valued friction, pairs rigid or with a penalty: the states that go on after it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline, jit_lean_sum
+from rubhpc.kernels.accumulators import PRESSING, Accumulator
+from rubhpc.kernels.complementarity import UNSOLVED
+from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - likewise
+from rubhpc.kernels.coulomb_friction import ROUNDING
+from rubhpc.kernels.friction_events import (
+    FrictionWork,
+    bring_to_rest,
+    collide,
+    observe_event,
+    part_pairs,
+    solve_event,
+)
+from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
+from rubhpc.kernels.mode_change import product
+from rubhpc.kernels.soft_friction_events import press_pairs
+
+Floats = NDArray[np.float64]
+
+
+@jit_lean_sum
+def change_states(
+    reduced: Reduced,
+    bodies: FrictionBodies,
+    states: int,
+    crossing: int,
+    moment: float,
+    cosine: float,
+    sine: float,
+    motion: Floats,
+    is_recorded: bool,
+    work: FrictionWork,
+    accumulator: Accumulator,
+) -> int:
+    """Take an event, in `motion` (2 n,): the states of all pairs that go on; -1 where there are none.
+
+    `crossing` has a bit for each switch function that turns negative, two a pair. Impulses obey Coulomb's law
+    with the velocities after them. What goes on follows from the forces of a virtual step of `moment` (s): a
+    pair whose normal force vanishes is open, one whose friction is within its cone sticks. Under a penalty
+    nothing impacts, a normal force follows from its own gap alone, and `work.solver` is that of a march's
+    `_soften`.
+    """
+    q, n = reduced.gap_jacobian.shape
+    velocity, solver, acceleration = motion[n:], work.solver, work.acceleration
+    is_soft = reduced.spring > 0.0
+    remaining = int(np.int64(0))
+    if is_soft:
+        remaining = press_pairs(reduced, bodies, states, crossing, motion, work)
+    elif not collide(reduced, bodies, states, crossing, velocity, is_recorded, work, accumulator):
+        return -1
+    for k in range(n):
+        acceleration[k] = (
+            reduced.force_cosine[k] * cosine
+            + reduced.force_sine[k] * sine
+            - product(reduced.stiffness[k], motion[:n])
+            - product(reduced.damping[k], velocity)
+        )
+    if is_soft:
+        for i in range(q):
+            solver.slip[i] = work.slip[i] / moment + product(reduced.slip[i], acceleration)
+    else:
+        part_pairs(reduced, bodies, moment, velocity, work)
+    pivots = solve_event(bodies, work, False)
+    if pivots == UNSOLVED:
+        return -1
+    if is_recorded:
+        observe_event(PRESSING, pivots, solver, accumulator)
+    for i in range(q):
+        if solver.gap[i] < np.inf if is_soft else solver.force[i] > 0.0:
+            remaining |= state_by_forces(solver, i) << (2 * i)
+        elif is_recorded and reduced.restitution > 0.0:
+            has_bounced = state_of(states, i) == OPEN and (crossing >> (2 * i)) & 1 == 1
+            accumulator.n_contact[i] += 1 if has_bounced else 0
+    bring_to_rest(reduced, bodies, remaining, velocity, is_recorded, work, accumulator)
+    return remaining
+
+
+@jit_inline
+def state_by_forces(solver: Workspace, i: int) -> int:
+    """State in which closed pair i goes on, by its forces: within its cone it sticks."""
+    traction, bound = solver.traction[i], solver.cone[i] * solver.force[i] * (1.0 - ROUNDING)
+    if abs(traction) < bound:
+        return STUCK
+    if traction != 0.0:
+        return FORWARD if traction > 0.0 else BACKWARD
+    return FORWARD if solver.slip[i] >= 0.0 else BACKWARD
