@@ -1,4 +1,4 @@
-"""What the last calls have made, for the next ones with the same content."""
+"""Cache of what the last calls assembled, for further calls with the same content."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What users read while kernels are compiled, and the time that it takes, which is none of a case's."""
+"""Announces the compilation of kernels, and counts its time, which is not part of a case's computing time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A motion carried to another case: its contacts as that case's clearances and stators have them.
+"""Initial states: rest in the sag, or a motion of another case adapted to the gaps of this one.
 
 What a wall that has moved in overlaps is pushed apart as by moving the wall slowly: by the static shapes of
 rotor and stators under the contact forces that it takes, with the least strain energy that does it. To let

@@ -1,4 +1,4 @@
-"""What the cases of one rig and speed share: assembled, checked and factorised once."""
+"""Set-up of an integration: what all cases of one rig and speed share, prepared once."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Who computes what, and when it stops."""
+"""Running a study: which process computes which case, resumption, plan, and when a run stops."""

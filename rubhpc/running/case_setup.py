@@ -1,4 +1,4 @@
-"""What integration needs of a case of a study."""
+"""From a case of a study to the set-up and arguments of its integration."""
 
 from __future__ import annotations
 

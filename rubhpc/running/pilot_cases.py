@@ -1,4 +1,4 @@
-"""What single cases of a study take: timed whole, or shortened where that would take long."""
+"""Timing of single cases of a study for `rubhpc plan`: whole, or shortened where that would take long."""
 
 from __future__ import annotations
 

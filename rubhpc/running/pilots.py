@@ -1,4 +1,4 @@
-"""What a run of a study spends its time on: a few of its cases, spread over all axes, are timed.
+"""Estimate of the time of a run for `rubhpc plan`, from some of its cases, spread over all axes.
 
 Times are those of the processor: other work on the machine does not count.
 """

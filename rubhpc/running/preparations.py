@@ -1,4 +1,4 @@
-"""How many times a run assembles a rig, prepares a speed and solves the contact modes of a friction."""
+"""Counts, for the plan, how often a run assembles a rig, prepares a speed and solves contact modes."""
 
 from __future__ import annotations
 

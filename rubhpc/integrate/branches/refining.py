@@ -1,4 +1,4 @@
-"""What a step along a branch may have passed unseen: pairs of folds, doublings or grazings within it."""
+"""Search within the steps of a branch for pairs of folds, doublings or grazings that the ends do not show."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The spin of a driven rotor under way, piece by piece (`driven`)."""
+"""Pieces of a driven rotor: the acceleration of each, from the energy exchanged with drive and friction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Over which speeds and accelerations the matrices of a run-up may keep their values."""
+"""Ranges of speed and acceleration over which the matrices of a run-up may keep their values."""
 
 from __future__ import annotations
 

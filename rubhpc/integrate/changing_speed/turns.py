@@ -1,4 +1,4 @@
-"""What the revolutions of a record with a changing speed gather, each by itself and together."""
+"""Contact measures of a record with a changing speed: of each revolution, and of the whole record."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stators on a carrier move by: with it, and against it."""
+"""Displacement of stators on a carrier: with the carrier, and relative to it."""
 
 from __future__ import annotations
 

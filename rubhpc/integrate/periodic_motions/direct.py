@@ -1,4 +1,4 @@
-"""The direct way through a transient: the periodic motion that a case is on its way to, solved for."""
+"""`transient = "direct"`: solves for the periodic motion that a case approaches, to shorten its transient."""
 
 from __future__ import annotations
 

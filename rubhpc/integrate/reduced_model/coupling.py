@@ -1,4 +1,4 @@
-"""Which rows of a matrix belong together, because others between couple them."""
+"""Uncoupled parts of a matrix: groups of rows that no entries connect."""
 
 from __future__ import annotations
 

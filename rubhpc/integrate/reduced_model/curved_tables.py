@@ -1,4 +1,4 @@
-"""What the tables of a contact mode lack where gaps are curved: `kernels.curved_contact`."""
+"""Further tables of a contact mode for curved gaps, read by `kernels.curved_contact`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A mode as the kernel takes it: its tables, and the room in which those of many contact modes stand."""
+"""Tables of contact modes as the kernels read them: those of one mode, and the stack of many."""
 
 from __future__ import annotations
 

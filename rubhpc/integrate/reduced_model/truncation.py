@@ -1,4 +1,4 @@
-"""How much of a motion lies in the modes that a reduced model leaves out, and which modes it has to keep."""
+"""Choice of the modes that a reduced model keeps, and an estimate of the error by those left out."""
 
 from __future__ import annotations
 
