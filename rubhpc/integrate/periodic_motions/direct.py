@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,10 +14,12 @@ from rubhpc.integrate.periodic_motions.known_motions import (
     HALF,
     LINEAR,
     SAME,
+    SHARE,
     Approach,
     KnownMotions,
     nothing,
 )
+from rubhpc.integrate.periodic_motions.onward import Onward
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.transient import idle_of, pass_revolutions
 
@@ -36,7 +39,10 @@ FIRST, LONGER = 32, 2.0  # revolutions before the first search, and by what thos
 WATCHED = 16  # revolutions, at least, in which a case must draw near
 SLOWER = 2  # times the periods that the linear theory needs for that, in which it must have done so
 NEARER = 0.3  # of its distance after one revolution: a return as near as that speaks for a longer period
-MOST_ITERATIONS, LEAST_STEP = 6, 1 / 4  # of Newton's method
+MOST_ITERATIONS, LEAST_STEP = 10, 1 / 4  # of Newton's method
+LOST = 3 / 4  # of what the linear theory takes from its distance, that it loses at least
+FAR = 1e-2  # of the square of its distance, until which the linear theory must keep its contacts
+AGAIN = 0.7  # of that square, at which they are looked at once more
 MOST_EVENTS = 24, 8  # in a revolution: of one pair, and more for each further one
 LOOK, N_LOOK = 4, 2  # revolutions after which a case is compared with known motions; looks at the nearest
 FIRST_BESIDE = 64  # revolutions before the first search, where motions are known
@@ -185,6 +191,7 @@ def pass_directly(
         piecewise, orbit = found
         force = piecewise.contact_force(orbit.states, orbit.motion)
         aim = piecewise.march.state_of(orbit.motion, force)
+        wanted = int(LONGER * wanted)  # to look at a motion that is known costs less than to search
         is_near, reason = draws_near(walk, piecewise, orbit, motion, wanted - LONGEST_PERIOD)
         if is_near and known is not None and (same := known.nearest(orbit.motion, SAME)) is not None:
             return walk.ended(reason, same)
@@ -200,37 +207,53 @@ def draws_near(
 ) -> tuple[bool, str | None]:
     """Simulate a case further: whether it draws near to a stable motion, or why it cannot go on.
 
-    Its distance (`Approach`) is to fall from one look to the next, four revolutions or a period later, to
-    half of what it was and for 16 revolutions or more, in no more than twice the periods that the linear
-    theory needs; and in the last 16 revolutions it is to be at each look where that theory takes it from the
-    one before, to a tenth of its distance. A motion that beats about another one, or only passes by, does
-    not. Where the distance does not fall it is watched anew, until so many revolutions have passed.
+    Its distance (`Approach`) is to fall from one look to the next, four revolutions or a period later, and
+    for 16 revolutions or more to be at each look where the linear theory takes it from the one before, to a
+    tenth of its distance; and what it has strayed from the theory in these looks (root of the sum of
+    squares) is to be less than half of what it loses by it, of which three quarters are to be lost. Then the
+    theory is believed if it keeps the contacts: until a tenth of the distance is left, none may come or go
+    that the motion has not (`Onward`). A motion that beats about another one, or only passes by, does not
+    draw near so. Where the distance does not fall it is watched anew, until so many revolutions have passed.
     """
     approach = Approach(orbit.monodromy, np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n))
     stride = max(1, LOOK // orbit.period)  # periods from one look to the next
     onward = np.linalg.matrix_power(orbit.monodromy, stride)
     least = -(-WATCHED // (stride * orbit.period))
     there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
+    theory: Onward | None = None
     apart = motion - orbit.motion
+    untried = math.inf  # square of the distance at which contacts are looked at next
     while walk.n_revolution < until:
-        first = last = approach.square(apart)
+        last = approach.square(apart)
         most = max(least, -(-SLOWER * approach.periods_to(HALF, apart) // stride))
-        n_linear = 0
+        looks: list[tuple[float, float, float]] = []  # what it strays, is to lose and loses, as shares
         for _ in range(most):
             if piecewise.size(apart) <= there:
                 return True, None
             reached, reason = walk.repeat(stride * orbit.period)
             if reached is None:
                 return False, reason
-            expected = onward @ apart
-            apart = reached - orbit.motion
+            foreseen, apart = onward @ apart, reached - orbit.motion
             was, last = last, approach.square(apart)
-            n_linear = n_linear + 1 if approach.square(apart - expected) <= LINEAR**2 * was else 0
-            if last <= HALF * first and n_linear >= least:
-                return True, None
+            stray = approach.square(apart - foreseen) / was
+            expected = 0.5 * math.log(was / approach.square(foreseen))
+            looks = [*looks, (stray, expected, 0.5 * math.log(was / last))] if stray <= LINEAR**2 else []
+            if last <= untried and _agree(looks, least):
+                theory = theory or Onward(piecewise, orbit)
+                if theory.keeps_contacts(apart, approach.periods_to(FAR, apart)):
+                    return True, None
+                untried = AGAIN * last
             if last >= was:
                 break
     return False, None
+
+
+def _agree(looks: list[tuple[float, float, float]], least: int) -> bool:
+    """Whether so many of the latest looks, or more, show what the linear theory says."""
+    if len(looks) < least:
+        return False
+    strayed, expected, lost = np.cumsum(looks[::-1], axis=0)[least - 1 :].T
+    return bool(np.any((strayed <= (SHARE * expected) ** 2) & (lost >= LOST * expected)))
 
 
 def _search(

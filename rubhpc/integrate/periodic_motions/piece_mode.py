@@ -29,6 +29,8 @@ class Mode(NamedTuple):
         Pairs that are closed, and those that are watched for their gap.
     tables : PieceTables
         What a piece is followed with.
+    moving : (c,)
+        These coordinates.
     exponent : (c,), 1/s
     shape : (2 n, c)
         Motion of unit coordinates, its real part.
@@ -42,6 +44,7 @@ class Mode(NamedTuple):
     is_closed: NDArray[np.bool_]
     is_open: NDArray[np.bool_]
     tables: PieceTables
+    moving: NDArray[np.int64]
     exponent: Complexes
     shape: Complexes
     enter: Floats
@@ -115,6 +118,7 @@ def _read_mode(march: EventDrivenMarch, states: int) -> Mode:
         is_closed=is_closed,
         is_open=is_open,
         tables=followed,
+        moving=moving,
         exponent=exponent[0, moving] + 1j * exponent[1, moving],
         shape=np.ascontiguousarray(shape),
         enter=np.ascontiguousarray(enter.conj()[:, moving]).view(np.float64).T.copy(),
