@@ -4,17 +4,20 @@
 """
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
-from rubhpc import Rig, Unbalance, assemble
+from rubhpc import LumpedStator, Rig, Unbalance, assemble, run_up
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import steady_response
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Disc, ShaftSection
 from rubhpc.rig.rotors import Rotor
+from rubhpc.study.speed_law import SpeedLaw
 
 PAIRS = ("xx", "xy", "yx", "yy")
 RIGHT = math.pi / 2  # ROSS counts phases from x, a quarter turn before y
@@ -124,3 +127,42 @@ def test_unbalance_response_of_ross(request, known, which):
             pair = np.array([v, w])
             expected = np.array([theirs[6 * node + 1], -theirs[6 * node]])
             assert np.abs(pair - expected).max() < 1e-6 * np.abs(expected).max(), (speed, node)
+
+
+@pytest.mark.long
+def test_run_up_of_ross(request, known, ours):
+    """In ROSS by Newmark's method, from two steps to their limit, here in pieces: nearer in order 2.
+
+    The speed rises by 450 rad/s each second, 1 to 8 % a piece; bearings follow their tables.
+    """
+    answers = np.load(request.path.parents[1] / "data" / "ross_3.1.0_run_up.npz")
+    fine, coarse = answers["response_10"], answers["response_5"]
+    limit = (4.0 * fine - coarse) / 3.0
+    times = np.arange(limit.shape[1]) / answers["rate"]
+    law = {name: float(answers[name]) for name in ("start", "stop", "time")}
+    rig = replace(ours, stator=(LumpedStator(node=5, mass=1.0, stiffness=1e6, damping=10.0, radius=0.1),))
+    probes = [
+        {"name": f"{name}_{node + 1}", "node": int(node) + 1, "angle": angle}
+        for node in answers["nodes"]
+        for name, angle in (("aside", -math.pi / 2), ("up", 0.0))
+    ]
+    errors = []
+    for pieces in (2, 4):
+        found = run_up(
+            rig,
+            **law,
+            clearance=1.0,
+            accuracy=1e-4,
+            initial={"from": "rest"},
+            samples_per_revolution=32,
+            pieces_per_revolution=pieces,
+            probes=probes,
+        )
+        turned = 2.0 * math.pi * np.arange(found.sizes["sample"]) / 32
+        at = SpeedLaw(time=(0.0, law["time"]), speed=(law["start"], law["stop"])).at_angle(turned)[0]
+        expected = CubicSpline(times, limit, axis=1)(at)
+        signals = np.array([found[f"probe_{probe['name']}"].values for probe in probes])
+        errors.append(np.linalg.norm(signals - expected) / np.linalg.norm(expected))
+    assert np.linalg.norm(fine - limit) < 3e-4 * np.linalg.norm(limit)
+    assert errors[1] < 1.5e-3
+    assert errors[1] < errors[0] / 3.0

@@ -12,11 +12,9 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-WIDEST, NARROWEST = 0.5, 0.00125  # half of the range over the speed
+WIDEST, NARROWEST = 0.5, 1e-4  # half of the range over the speed
 WIDEST_TABULATED = 0.16  # the same where bearings follow a table, not a straight line
 ACCELERATION_SHARE = 0.25  # of these errors, by the acceleration
-RESPONSE = 3e-3  # relative error of the response to unbalance by a mode whose exponent is held
-RINGING = 2e-3  # relative error of an exponent
 
 
 def held_range(
@@ -26,6 +24,7 @@ def held_range(
     speed: float,
     acceleration: float,
     *,
+    accuracy: float,
     momentum: Floats | None = None,
     widest: float = WIDEST,
 ) -> tuple[float, float]:
@@ -43,6 +42,8 @@ def held_range(
     drift : two of (n, n)
         Change of stiffness and damping with the speed, per rad/s.
     speed, acceleration : float, rad/s, rad/s^2
+    accuracy : float
+        Relative error of the response to unbalance by a mode, and of each exponent.
     momentum : (n, n), optional
         Change of the stiffness with the acceleration, per rad/s^2.
     widest : float
@@ -58,7 +59,7 @@ def held_range(
         excited = np.clip(np.abs(exponent.imag), speed - half, speed + half)
         distance = np.hypot(exponent.real, np.abs(exponent.imag) - excited)
         distance = np.maximum(distance, abs(acceleration) / half)
-        allowed = np.minimum(RESPONSE * distance, RINGING * np.abs(exponent))
+        allowed = accuracy * np.minimum(distance, np.abs(exponent))
         if half <= NARROWEST * speed or np.all(shift * half <= allowed):
             break
         half *= 0.5

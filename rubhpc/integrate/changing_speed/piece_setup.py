@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 R = TypeVar("R", bound=RetunedLibrary)
 D = TypeVar("D")
 SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the speed is taken
+LONGEST_FALL = 1.0 / 3.0  # half of the range over the first speed of a coast-down, which stays above 0
 MOST_HELD = 4  # matrices kept, of a spin that swings between them
 
 
@@ -253,12 +254,15 @@ class Pieces:
             drift,
             speed,
             acceleration,
+            accuracy=fastest.accuracy,
             momentum=self._momentum,
             widest=WIDEST_TABULATED if fastest.model.rotor.tabulated_speeds else WIDEST,
         )
         if free is None:
             if acceleration > 0.0:  # no farther than the law goes
                 reach = min(reach, max(0.5 * (fastest.spin - speed), 0.0))
+            else:
+                reach = min(reach, LONGEST_FALL * speed)
             speed += np.sign(acceleration) * reach
             model, damping, stiffness = self._matrices(speed, acceleration)
             model = _sagging(model, sag_under(model.rotor, model.load - acceleration * self._inertia))
