@@ -48,7 +48,12 @@ def open_regular(path: Path) -> BinaryIO:
     OSError
         It cannot be opened.
     """
-    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError as error:
+        if error.errno == errno.ELOOP:  # a link that leads back to itself
+            raise NotRegular(errno.EINVAL, "is not a regular file", str(path)) from error
+        raise
     try:
         if not stat.S_ISREG(os.fstat(handle).st_mode):
             raise NotRegular(errno.EINVAL, "is not a regular file", str(path))
@@ -87,6 +92,10 @@ def is_filled(path: Path) -> bool:
         found = path.stat()
     except (FileNotFoundError, NotADirectoryError):
         return False
+    except OSError as error:
+        if error.errno == errno.ELOOP:  # a link that leads back to itself
+            return False
+        raise
     return stat.S_ISREG(found.st_mode) and found.st_size > 0
 
 

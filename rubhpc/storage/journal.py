@@ -164,8 +164,9 @@ class Journal:
 
 
 def journals(directory: Path) -> list[Path]:
-    """The journals in the order in which they count."""
-    return sorted(path for path in directory.glob("*.journal") if _NAME.fullmatch(path.name))
+    """The journals in the order in which they count; no link that leads nowhere."""
+    found = (path for path in directory.glob("*.journal") if _NAME.fullmatch(path.name))
+    return sorted(path for path in found if path.exists())
 
 
 def next_run(directory: Path) -> int:

@@ -7,6 +7,7 @@ lost, and its place has to be free before it can be written again.
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,17 +79,30 @@ def _unfit_chunks(folder: Path, depth: int) -> Iterator[Path]:
             yield folder
         return
     for entry in _entries(folder):
-        if depth > 1 and entry.is_dir():
+        if depth > 1 and _is_directory(entry):
             yield from _unfit_chunks(Path(entry.path), depth - 1)
-        elif depth > 1 or not entry.is_file() or entry.name.endswith(".partial"):
+        elif depth > 1 or not _is_regular(entry) or entry.name.endswith(".partial"):
             yield Path(entry.path)
 
 
 def _unfit_files(folder: Path, is_file: Callable[[str], bool]) -> Iterator[Path]:
     """Unfinished files, and what is none though its name is that of a file."""
     for entry in _entries(folder) if folder.is_dir() else ():
-        if entry.name.endswith(".partial") or (is_file(entry.name) and not entry.is_file()):
+        if entry.name.endswith(".partial") or (is_file(entry.name) and not _is_regular(entry)):
             yield Path(entry.path)
+
+
+def _is_directory(entry: os.DirEntry[str]) -> bool:
+    """Whether it is one; a link that leads back to itself is neither that nor a file."""
+    with suppress(OSError):
+        return entry.is_dir()
+    return False
+
+
+def _is_regular(entry: os.DirEntry[str]) -> bool:
+    with suppress(OSError):
+        return entry.is_file()
+    return False
 
 
 def _entries(folder: Path) -> list[os.DirEntry[str]]:

@@ -73,6 +73,17 @@ def test_a_chunk_is_deleted(store, finished):
     assert mended_by_run(store, finished) == 2
 
 
+def test_links_that_lead_back_to_themselves(store, finished):
+    """In place of a chunk, of the chunks of some cases, and of a journal."""
+    chunk, other = Store(store).chunk_files((1, 0, 0))[4], store / "vertical" / "c" / "0"
+    (journal,) = (store / ".rubhpc" / "journal").iterdir()
+    for path, n_case in ((chunk, 2), (other, 6), (journal, 4)):  # that of the repairs holds 8
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+        path.symlink_to(path)
+        assert len(named_by_verify(store)) == n_case
+        assert mended_by_run(store, finished) == n_case
+
+
 def test_a_run_sees_a_deleted_chunk_by_itself(store, finished):
     Store(store).chunk_files((1, 0, 0))[4].unlink()
     assert mended_by_run(store, finished) == 2
