@@ -29,6 +29,8 @@ _ENOUGH, _MOST = 3.0, 12.0  # processor seconds after which no more are begun: w
 _AGREED = 0.25  # standard error of the mean pace, as a share of it, where cases agree
 _DEAR = 0.2  # share of the time of all pilot cases from which one that was shortened is run whole
 _LONGEST = 20.0  # s, in which such cases are run whole, together
+_LEAST, _SHARE = 10.0, 0.2  # s that all may take, or that share of the time foreseen where it is more
+_FEWEST = 3  # cases, timed in any case
 # Positions that spread evenly over a square, however many (R. Kronecker; steps of M. Roberts' R2 sequence).
 _AMONG_BLOCKS, _WITHIN_BLOCK = 0.7548776662466927, 0.5698402909980532
 
@@ -83,10 +85,20 @@ def time_pilots(
     began = time.process_time()
     pilots = Pilots(grid)
     few = _FEW_PILOTS if grid.study.branch is None else _FEW_BRANCHED
+    all_steps = sum(block.cost * float(share_of(block, missing).mean()) for block in blocks)
+
+    def allowed() -> float:
+        """Seconds that are left."""
+        foreseen = all_steps * float(np.mean([pace.step for pace in paces])) if paces else 0.0
+        spent = time.process_time() - began - pilots.loading - pilots.compiling
+        return max(_LEAST, _SHARE * foreseen) - spent
+
     for k, (index, steps) in enumerate(_picked(blocks, missing)):
         spent = time.process_time() - began - pilots.loading - pilots.compiling
         if k >= few and spent > (_ENOUGH if _spread(paces, missing) <= _AGREED else _MOST):
             break  # a few rubs among many free motions take most of the time of some studies
+        if k >= min(few, _FEWEST) and allowed() < spent:  # as much is left to run dear cases whole
+            break
         try:
             paces.append(pilots.pace(index, steps))
             picked.append((index, steps))
@@ -96,7 +108,7 @@ def time_pilots(
         if pilots.was_cut:  # another would take as long
             is_bound = True
             break
-    is_bound |= _run_dear_ones(pilots, picked, paces)
+    is_bound |= _run_dear_ones(pilots, picked, paces, min(_LONGEST, allowed()))
     block = time_block(manifest, pilots.arrays) if pilots.arrays else 0.0
     seconds = time.process_time() - began - pilots.loading
     if not paces:
@@ -111,14 +123,17 @@ def time_pilots(
     )
 
 
-def _run_dear_ones(pilots: Pilots, picked: list[tuple[tuple[int, ...], float]], paces: list[Pace]) -> bool:
+def _run_dear_ones(
+    pilots: Pilots, picked: list[tuple[tuple[int, ...], float]], paces: list[Pace], left: float
+) -> bool:
     """Run whole, the dearest first, the shortened cases that cost most of all; whether one was cut off.
+
+    All of them take `left` seconds at most.
 
     What such a case comes to is hardly known from its beginning: more and more sets of contacts, neighbours
     of a motion without a period.
     """
     guessed = [pace.step * steps for pace, (_, steps) in zip(paces, picked, strict=True)]
-    left = _LONGEST
     for k in sorted(range(len(paces)), key=lambda k: -guessed[k]):
         index, steps = picked[k]
         if index not in pilots.shortened or guessed[k] < _DEAR * sum(guessed) or left <= guessed[k]:

@@ -38,7 +38,9 @@ def test_more_cases_are_timed_where_they_differ(costs, n_pilot, monkeypatch):
     monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3) for i in range(64)))
     monkeypatch.setattr(pilots, "time", SimpleNamespace(process_time=lambda: now[0]))
     grid = SimpleNamespace(study=SimpleNamespace(branch=None))
-    timing = pilots.time_pilots(grid, None, [], np.ones(1000, dtype=bool))
+    monkeypatch.setattr(pilots, "share_of", lambda *_: np.ones(1000))
+    block = SimpleNamespace(cost=1e6)
+    timing = pilots.time_pilots(grid, None, [block], np.ones(1000, dtype=bool))
     assert timing.n_pilot == n_pilot
     assert timing.pace.step == pytest.approx(np.mean(costs[:n_pilot]) / 1e3)
 
@@ -60,8 +62,14 @@ def test_part_of_a_drive_is_its_beginning():
     assert [part.n_revolution for part in parts(law, 64)] == [64]
 
 
-def test_dearest_case_is_run_whole(monkeypatch):
-    """What a shortened one comes to is not known from its beginning: it is run whole if it dominates."""
+@pytest.mark.parametrize(
+    ("all_steps", "left"), [(6e3, pilots._LEAST - 6 * 0.5), (1e5, 0.2 * 1e5 * 3.5e-3 / 6 - 3.0), (1e8, 20.0)]
+)
+def test_dearest_case_is_run_whole(monkeypatch, all_steps, left):
+    """What a shortened one comes to is not known from its beginning: it is run whole if it dominates.
+
+    All takes ten seconds at most, or a fifth of the time foreseen.
+    """
     now = [0.0]
 
     class Pilots:
@@ -77,12 +85,15 @@ def test_dearest_case_is_run_whole(monkeypatch):
 
         def whole(self, index, steps, guessed, limit):
             assert index == (0,)
-            assert limit == pilots._LONGEST
+            assert limit == pytest.approx(left)
             return guessed._replace(step=15.0 / steps)
 
     monkeypatch.setattr(pilots, "Pilots", Pilots)
     monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3) for i in range(6)))
     monkeypatch.setattr(pilots, "time", SimpleNamespace(process_time=lambda: now[0]))
     grid = SimpleNamespace(study=SimpleNamespace(branch=None))
-    timing = pilots.time_pilots(grid, None, [], np.ones(6, dtype=bool))
+    monkeypatch.setattr(pilots, "share_of", lambda *_: np.ones(6))
+    monkeypatch.setattr(pilots, "time_block", lambda *_: 0.0)
+    block = SimpleNamespace(cost=all_steps)
+    timing = pilots.time_pilots(grid, None, [block], np.ones(6, dtype=bool))
     assert timing.pace.step == pytest.approx((15.0 + 5 * 0.1) / 6 / 1e3)
