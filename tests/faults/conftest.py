@@ -1,9 +1,14 @@
-"""What this machine does not offer is not collected."""
+"""A finished study to damage; what this machine does not offer is not collected."""
 
 from __future__ import annotations
 
 import subprocess
 from pathlib import Path
+
+import pytest
+from running import write_study
+
+from rubhpc.running.driver import run as run_study
 
 collect_ignore = []
 try:
@@ -17,3 +22,11 @@ except FileNotFoundError:
     can_mount = False
 if not can_mount:
     collect_ignore.append("test_small_disk.py")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a study that has run."""
+    folder = tmp_path_factory.mktemp("finished")
+    run_study(write_study(folder), quiet=True)
+    return folder

@@ -9,18 +9,11 @@ from pathlib import Path
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from running import stored_bytes, write_study
+from running import stored_bytes
 
 from rubhpc.running.driver import run as run_study
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("finished")
-    run_study(write_study(folder), quiet=True)
-    return folder
 
 
 def damage(path: Path, how: str, where: float, bit: int) -> None:

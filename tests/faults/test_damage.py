@@ -8,18 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running import array_of, run, stored_bytes, write_study
+from running import array_of, run, stored_bytes
 
 from rubhpc.running.driver import run as run_study
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("finished")
-    run_study(write_study(folder), quiet=True)
-    return folder
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 import reference
+from record_distance import MOTIONS
 
 from rubhpc import simulate
 from rubhpc.rig.forces import Unbalance
@@ -67,7 +68,6 @@ def stator(node, degrees, **changed):
     return Stator(node=node, angle=math.radians(degrees), **(given | changed))
 
 
-MOTIONS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral")
 STIFF = {"youngs_modulus": 2e10, "lateral": False}
 RING = "a ring, and one at another node"
 # name: rotor, stators, speed (rad/s), clearance (m), friction

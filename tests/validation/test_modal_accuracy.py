@@ -8,10 +8,10 @@ enough to leave it if it were not its own orbit.
 import numpy as np
 import pytest
 from random_rigs import found_error, random_rig
+from record_distance import MOTIONS
 
 from rubhpc import simulate
 
-MOTIONS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral")
 STIFF = {"stator.youngs_modulus": "30 GPa"}
 ORBITS = {
     "period 1": (1, {"speed_ratio": 0.75, "clearance": "84 um"}),

@@ -13,7 +13,12 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.periodic_motions.family import flow
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.saltation import monodromy
-from rubhpc.integrate.periodic_motions.shooting import CONVERGED, NotConverged, shoot
+from rubhpc.integrate.periodic_motions.shooting import (
+    CONVERGED,
+    NotConverged,
+    floquet_multipliers,
+    shoot,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -72,8 +77,7 @@ class Point:
     @cached_property
     def multipliers(self) -> Complexes:
         """Its eigenvalues, largest first, (2 n,)."""
-        found = np.linalg.eigvals(self.monodromy).astype(np.complex128)
-        return found[np.lexsort((-found.imag, -np.abs(found)))]
+        return floquet_multipliers(self.monodromy)
 
     @property
     def is_near_fold(self) -> bool:

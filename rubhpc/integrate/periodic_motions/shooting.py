@@ -66,8 +66,13 @@ class Orbit:
     @cached_property
     def multipliers(self) -> Complexes:
         """Eigenvalues of the monodromy matrix, largest first, (2 n,)."""
-        found = np.linalg.eigvals(self.monodromy).astype(np.complex128)
-        return found[np.lexsort((-found.imag, -np.abs(found)))]
+        return floquet_multipliers(self.monodromy)
+
+
+def floquet_multipliers(monodromy: Floats) -> Complexes:
+    """Return the eigenvalues of a monodromy matrix (2 n, 2 n), largest modulus first, (2 n,)."""
+    found = np.linalg.eigvals(monodromy).astype(np.complex128)
+    return found[np.lexsort((-found.imag, -np.abs(found)))]
 
 
 class _Trial:

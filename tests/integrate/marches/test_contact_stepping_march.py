@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from record_distance import MOTIONS
 from trial_rig import trial_rig
 
 from rubhpc import simulate
@@ -20,7 +21,6 @@ def in_steps(monkeypatch):
 
 RUB = {"speed": 170.0, "clearance": "80 um", "friction": 0.2, "transient": 0, "revolutions": 2}
 CLOSE = RUB | {"clearance": "40 um"}
-MOTIONS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral")
 
 
 def distance(found, known, names=MOTIONS):

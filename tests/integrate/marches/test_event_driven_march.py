@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from record_distance import MOTIONS
 from trial_rig import trial_rig, turn
 
 from rubhpc import State, read_rig, simulate
@@ -33,7 +34,6 @@ from rubhpc.study.study import Contact, Integrator, Recording
 SPEED = 170.0
 RUB = {"speed": SPEED, "clearance": "80 um", "friction": 0.2, "transient": 1, "revolutions": 2}
 CLOSE = RUB | {"clearance": "40 um"}  # three stators are all met, two at a time
-MOTIONS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral")
 COUNTED = ("contacts_per_revolution", "contact_fraction", "contact_impulse", "peak_contact_force")
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from record_distance import largest_difference
 from trial_rig import trial_rig
 
 from rubhpc import State, simulate
@@ -16,15 +17,6 @@ from rubhpc.study.study import Contact, Integrator
 
 PENALTY = {"law": "penalty", "stiffness": 1e7, "friction_law": "coulomb"}
 WHIP = {"speed": 120.0, "clearance": "20 um", "friction": 0.6} | PENALTY  # of the trial rig
-MOTIONS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral")
-
-
-def apart(one, other):
-    """Largest difference of two records, as a share of each signal's size."""
-    return max(
-        float(np.abs(getattr(one, name) - getattr(other, name)).max() / np.abs(getattr(other, name)).max())
-        for name in MOTIONS
-    )
 
 
 @pytest.mark.parametrize(
@@ -45,7 +37,7 @@ def test_short_steps_come_to_sticking_as_they_are_halved(monkeypatch, steps, mos
         assert stepped.peak_contact_force == pytest.approx(exact.peak_contact_force, rel=1e-3)
         assert stepped.stick_fraction == pytest.approx(exact.stick_fraction, abs=1e-3)
         assert stepped.friction_work == pytest.approx(exact.friction_work, rel=1e-3)
-        distance.append(apart(stepped, exact))
+        distance.append(largest_difference(stepped, exact))
     assert distance[0] < most
     assert distance[1] < 0.4 * distance[0]
 
@@ -90,7 +82,7 @@ def test_central_difference_is_the_same_motion(whipping):
     exact = simulate(trial_rig(3), **given, accuracy=1e-6)
     stepped = simulate(trial_rig(3), **given, method="central-difference", step="0.4 us")
     assert exact.stick_fraction.min() > 0.5
-    assert apart(exact, stepped) < 1e-3
+    assert largest_difference(exact, stepped) < 1e-3
 
 
 def test_run_goes_on_amid_stick(whipping):

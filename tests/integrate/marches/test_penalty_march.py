@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from record_distance import largest_difference
 from trial_rig import trial_rig
 
 import rubhpc
@@ -18,15 +19,6 @@ from rubhpc.study.study import Contact, Integrator
 
 STIFF = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": 3e10})
 HARD = {"speed_ratio": 1.1, "clearance": "100 um", "law": "penalty", "stiffness": 1e8, "damping": 500.0}
-MOTIONS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral")
-
-
-def apart(one, other):
-    """Largest difference of two records, as a share of each signal's size."""
-    return max(
-        float(np.abs(getattr(one, name) - getattr(other, name)).max() / np.abs(getattr(other, name)).max())
-        for name in MOTIONS
-    )
 
 
 def test_short_steps_come_to_the_closed_form_as_they_are_halved(monkeypatch):
@@ -41,7 +33,7 @@ def test_short_steps_come_to_the_closed_form_as_they_are_halved(monkeypatch):
         stepped = simulate(STIFF, **given, step=step)
         assert stepped.steps > 5 * exact.steps
         assert stepped.peak_contact_force == pytest.approx(exact.peak_contact_force, rel=1e-3)
-        distance.append(apart(stepped, exact))
+        distance.append(largest_difference(stepped, exact))
     assert distance[0] < 1e-3
     assert distance[1] < 0.2 * distance[0]
 
@@ -52,7 +44,7 @@ def test_central_difference_is_the_same_motion():
     exact = simulate("mokhtar2017", **given)
     stepped = simulate("mokhtar2017", **given, method="central-difference", step="1 us")
     assert exact.contact_impulse[0] > 0.0
-    assert apart(exact, stepped) < 1e-3
+    assert largest_difference(exact, stepped) < 1e-3
     assert exact.peak_contact_force == pytest.approx(stepped.peak_contact_force, rel=1e-3)
 
 
