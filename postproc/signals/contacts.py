@@ -225,7 +225,7 @@ def _force(case: xr.Dataset, stator: int | None) -> xr.DataArray:
 def _place(case: xr.Dataset, stator: int) -> int:
     n_stator = case.sizes["stator"]
     if not 1 <= stator <= n_stator:
-        raise InputError(f"{source(case)}: there is no stator {stator}; they count 1 to {n_stator}")
+        raise InputError(f"{source(case)}: there is no stator {stator}; choose one from 1 to {n_stator}")
     return stator - 1
 
 

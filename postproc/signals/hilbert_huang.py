@@ -127,7 +127,7 @@ def hilbert_huang(
     """
     contact = contact or ("kept" if signal.startswith("stator") else "masked")
     if contact not in CONTACT:
-        raise InputError(f"contact: {contact}: there is {' or '.join(CONTACT)}")
+        raise InputError(f"contact: {contact}: is unknown; choose {' or '.join(CONTACT)}")
     if n_mode < 1:
         raise InputError(f"n_mode: {n_mode} is out of range; it must be at least 1")
     wave, touches = signal_of(case, signal, stator), touching(case, stator)

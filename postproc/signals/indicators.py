@@ -167,7 +167,7 @@ def _natural(data: xr.Dataset) -> dict[str, xr.DataArray]:
     each = [data.isel(stator=i) for i in range(data.sizes["stator"])] if "stator" in data.dims else [data]
     stators = [stator_frequencies(case, axis) for case in each]
     if "torsional" not in rotor or any("lateral" not in stator for stator in stators):
-        raise InputError(f"{source(data)}: torsion or stator has no natural frequency to look at")
+        raise InputError(f"{source(data)}: no natural frequency of torsion or stator; use another rig")
     lateral = [stator["lateral"] for stator in stators]
     stator = xr.concat(lateral, "stator") if "stator" in data.dims else lateral[0]
     return {"torsion": rotor["torsional"], "stator": stator}

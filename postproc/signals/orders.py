@@ -105,7 +105,7 @@ def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float, over: st
 def _of_cases(store: xr.Dataset, signals: Sequence[str], order: float, over: str | None) -> xr.Dataset:
     along = next((axis for axis in axes_of(store) if axis in SPEED_AXES), None)
     if along is None or store.sizes[along] < 2:
-        raise InputError(f"{source(store)}: bode needs an axis of several speeds")
+        raise InputError(f"{source(store)}: bode needs an axis of several speeds; give another store")
     spread = [along, *([find_axis(store, over)] if over else [])]
     data = narrow(store, [*signals, "spin_speed"], spread).load()
     variables = {}

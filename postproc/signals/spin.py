@@ -40,7 +40,7 @@ def spin_over_time(store: xr.Dataset, over: str | None = None) -> xr.Dataset:
         The speed is constant, or several cases are left.
     """
     if not is_run_up(store):
-        raise InputError(f"{source(store)}: no speed changes in it; give a store with [run_up] or [drive]")
+        raise InputError(f"{source(store)}: its speeds are constant; give a store with [run_up] or [drive]")
     prefix = _PREFIX if _PREFIX + _TORQUES[1] in store else ""
     is_driven = prefix + _TORQUES[1] in store
     names = ["speed", "time", *([prefix + name for name in _TORQUES] if is_driven else [])]

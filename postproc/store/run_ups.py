@@ -39,7 +39,7 @@ def steady_view(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
     """
     if "spin_speed" in names or any(name.startswith("spectrum_") for name in names):
         fix = "draw it with rubhpc waterfall or rubhpc bode"
-        raise InputError(f"{source(store)}: the speed changes, which this figure holds for steady; {fix}")
+        raise InputError(f"{source(store)}: the speed changes, and this figure needs a constant one; {fix}")
     if any("revolution" in store[name].dims for name in names if name in store):
         return store
     status = ["status"] if "status" in store else []

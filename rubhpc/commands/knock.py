@@ -94,13 +94,13 @@ def knock(
 
 
 def _report() -> Callable[[int, int], None]:
-    """Print how many cases are there, at first and then every few seconds."""
+    """Print how many cases are done, at first and then every few seconds."""
     printed: list[float] = []
 
     def report(n_done: int, n_case: int) -> None:
         if not printed or time.monotonic() > printed[-1] + _GAP:
             rest = "; searching the rest" if not printed else ""
-            click.echo(f"{n_done}/{n_case} cases are there{rest}")
+            click.echo(f"{n_done}/{n_case} cases are done{rest}")
             printed.append(time.monotonic())
 
     return report

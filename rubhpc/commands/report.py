@@ -55,5 +55,5 @@ def view(store: Path, port: int) -> None:
     from postproc.store.live import open_live
 
     with Server(Library(lambda: open_live(store)), port) as server, contextlib.suppress(KeyboardInterrupt):
-        click.echo(f"{store} is at {server.url} until Ctrl-C")
+        click.echo(f"{store} is served at {server.url} (Ctrl-C ends it)")
         server.serve_forever()

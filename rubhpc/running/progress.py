@@ -68,7 +68,7 @@ class Progress:
             self._bar.start()
             self._bar.add_task("", total=self._n_case, completed=self._n_done, rest="")
         else:
-            print(f"{self._n_done}/{self._n_case} cases are there; computing the rest", flush=True)
+            print(f"{self._n_done}/{self._n_case} cases are stored; computing the rest", flush=True)
         return self
 
     def __exit__(

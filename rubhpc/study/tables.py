@@ -142,7 +142,7 @@ class Recording:
             raise FieldError("samples_per_revolution", problem)
         for key in ("transient_limit", "transient_tolerance"):
             if isinstance(self.transient, int) and getattr(self, key) is not None:
-                raise FieldError(key, f'it goes with transient = "{AUTO}"; leave it out, or set that')
+                raise FieldError(key, f'has no effect without transient = "{AUTO}"; leave it out or set it')
         names = [probe.name for probe in self.probe]
         for i, name in enumerate(names, 1):
             if name in names[: i - 1]:

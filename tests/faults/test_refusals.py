@@ -150,7 +150,7 @@ def test_a_full_disk_is_told_in_a_line_and_the_run_goes_on_once_there_is_space(t
     done = run(study)
     assert done.returncode == 0, done.stderr
     assert not verify(store)
-    n_kept = int(done.stdout.split("/12 cases are there")[0])
+    n_kept = int(done.stdout.split("/12 cases are stored")[0])
     assert 0 < n_kept < 12
 
 

@@ -132,7 +132,7 @@ def test_what_has_no_run_up_is_refused():
     steady = xr.Dataset(
         {"vertical": ("sample", np.zeros(8))}, coords={"revolution": ("sample", np.arange(8))}
     )
-    with pytest.raises(InputError, match=r"no speed changes in it; give a store of a study with \[run_up\]"):
+    with pytest.raises(InputError, match=r"its speeds are constant; give a store of a study with \[run_up\]"):
         waterfall(steady)
     with pytest.raises(InputError, match="no such signal"):
         waterfall(run_up(), "vertcal")
@@ -154,5 +154,5 @@ def test_the_speed_is_drawn_over_the_time_with_the_torques_of_a_drive():
 
 
 def test_a_steady_speed_is_not_drawn_over_the_time():
-    with pytest.raises(InputError, match=r"no speed changes in it; give a store with \[run_up\]"):
+    with pytest.raises(InputError, match=r"its speeds are constant; give a store with \[run_up\]"):
         speed(xr.Dataset({"vertical": ("sample", np.zeros(8))}))

@@ -89,7 +89,7 @@ def test_ringing_stators_do_not_prolong_the_transient():
 @pytest.mark.parametrize("key", ["transient_limit", "transient_tolerance"])
 def test_keys_of_auto_go_with_it_alone(key):
     value = {"transient_limit": 50, "transient_tolerance": 1e-3}[key]
-    with pytest.raises(InputError, match=f"{key}: it goes with transient"):
+    with pytest.raises(InputError, match=f"{key}: has no effect without transient"):
         Recording(transient=120, **{key: value})
     assert Recording(transient="auto", **{key: value}).is_transient_auto
     assert Recording(transient="direct", **{key: value}).is_transient_direct

@@ -43,7 +43,7 @@ def test_lines_come_now_and_then_with_the_time_left_by_predicted_steps(clock, ca
         clock.time += 1
         shown.update(Totals(done=4, failed=1, diverged=1, cost=800))
     assert capsys.readouterr().out.splitlines() == [
-        "10/20 cases are there; computing the rest",
+        "10/20 cases are stored; computing the rest",
         "15/20 cases; 0.167 a second, 10 s left, 1 failed, 1 diverged",
     ]
 

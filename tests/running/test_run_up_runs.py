@@ -110,7 +110,7 @@ def test_figures_of_one_case_see_its_signals(folder):
     assert section_of(store, "vertical").sizes["section"] == 13
     assert len(orbit(store).show().lines) > 0
     for signal in ("torsion", "probe_left"):
-        with pytest.raises(InputError, match="the speed changes, which this figure holds for steady"):
+        with pytest.raises(InputError, match="the speed changes, and this figure needs a constant one"):
             spectrum(store, signal)
 
 

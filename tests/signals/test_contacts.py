@@ -88,7 +88,7 @@ def test_several_stators_count_together_or_alone():
     assert contact_spans(two, stator=2)["peak_force"].values == pytest.approx(np.full(4, 2.0))
     assert float(touching(two, stator=1).mean()) == pytest.approx(0.125)
     assert float(touching(two.isel(stator=0)).mean()) == pytest.approx(0.125)
-    with pytest.raises(InputError, match="they count 1 to 2"):
+    with pytest.raises(InputError, match="choose one from 1 to 2"):
         touching(two, stator=3)
 
 

@@ -179,7 +179,7 @@ def test_the_last_revolutions_are_those_of_the_record():
         ({"signal": "twist"}, "no such signal"),
         ({"contact": "cut"}, "masked or kept"),
         ({"n_mode": 0}, "at least 1"),
-        ({"stator": 2}, "they count 1 to 1"),
+        ({"stator": 2}, "choose one from 1 to 1"),
     ],
 )
 def test_bad_arguments_are_refused(arguments, said):
