@@ -1,6 +1,7 @@
 """Figures of run-ups: what a signal of known orders and a known offset becomes in them."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -126,6 +127,24 @@ def test_critical_speeds_are_those_that_the_unbalance_excites():
     assert critical_speeds(run_up(), 50.0, 150.0) == []
     _, phase = bode(cases, "probe_left").show()
     assert [text.get_text() for text in phase.get_legend().get_texts()] == ["critical speed, 955 rpm"]
+
+
+def test_figures_of_cases_of_one_law_seek_them_once(monkeypatch):
+    """Their first and last speeds differ a little; a speed beyond those of a case is not its own."""
+    asked = []
+    monkeypatch.setattr(
+        "rubhpc.fem.critical_speeds.find_critical_speeds",
+        lambda model, speeds: (
+            asked.append(speeds),
+            [SimpleNamespace(speed=v, is_excited=True) for v in (100, 149.9)],
+        )[1],
+    )
+    cases = run_up(rig=mass_of_1_kg(1e4, 2e4).as_dict())
+    assert critical_speeds(cases, 50.2, 150.0) == [100, 149.9]
+    assert critical_speeds(cases, 50.1, 149.8) == [100]
+    assert len(asked) == 1
+    assert asked[0][0] <= 50.1
+    assert asked[0][-1] >= 150.0
 
 
 def test_what_has_no_run_up_is_refused():
