@@ -25,6 +25,7 @@ from rubhpc.storage.verify import verify
 from rubhpc.study.study import read_study
 
 FRICTION = "{ start = 0.0, stop = 0.8, num = 17 }"
+COARSE_FRICTION = "{ start = 0.0, stop = 0.8, num = 9 }"
 SPEED = "{ start = 1.0, stop = 2.0, num = 17 }"
 REFINE = '[refine]\naxes = ["speed_ratio", "friction"]\ncoarse = 4'
 
@@ -251,12 +252,10 @@ def test_a_finer_axis_keeps_what_is_computed(tmp_path, physics):
 
 
 def test_a_packed_store_is_the_same(tmp_path, physics):
-    plain = study_of(tmp_path, "plain", keep='["section"]', friction="{ start = 0.0, stop = 0.8, num = 9 }")
+    plain = study_of(tmp_path, "plain", keep='["section"]', friction=COARSE_FRICTION)
     run(plain, quiet=True)
     with shards():
-        packed = study_of(
-            tmp_path, "packed", keep='["section"]', friction="{ start = 0.0, stop = 0.8, num = 9 }"
-        )
+        packed = study_of(tmp_path, "packed", keep='["section"]', friction=COARSE_FRICTION)
         run(packed, quiet=True)
         assert not verify(packed.output)
     a, b = open_store(plain.output), open_store(packed.output)
@@ -344,15 +343,42 @@ def uneven(friction):
 @pytest.mark.parametrize(("n_rank", "keep"), [(2, '["section"]'), (8, '["section"]'), (3, "[]")])
 def test_no_rank_waits_for_more_than_a_case(tmp_path, physics, n_rank, keep):
     """Where all axes are refined: once a rank has found nothing left no case begins before all have met."""
-    whole = study_of(tmp_path, "whole", keep=keep)
+    whole = study_of(tmp_path, "whole", keep=keep, friction=COARSE_FRICTION)
     run(whole, quiet=True)
     n_case, physics.n_case = physics.n_case, 0
-    study = study_of(tmp_path, keep=keep)
+    study = study_of(tmp_path, keep=keep, friction=COARSE_FRICTION)
     happened = on_ranks(study, physics, n_rank, uneven)
     assert physics.n_case == n_case
     assert stored_bytes(study.output) == stored_bytes(whole.output)
     assert all(n_begun == 0 for _, _, n_begun in happened.waits)
     assert max(end - came for came, end, _ in happened.waits) <= 10.0
+
+
+def test_blocks_found_damaged_are_completed_by_any_ranks(tmp_path, physics):
+    """A map is stopped, all its chunks are damaged, and three ranks go on."""
+    whole = study_of(tmp_path, "whole", keep='["section"]', friction=COARSE_FRICTION)
+    run(whole, quiet=True)
+    study, stopping = study_of(tmp_path, keep='["section"]', friction=COARSE_FRICTION), Stopping()
+    physics.n_case = 0
+    physics.on_case = lambda: stopping.ask("a test") if physics.n_case == 80 else None
+    with pytest.raises(StoppedEarly):
+        run(study, quiet=True, stopping=stopping)
+    physics.on_case = lambda: None
+    chunks = [path for path in (study.output / "section_vertical/c").rglob("*") if path.is_file()]
+    assert chunks
+    for chunk in chunks:
+        data = bytearray(chunk.read_bytes())
+        data[-1] ^= 0xFF
+        chunk.write_bytes(data)
+    n_before = physics.n_case
+    on_ranks(study, physics, 3, uneven)
+    journals = [path.name for path in (study.output / ".rubhpc/journal").iterdir()]
+    assert any("rank_0" in name for name in journals)  # lines after those that mark cases as missing
+    verify(study.output)  # marks what no rank has touched since
+    run(study, quiet=True)
+    assert physics.n_case > n_before
+    assert not verify(study.output)
+    assert stored_bytes(study.output) == stored_bytes(whole.output)
 
 
 @pytest.mark.parametrize("moments", [(1,), (60, 20, 9)])
