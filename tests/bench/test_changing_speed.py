@@ -1,0 +1,56 @@
+"""What a run-up costs over as many revolutions at constant speeds, law by law, in processor time."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+
+from rubhpc import read_rig
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.changing_speed.case import record_run_up
+from rubhpc.integrate.setup import prepare
+from rubhpc.study.initial import CONTACT_FREE, Initial
+from rubhpc.study.speed_law import SpeedLaw
+from rubhpc.study.study import Contact, Integrator, Recording
+
+pytestmark = pytest.mark.bench
+RPM = math.pi / 30.0
+SAMPLES = 256
+CASE = {"clearance": 1e-4, "friction": 0.2, "initial": Initial(from_=CONTACT_FREE)}
+STEADY = (1300, 1500, 1700, 1900, 2100, 2300)  # rpm, of the range of the run-up
+PENALTY, COULOMB = {"law": "penalty", "stiffness": 1e6}, {"friction_law": "coulomb"}
+LAWS = {"sliding": {}, "Coulomb": COULOMB, "penalty": PENALTY, "Coulomb, penalty": COULOMB | PENALTY}
+REPEATED = 4
+
+
+def setup_at(law, speed):
+    rig, contact = read_rig("mokhtar2017"), Contact(**law)
+    return prepare(rig, speed, contact=contact, integrator=Integrator(), samples_per_revolution=SAMPLES)
+
+
+def seconds_of(integrate, setup, recording, *law):
+    began = time.process_time()
+    integrate(setup, *law, recording=recording, **CASE)
+    return time.process_time() - began
+
+
+@pytest.mark.parametrize(("seconds", "most"), [(20.0, 6.0), (4.0, 9.0)])
+def test_a_run_up_over_constant_speed(seconds, most, capsys):
+    """From 1200 to 2400 rpm, contact from 1400 rpm on; asked 3. Signals, spectra or orders, and measures."""
+    speed_law = SpeedLaw(time=(0.0, seconds), speed=(1200 * RPM, 2400 * RPM))
+    recording = Recording(transient=0, revolutions=speed_law.n_revolution, samples_per_revolution=SAMPLES)
+    lines, ratios = [], []
+    for name, law in LAWS.items():
+        steady = [setup_at(law, speed * RPM) for speed in STEADY]
+        rising = setup_at(law, 2400 * RPM)
+        held, changing = [], []
+        for _ in range(1 + REPEATED):  # the first one compiles, and solves contact modes
+            held.append([seconds_of(run_case, s, recording) for s in steady])
+            changing.append(seconds_of(record_run_up, rising, recording, speed_law))
+        at_constant, rise = np.min(held[1:], axis=0).mean(), min(changing[1:])
+        ratios.append(rise / at_constant)
+        lines.append(f"{name:18} {1e3 * rise:7.1f} ms for {1e3 * at_constant:6.1f}: {ratios[-1]:.2f}")
+    with capsys.disabled():
+        print(f"\n{speed_law.n_revolution} revolutions in {seconds:g} s\n" + "\n".join(lines))
+    assert max(ratios) < most
