@@ -30,13 +30,17 @@ def fractions(attractor: xr.DataArray, starts: Sequence[str], store: xr.Dataset)
     -------
     Dataset over (*settings, attractor)
         `count`; `fraction` of the starts with a motion, its interval from `fraction_low` to `fraction_high`;
-        `motion_regime` and `motion_period`; over settings alone `n_start` with a motion, and
-        `n_without_motion`: not done, or not settled.
+        `motion_regime` and `motion_period`, 0 where its cases have several; over settings alone `n_start`
+        with a motion, and `n_without_motion`: not done, or not settled.
     """
     present = np.unique(attractor.values)
     numbers = present[present != NO_MOTION]
     is_of = attractor == xr.DataArray(numbers, dims="attractor", coords={"attractor": numbers})
     count = is_of.sum(starts)
+    longest = store["period"].where(is_of, -1).max(starts)
+    is_one = ((store["period"] == longest) | ~is_of).all(starts)
+    period = longest.where(is_one, 0)  # records on a torus may pass for long periods
+    is_like = (store["period"] == period) | ~(is_of & (store["period"] == period)).any(starts)
     n_start = (attractor != NO_MOTION).sum(starts)
     low, high = wilson(count, n_start)
     return xr.Dataset(
@@ -45,8 +49,8 @@ def fractions(attractor: xr.DataArray, starts: Sequence[str], store: xr.Dataset)
             "fraction": (count / n_start).assign_attrs(units="1", long_name="Basin fraction"),
             "fraction_low": low.assign_attrs(units="1", long_name="Lower end of the 95 % interval"),
             "fraction_high": high.assign_attrs(units="1", long_name="Upper end of the 95 % interval"),
-            "motion_regime": _most_common(store["regime"], is_of, starts, len(REGIME)),
-            "motion_period": store["period"].where(is_of, -1).max(starts).assign_attrs(store["period"].attrs),
+            "motion_regime": _most_common(store["regime"], is_of & is_like, starts, len(REGIME)),
+            "motion_period": period.assign_attrs(store["period"].attrs),
             "n_start": n_start.assign_attrs(units="1", long_name="Starts with a motion"),
             "n_without_motion": (attractor == NO_MOTION)
             .sum(starts)

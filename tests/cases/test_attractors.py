@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
-from motions_store import NO_CONTACT, PERIODIC, store_of
+from motions_store import NO_CONTACT, PERIODIC, TORUS, store_of
 from scipy.stats import binom, binomtest
 
 from postproc.cases.attractors import attractors, start_axes
@@ -109,6 +109,8 @@ def test_a_torus_that_passes_slowly_by_a_long_period_is_one_motion():
     found = attractors(store).values
     assert len(set(found[:6])) == 1
     assert len(set(found)) == 3
+    what = fractions(attractors(store), ["initial_vertical"], store).sel(attractor=found[0])
+    assert (int(what["motion_regime"]), int(what["motion_period"])) == (TORUS, 0)
     store["largest_multiplier"] = "initial_vertical", np.where(np.arange(9) == 2, 0.9, np.nan)
     store["multiplier_angle"] = "initial_vertical", np.zeros(9)
     with_solution = attractors(store).values  # a motion of that period beside the torus
