@@ -180,6 +180,38 @@ def test_ring_of_springs_over_its_speed():
     assert whole.events()[-1][1] == pytest.approx(1.195, abs=1e-3)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("count", "along", "start", "stop", "largest", "case", "step"),
+    [
+        (5, "clearance", 200e-6, 300e-6, 10e-6, {"friction": 0.05}, 2e-7),
+        (16, "clearance", 300e-6, 900e-6, 60e-6, {"friction": 0.0}, 1e-6),
+        (5, "friction", 0.0, 0.2, 0.02, {"clearance": 240e-6}, 5e-4),
+    ],
+)
+def test_rub_on_a_ring_ends_in_a_sweep_where_its_branch_folds(count, along, start, stop, largest, case, step):
+    """Up in steps across the first fold: the same motion up to it, another one from there on."""
+    springs = LumpedStator(node=8, radius=0.06, count=count, mass=1e-3, damping=2.0, stiffness=1e5)
+    ring = replace(read_rig("mokhtar2017"), stator=(springs,))
+    case = {"speed_ratio": 1.25, **case}
+    found = rubhpc.branch(
+        ring, along=along, start=start, stop=stop, largest_step=largest, transient=40, doublings=0, keep=(),
+        **case,
+    )[0]  # fmt: skip
+    at = next(k for k, point in enumerate(found.points) if point.event == "fold")
+    assert found.is_stable[:at].all()
+    final, orbits = found.points[at - 1].state, []
+    for value in found.values[at] + step * np.array([-2.5, -1.5, -0.5, 0.5]):
+        record = rubhpc.simulate(
+            ring, transient=2000, revolutions=1, initial=final, keep=("waveform",),
+            **(case | {along: float(value)}),
+        )  # fmt: skip
+        final = record.final
+        orbits.append([record.vertical, record.horizontal])
+    changes = np.linalg.norm(np.diff(orbits, axis=0), axis=(1, 2))
+    assert changes[2] > 4 * changes[:2].max()
+
+
 def test_overhung_disc_on_three_bearings_grazes_at_its_contact_free_amplitude():
     """Before, the motion with one impact a revolution doubles its period."""
     rig = read_rig("mokhtar2017")
