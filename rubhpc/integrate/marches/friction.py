@@ -52,6 +52,7 @@ class FrictionMarch(EventDrivenMarch):
     """
 
     most_pairs = MOST_PAIRS
+    take_change = staticmethod(change_states)
 
     def __init__(
         self,
@@ -128,7 +129,7 @@ class FrictionMarch(EventDrivenMarch):
     def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
         """Take an event: `motion` (2 n,) after it, in place, and the states that go on, or -1."""
         return int(
-            change_states(
+            self.take_change(
                 self.bodies,
                 self._friction,
                 mask,
