@@ -276,8 +276,8 @@ def test_another_version_of_the_physics_is_refused_unless_it_is_accepted(tmp_pat
     store = open_store(grid_for(study))
     compute(store, all_of_it=True)
     before = known(store)
-    old = identity.PHYSICS
-    monkeypatch.setattr(identity, "PHYSICS", old + 1)
+    old = identity.physics_of(study)
+    monkeypatch.setattr(identity, "PHYSICS", identity.PHYSICS + 1)
     told = f"physics was {old}, is {old + 1}"
     with pytest.raises(StoreError, match=f"{told}; --accept-version keeps its cases"):
         grid_for(study)
