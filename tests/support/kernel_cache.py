@@ -28,7 +28,8 @@ def compile_once() -> None:
         subprocess.Popen([sys.executable, __file__, *schemes], env=environment, cwd=ROOT)
         for schemes in SCHEMES
     ]
-    if any([process.wait() for process in compiling]):
+    codes = [process.wait() for process in compiling]
+    if any(codes):
         raise SystemExit("the kernels could not be compiled")
     _mark(stamp)
 
