@@ -58,7 +58,7 @@ class Computing:
     def compute(self) -> None:
         """Compute all that is missing, together with all ranks."""
         together(self._pool, self._compute_blocks)
-        if self._job.suspect and not self._stopping.look():
+        if self._job.suspect and not any(self._pool.gather(bool(self._stopping.look()))):  # all agree
             together(self._pool, self.try_suspects)
 
     def _compute_blocks(self) -> None:
