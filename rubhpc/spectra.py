@@ -8,6 +8,8 @@ import numpy as np
 import scipy.fft
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
@@ -37,8 +39,8 @@ def amplitude_spectrum(signal: Floats) -> Floats:
     return spectrum
 
 
-def track_order(signal: Floats, per_revolution: int, order: float, window: int) -> Complexes:
-    """Return the complex amplitude of an order in every revolution of a shaft-locked signal, (n_revolution,).
+def track_orders(signal: Floats, per_revolution: int, orders: Sequence[float], window: int) -> Complexes:
+    """Return the complex amplitude of each order in every revolution of a shaft-locked signal.
 
     The signal is `Re(c exp(i order angle))` where that order is all there is: `abs(c)` is its amplitude, zero
     to peak, and the argument its lead over the order of the shaft's angle.
@@ -47,17 +49,27 @@ def track_order(signal: Floats, per_revolution: int, order: float, window: int) 
     ----------
     signal : (n_sample,)
         Whole revolutions.
-    order : float
-        Multiple of the spin frequency; the window holds whole periods of it.
+    orders : sequence of float
+        Multiples of the spin frequency; the window holds whole periods of them.
     window : int
-        Revolutions over which it is taken, around each; those at the ends have the window of the first, or
+        Revolutions over which they are taken, around each; those at the ends have the window of the first, or
         last, that fits.
+
+    Returns
+    -------
+    (n_revolution, n_order)
     """
     n = signal.size // per_revolution
     window = min(window, n)
-    within = np.exp(-2j * np.pi * order / per_revolution * np.arange(per_revolution))
-    sums = (signal.reshape(n, per_revolution) @ within) * np.exp(-2j * np.pi * order * np.arange(n))
-    whole: Complexes = np.convolve(sums, np.ones(window, dtype=np.complex128), mode="valid")
-    whole = whole * (2.0 / (window * per_revolution))
-    followed: Complexes = whole[np.clip(np.arange(n) - window // 2, 0, whole.size - 1)]
+    turned = 2.0 * np.pi * np.asarray(orders, dtype=np.float64)
+    angle = turned / per_revolution * np.arange(per_revolution)[:, np.newaxis]
+    both = signal.reshape(n, per_revolution) @ np.hstack([np.cos(angle), -np.sin(angle)])
+    sums = both[:, : turned.size] + 1j * both[:, turned.size :]
+    sums *= np.exp(-1j * turned * np.arange(n)[:, np.newaxis])
+    fits = n - window + 1
+    whole: Complexes = sums[:fits].copy()
+    for ahead in range(1, window):
+        whole += sums[ahead : ahead + fits]
+    whole *= 2.0 / (window * per_revolution)
+    followed: Complexes = whole[np.clip(np.arange(n) - window // 2, 0, fits - 1)]
     return followed

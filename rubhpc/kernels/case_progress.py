@@ -77,9 +77,9 @@ def restart_clock(record: Any, tick: int, sample: int, *, is_recorded: bool) -> 
         record["energy_from"] = NONE
 
 
-def begin_in(progress: Progress, mode: int) -> None:
-    """Put the case into a contact mode, of which it has the modal coordinates."""
-    progress.mode = mode
+def begin_in(record: Any, mode: int) -> None:
+    """Put the case of a bare record into a contact mode, of which it has the modal coordinates."""
+    record["mode"] = mode
 
 
 def ask_for(progress: Progress, mask: int) -> None:

@@ -215,6 +215,41 @@ def resolved_time(re: Floats, im: Floats, pace: Floats, least: float, z_re: Floa
     return float((RESOLVED * size / bend) ** 0.25) if bend > 0.0 else np.inf
 
 
+@jit_lean_sum
+def is_within(
+    motion: Floats,
+    translations: Floats,
+    stiffness: Floats,
+    highest: Floats,
+    lowest: Floats,
+    limit: float,
+    energy_limit: float,
+) -> bool:
+    """Whether a motion (2 n,), and the extrema of the output node so far, are those of no diverged case.
+
+    Displacements are to be within `limit` (m), the energy within `energy_limit` (J).
+    """
+    n = stiffness.shape[0]
+    for row in range(translations.shape[0]):
+        seen = 0.0
+        for k in range(n):
+            seen += translations[row, k] * motion[k]
+        if not abs(seen) <= limit:
+            return False
+    if highest[0] >= lowest[0]:  # a sample was taken
+        for k in range(2):
+            if not max(highest[k], -lowest[k]) <= limit:
+                return False
+    twice = 0.0
+    for j in range(n):
+        twice += motion[n + j] * motion[n + j]
+        along = 0.0
+        for k in range(n):
+            along += stiffness[j, k] * motion[k]
+        twice += motion[j] * along
+    return bool(0.5 * twice <= energy_limit)
+
+
 @jit_inline_sum
 def is_beyond(reduced: Reduced, displacement: Floats) -> bool:
     """Whether reduced displacements, the first n of a motion, pass the limit, or are no numbers."""

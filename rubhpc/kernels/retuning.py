@@ -18,6 +18,7 @@ from rubhpc.kernels.contact_modes import (
     SAMPLES_AT_ONCE,
     ModeTables,
 )
+from rubhpc.kernels.retuning_laws import RimPart, Springs, follow_growth, move_rim, stretch_springs
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -50,11 +51,20 @@ class HeldMode(NamedTuple):
     work: Complexes  # (2, width), power of the unbalance and of its conjugate at unit speed
     output: Floats  # (o, 3 n), what output rows see of displacements, rates and accelerations
     row: Complexes  # (o, width), output rows; that of the response is filled in
+    rim: RimPart
+    springs: Springs
 
 
 @jit
 def retune(
-    tables: ModeTables, mode: int, held: HeldMode, spin: float, factor: complex, tick: float, interval: float
+    tables: ModeTables,
+    mode: int,
+    held: HeldMode,
+    spin: float,
+    share: float,
+    factor: complex,
+    tick: float,
+    interval: float,
 ) -> None:
     """Bring tables of a mode to a spin speed (rad/s), in place.
 
@@ -62,6 +72,8 @@ def retune(
     ----------
     mode : int
         Index of the mode in the tables.
+    share : float
+        Of the speed at which its matrices are.
     factor : complex
         By which the unbalance at unit speed acts: `spin^2 exp(i angle)` at a steady speed, 1/s^2.
     tick, interval : float, s
@@ -70,6 +82,8 @@ def retune(
     m, width, n_level = held.is_pair.size, held.exponent.size, tables.power_re.shape[1]
     n, end = held.slip.shape[1], held.n_coordinate
     turning = 1j * spin
+    if held.rim.one >= 0:
+        move_rim(tables, mode, held.rim, share, held.rate, held.resisting, held.row, held.work)
     exponent = held.exponent
     exponent[m] = turning
     x = np.zeros(2 * n, dtype=np.complex128)
@@ -89,16 +103,19 @@ def retune(
         tables.enter_sine[mode, 0, k], tables.enter_sine[mode, 1, k] = sine.real, sine.imag
     for a in range(2 * n):
         tables.motion_re[mode, a, m], tables.motion_im[mode, a, m] = x[a].real, x[a].imag
-    for i in range(held.slip.shape[0]):
-        switch, slip = -factor * held.reaction[i], 0j
+    for i in range(held.switch.shape[0]):
+        switch = -factor * held.reaction[i]
         for a in range(2 * n):
             switch += held.switch[i, a] * x[a]
+        tables.switch_re[mode, i, m], tables.switch_im[mode, i, m] = switch.real, switch.imag
+        switch = switch * turning
+        tables.rate_re[mode, i, m], tables.rate_im[mode, i, m] = switch.real, switch.imag
+    for i in range(held.slip.shape[0]):
+        slip = 0j
         for a in range(n):
             slip += held.slip[i, a] * x[n + a]
-        tables.switch_re[mode, i, m], tables.switch_im[mode, i, m] = switch.real, switch.imag
         tables.slip_re[mode, i, m], tables.slip_im[mode, i, m] = slip.real, slip.imag
-        switch, slip = switch * turning, slip * turning
-        tables.rate_re[mode, i, m], tables.rate_im[mode, i, m] = switch.real, switch.imag
+        slip = slip * turning
         tables.slip_rate_re[mode, i, m], tables.slip_rate_im[mode, i, m] = slip.real, slip.imag
     for k in range(end):
         _retune_powers(tables, mode, k, exponent[k], tick, n_level)
@@ -120,6 +137,10 @@ def retune(
                 tables.output[mode, width + k, later * n_output + o] = -value.imag
             ahead *= onward
     _retune_energies(tables, mode, held, x, factor)
+    if held.rim.one >= 0:
+        follow_growth(tables, mode, held.rim, share, spin, m, x, held.resisting)
+    if held.springs.gap.shape[0] > 0:
+        stretch_springs(tables, mode, held.springs, m, held.rim.one)
 
 
 @jit

@@ -13,6 +13,7 @@ from rubhpc.integrate.setup import prepare
 from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import SpeedLaw
 from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.threads import on_one_thread
 
 pytestmark = pytest.mark.bench
 RPM = math.pi / 30.0
@@ -36,6 +37,7 @@ def seconds_of(integrate, setup, recording, *law):
 
 
 @pytest.mark.parametrize(("seconds", "most"), [(20.0, 6.0), (4.0, 9.0)])
+@on_one_thread
 def test_a_run_up_over_constant_speed(seconds, most, capsys):
     """From 1200 to 2400 rpm, contact from 1400 rpm on; asked 3. Signals, spectra or orders, and measures."""
     speed_law = SpeedLaw(time=(0.0, seconds), speed=(1200 * RPM, 2400 * RPM))

@@ -17,7 +17,7 @@ from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.measuring.measures import by_name, probe_extents
 from rubhpc.integrate.setup import ModalSetup
 from rubhpc.schema import AMPLITUDE, DIVERGED, DONE, ORDERS, PHASE, PROBE, TRACKED, case_measures
-from rubhpc.spectra import track_order
+from rubhpc.spectra import track_orders
 from rubhpc.study.drive_law import DriveLaw
 
 if TYPE_CHECKING:
@@ -150,8 +150,6 @@ def by_revolution(found: RunUp, signals: dict[str, Floats], per_revolution: int)
             "revolution_braking_torque": found.braking_torque,
         }
     for name in (*TRACKED, *(name for name in signals if name.startswith(PROBE))):
-        lines = np.stack(
-            [track_order(signals[name], per_revolution, order, WINDOW) for order in ORDERS], axis=-1
-        )
+        lines = track_orders(signals[name], per_revolution, ORDERS, WINDOW)
         known[AMPLITUDE + name], known[PHASE + name] = np.abs(lines), np.angle(lines)
     return known

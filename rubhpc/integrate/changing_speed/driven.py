@@ -142,6 +142,7 @@ def integrate_driven(
             break
         if pieces_per_revolution is None and 4.0 * taken.lag <= LAG:
             length *= 2
+    gathered.sum_up()
     if n_done == 0 and not reason:
         problem = "falls" if end == TOO_SLOW else "rises"
         limit = (drive.lowest if end == TOO_SLOW else fastest.spin) * 30.0 / math.pi

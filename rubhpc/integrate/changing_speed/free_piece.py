@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.passing import Passed, Passing, state_at
 from rubhpc.integrate.changing_speed.piece_setup import Pieces
-from rubhpc.integrate.measuring.measures import new_accumulator
+from rubhpc.integrate.measuring.measures import lift_samples, new_accumulator
 from rubhpc.integrate.start import start_of
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
@@ -107,6 +107,7 @@ class Spin:
                 start = self._initial
                 self._begun = start_of(start, setup, self._clearance) if isinstance(start, Initial) else start
             passed = self._passing.take(setup, length, self._begun, self._earlier, is_balanced=True)
+            lift_samples(passed.whole, setup.model)
             if passed.reason:
                 return self._taken(passed, acceleration, length, per_revolution, torque, np.zeros(6))
             flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)

@@ -12,9 +12,9 @@ from rubhpc.integrate.case import march_of
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.marches.modal import ModalMarch, Place
-from rubhpc.integrate.measuring.measures import add_sag, empty_samples, following_accumulator
+from rubhpc.integrate.measuring.measures import empty_samples, following_accumulator
 from rubhpc.integrate.record import State
-from rubhpc.kernels.accumulators import Accumulator  # noqa: TC001 - of a NamedTuple
+from rubhpc.kernels.accumulators import Accumulator, Samples  # noqa: TC001 - of a NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 class Passed(NamedTuple):
     """What a piece has yielded."""
 
-    whole: Floats  # (n_row, n_sample)
+    whole: Floats  # (n_row, n_sample), about the sag, until the next piece
     accumulators: list[Accumulator]  # of each revolution in it, or of the part of one that it is
     n_step: int
     end: Place
@@ -42,6 +42,7 @@ class Passing:
         self._case = clearance, friction
         self._check = check
         self._march: EventDrivenMarch | None = None
+        self._room: dict[int, Samples] = {}  # by how many samples a piece has
 
     def take(
         self,
@@ -86,7 +87,10 @@ class Passing:
         is_balanced: bool,
     ) -> Passed:
         model = setup.model
-        samples = empty_samples(model.n_place, n_sample, model.n_probe)
+        if n_sample not in self._room:
+            self._room[n_sample] = empty_samples(model.n_place, n_sample, model.n_probe)
+        samples = self._room[n_sample]
+        samples.whole[:] = 0.0
         before = march.energy() if is_balanced else math.nan
         accumulators: list[Accumulator] = []
         stride, reason = min(n_sample, setup.samples_per_revolution), None
@@ -98,7 +102,6 @@ class Passing:
             reason = march.advance(first, first + stride, samples, accumulator, is_recorded=True)
             if reason is not None:
                 break
-        add_sag(samples, accumulators[0], model)
         gained = march.energy() - before if is_balanced else math.nan
         return Passed(samples.whole, accumulators, march.n_step, march.reached(), gained, reason or "")
 

@@ -17,13 +17,13 @@ from rubhpc.integrate.reduced_model.mode_tables import TableStack
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 from rubhpc.kernels.retuning import HeldMode, retune
+from rubhpc.kernels.retuning_laws import NO_RIM, RimPart, Springs
 
 NOT_TUNED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode, Solved
-    from rubhpc.kernels.contact_modes import ModeTables
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -72,11 +72,10 @@ class RetunedLibrary(ModeLibrary):
         self.add(0)
 
     def tune(self, spin: float, factor: complex, tick: float) -> None:
-        """Begin at another speed, rad/s, with the unbalance at unit speed times `factor`: with pairs open."""
+        """Begin at another speed, rad/s, with the unbalance at unit speed times `factor`: with no mode."""
         self._spin, self._factor, self._tick = spin, factor, tick
         self.masks = [NOT_TUNED] * len(self._held)
         self.tables().mask[:] = NOT_TUNED
-        self.add(0)
 
     def add(self, mask: int) -> bool:
         """Tune the mode with these pairs closed; returns whether the tables are wide enough for it."""
@@ -90,10 +89,8 @@ class RetunedLibrary(ModeLibrary):
             self.masks.append(mask)
         place = self._place[mask]
         interval = self._tick * 2.0**self._sample_level
-        tables = self.tables()
-        self._before(place, tables)
-        retune(tables, place, self._held[place], self._spin, self._factor, self._tick, interval)
-        self._after(place, tables)
+        tables, share = self.tables(), abs(self._spin / self.reduced.spin)
+        retune(tables, place, self._held[place], self._spin, share, self._factor, self._tick, interval)
         self.masks[place] = tables.mask[place] = mask
         return True
 
@@ -132,12 +129,6 @@ class RetunedLibrary(ModeLibrary):
         across[:, closed] = (self.force_direction - self.gap_jacobian)[closed].T
         return Linear(tangent @ (project @ self._phasor), switch, reaction, across, reduced.damping)
 
-    def _before(self, place: int, tables: ModeTables) -> None:
-        """Change what the kernel does not know of."""
-
-    def _after(self, place: int, tables: ModeTables) -> None:
-        """The same of what it fills in."""
-
     def _hold(self, mode: ContactMode) -> HeldMode:
         """What the spin speed leaves alone of a mode."""
         reduced, m, width = self.reduced, mode.n_eigenmode, self.width
@@ -173,7 +164,32 @@ class RetunedLibrary(ModeLibrary):
             work=np.stack([self._phasor @ motion[n:], self._phasor.conj() @ motion[n:]]),
             output=np.hstack(self._output),
             row=row,
+            rim=_NO_RIM,
+            springs=self._springs_of(mode),
         )
+
+    def _springs_of(self, mode: ContactMode) -> Springs:
+        """Springs that press in a mode."""
+        return Springs(0.0, self.gap_jacobian[:0], np.zeros((0, 2 * self.width)))
+
+
+_NONE = np.zeros(0, dtype=np.complex128)
+_NO_RIM = RimPart(
+    one=NO_RIM,
+    motion=_NONE,
+    entered=_NONE,
+    switch=_NONE,
+    fixed=_NONE,
+    rate=_NONE,
+    loss=np.zeros((0, 0)),
+    power=0.0,
+    velocity=_NONE,
+    resisting=_NONE,
+    row=_NONE,
+    work=_NONE,
+    growing=np.zeros(0, dtype=np.int64),
+    speed=np.zeros(0),
+)
 
 
 class Linear(NamedTuple):

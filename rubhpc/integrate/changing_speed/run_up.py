@@ -19,7 +19,7 @@ import numpy as np
 from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.piece_setup import Pieces
 from rubhpc.integrate.changing_speed.turns import Turns
-from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
+from rubhpc.integrate.measuring.measures import empty_samples, lift_samples, new_accumulator
 from rubhpc.integrate.record import State
 from rubhpc.integrate.start import start_of
 from rubhpc.study.initial import Initial
@@ -109,9 +109,13 @@ def integrate_run_up(
     reached: State | Place | None = initial if isinstance(initial, State) else None
     n_step, reason, n_done, before = 0, "", n, 0.0
     earlier = new_accumulator(n_stator, model.n_place)
+    sagging, begun = model, 0  # whose sag the samples from there on are about
     for i, (first, last) in enumerate(itertools.pairwise(cuts)):
         duration = times[i + 1] - times[i]
         setup = pieces.setup((angles[i + 1] - angles[i]) / duration, accelerations[i], angles[i], duration)
+        if setup.model is not sagging:
+            lift_samples(whole[:, begun:first], sagging)
+            sagging, begun = setup.model, first
         if reached is None:
             reached = start_of(initial, setup, clearance) if isinstance(initial, Initial) else initial
         passed = passing.take(setup, last - first, reached, (earlier, before))
@@ -124,6 +128,8 @@ def integrate_run_up(
             n_done = first // per_revolution + len(passed.accumulators) - 1
             reason = f"{passed.reason} in revolution {n_done + 1}"
             break
+    lift_samples(whole[:, begun : n_done * per_revolution], sagging)
+    gathered.sum_up()
     assert reached is not None  # a law has a whole revolution at least
     turns = np.diff(begins)[:n_done]
     return RunUp(

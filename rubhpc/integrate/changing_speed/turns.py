@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 _SUMMED = ("n_contact", "contact_time", "impulse", "stick_time")
+MOST_WAITING = 128  # revolutions that are added at once
 
 
 class Turns:
@@ -29,25 +30,42 @@ class Turns:
         Of each revolution; s, N and J.
     together : Accumulator
         Sums and extrema of all revolutions.
+
+    They hold what was added before the last call of `sum_up`.
     """
 
     def __init__(self, n: int, model: Model) -> None:
         n_stator = len(model.stators)
         self.contact_time, self.peak_force, self.friction_work = np.zeros((3, n, n_stator))
         self.together = new_accumulator(n_stator, model.n_place)
+        self._waiting: list[tuple[int, Accumulator]] = []
 
     def add(self, turn: int, accumulator: Accumulator) -> None:
         """Add what a revolution, or a part of one, has gathered."""
-        self.contact_time[turn] += accumulator.contact_time
-        self.friction_work[turn] += accumulator.friction_work
-        np.maximum(self.peak_force[turn], accumulator.peak_force, out=self.peak_force[turn])
-        together = self.together
+        self._waiting.append((turn, accumulator))
+        if len(self._waiting) == MOST_WAITING:
+            self.sum_up()
+
+    def sum_up(self) -> None:
+        """Add what waits to be added."""
+        if not self._waiting:
+            return
+        turns, accumulators = zip(*self._waiting, strict=True)
+        self._waiting, together, at = [], self.together, list(turns)
+        new = {
+            name: np.array([getattr(accumulator, name) for accumulator in accumulators])
+            for name in (*_SUMMED, "friction_work", "least_slip", "peak_force", "peak_lateral")
+        }
+        np.add.at(self.contact_time, at, new["contact_time"])
+        np.add.at(self.friction_work, at, new["friction_work"])
+        np.maximum.at(self.peak_force, at, new["peak_force"])
         for name in _SUMMED:
             total = getattr(together, name)
-            total += getattr(accumulator, name)
-        np.minimum(together.least_slip, accumulator.least_slip, out=together.least_slip)
-        np.maximum(together.peak_force, accumulator.peak_force, out=together.peak_force)
-        np.maximum(together.peak_lateral, accumulator.peak_lateral, out=together.peak_lateral)
+            total += new[name].sum(axis=0)
+        np.minimum(together.least_slip, new["least_slip"].min(axis=0), out=together.least_slip)
+        for name in ("peak_force", "peak_lateral"):
+            largest = getattr(together, name)
+            np.maximum(largest, new[name].max(axis=0), out=largest)
 
 
 def contact_measures(

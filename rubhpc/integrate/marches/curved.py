@@ -36,6 +36,7 @@ class CurvedMarch(EventDrivenMarch):
     """A case from one contact mode to another, of which only flights have a closed form."""
 
     has_closed_form = False
+    is_foreseeing = False  # contact modes are solved for each piece
 
     def __init__(
         self,
@@ -108,7 +109,7 @@ class CurvedMarch(EventDrivenMarch):
         return setup.curved_library(friction)
 
     def _start(self, mode: int) -> None:
-        begin_in(self.progress, mode)
+        begin_in(self._bare_progress, mode)
         ask_for(self.progress, int(self.tables.mask[mode]))
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+FORESEEN, MOST_FORESEEN = 4, 4  # pieces for which a set of contacts is found again at their beginning; sets
 MOST_REFILLS = 8  # of tables that one case may meet; where it meets more, short steps cost less
 
 
@@ -43,6 +44,7 @@ class EventDrivenMarch(ModalMarch):
     """A case that goes from one contact mode to another; `NoClosedForm` leaves it to contact stepping."""
 
     has_closed_form = True  # of its closed contacts
+    is_foreseeing = True  # whether pieces begin with sets of contacts that those before have met
     take_change: ClassVar[Callable[..., int]] = staticmethod(change_contacts)  # kernel that takes an event
 
     def __init__(
@@ -56,6 +58,8 @@ class EventDrivenMarch(ModalMarch):
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(setup, clearance, friction, initial, check)
         self._event_work = event_work(self._clearance.size)
+        self._n_piece = 0
+        self._asked: dict[int, int] = {}  # piece in which each set of contacts was last asked for
         self._enter_first(initial.contact_force)
 
     def begin(self, setup: ModalSetup, place: Place) -> None:
@@ -66,15 +70,20 @@ class EventDrivenMarch(ModalMarch):
         if place.sag is not setup.model.sag and (moved := place.sag - setup.model.sag).any():
             n = self.bodies.stiffness.shape[0]
             self._motion[:n] += setup.reduced.project[:, : moved.size] @ moved
+        self._n_piece += 1
+        self._asked = {mask: n for mask, n in self._asked.items() if self._n_piece - n <= FORESEEN}
         self._enter_first(place.contact_force)
 
     def _enter_first(self, contact_force: Floats) -> None:
         """Enter the contact mode with which the case begins; forces (q,), N."""
         self._library = self._find_library(self._setup, self._coefficient)
         self._met = set(self._library.first_masks)  # sets of closed contacts
+        if self.is_foreseeing:
+            for foreseen in list(self._asked)[-MOST_FORESEEN:]:
+                self.find(foreseen)
         mask = self._first_mask(contact_force)
         self.find(mask)
-        self._start(int(np.flatnonzero(self.tables.mask == mask)[0]))
+        self._start(self._library.masks.index(mask))
 
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs are closed, (q,)."""
@@ -173,6 +182,13 @@ class EventDrivenMarch(ModalMarch):
             tables = tables._replace(mask=shown)
         self._use(tables)
 
+    def find_wanted(self) -> None:
+        """See that the tables hold the set of contacts that the kernel asks for."""
+        mask = int(self._bare_progress["wanted"])
+        self._asked.pop(mask, None)
+        self._asked[mask] = self._n_piece  # the last one asked for comes last
+        self.find(mask)
+
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
         while True:
             outcome = advance(
@@ -192,7 +208,7 @@ class EventDrivenMarch(ModalMarch):
             )
             if outcome != MODE_WANTED:
                 return outcome
-            self.find(self.progress.wanted)
+            self.find_wanted()
 
     def _unsolved(self) -> str:
         raise NoClosedForm

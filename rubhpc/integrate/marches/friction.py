@@ -21,7 +21,7 @@ from rubhpc.kernels.case_progress import (
     follow,
     shaft_angle,
 )
-from rubhpc.kernels.contact_modes import FORCED_LEVEL, enter
+from rubhpc.kernels.contact_modes import FORCED_LEVEL
 from rubhpc.kernels.friction_change import change_states
 from rubhpc.kernels.friction_events import friction_work
 from rubhpc.kernels.friction_loop import advance_with_friction
@@ -144,10 +144,6 @@ class FrictionMarch(EventDrivenMarch):
             )
         )
 
-    def _start(self, mode: int) -> None:
-        super()._start(mode)
-        enter(self.tables, mode, self._entered_with, 1.0, 0.0, self._motion, self._z)
-
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
         while True:
             if self._n_short:
@@ -171,7 +167,7 @@ class FrictionMarch(EventDrivenMarch):
                 accumulator,
             )
             if outcome == MODE_WANTED:
-                self.find(self.progress.wanted)
+                self.find_wanted()
             elif outcome == CONTACT_UNSOLVED:
                 self._hand_over()
             else:

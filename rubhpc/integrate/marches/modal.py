@@ -23,7 +23,7 @@ from rubhpc.kernels.case_progress import (
     new_progress,
     restart_clock,
 )
-from rubhpc.kernels.contact_modes import enter
+from rubhpc.kernels.contact_modes import enter, is_within
 from rubhpc.kernels.measuring import recorder
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-_BEGUN = new_progress(1)  # to fill one anew takes a hundred times as long
+_BEGUN = bare(new_progress(1))
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
 
 
@@ -67,6 +67,10 @@ class ModalMarch(March):
         offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
         self._at_rest, self._coefficient = clearance + offsets, friction
         self._model: Model | None = None  # to which the clearances belong
+        records = new_progress(1)
+        self.progress: Progress = records[0]
+        self._bare_records = bare(records)
+        self._bare_progress = self._bare_records[0]  # the same, for kernels
         self._take(setup)
         self._motion = self._reduce(initial)
         self._recorder = recorder(setup.model.n_place, setup.model.n_probe)
@@ -91,9 +95,8 @@ class ModalMarch(March):
             n_sample=0,
         )
         self.bodies = setup.bodies(self._coefficient, self._clearance)
-        records = _BEGUN.copy()
-        self.progress: Progress = records[0]
-        self._bare_progress = bare(records)[0]  # the same, for kernels
+        self._bare_records[:] = _BEGUN
+        self._entered_with = self._clearance  # values of the coordinates that do not move
 
     @abstractmethod
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
@@ -152,8 +155,8 @@ class ModalMarch(March):
 
     def _start(self, mode: int) -> None:
         """Begin in a contact mode of the tables, at the shaft's angle 0."""
-        begin_in(self.progress, mode)
-        enter(self.tables, mode, self._clearance, 1.0, 0.0, self._motion, self._z)
+        begin_in(self._bare_progress, mode)
+        enter(self.tables, mode, self._entered_with, 1.0, 0.0, self._motion, self._z)
 
     def _call(
         self, stop: int, samples: Samples, accumulator: Accumulator, *, is_recorded: bool
@@ -181,6 +184,16 @@ class ModalMarch(March):
         limit, motion = setup.displacement_limit, self._motion
         if not is_at_event:
             motion = self.motion()
+            if is_within(
+                motion,
+                self.bodies.translations,
+                self.bodies.stiffness,
+                accumulator.highest,
+                accumulator.lowest,
+                limit,
+                setup.energy_limit,
+            ):
+                return None
         seen = np.abs(setup.reduced.translations @ motion[: self.bodies.stiffness.shape[0]])
         (highest, aside, _), (lowest, other, _) = accumulator.highest.tolist(), accumulator.lowest.tolist()
         if highest >= lowest:  # a sample was taken

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
+_WIDEST = np.array([[-np.inf] * 3, [np.inf] * 3])  # extrema before anything is seen
 LEAST_EXCHANGE = 1e-6  # of the mechanical energy: a motion that exchanges less is balanced against that
 
 
@@ -91,8 +92,8 @@ def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
     """Sums at zero, but for the window of the mean force; a run-up takes one a revolution."""
     contact_time, impulse, stick_time, friction_work, peak_force, least_slip = np.zeros((6, n_stator))
     n_contact, sense, reversals = np.zeros((3, n_stator), dtype=np.int64)
-    highest, lowest = np.zeros((2, 3))
-    highest[:], lowest[:], least_slip[:] = -np.inf, np.inf, np.inf
+    highest, lowest = _WIDEST.copy()
+    least_slip[:] = np.inf
     return Accumulator(
         highest=highest,
         lowest=lowest,
@@ -118,12 +119,19 @@ def add_sag(samples: Samples, accumulator: Accumulator, model: Model) -> None:
     """Count what output node and probes see from the shaft without loads, not from where it sags to."""
     if not model.sag.any():
         return
-    if model.probe is not None:
-        samples.probe[:] += model.probe.constant[:, np.newaxis]
+    lift_samples(samples.whole, model)
     sag = model.output_sag
-    samples.rotor[:3] += sag[:, np.newaxis]
     accumulator.highest[:] += sag
     accumulator.lowest[:] += sag
+
+
+def lift_samples(whole: Floats, model: Model) -> None:
+    """Count samples (`Samples.whole`) from the shaft without loads."""
+    if not model.sag.any():
+        return
+    if model.probe is not None:
+        whole[4 + 3 * model.n_place :] += model.probe.constant[:, np.newaxis]
+    whole[:3] += model.output_sag[:, np.newaxis]
 
 
 def samples_within(samples: Samples, n_taken: int, limit: float) -> int:

@@ -130,7 +130,7 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
     spin, tick = 231.0, 0.9 * base.tick
     factor = (spin**2 - 40.0j) * np.exp(0.7j)
     library.tune(spin, factor, tick)
-    assert [mask for mask in library.masks if mask >= 0] == [0]  # others wait until they are met
+    assert not any(mask >= 0 for mask in library.masks)  # they wait until they are met
     force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
     reduced = replace(base.reduced, spin=spin, force=force)
     levels |= {"width": library.width, "tick": tick}

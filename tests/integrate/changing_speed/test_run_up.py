@@ -10,9 +10,13 @@ from trial_rig import trial_rig
 
 from rubhpc import LumpedStator, Rig, Unbalance, run_up, simulate
 from rubhpc.errors import InputError
+from rubhpc.integrate.changing_speed.run_up import integrate_run_up
+from rubhpc.integrate.setup import prepare
 from rubhpc.rig.bearing_table import BearingTable
-from rubhpc.spectra import track_order
+from rubhpc.spectra import track_orders
+from rubhpc.study.initial import Initial
 from rubhpc.study.speed_law import LAG, SpeedLaw, cut
+from rubhpc.study.study import Contact, Integrator
 
 M = np.diag([5.0, 5.0, 1e-2, 1e-2, 8e-3])
 C = np.diag([30.0, 30.0, 1e-3, 1e-3, 1e-2])
@@ -212,7 +216,7 @@ def test_orders_are_followed():
     angle = 2 * math.pi * np.arange(64 * 40) / 64
     growth = 1.0 + 1e-3 * angle
     signal = 3.0 + growth * np.cos(angle + 0.3) + 0.5 * np.sin(angle / 3)
-    first, third = (track_order(signal, 64, order, 6) for order in (1.0, 1 / 3))
+    first, third = track_orders(signal, 64, (1.0, 1 / 3), 6).T
     assert np.abs(first[6:-6]) == pytest.approx(growth[::64][6:-6], rel=2e-3)
     assert np.angle(first) == pytest.approx(0.3, abs=5e-3)
     assert np.abs(third[6:-6]) == pytest.approx(0.5, rel=5e-3)
@@ -250,6 +254,26 @@ def test_pieces_of_several_revolutions_are_as_accurate_as_short_ones():
         expected = fine[name].values[: touched + 64 * 6]
         error = np.abs(found[name].values[: touched + 64 * 6] - expected).max()
         assert error < 0.01 * np.abs(expected).max(), name
+
+
+SPRINGS, STICK = {"law": "penalty", "stiffness": 1e6}, {"friction_law": "coulomb"}
+
+
+@pytest.mark.parametrize(
+    "contact", [{}, STICK, SPRINGS, STICK | SPRINGS], ids=["sliding", "stick", "springs", "both"]
+)
+def test_earlier_cases_of_a_set_up_change_nothing(contact):
+    """Cases share matrices and contact modes, in whatever order they meet them."""
+    law = SpeedLaw(time=(0.0, 0.4), speed=(185.0, 209.0))
+    case = {"contact": Contact(**contact), "integrator": Integrator(), "samples_per_revolution": 64}
+    used, fresh = (prepare(trial_rig(3), 209.0, **case) for _ in range(2))
+    start = {"friction": 0.2, "initial": Initial(from_="contact-free")}
+    for clearance in (3e-5, 5e-5):
+        found = integrate_run_up(used, law, clearance=clearance, **start)
+    alone = integrate_run_up(fresh, law, clearance=5e-5, **start)
+    assert found.contact_fraction.max() > 0.0
+    assert found.whole.tobytes() == alone.whole.tobytes()
+    assert found.friction_work.tobytes() == alone.friction_work.tobytes()
 
 
 @pytest.mark.parametrize(
