@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -252,11 +253,26 @@ class ModalSetup:
             )
         return self._friction_libraries[friction]
 
+    @property
+    def _all_libraries(self) -> tuple[dict[float, Any], ...]:
+        return self._libraries, self._curved_libraries, self._friction_libraries, self._penalty_libraries
+
+    @property
+    def n_byte(self) -> dict[float, int]:
+        """Memory that tables of contact modes hold, by friction."""
+        found: Counter[float] = Counter()
+        for held in self._all_libraries:
+            found.update({friction: library.n_byte for friction, library in held.items()})
+        return found
+
+    def n_mode(self, friction: float) -> int:
+        """Contact modes of a friction that are solved."""
+        return sum(len(held[friction].masks) for held in self._all_libraries if friction in held)
+
     def forget(self, friction: float) -> None:
         """Free the contact modes of a friction."""
         self._open_tables.pop(friction, None)
-        libraries = self._libraries, self._curved_libraries, self._friction_libraries, self._penalty_libraries
-        for held in libraries:
+        for held in self._all_libraries:
             held.pop(friction, None)
 
     def penalty_library(self, friction: float) -> ModeLibrary:

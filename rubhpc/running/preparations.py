@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from rubhpc.running.worker import MOST_SETUPS
+from rubhpc.running.kept_setups import MOST_SETUPS
 from rubhpc.storage.resume import missing_share
 
 if TYPE_CHECKING:

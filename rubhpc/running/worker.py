@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import OrderedDict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,15 +14,15 @@ from rubhpc.integrate.changing_speed.case import RunUpRecord, record_run_up
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.record import State
 from rubhpc.running.case_rows import packed_measures, put_any
-from rubhpc.running.case_setup import operation_of, set_up
+from rubhpc.running.case_setup import operation_of
 from rubhpc.running.held_blocks import HeldBlocks
 from rubhpc.running.initial_states import InitialState, InitialStates
+from rubhpc.running.kept_setups import KeptSetups
 from rubhpc.running.pool import Totals
 from rubhpc.running.stopping import Stopped
 from rubhpc.schema import DIVERGED, DONE, FAILED
 from rubhpc.storage.journal import Entry
 from rubhpc.storage.store import case_checksum
-from rubhpc.study.drive_law import DriveLaw
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,20 +31,16 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.record import Record
     from rubhpc.integrate.setup import Setup
-    from rubhpc.rig.rig import Rig
     from rubhpc.running.stopping import Stopping
     from rubhpc.running.watchdog import Watchdog
     from rubhpc.storage.journal import Journal
     from rubhpc.storage.ledger import Ledger
     from rubhpc.storage.store import Store
     from rubhpc.study.cases import Block, Case, CaseGrid
-    from rubhpc.study.contact_keys import Contact
     from rubhpc.study.initial import Initial
     from rubhpc.study.study import Study
 
     Arrays = dict[str, NDArray[Any]]
-
-MOST_SETUPS = 4  # prepared setups a rank keeps; a block shares one, and neighbours often do
 
 
 class _OverTime(Exception):  # noqa: N818 - becomes the reason of a failed case
@@ -84,7 +79,7 @@ class Worker:
 
     def __post_init__(self) -> None:
         self._record_type = self.store.manifest.header.record_type
-        self._setups: OrderedDict[tuple[int, float, Contact, float], tuple[Rig, Setup]] = OrderedDict()
+        self._setups = KeptSetups(self.grid.study)
         self._initial_states = InitialStates(self.grid, self.store, self.ledger, self._repair)
         self.say: Callable[[str], None] = lambda _: None
         self.is_wanted_elsewhere: Callable[[], bool] = lambda: False
@@ -200,20 +195,7 @@ class Worker:
                 return record_branches(operation, study.branch, span, study.recording, check, self.say)
             finally:
                 self.say("")
-        key = (
-            id(case.rig),
-            case.speed,
-            case.contact,
-            case.speed_law.inertia or 0.0 if isinstance(case.speed_law, DriveLaw) else 0.0,
-        )  # a rig that is kept here keeps its id; hashing it takes as long as a block
-        if key in self._setups:
-            setup = self._setups[key][1]
-        else:
-            model = next((kept.model for rig, kept in self._setups.values() if rig is case.rig), None)
-            setup = set_up(study, case, model)
-            self._setups[key] = (case.rig, setup)
-            if len(self._setups) > MOST_SETUPS:
-                self._setups.popitem(last=False)
+        setup = self._setups.of(case)
         initial = case.initial if start.state is None else State.unpacked(start.state, setup.model)
         return integrate(study, case, setup, initial, check)
 

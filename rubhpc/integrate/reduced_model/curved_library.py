@@ -26,6 +26,11 @@ class CurvedLibrary(ModeLibrary):
         """Contact modes that there is room for."""
         return super().n_most if self._curved is None else min(super().n_most, self._curved.n_most)
 
+    @property
+    def n_byte(self) -> int:
+        """Memory that its tables hold."""
+        return super().n_byte + (0 if self._curved is None else self._curved.n_byte)
+
     def forget(self) -> None:
         """Make room: keep no mode but that with every pair open."""
         if self._curved is not None:

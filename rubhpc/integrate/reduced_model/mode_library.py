@@ -80,6 +80,11 @@ class ModeLibrary:
         return self._tables.n_most
 
     @property
+    def n_byte(self) -> int:
+        """Memory that its tables hold."""
+        return self._tables.n_byte
+
+    @property
     def is_full(self) -> bool:
         """Whether there is no room for another contact mode."""
         return len(self.masks) >= self.n_most

@@ -52,7 +52,8 @@ class TableStack:
             self._kind = type(row)
         elif self._n_filled == len(self._room[0]):  # twice the room: most books never need it
             n_room = min(2 * self._n_filled, self.n_most)
-            self._room = [np.resize(field, (n_room, *field.shape[1:])) for field in self._room]
+            for i, field in enumerate(self._room):  # one after the other: all at once would take it twice
+                self._room[i] = np.resize(field, (n_room, *field.shape[1:]))
         for field, new in zip(self._room, rows, strict=True):
             field[self._n_filled] = new[0]
         self._n_filled += 1
@@ -61,6 +62,11 @@ class TableStack:
     def clear(self) -> None:
         """Give all room back to contact modes to come."""
         self._n_filled, self._view = 0, None
+
+    @property
+    def n_byte(self) -> int:
+        """Memory that is held."""
+        return sum(field.nbytes for field in self._room)
 
     def view(self) -> Any:
         """The tables of all contact modes."""
