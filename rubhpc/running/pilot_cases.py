@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,6 +15,7 @@ from rubhpc.integrate.branches.case import record_branches
 from rubhpc.integrate.case import compile_kernels, run_case
 from rubhpc.integrate.changing_speed.case import RunUpRecord
 from rubhpc.integrate.compilation import seconds_compiling
+from rubhpc.integrate.setup import ModalSetup
 from rubhpc.running.case_setup import operation_of, set_up
 from rubhpc.running.worker import integrate
 from rubhpc.schema import FINAL_STATE
@@ -31,7 +33,8 @@ if TYPE_CHECKING:
     from rubhpc.study.contact_keys import Contact
     from rubhpc.study.study import Recording
 
-_LONG, _PILOT_TIME = 0.25, 0.5  # s: longer cases are shortened; of the longest run of such a case, about
+_LONG = 0.25  # s: cases that take longer are shortened where there is no time for the whole of them
+_PATIENCE = 4.0  # times as long as foreseen: a case is cut off
 _FIRST_STEPS = 50_000  # predicted, of the first run of a case that is shortened
 _LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
 _FIRST_TURNS, _WINDOWS = 64, 4  # revolutions of a changing speed that are tried first, and in how many parts
@@ -43,7 +46,8 @@ class Pace(NamedTuple):
     """What a run spends its time on, seconds.
 
     `step` is that of a predicted step, `rig` of assembling a rig, `speed` of preparing it at a speed with the
-    modes, `friction` of solving the contact modes of a friction, `block` of writing a block.
+    modes, `friction` of solving the contact modes of a friction, `block` of writing a block, `case` of a case
+    whatever its steps.
     """
 
     step: float
@@ -51,6 +55,7 @@ class Pace(NamedTuple):
     speed: float
     friction: float
     block: float = 0.0
+    case: float = 0.0
 
 
 class _Enough(Exception):  # noqa: N818 - no error: what ends the branches of a pilot case
@@ -81,29 +86,61 @@ class Pilots:
         self.shortened: set[tuple[int, ...]] = set()
         self.arrays: dict[str, NDArray[Any]] = {}
 
-    def pace(self, index: tuple[int, ...], steps: float) -> Pace:
-        """Times of a case, shortened where the whole of it takes long, and of its preparation."""
+    def pace(self, index: tuple[int, ...], steps: float, limit: float) -> Pace:
+        """Times of a case and of its preparation; shortened where the whole takes longer than `limit`, s.
+
+        With several stators each case meets other sets of contacts. Another case of its speed and friction is
+        run after it: the modes that this one did not have to solve are those that such cases share.
+        """
         case = self._grid.case(index)
         if self._study.branch is not None:
             return Pace(self._branches(case) / steps, 0.0, 0.0, 0.0)
         rig, speed, setup = self._prepared(case)
         if case.speed_law is not None:
             return Pace(self._turning(case, setup, case.speed_law) / steps, rig, speed, 0.0)
-        runs, recording = self._runs(case, setup, steps)
-        done, taken = runs[-1]
-        if len(runs) == 1:  # it has solved the contact modes
-            first, again = taken, min(taken, self._run(case, setup, recording))
-        else:
-            first = self._run(case, set_up(self._study, case, setup.model), recording)
-            again = min(taken, first)
-        whole = again
-        if done < 1.0:  # a rub may begin late, and then costs more
-            before = runs[-2] if len(runs) > 1 else (0.0, 0.0)
-            slope = max((again - before[1]) / (done - before[0]), _LATE * again / done)
-            whole = again + (1.0 - done) * slope
+        modes, whole, is_whole = self._modes_and_rest(case, setup, steps, limit)
+        if not is_whole:
             self.shortened.add(index)
         self._paces.append(whole / steps)
-        return Pace(step=whole / steps, rig=rig, speed=speed, friction=max(0.0, first - again))
+        return Pace(step=whole / steps, rig=rig, speed=speed, friction=modes)
+
+    def _modes_and_rest(
+        self, case: Case, setup: Setup, steps: float, limit: float
+    ) -> tuple[float, float, bool]:
+        """Times of solving contact modes and of a case that finds them solved, and whether it ran whole."""
+        modes, runs = self._runs(case, setup, steps, limit)
+        done, whole = runs[-1]
+        if done < 1.0:  # a rub may begin late, and then costs more
+            before = runs[-2] if len(runs) > 1 else (0.0, 0.0)
+            slope = max((whole - before[1]) / (done - before[0]), _LATE * whole / done)
+            whole += (1.0 - done) * slope
+        if not _is_ring(setup):
+            return modes, whole, done == 1.0
+        a_mode = modes / max(_n_mode(setup, case), 1)
+        whole += modes
+        try:
+            if done < 1.0 and whole <= limit:
+                setup, done = set_up(self._study, case, setup.model), 1.0
+                whole = self._run(case, setup, self._study.recording, _PATIENCE * limit)
+            if done == 1.0 and (other := self._alike(case)) is not None:
+                met = _n_mode(setup, case)
+                later = self._run(other, setup, self._study.recording, _PATIENCE * limit)
+                shared = min(a_mode * max(2 * met - _n_mode(setup, case), 0), 0.9 * whole)
+                return shared, 0.5 * (whole - shared + later), True
+        except _Enough:
+            return 0.0, max(whole, _PATIENCE * limit), False
+        return 0.0, whole, done == 1.0
+
+    def _alike(self, case: Case) -> Case | None:
+        """Another case, far along one axis, that shares the contact modes of this one."""
+        for axis, n in enumerate(self._grid.shape):
+            index = list(case.index)
+            index[axis] = (index[axis] + max(n // 2, 1)) % n
+            other = self._grid.case(index)
+            shared = other.rig is case.rig and other.contact == case.contact
+            if shared and (other.speed, other.friction) == (case.speed, case.friction) and n > 1:
+                return other
+        return None
 
     def _prepared(self, case: Case) -> tuple[float, float, Setup]:
         """Times of assembling the rig and of preparing the speed, and the set-up, its kernels compiled."""
@@ -127,12 +164,19 @@ class Pilots:
         prepared = time.process_time() - middle
         return max(0.0, middle - began - prepared), prepared, setup
 
-    def _runs(self, case: Case, setup: Setup, steps: float) -> tuple[list[tuple[float, float]], Recording]:
-        """Shares of the case that were run, each longer than the last, what they took, s, and the longest."""
+    def _runs(
+        self, case: Case, setup: Setup, steps: float, limit: float
+    ) -> tuple[float, list[tuple[float, float]]]:
+        """What contact modes took, s; shares of the case that were run, each longer than the last, and times.
+
+        A run is as long as `limit`, s, allows.
+        """
         whole = self._study.recording
         known = max(self._paces, default=math.nan) * steps
         ends_by_itself = isinstance(whole.transient, str)  # nobody knows when, but by trying
-        share = 1.0 if ends_by_itself or known < _LONG else min(1 / 16, _FIRST_STEPS / steps)
+        is_short = known < _LONG and not _is_ring(setup)
+        share = 1.0 if ends_by_itself or is_short else min(1 / 16, _FIRST_STEPS / steps)
+        modes = 0.0
         runs: list[tuple[float, float]] = []
         while True:
             recording = _shortened(whole, share)
@@ -140,10 +184,13 @@ class Pilots:
             done = (recording.longest_transient + recording.revolutions) / (
                 whole.longest_transient + whole.revolutions
             )
+            if not runs and (done < 1.0 or (taken < _LONG and not _is_ring(setup))):
+                again = min(taken, self._run(case, setup, recording))
+                modes, taken = taken - again, again
             runs.append((done, taken))
-            longer = min(1.0, done * _PILOT_TIME / taken, 4 * share)
-            if done == 1.0 or (longer < 1.0 and longer < 2 * share):
-                return runs, recording
+            longer = min(1.0, done * limit / taken, 4 * share)
+            if done == 1.0 or _is_ring(setup) or (longer < 1.0 and longer < 2 * share):
+                return modes, runs
             share = longer
 
     def whole(self, index: tuple[int, ...], steps: float, guessed: Pace, limit: float) -> Pace:
@@ -205,8 +252,8 @@ class Pilots:
                 return taken
             self.compiling += taken
 
-    def _run(self, case: Case, setup: Setup, recording: Recording) -> float:
-        """Processor time of a case, s."""
+    def _run(self, case: Case, setup: Setup, recording: Recording, most: float = math.inf) -> float:
+        """Processor time of a case, s; `_Enough` where it takes longer than `most`."""
         return self._timed(
             lambda: run_case(
                 setup,
@@ -214,6 +261,7 @@ class Pilots:
                 friction=case.friction,
                 recording=recording,
                 initial=case.initial,
+                check=_limited(most),
             )
         )
 
@@ -221,12 +269,25 @@ class Pilots:
         """Processor time of what yields a record, s; it is run once more where kernels were compiled."""
         while True:
             compiled, began = seconds_compiling(), time.process_time()
-            record = run()
+            record = None
+            with suppress(_Enough):
+                record = run()
             taken = time.process_time() - began
             if seconds_compiling() == compiled:
+                if record is None:
+                    raise _Enough
                 self.arrays = arrays_of(record)
                 return max(taken, 1e-6)
             self.compiling += taken
+
+
+def _is_ring(setup: Setup) -> bool:
+    return len(setup.model.stators) > 1
+
+
+def _n_mode(setup: Setup, case: Case) -> int:
+    """Contact modes that cases of this friction have met so far."""
+    return setup.n_mode(case.friction) if isinstance(setup, ModalSetup) else 0
 
 
 def arrays_of(record: Record | RunUpRecord) -> dict[str, NDArray[Any]]:

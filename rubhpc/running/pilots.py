@@ -14,6 +14,7 @@ import numpy as np
 
 from rubhpc.running.block_time import time_block
 from rubhpc.running.pilot_cases import Pace, Pilots
+from rubhpc.running.pilot_estimate import Sample
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,8 +28,7 @@ if TYPE_CHECKING:
 _MOST_PILOTS, _FEW_PILOTS, _FEW_BRANCHED = 64, 6, 2  # cases; timed even if slow, and of a branch study
 _ENOUGH, _MOST = 3.0, 12.0  # processor seconds after which no more are begun: where they agree, and at all
 _AGREED = 0.25  # standard error of the mean pace, as a share of it, where cases agree
-_DEAR = 0.2  # share of the time of all pilot cases from which one that was shortened is run whole
-_LONGEST = 20.0  # s, in which such cases are run whole, together
+_LONGEST = 20.0  # s, in which cases that were shortened are run whole, together
 _LEAST, _SHARE = 10.0, 0.2  # s that all may take, or that share of the time foreseen where it is more
 _FEWEST = 3  # cases, timed in any case
 # Positions that spread evenly over a square, however many (R. Kronecker; steps of M. Roberts' R2 sequence).
@@ -42,12 +42,12 @@ class Timing:
     Attributes
     ----------
     pace : Pace
-        Means over them; NaN where all failed.
+        For all cases, from them; NaN where all failed.
     n_pilot : int
         Cases that were timed.
     spread : float
-        Standard error of the mean time of a step, as a share of it: 0 where all cases were timed, NaN
-        where one of several was.
+        Standard error of the time of all cases, as a share of it: 0 where all were timed, NaN where one of
+        several was.
     is_bound : bool
         Whether a case took longer than is waited for, so that the pace is a lower bound.
     seconds : float
@@ -64,10 +64,10 @@ class Timing:
     failures: tuple[str, ...] = ()
 
 
-def seconds_of(pace: Pace, steps: float, n: Preparations, n_block: int) -> float:
+def seconds_of(pace: Pace, steps: float, n_case: float, n: Preparations, n_block: int) -> float:
     """Time of a whole run on one core."""
     prepared = pace.rig * n.rig + pace.speed * n.speed + pace.friction * n.friction
-    return pace.step * steps + prepared + pace.block * n_block
+    return pace.step * steps + pace.case * n_case + prepared + pace.block * n_block
 
 
 def time_pilots(
@@ -75,8 +75,8 @@ def time_pilots(
 ) -> Timing:
     """Time cases of the blocks that are missing, until enough time has gone by.
 
-    A case is picked with a probability proportional to its predicted steps, so that the mean pace of the
-    picked ones is that of all; they spread evenly over the blocks and over the cases of a block.
+    A case is picked with a probability that is half proportional to its predicted steps and half the same
+    for all; the cases spread evenly over the blocks and over the cases of a block.
     """
     paces: list[Pace] = []
     picked: list[tuple[tuple[int, ...], float]] = []
@@ -85,94 +85,113 @@ def time_pilots(
     began = time.process_time()
     pilots = Pilots(grid)
     few = _FEW_PILOTS if grid.study.branch is None else _FEW_BRANCHED
-    all_steps = sum(block.cost * float(share_of(block, missing).mean()) for block in blocks)
+    n_case = int(missing.sum())
+    sample = Sample(n_case, sum(block.cost * float(share_of(block, missing).mean()) for block in blocks))
+
+    def spent() -> float:
+        return time.process_time() - began - pilots.loading - pilots.compiling
 
     def allowed() -> float:
         """Seconds that are left."""
-        foreseen = all_steps * float(np.mean([pace.step for pace in paces])) if paces else 0.0
-        spent = time.process_time() - began - pilots.loading - pilots.compiling
-        return max(_LEAST, _SHARE * foreseen) - spent
+        foreseen = n_case * float(np.mean(sample.seconds)) if paces else 0.0
+        return min(max(_LEAST, _SHARE * foreseen), _MOST + _LONGEST) - spent()
 
-    for k, (index, steps) in enumerate(_picked(blocks, missing)):
-        spent = time.process_time() - began - pilots.loading - pilots.compiling
-        if k >= few and spent > (_ENOUGH if _spread(paces, missing) <= _AGREED else _MOST):
+    for k, (index, steps, probability) in enumerate(_picked(blocks, missing)):
+        if k >= few and spent() > (_ENOUGH if _spread(sample) <= _AGREED else _MOST):
             break  # a few rubs among many free motions take most of the time of some studies
-        if k >= min(few, _FEWEST) and allowed() < spent:  # as much is left to run dear cases whole
+        kept_back = spent() if pilots.shortened else 0.0  # as much is left to run dear cases whole
+        if k >= min(few, _FEWEST) and allowed() < kept_back:
             break
         try:
-            paces.append(pilots.pace(index, steps))
+            pace = pilots.pace(index, steps, allowed() / max(few - k, _FEWEST))
+            paces.append(pace)
             picked.append((index, steps))
+            is_whole = index not in pilots.shortened
+            sample.add(steps, probability, pace.step * steps, is_whole=is_whole)
         except Exception as error:  # whatever is wrong with the case: the others are timed all the same
             where = manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))
             failures.append(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}")
         if pilots.was_cut:  # another would take as long
             is_bound = True
             break
-    is_bound |= _run_dear_ones(pilots, picked, paces, min(_LONGEST, allowed()))
+    is_bound |= _run_whole(pilots, picked, paces, sample, min(_LONGEST, allowed()))
     block = time_block(manifest, pilots.arrays) if pilots.arrays else 0.0
     seconds = time.process_time() - began - pilots.loading
     if not paces:
         return Timing(pace=Pace(*[math.nan] * len(Pace._fields)), seconds=seconds, failures=tuple(failures))
+    case, step, _ = sample.estimate()
+    mean = Pace(*np.mean(paces, axis=0).tolist())
     return Timing(
-        pace=Pace(*np.mean(paces, axis=0).tolist())._replace(block=block),
+        pace=mean._replace(step=step, case=case, block=block),
         n_pilot=len(paces),
-        spread=_spread(paces, missing),
+        spread=_spread(sample),
         is_bound=is_bound,
         seconds=seconds,
         failures=tuple(failures),
     )
 
 
-def _run_dear_ones(
-    pilots: Pilots, picked: list[tuple[tuple[int, ...], float]], paces: list[Pace], left: float
+def _run_whole(
+    pilots: Pilots,
+    picked: list[tuple[tuple[int, ...], float]],
+    paces: list[Pace],
+    sample: Sample,
+    left: float,
 ) -> bool:
-    """Run whole, the dearest first, the shortened cases that cost most of all; whether one was cut off.
+    """Run cases whole that were shortened, the dearest first; whether one was cut off.
 
     All of them take `left` seconds at most.
 
     What such a case comes to is hardly known from its beginning: more and more sets of contacts, neighbours
-    of a motion without a period.
+    of a motion without a period. The others are corrected by what it came to.
     """
-    guessed = [pace.step * steps for pace, (_, steps) in zip(paces, picked, strict=True)]
-    for k in sorted(range(len(paces)), key=lambda k: -guessed[k]):
+    foreseen = list(sample.seconds)
+    for k in sorted(range(len(paces)), key=lambda k: -foreseen[k]):
         index, steps = picked[k]
-        if index not in pilots.shortened or guessed[k] < _DEAR * sum(guessed) or left <= guessed[k]:
+        if index not in pilots.shortened or left <= foreseen[k]:
             continue
         began = time.process_time()
         paces[k] = pilots.whole(index, steps, paces[k], left)
         left -= time.process_time() - began
+        sample.seconds[k], sample.is_whole[k] = paces[k].step * steps, True
+        sample.checked.append((foreseen[k], sample.seconds[k]))
         if pilots.was_cut:
             return True
     return False
 
 
-def _spread(paces: list[Pace], missing: NDArray[np.bool_]) -> float:
-    """Standard error of the mean time of a step, as a share of it; NaN of one case among several."""
-    steps = np.array([pace.step for pace in paces])
-    unseen = 1.0 - len(paces) / max(int(missing.sum()), len(paces))  # share of the cases
-    if len(paces) < 2:
-        return 0.0 if unseen == 0.0 and len(paces) else math.nan
-    return float(steps.std(ddof=1) * math.sqrt(unseen / len(paces)) / steps.mean())
+def _spread(sample: Sample) -> float:
+    """Standard error of the time of all cases, as a share of it; NaN of none, or one among several."""
+    if not sample.seconds:
+        return math.nan
+    case, step, error = sample.estimate()
+    whole = case * sample.n_case + step * sample.all_steps
+    return error / whole if whole > 0.0 else 0.0
 
 
-def _picked(blocks: list[Block], missing: NDArray[np.bool_]) -> Iterator[tuple[tuple[int, ...], float]]:
-    """Missing cases, none twice, with their predicted steps."""
-    costs = []
-    for block in blocks:
-        costs.append(block.cost * float(share_of(block, missing).mean()))
-    ends = np.cumsum(costs)
+def _picked(
+    blocks: list[Block], missing: NDArray[np.bool_]
+) -> Iterator[tuple[tuple[int, ...], float, float]]:
+    """Missing cases, none twice, with their predicted steps and the probability that a draw picks each."""
+    if not blocks:
+        return
+    shares = [share_of(block, missing) for block in blocks]
+    costs = np.array([block.cost * float(share.mean()) for block, share in zip(blocks, shares, strict=True)])
+    numbers = np.array([float(share.sum()) for share in shares])
+    chances = 0.5 * costs / costs.sum() + 0.5 * numbers / numbers.sum()
+    ends = np.cumsum(chances)
     seen: set[tuple[int, ...]] = set()
-    for k in range(4 * _MOST_PILOTS if blocks else 0):
+    for k in range(4 * _MOST_PILOTS):
         if len(seen) == _MOST_PILOTS:
             return
         n = int(np.searchsorted(ends, (0.5 + k * _AMONG_BLOCKS) % 1.0 * ends[-1], side="right"))
-        block = blocks[min(n, len(blocks) - 1)]
-        inside = np.argwhere(share_of(block, missing))
+        n = min(n, len(blocks) - 1)
+        block, inside = blocks[n], np.argwhere(shares[n])
         chosen = inside[int((0.5 + k * _WITHIN_BLOCK) % 1.0 * len(inside))]
         index = tuple((chosen + np.array(block.start)).tolist())
         if index not in seen:
             seen.add(index)
-            yield index, block.cost / math.prod(block.shape)
+            yield index, block.cost / math.prod(block.shape), float(chances[n]) / len(inside)
 
 
 def share_of(block: Block, missing: NDArray[np.bool_]) -> NDArray[np.bool_]:

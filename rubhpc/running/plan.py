@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.running.pilot_estimate import within
 from rubhpc.running.pilots import Timing, seconds_of, time_pilots
 from rubhpc.running.preparations import count_preparations
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
-from rubhpc.storage.duration import duration
+from rubhpc.storage.duration import duration, span
 from rubhpc.storage.growth import origins
 from rubhpc.storage.ledger import count
 from rubhpc.storage.measures import blank_records, converted
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 _LINE = 400  # bytes of a case in a journal, about, for one stator
 _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the settings
 _AT_EDGES = 1.1  # cases that a refined map computes over all cases, seconds a step, about
+_AGREED = 0.03  # standard error of the time, as a share of it, up to which no range is given
 _PRIVATE_FILES = 8  # manifests, journals, records of runs
 
 
@@ -104,12 +106,20 @@ class Plan:
         timing = self.timing
         if not timing.n_pilot:
             return []
-        within = ""
+        note = ""
         if timing.n_pilot == self.counts[MISSING]:
-            within = ", all that are missing"
-        elif math.isfinite(timing.spread):
-            within = f"; they differ, so the core-hours are good to {200.0 * timing.spread:.0f} %, about"
-        return [f"timed       {timing.n_pilot} case{'s' * (timing.n_pilot > 1)}{within}"]
+            note = ", all that are missing"
+        elif self._range:
+            note = "; they differ: such a range holds the time of eight to nine plans in ten"
+        return [f"timed       {timing.n_pilot} case{'s' * (timing.n_pilot > 1)}{note}"]
+
+    @property
+    def _range(self) -> str:
+        """From and to where the time lies, for people; "" where cases agree, or nobody knows."""
+        timing, seconds = self.timing, 3600.0 * self.core_hours
+        if timing.is_bound or not _AGREED < timing.spread < math.inf:
+            return ""
+        return span(*within(seconds, timing.spread * seconds, timing.n_pilot))
 
     @property
     def _idle(self) -> str:
@@ -124,7 +134,7 @@ class Plan:
         sizes = " x ".join(f"{n} {name}" for name, n in self.shape.items())
         cost = (
             f"{'at least ' * self.timing.is_bound}{self.core_hours:.3g} core-hours "
-            f"({duration(self.core_hours * 3600)} on one core)"
+            f"({self._range or duration(self.core_hours * 3600)} on one core)"
             if math.isfinite(self.core_hours)
             else "core-hours unknown: the pilot cases failed"
         )
@@ -206,10 +216,13 @@ def make_plan(study: Study, part: str | None = None) -> Plan:
     seconds = most = 0.0
     if left:
         prepared = count_preparations(grid, missing)
-        most = seconds = seconds_of(timing.pace, all_steps, prepared, len(left))
+        n_case = int(missing.sum())
+        most = seconds = seconds_of(timing.pace, all_steps, n_case, prepared, len(left))
         if manifest.refine is not None:
-            at_edges = timing.pace._replace(step=_AT_EDGES * timing.pace.step)
-            seconds = min(most, seconds_of(at_edges, steps, prepared, round(left_of_all * len(left))))
+            pace = timing.pace
+            at_edges = pace._replace(step=_AT_EDGES * pace.step, case=_AT_EDGES * pace.case)
+            n_block = round(left_of_all * len(left))
+            seconds = min(most, seconds_of(at_edges, steps, left_of_all * n_case, prepared, n_block))
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
     shards = zip(manifest.shape, manifest.shard, strict=False)
     n_shard = math.prod(-(-n // s) for n, s in shards) if manifest.shard else 0

@@ -30,12 +30,12 @@ def test_more_cases_are_timed_where_they_differ(costs, n_pilot, monkeypatch):
         def __init__(self, grid):
             pass
 
-        def pace(self, index, steps):
+        def pace(self, index, steps, limit):
             now[0] += costs[index[0]]
             return pilots.Pace(costs[index[0]] / steps, 0.0, 0.0, 0.0)
 
     monkeypatch.setattr(pilots, "Pilots", Pilots)
-    monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3) for i in range(64)))
+    monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3, 1e-3) for i in range(64)))
     monkeypatch.setattr(pilots, "time", SimpleNamespace(process_time=lambda: now[0]))
     grid = SimpleNamespace(study=SimpleNamespace(branch=None))
     monkeypatch.setattr(pilots, "share_of", lambda *_: np.ones(1000))
@@ -63,37 +63,41 @@ def test_part_of_a_drive_is_its_beginning():
 
 
 @pytest.mark.parametrize(
-    ("all_steps", "left"), [(6e3, pilots._LEAST - 6 * 0.5), (1e5, 0.2 * 1e5 * 3.5e-3 / 6 - 3.0), (1e8, 20.0)]
+    ("n_case", "left"), [(6, pilots._LEAST - 6 * 0.5), (180, 0.2 * 180 * 3.6 / 6 - 3.0), (10**5, 20.0)]
 )
-def test_dearest_case_is_run_whole(monkeypatch, all_steps, left):
-    """What a shortened one comes to is not known from its beginning: it is run whole if it dominates.
+def test_dearest_case_is_run_whole(monkeypatch, n_case, left):
+    """What a shortened one comes to is not known from its beginning: it is run whole, and then the others.
 
-    All takes ten seconds at most, or a fifth of the time foreseen.
+    All takes ten seconds at most, or a fifth of the time foreseen; another that is left takes what these say.
     """
-    now = [0.0]
+    now, asked = [0.0], []
 
     class Pilots:
         loading = compiling = 0.0
-        was_cut, arrays, shortened = False, {}, {(0,), (1,)}
+        was_cut, arrays, shortened = False, {}, {(0,), (1,), (2,)}
 
         def __init__(self, grid):
             pass
 
-        def pace(self, index, steps):
+        def pace(self, index, steps, limit):
             now[0] += 0.5
-            return pilots.Pace(3.0 / steps if index == (0,) else 0.1 / steps, 0.0, 0.0, 0.0)
+            return pilots.Pace(([3.0, 0.2] + 4 * [0.1])[index[0]] / steps, 0.0, 0.0, 0.0)
 
         def whole(self, index, steps, guessed, limit):
-            assert index == (0,)
-            assert limit == pytest.approx(left)
-            return guessed._replace(step=15.0 / steps)
+            asked.append((index, limit))
+            now[0] += limit - 0.15  # no time is left for the third
+            return guessed._replace(step=3.0 * guessed.step)
 
     monkeypatch.setattr(pilots, "Pilots", Pilots)
-    monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3) for i in range(6)))
+    monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3, 1 / n_case) for i in range(6)))
     monkeypatch.setattr(pilots, "time", SimpleNamespace(process_time=lambda: now[0]))
     grid = SimpleNamespace(study=SimpleNamespace(branch=None))
-    monkeypatch.setattr(pilots, "share_of", lambda *_: np.ones(6))
+    monkeypatch.setattr(pilots, "share_of", lambda *_: np.ones(n_case))
     monkeypatch.setattr(pilots, "time_block", lambda *_: 0.0)
-    block = SimpleNamespace(cost=all_steps)
-    timing = pilots.time_pilots(grid, None, [block], np.ones(6, dtype=bool))
-    assert timing.pace.step == pytest.approx((15.0 + 5 * 0.1) / 6 / 1e3)
+    block = SimpleNamespace(cost=n_case * 1e3)
+    timing = pilots.time_pilots(grid, None, [block], np.ones(n_case, dtype=bool))
+    assert [index for index, _ in asked] == [(0,), (2,)]  # 0.2 s are more than is left
+    assert asked[0][1] == pytest.approx(left)
+    known = 3 * 3.0 + 3 * 0.1 + 3 * 0.1
+    other = 0.2 * (known - 0.3 + 3.1 / 2) / (3.1 + 3.1 / 2)  # ratio of the two, and one of 1
+    assert timing.pace.step * 6e3 == pytest.approx(known + other)
