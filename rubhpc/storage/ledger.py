@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rubhpc.storage.journal import Header
 
 _BATCH = 2**16  # records moved to the ledger at once
-_LONGEST = 2**24  # bytes of a line, at most
+LONGEST = 2**24  # bytes of a line, at most
 
 
 @dataclass(kw_only=True)
@@ -107,15 +107,15 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
         ledger.n_damaged += 1
         return 0
     with opened as file:
-        first = file.readline(_LONGEST)
-        about = _header_in(first)
+        first = file.readline(LONGEST)
+        about = header_in(first)
         is_sound = about is not None
         kind = header.type_in(about) if about is not None else None
         if is_sound and kind is None:
             return 0
         ledger.n_damaged += not is_sound
         n_line = 0
-        while line := file.readline(_LONGEST):
+        while line := file.readline(LONGEST):
             text = line[9:-1]
             if line[:8] != b"%08x" % crc32(text) or line[-1:] != b"\n":
                 ledger.n_damaged += 1
@@ -163,7 +163,7 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
     return n_line
 
 
-def _header_in(line: bytes) -> dict[str, Any] | None:
+def header_in(line: bytes) -> dict[str, Any] | None:
     """The header in a line; None where it is damaged."""
     if line[:8] != b"%08x" % crc32(line[9:-1]):
         return None

@@ -10,6 +10,7 @@ import numpy as np
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, INFERRED, MISSING, VARIABLES
+from rubhpc.storage.contradictions import contradicted
 from rubhpc.storage.disk import is_filled
 from rubhpc.storage.growth import finish_growth
 from rubhpc.storage.journal import next_run
@@ -73,6 +74,9 @@ def verify(path: Path) -> Damage:
         store.reopen()
     ledger = store.replay()
     damaged = _damaged_cases(store, ledger)
+    for flat in contradicted(store.journal_directory, store.manifest.header):
+        if ledger.status[flat] != MISSING:
+            damaged.setdefault(flat, "two lines of a journal contradict each other")
     lost = _lost_lines(store, ledger)
     packed = _damaged_packed(store, ledger)
     oversized = dict.fromkeys(
