@@ -32,15 +32,15 @@ def contradicted(directory: Path, header: Header) -> set[int]:
     """Flat indices of cases of which a journal says two things, and no later journal says anything."""
     found: set[int] = set()
     for path in journals(directory):
-        told, contradicted_here = _read(path, header)
-        found -= told
+        known, contradicted_here = _read(path, header)
+        found -= known
         found |= contradicted_here
     return found
 
 
 def _read(path: Path, header: Header) -> tuple[set[int], set[int]]:
-    """Cases that a sound journal tells of, and those of which it says two things."""
-    told: dict[int, int] = {}
+    """Cases that a sound journal names, and those of which it says two things."""
+    known: dict[int, int] = {}
     twice: set[int] = set()
     try:
         opened = open_regular(path)
@@ -58,13 +58,13 @@ def _read(path: Path, header: Header) -> tuple[set[int], set[int]]:
                 continue
             flat, said = int(parts[0]), _said(parts, kind)
             if parts[2] not in _STORED:  # what follows is computed anew
-                told[flat] = 0
+                known[flat] = 0
                 twice.discard(flat)
             elif said is not None:
-                if told.get(flat, 0) not in (0, said):
+                if known.get(flat, 0) not in (0, said):
                     twice.add(flat)
-                told[flat] = said
-    return set(told), twice
+                known[flat] = said
+    return set(known), twice
 
 
 def _said(parts: list[bytes], kind: np.dtype[np.void]) -> int | None:
