@@ -134,7 +134,7 @@ def branch(
         samples_per_revolution=samples_per_revolution,
         keep=(keep,) if isinstance(keep, str) else tuple(keep),
     )
-    branching = Branching(Family(operation, along, abs(last - first)), largest)
+    branching = Branching(Family(operation, along, (first, last)), largest)
     seeds = [_first(branching, first, begin, period, recording)]
     low, high = sorted((first, last))
     places = np.linspace(low, high, sweeps + 2)[1:-1].tolist()

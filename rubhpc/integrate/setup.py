@@ -126,6 +126,7 @@ class ModalSetup:
     law: Law = MULTIPLIER
     accuracy: float = 1e-3  # relative, of the modes kept, and of loads where gaps are curved
     free_spin: FreeSpin | None = None  # where a drive turns it
+    is_measured: bool = True  # or followed alone: tables then hold no outputs and energies
     _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
     _curved_libraries: dict[float, CurvedLibrary] = field(default_factory=dict)
     _friction_libraries: dict[float, FrictionLibrary] = field(default_factory=dict)
@@ -210,6 +211,7 @@ class ModalSetup:
             tick=self.tick,
             sample_level=self.sample_level,
             n_level=self._n_level,
+            is_measured=self.is_measured,
         )
 
     @cached_property
@@ -250,6 +252,7 @@ class ModalSetup:
                 tick=self.tick,
                 sample_level=self.sample_level,
                 n_level=self._n_level,
+                is_measured=self.is_measured,
             )
         return self._friction_libraries[friction]
 
@@ -289,6 +292,7 @@ class ModalSetup:
                 tick=self.tick,
                 sample_level=self.sample_level,
                 n_level=self._n_level,
+                is_measured=self.is_measured,
             )
         return self._penalty_libraries[friction]
 
@@ -323,12 +327,15 @@ def prepare(
     model: Model | None = None,
     probes: Sequence[Probe] = (),
     drive: DriveLaw | None = None,
+    reduced: ReducedModel | None = None,
+    is_measured: bool = True,
 ) -> Setup:
     """Assemble, check the step and factorise: once per rig and speed.
 
     `model` is that of the rig, where it has been assembled already, `probes` what is measured of it, `drive`
-    what turns it where its speed is free. The step is shortened so that a whole number of steps fills a
-    sample's interval.
+    what turns it where its speed is free, `reduced` what it is in modal coordinates, where that is known.
+    What is followed and never recorded need not be measured. The step is shortened so that a whole number of
+    steps fills a sample's interval.
 
     Raises
     ------
@@ -350,7 +357,8 @@ def prepare(
         return ModalSetup(
             scheme=scheme,
             model=model,
-            reduced=reduce_model(model, speed, integrator.accuracy, free_spin),
+            reduced=reduced or reduce_model(model, speed, integrator.accuracy, free_spin),
+            is_measured=is_measured,
             free_spin=free_spin,
             spin=speed,
             step=SEARCH_STEP if integrator.step is None else integrator.step,

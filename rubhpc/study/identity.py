@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 from rubhpc.input.reading import plain
 from rubhpc.rig.reading import with_keys
 from rubhpc.study import contact_axes, initial
-from rubhpc.study.axes import DRIVE_AXES, DRIVE_PREFIX, FROM_REST, RUN_UP_PREFIX, RUN_UP_TIME
+from rubhpc.study.axes import (
+    DRIVE_AXES,
+    DRIVE_PREFIX,
+    FROM_REST,
+    RUN_UP_PREFIX,
+    RUN_UP_TIME,
+    SPEED_AXES,
+)
 
 if TYPE_CHECKING:
     from rubhpc.study.study import Study
@@ -21,6 +28,7 @@ CHANGING_SPEED = 3  # run-ups and drives
 COULOMB = 1  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 MANY_STATORS = 1  # more than five, whose sets of closed contacts or states may be more than 256
+ALONG_SPEED = 1  # branches along a speed
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
@@ -39,6 +47,7 @@ def physics_of(study: Study) -> int:
         + COULOMB * ("coulomb" in friction_laws)
         + SOFT_FRICTION * is_soft
         + MANY_STATORS * (len(study.rig.stator) > 5)
+        + ALONG_SPEED * (study.branch is not None and study.branch.along in SPEED_AXES)
     )
 
 

@@ -1,5 +1,7 @@
 """Keys of [contact] as axes of a grid: which combinations can be, what each case takes, ids, the store."""
 
+from dataclasses import replace
+
 import pytest
 import xarray as xr
 
@@ -15,6 +17,7 @@ from rubhpc.storage.verify import verify
 from rubhpc.study import identity
 from rubhpc.study.axes import Axis
 from rubhpc.study.axis_reading import make_axis
+from rubhpc.study.branch_keys import BranchKeys
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.contact_keys import Contact
 from rubhpc.study.study import read_study
@@ -71,6 +74,13 @@ def test_each_case_takes_its_own_contact(tmp_path):
 def test_a_version_of_some_laws_is_that_of_the_studies_that_take_them(tmp_path, axes, contact, further):
     plain = identity.PHYSICS + identity.MODAL
     assert identity.physics_of(study_of(tmp_path, axes, contact)) == plain + further
+
+
+@pytest.mark.parametrize(("along", "further"), [("speed_ratio", 1), ("friction", 0)])
+def test_a_version_of_branches_along_a_speed_is_that_of_these(tmp_path, along, further):
+    plain = study_of(tmp_path)
+    followed = replace(plain, branch=BranchKeys(along=along))
+    assert identity.physics_of(followed) == identity.physics_of(plain) + further
 
 
 def test_quantities_are_axes_in_si_units(tmp_path):

@@ -145,19 +145,17 @@ def branch_of(branching: Branching, track: Track, recording: Recording) -> Branc
     return Branch(
         along=branching.family.along,
         period=track.points[0].period,
-        points=tuple(
-            _point(branching, point, event) for point, event in zip(track.points, track.events, strict=True)
-        ),
+        points=tuple(_point(point, event) for point, event in zip(track.points, track.events, strict=True)),
         end=track.end,
         _family=branching.family,
         _recording=recording,
     )
 
 
-def _point(branching: Branching, point: Point, event: Event) -> BranchPoint:
-    begun = branching.moved(point, (1.0 - point.phase) % 1.0)
+def _point(point: Point, event: Event) -> BranchPoint:
     case = point.case
-    state = case.march.state_of(begun.motion, case.contact_force(begun.states, begun.motion))
+    motion, states, _ = point.after((1.0 - point.phase) % 1.0)
+    state = case.march.state_of(motion, case.contact_force(states, motion))
     return BranchPoint(
         value=point.value,
         event=event.name.lower(),

@@ -74,7 +74,7 @@ def record_branches(
     began = time.perf_counter() - seconds_compiling()
     low, high = sorted((span.start, span.stop))
     step = (high - low) / STEPS if keys.step is None else keys.step
-    branching = Branching(Family(operation, keys.along, high - low), step, check, say)
+    branching = Branching(Family(operation, keys.along, (low, high)), step, check, say)
     values = np.linspace(low, high, keys.sweeps).tolist() if keys.sweeps > 1 else [0.5 * (low + high)]
     found = starts(branching, values, [int(period) for period in keys.periods], recording)
     tracks = search(branching, found, low=low, high=high, most=keys.points, doublings=keys.doublings)

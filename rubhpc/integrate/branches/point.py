@@ -79,6 +79,12 @@ class Point:
         """Its eigenvalues, largest first, (2 n,)."""
         return floquet_multipliers(self.monodromy)
 
+    @cached_property
+    def scale(self) -> Floats:
+        """Steps (2 n,) for a unit of each coordinate."""
+        spin, size = abs(self.case.setup.spin), max(self.case.size(self.motion), np.finfo(float).tiny)
+        return np.repeat([spin, 1.0], self.case.n) / (TURN * size)
+
     @property
     def is_near_fold(self) -> bool:
         """Whether the motion hardly closes less well next to it, with the parameter held."""
@@ -88,6 +94,15 @@ class Point:
     def n_unstable(self) -> int:
         """Multipliers beyond the unit circle."""
         return int((np.abs(self.multipliers) > 1.0).sum())
+
+    def after(self, ahead: float) -> tuple[Floats, int, float]:
+        """The motion (2 n,) some revolutions ahead, the states of the pairs, and the phase there."""
+        phase, motion, states = self.phase, self.motion, self.states
+        whole, rest = divmod(ahead, 1.0)
+        for share in [1.0] * int(whole) + ([rest] if rest else []):
+            ended = self.case.revolve(motion, states, phase=phase, share=share)
+            motion, states, phase = ended.end, ended.states, (phase + share) % 1.0
+        return motion, states, phase
 
     @cached_property
     def sequence(self) -> tuple[tuple[int, tuple[int, ...]], ...]:
@@ -154,18 +169,14 @@ class Branching:
         """The same motion from a section some revolutions ahead, a number from 0 to its period."""
         if ahead == 0.0:
             return point
-        case, phase, motion, states = point.case, point.phase, point.motion, point.states
-        whole, rest = divmod(ahead, 1.0)
-        for share in [1.0] * int(whole) + ([rest] if rest else []):
-            ended = case.revolve(motion, states, phase=phase, share=share)
-            motion, states, phase = ended.end, ended.states, (phase + share) % 1.0
+        motion, states, phase = point.after(ahead)
         return Point(
             value=point.value,
             phase=phase,
             motion=motion,
             states=states,
-            revolutions=flow(case, motion, states, point.period, phase),
-            case=case,
+            revolutions=flow(point.case, motion, states, point.period, phase),
+            case=point.case,
         )
 
     def repeated(self, point: Point, times: int) -> Point:
@@ -178,17 +189,17 @@ class Branching:
 
     def direction(self, point: Point, change: Floats) -> Floats:
         """A change (2 n,) of the motion alone, in steps, of length 1 (2 n + 1,)."""
-        scaled = np.append(self._scale(point) * change, 0.0)
+        scaled = np.append(point.scale * change, 0.0)
         return np.asarray(scaled / np.linalg.norm(scaled))
 
     def length_of(self, point: Point, change: Floats) -> float:
         """Length, in steps, of a change (2 n,) of a motion."""
-        return float(np.linalg.norm(self._scale(point) * change))
+        return float(np.linalg.norm(point.scale * change))
 
     def difference(self, a: Point, b: Point) -> Floats:
         """From one point to another in steps: (2 n + 1,), the parameter last."""
         motion = self.family.carry(a.motion, a.case, b.case)
-        return np.append(self._scale(b) * (b.motion - motion), (b.value - a.value) / self.step)
+        return np.append(b.scale * (b.motion - motion), (b.value - a.value) / self.step)
 
     def is_same(self, a: Point, b: Point) -> bool:
         """Whether two motions of a case are one, but for a shift by revolutions."""
@@ -201,17 +212,12 @@ class Branching:
                 return True
         return False
 
-    def _scale(self, point: Point) -> Floats:
-        """Steps (2 n,) for a unit of each coordinate."""
-        spin, size = abs(point.case.setup.spin), max(point.case.size(point.motion), np.finfo(float).tiny)
-        return np.repeat([spin, 1.0], point.case.n) / (TURN * size)
-
     def tangent(self, point: Point, toward: Floats) -> Floats:
         """Direction of the branch at a point, in steps, of length 1 (2 n + 1,), along another."""
         rate = self.family.derivative(
             point.value, point.motion, point.states, point.revolutions, point.phase
         )  # fmt: skip
-        moving = (point.monodromy - np.eye(point.motion.size)) / self._scale(point)
+        moving = (point.monodromy - np.eye(point.motion.size)) / point.scale
         matrix = np.column_stack([moving, rate * self.step])
         along: Floats = np.linalg.svd(matrix / np.abs(matrix).max(axis=1, keepdims=True))[2][-1]
         return along if along @ toward >= 0.0 else -along
@@ -268,7 +274,7 @@ class Branching:
             self._say(f"{self._n_found} motions of branches found, now at {family.along} {base.value:.4g}")
         if self._check is not None:
             self._check()
-        scale = self._scale(base)
+        scale = base.scale
         value = base.value + guess[-1] * self.step
         before = base.motion + guess[:-1] / scale
         origin, rate, derivative, last = base.case, None, None, math.inf

@@ -161,6 +161,7 @@ class ModalMarch(March):
     def _call(
         self, stop: int, samples: Samples, accumulator: Accumulator, *, is_recorded: bool
     ) -> str | None:
+        assert self._setup.is_measured
         sample_level = self.clock.sample_level
         restart_clock(self._bare_progress, self.sample << sample_level, self.sample, is_recorded=is_recorded)
         self.clock = self.clock._replace(n_sample=samples.rotor.shape[1])

@@ -15,6 +15,7 @@ from rubhpc.integrate.marches.event_driven import NoClosedForm
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
 from rubhpc.integrate.periodic_motions.saltation import by_clearance
 from rubhpc.integrate.record import State
+from rubhpc.integrate.reduced_model.along_speeds import AlongSpeeds
 from rubhpc.integrate.setup import ModalSetup, Scheme, prepare
 from rubhpc.rig.reading import with_keys
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.periodic_motions.piecewise_motion import Revolution
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.rig.rig import Rig
     from rubhpc.study.contact_keys import Contact
     from rubhpc.study.tables import Integrator
@@ -71,17 +73,23 @@ class Family:
     ----------
     along : str
         speed_ratio, speed, clearance_ratio, clearance, friction or a key of the rig.
+    ends : (2,)
+        Of the range of the parameter; the smallest change of interest is small beside it.
+
+    Attributes
+    ----------
     span : float
-        Of the parameter; the smallest change of interest is small beside it.
+        Of the range.
     """
 
-    def __init__(self, operation: Operation, along: str, span: float) -> None:
+    def __init__(self, operation: Operation, along: str, ends: tuple[float, float]) -> None:
         """Take the case that is varied."""
-        self.along, self.span = along, span
-        self._operation = operation
+        self.along, self.span = along, abs(ends[1] - ends[0])
+        self._operation, self._ends = operation, ends
+        self._speeds: AlongSpeeds | None = None
         self._models: OrderedDict[int, tuple[Rig, Model]] = OrderedDict()
         self._frequency: tuple[Model, float] | None = None
-        self._setups: OrderedDict[tuple[int, float], ModalSetup] = OrderedDict()
+        self._setups: OrderedDict[tuple[int, float, bool], ModalSetup] = OrderedDict()
         self._cases: OrderedDict[float, PiecewiseMotion] = OrderedDict()
 
     def at(self, value: float) -> PiecewiseMotion:
@@ -95,7 +103,7 @@ class Family:
             There is no such case.
         """
         if value not in self._cases:
-            setup, clearance, friction = self.settings(value)
+            setup, clearance, friction = self.settings(value, is_measured=self.along not in SPEEDS)
             try:
                 found = PiecewiseMotion(setup, clearance, friction, State.at_rest(setup.model))
             except NoClosedForm:
@@ -106,14 +114,11 @@ class Family:
         self._cases.move_to_end(value)
         return self._cases[value]
 
-    def settings(self, value: float) -> tuple[ModalSetup, float, float]:
-        """Set-up, clearance (m) and friction at a value of the parameter."""
+    def settings(self, value: float, *, is_measured: bool = True) -> tuple[ModalSetup, float, float]:
+        """Set-up, clearance (m) and friction at a value; to be recorded, or to be followed alone."""
         case = self._operation.at(self.along, value)
         model = self._model(case.rig)
-        spin = case.speed
-        if spin is None:
-            assert case.speed_ratio is not None
-            spin = case.speed_ratio * self._first_frequency(model)
+        spin = self._spin(case, model)
         clearance = case.clearance
         if clearance is None:
             assert case.clearance_ratio is not None
@@ -122,7 +127,7 @@ class Family:
             if clearance + stator.clearance_offset <= 0:
                 problem = f"{clearance:g} m and a stator's clearance_offset leave no gap"
                 raise InputError(f"{self.along}: {value:g}: {problem}; take a range without it")
-        return self._setup(case, model, spin), clearance, case.friction
+        return self._setup(case, model, spin, is_measured), clearance, case.friction
 
     def carry(self, motion: Floats, before: PiecewiseMotion, after: PiecewiseMotion) -> Floats:
         """A motion (2 n,) of one case in the coordinates of another."""
@@ -170,6 +175,13 @@ class Family:
             return 1.0
         return contact_free_amplitude(here.setup.model, here.setup.spin)
 
+    def _spin(self, case: Operation, model: Model) -> float:
+        """Speed of a case, rad/s."""
+        if case.speed is not None:
+            return case.speed
+        assert case.speed_ratio is not None
+        return case.speed_ratio * self._first_frequency(model)
+
     def _first_frequency(self, model: Model) -> float:
         """Lowest lateral natural frequency of a model, rad/s, found once."""
         if self._frequency is None or self._frequency[0] is not model:
@@ -183,8 +195,18 @@ class Family:
                 self._models.popitem(last=False)
         return self._models[id(rig)][1]
 
-    def _setup(self, case: Operation, model: Model, spin: float) -> ModalSetup:
-        key = id(case.rig), spin
+    def _reduced(self, model: Model, spin: float) -> ReducedModel | None:
+        """A model whose speed alone changes, in the coordinates of the whole range; None for others."""
+        is_modal = self._operation.integrator.method == "modal"
+        if self.along not in SPEEDS or model.rotor.by_speed is not None or not is_modal:
+            return None
+        if self._speeds is None:
+            spins = [self._spin(self._operation.at(self.along, end), model) for end in self._ends]
+            self._speeds = AlongSpeeds(model, spins, self._operation.integrator.accuracy)
+        return self._speeds.at(spin)
+
+    def _setup(self, case: Operation, model: Model, spin: float, is_measured: bool) -> ModalSetup:
+        key = id(case.rig), spin, is_measured
         if key not in self._setups:
             setup = prepare(
                 case.rig,
@@ -193,6 +215,8 @@ class Family:
                 integrator=case.integrator,
                 samples_per_revolution=case.samples_per_revolution,
                 model=model,
+                reduced=self._reduced(model, spin),
+                is_measured=is_measured,
             )
             if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
                 raise InputError(

@@ -81,7 +81,7 @@ def solve_contact_mode(
     tangent, project, system = confine(reduced, rate, force)
     offset = np.zeros((q, n))  # displacement that closes a unit clearance
     if closed.size:
-        offset[closed] = -np.linalg.pinv(rate).T
+        offset[closed] = _closing(rate.tobytes(), *rate.shape)
     n_free = tangent.shape[1]
     exponent, shape, inverse = modes_of(system, known)
     phasor = reduced.force[0] - 1j * reduced.force[1]
@@ -138,20 +138,36 @@ def confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats,
     the system (2 n_free, 2 n_free) is that of the coordinates y and their rates.
     """
     n = reduced.stiffness.shape[0]
+    system: Floats
     if not len(rate):
-        whole = np.eye(n)
-        free = np.block([[np.zeros((n, n)), whole], [-reduced.stiffness, -reduced.damping]])
-        return whole, whole, free
-    tangent, left = _null_space(rate), _null_space(force.T)
-    n_free = tangent.shape[1]
-    project = np.asarray(np.linalg.solve(left.T @ tangent, left.T), dtype=np.float64)
-    system: Floats = np.block(
-        [
-            [np.zeros((n_free, n_free)), np.eye(n_free)],
-            [-project @ reduced.stiffness @ tangent, -project @ reduced.damping @ tangent],
-        ]
-    )
+        whole, system = np.eye(n), np.zeros((2 * n, 2 * n))
+        system[:n, n:], system[n:, :n], system[n:, n:] = whole, -reduced.stiffness, -reduced.damping
+        return whole, whole, system
+    tangent, project = _left_free(rate.tobytes(), np.ascontiguousarray(force).tobytes(), n)
+    m = tangent.shape[1]
+    system = np.zeros((2 * m, 2 * m))
+    system[:m, m:] = np.eye(m)
+    system[m:, :m] = -project @ reduced.stiffness @ tangent
+    system[m:, m:] = -project @ reduced.damping @ tangent
     return tangent, project, system
+
+
+@lru_cache(maxsize=32)
+def _left_free(rate: bytes, force: bytes, n: int) -> tuple[Floats, Floats]:
+    """Motions and projection of `confine` from `rate` (r, n) and `force` (n, r), which no speed changes."""
+    rows, directions = np.frombuffer(rate).reshape(-1, n), np.frombuffer(force).reshape(n, -1)
+    tangent, left = _null_space(rows), _null_space(directions.T)
+    project = np.asarray(np.linalg.solve(left.T @ tangent, left.T), dtype=np.float64)
+    tangent.flags.writeable = project.flags.writeable = False
+    return tangent, project
+
+
+@lru_cache(maxsize=32)
+def _closing(rate: bytes, r: int, n: int) -> Floats:
+    """Displacements (r, n) that close a unit clearance each, from `rate` (r, n)."""
+    found = -np.linalg.pinv(np.frombuffer(rate).reshape(r, n)).T
+    found.flags.writeable = False
+    return np.asarray(found)
 
 
 def _null_space(rows: Floats) -> Floats:
@@ -242,7 +258,13 @@ def solve_parts(system: Floats) -> Solved:
 
 def _parts(system: Floats) -> list[NDArray[np.int64]]:
     """Rows of each part of a system that nothing couples to the rest."""
-    return coupled_rows(system != 0.0)
+    return _rows_of_parts((system != 0.0).tobytes(), len(system))
+
+
+@lru_cache(maxsize=32)
+def _rows_of_parts(linked: bytes, n: int) -> list[NDArray[np.int64]]:
+    """The same from which entries (n, n) are not zero."""
+    return coupled_rows(np.frombuffer(linked, dtype=bool).reshape(n, n))
 
 
 def _kept(exponent: Complexes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -44,6 +44,8 @@ class ModeLibrary:
     sample_level, n_level : int
         2^sample_level ticks are the interval of samples; exponentials are tabulated over 1, 2, ...,
         2^(n_level - 1) ticks.
+    is_measured : bool
+        Whether the tables hold outputs and energies, or what a motion is followed with alone.
     """
 
     def __init__(
@@ -57,11 +59,13 @@ class ModeLibrary:
         tick: float,
         sample_level: int,
         n_level: int,
+        is_measured: bool = True,
     ) -> None:
         """Start with every pair open; of one pair also with it closed."""
         self.reduced = reduced
         self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
+        self._is_measured = is_measured
         self._opened, self._known = opened, known
         q = len(self.gap_jacobian)
         self.first_masks = [0] if q > 1 else [0, self._closed]
@@ -117,6 +121,7 @@ class ModeLibrary:
 
     _most_modes = MOST_MODES
     _closed = 1  # set of one pair that is closed
+    _is_measured = True
 
     def _width(self, sizes: list[int]) -> int:
         """Width of tables for modes of these sizes and any set that is met later."""
@@ -138,9 +143,9 @@ class ModeLibrary:
         return friction
 
     def _tabulate(self, mode: ContactMode) -> None:
-        n_blank = self.width - mode.exponent.size
-        exponent = np.pad(np.stack([mode.exponent.real, mode.exponent.imag]), ((0, 0), (0, n_blank)))
-        self._exponents[mode.mask] = exponent, np.pad(mode.drift, (0, n_blank))
+        exponent, drift, m = np.zeros((2, self.width)), np.zeros(self.width), mode.exponent.size
+        exponent[0, :m], exponent[1, :m], drift[:m] = mode.exponent.real, mode.exponent.imag, mode.drift
+        self._exponents[mode.mask] = exponent, drift
         self._tables.add(self._tables_of(mode, self.reduced))
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
@@ -149,11 +154,12 @@ class ModeLibrary:
             mode,
             reduced,
             self._slip_rows(),
-            friction=self._friction_of(mode),
+            friction=self._friction_of(mode) if self._is_measured else None,
             width=self.width,
             tick=self._tick,
             sample_level=self._sample_level,
             n_level=self._n_level,
+            is_measured=self._is_measured,
         )
 
 
@@ -175,6 +181,7 @@ class PenaltyLibrary(ModeLibrary):
         tick: float,
         sample_level: int,
         n_level: int,
+        is_measured: bool = True,
     ) -> None:
         """Start as `ModeLibrary` does."""
         self._penalty = penalty
@@ -187,12 +194,15 @@ class PenaltyLibrary(ModeLibrary):
             tick=tick,
             sample_level=sample_level,
             n_level=n_level,
+            is_measured=is_measured,
         )
 
     def _solved(self, mask: int) -> ContactMode:
         return solve_penalty_mode(self.reduced, self._penalty, self._opened, mask, self._known)
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
+        if not self._is_measured:
+            return super()._tables_of(mode, reduced)
         tables = super()._tables_of(mode, self._penalty.damped(reduced, mode.mask))
         tables.loss[0] += self._penalty.stored_energy(mode, self.width)
         return tables
@@ -217,6 +227,7 @@ class FrictionLibrary(ModeLibrary):
         tick: float,
         sample_level: int,
         n_level: int,
+        is_measured: bool = True,
     ) -> None:
         """Start as `ModeLibrary` does, with one pair sliding forward."""
         self._pairs = pairs
@@ -229,6 +240,7 @@ class FrictionLibrary(ModeLibrary):
             tick=tick,
             sample_level=sample_level,
             n_level=n_level,
+            is_measured=is_measured,
         )
 
     _closed = FORWARD
@@ -242,7 +254,7 @@ class FrictionLibrary(ModeLibrary):
         return solve_friction_mode(self.reduced, self._pairs, mask, self._known)
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
-        if not self._pairs.stiffness:
+        if not self._pairs.stiffness or not self._is_measured:
             return super()._tables_of(mode, reduced)
         tables = super()._tables_of(mode, self._pairs.damped(reduced, mode.mask))
         tables.loss[0] += self._pairs.stored_energy(mode, self.width)

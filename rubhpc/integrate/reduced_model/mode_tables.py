@@ -85,6 +85,7 @@ def tabulate(
     tick: float,
     sample_level: int,
     n_level: int,
+    is_measured: bool = True,
 ) -> kernel.ModeTables:
     """Tables of one mode, (1, ...) each, its coordinates padded to `width`.
 
@@ -97,6 +98,8 @@ def tabulate(
     tick : float, s
     sample_level, n_level : int
         As in `mode_library.ModeLibrary`.
+    is_measured : bool
+        Outputs and energies are empty where not.
     """
     n, m = reduced.stiffness.shape[0], width
     end, n_filled = mode.exponent.size, len(mode.enter)
@@ -123,7 +126,11 @@ def tabulate(
     rubbing = np.zeros((n, m), dtype=complex)
     if friction is not None:
         rubbing[:, :end] = friction
-    loss, work, steady_power = _energies(reduced, exponent, motion, rubbing, mode.n_eigenmode, growing)
+    output, loss = np.zeros((2 * m, 0)), np.zeros((0, 0))
+    work, steady_power = np.zeros((2, 0), dtype=complex), np.zeros(2)
+    if is_measured:
+        output = _outputs(reduced, exponent, motion, tick * 2.0**sample_level)
+        loss, work, steady_power = _energies(reduced, exponent, motion, rubbing, mode.n_eigenmode, growing)
     halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q or more, 2, m)
     row = kernel.ModeTables(
         mask=np.array(mode.mask),
@@ -136,7 +143,7 @@ def tabulate(
         pace=np.where(exponent.real * tick * 2**kernel.FORCED_LEVEL < GONE, kernel.DYING, np.abs(exponent)),
         power_re=power.real,
         power_im=power.imag,
-        output=_outputs(reduced, exponent, motion, tick * 2.0**sample_level),
+        output=output,
         slip_re=sliding.real,
         slip_im=sliding.imag,
         slip_rate_re=(sliding * exponent).real,

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
+    Bools = NDArray[np.bool_]
 
 # Static response to a damper, as a share of the mode that it slows, times sqrt(accuracy), that is left out:
 # the mode's exponent errs by the square.
@@ -104,10 +105,16 @@ def reduce_model(
         Where nothing holds a body: its constant response, on which the modal form of closed contacts rests,
         does not exist.
     """
+    return reduce_to(model, spin, accuracy, kept_modes(model, spin, accuracy), free_spin)
+
+
+def reduce_to(
+    model: Model, spin: float, accuracy: float, are_kept: list[Bools], free_spin: FreeSpin | None = None
+) -> ReducedModel:
+    """The same with the modes of each part that are kept (`truncation.kept_modes`)."""
     mass, damping, stiffness, force = whole_system(model, spin)
     degree, output, carrier = degrees_of(model), output_degrees(model), carrier_degrees(model)
     standstill = at_standstill(model)
-    are_kept = kept_modes(model, spin, accuracy)
     modes = [parted(part, is_kept) for part, is_kept in zip(standstill.parts, are_kept, strict=True)]
     symmetric, seen = standstill.stiffness, seen_degrees(model)
     kept = np.hstack([those.kept for those in modes])

@@ -23,20 +23,20 @@ def found():
 
 def contact_free_amplitude():
     """Amplitude of the gap without contact, of the reduced model; cubics between steps err by 1.5e-8."""
-    setup, *_ = family_of("clearance", 1e-5).settings(1e-3)
+    setup, *_ = family_of("clearance", (0.0, 1e-5)).settings(1e-3)
     bodies, spin = PiecewiseMotion(setup, 1e-3, 0.3, rubhpc.State.at_rest(setup.model)).bodies, setup.spin
     dynamic = bodies.stiffness - spin**2 * np.eye(len(bodies.stiffness)) + 1j * spin * bodies.damping
     phasor = np.linalg.solve(dynamic, bodies.force_cosine - 1j * bodies.force_sine)
     return abs((bodies.gap_jacobian @ phasor)[0])
 
 
-def family_of(along, span):
+def family_of(along, ends, contact=None):
     return Family(
         Operation(
             rig=rubhpc.read_rig("mokhtar2017"), friction=0.3, speed_ratio=0.75, clearance=1e-4,
-            contact=Contact(), integrator=Integrator(), samples_per_revolution=256,
+            contact=contact or Contact(), integrator=Integrator(), samples_per_revolution=256,
         ),
-        along, span,
+        along, ends,
     )  # fmt: skip
 
 
@@ -100,7 +100,7 @@ def test_dataset_has_a_value_a_point(found):
 
 @pytest.mark.parametrize("along", ["clearance", "clearance_ratio"])
 def test_derivative_by_the_clearance_is_that_of_two_flows(along):
-    family = family_of(along, 0.1 if along == "clearance_ratio" else 1e-5)
+    family = family_of(along, (0.0, 0.1 if along == "clearance_ratio" else 1e-5))
     motion = rubhpc.periodic("mokhtar2017", clearance="100 um", period=2, keep=(), **CASE)
     unit = motion.record.contact_free_amplitude if along == "clearance_ratio" else 1.0
     value = 1e-4 / unit
@@ -116,6 +116,20 @@ def test_derivative_by_the_clearance_is_that_of_two_flows(along):
     )
     expected = (up - down) / (2 * step)
     assert exact == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("law", [{}, {"friction_law": "coulomb", "law": "penalty", "stiffness": 1e7}])
+def test_cases_along_a_speed_share_a_basis_and_are_followed_as_they_are_recorded(law):
+    family = family_of("speed_ratio", (0.7, 0.8), Contact(**law))
+    here, there = family.at(0.75), family.at(0.76)
+    motion = np.concatenate([np.full(here.n, 1e-5), np.full(here.n, 1e-3)])
+    assert np.array_equal(family.carry(motion, here, there), motion)
+    setup, clearance, friction = family.settings(0.75)
+    recorded = PiecewiseMotion(setup, clearance, friction, rubhpc.State.at_rest(setup.model))
+    begun = recorded.start, recorded.states
+    ends = [flow(case, *begun, 1, 0.0)[-1] for case in (here, recorded)]
+    assert len(ends[0].pieces) > 1
+    assert np.array_equal(ends[0].end, ends[1].end)
 
 
 @pytest.mark.parametrize(

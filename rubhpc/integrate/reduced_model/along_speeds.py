@@ -1,0 +1,67 @@
+"""A model in the same reduced coordinates at every speed of a range."""
+
+from __future__ import annotations
+
+from copy import copy
+from functools import reduce
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.packing import whole_system
+from rubhpc.integrate.reduced_model.reduction import reduce_to
+from rubhpc.integrate.reduced_model.standstill import at_standstill, completed
+from rubhpc.integrate.reduced_model.truncation import kept_modes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
+
+    Floats = NDArray[np.float64]
+
+
+class AlongSpeeds:
+    """Reduces a model once for a range of speeds: its motions change with the speed alone, not with a basis.
+
+    Modes are kept that any of some speeds needs. Gyroscopic terms go with the speed, unbalance forces with
+    its square; nothing else of a model changes, unless its bearings do.
+
+    Parameters
+    ----------
+    spins : iterable of float, rad/s
+        Speeds of the range, its ends above all.
+    accuracy : float
+        As of `reduce_model`.
+    """
+
+    def __init__(self, model: Model, spins: Iterable[float], accuracy: float) -> None:
+        """Choose the basis, and project on it."""
+        spins = sorted(spins, key=abs)
+        choices = zip(*(kept_modes(model, spin, accuracy) for spin in spins), strict=True)
+        parts = at_standstill(model).parts
+        are_kept = [
+            completed(part, reduce(np.logical_or, of)) for part, of in zip(parts, choices, strict=True)
+        ]
+        self._fastest = reduce_to(model, spins[-1], accuracy, are_kept)
+        basis, *_ = self._fastest.basis, self._fastest.project, self._fastest.translations
+        _, still, _, _ = whole_system(model, 0.0)
+        _, _, _, force = whole_system(model, 1.0)
+        self._damping = basis.T @ still @ basis
+        gyroscopic = np.zeros_like(still)
+        first = 0
+        for body in model.bodies:
+            rows = slice(first, first + body.n_dof)
+            gyroscopic[rows, rows] = body.gyroscopic
+            first += body.n_dof
+        self._gyroscopic, self._force = basis.T @ gyroscopic @ basis, force @ basis
+
+    def at(self, spin: float) -> ReducedModel:
+        """The model at a speed, rad/s."""
+        found = copy(self._fastest)  # with what its basis has yielded
+        damping, force = self._damping + spin * self._gyroscopic, spin**2 * self._force
+        vars(found).update(spin=spin, damping=damping, force=force)
+        return found
