@@ -35,10 +35,10 @@ class Oscillators(Family):
     """Of one frequency or one wall, and a restitution."""
 
     def __init__(self, along, span, frequency, restitution):
-        super().__init__(None, along, span)
+        super().__init__(None, along, (0.0, span))
         self._frequency, self._restitution, self._known = frequency, restitution, {}
 
-    def settings(self, value):
+    def settings(self, value, *, is_measured=True):
         frequency = value if self.along == "speed" else self._frequency
         if frequency not in self._known:
             self._known[frequency] = set_up_modal(
@@ -116,10 +116,10 @@ class CrossCoupled(Family):
     """A whirling mass with u'' + c u' + k u + cross (w, -v) = unbalance, over the cross-coupled stiffness."""
 
     def __init__(self, span):
-        super().__init__(None, "cross", span)
+        super().__init__(None, "cross", (0.0, span))
         self._known = {}
 
-    def settings(self, value):
+    def settings(self, value, *, is_measured=True):
         if value not in self._known:
             rig = Rig.from_matrices(
                 np.eye(2), 0.08 * np.eye(2), [[1.69, value], [-value, 1.69]],
