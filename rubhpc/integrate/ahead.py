@@ -20,12 +20,16 @@ from typing import TYPE_CHECKING
 import numba
 
 from rubhpc.integrate.marches.closed_form import closed_form_march
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.measuring.measures import new_accumulator
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import ModalSetup, Scheme, prepare
 from rubhpc.kernels._jit import cache_of, plain
 from rubhpc.kernels.flow import follow_piece
+from rubhpc.kernels.force_average import add_force
 from rubhpc.kernels.laws import FRICTION_LAWS, is_penalty
+from rubhpc.kernels.penalty_events import change_pressed
 from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import Contact, Integrator
 from rubhpc.threads import VARIABLES
@@ -87,13 +91,20 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def _compile(friction_law: str, *, is_soft: bool) -> None:
-    """Compile what takes an event, then what finds the next one, on a rotor that touches nothing."""
+    """Compile what takes an event, then what finds the next one, on a rotor that touches nothing.
+
+    Before these what the march needs towards its end: both processes then end at about the same time.
+    """
+    seen = new_accumulator(1)
+    add_force(0, 0.0, 0.0, 0.0, 0.0, 0.0, seen.origin, seen.force_piece, seen.force_held, seen.peak_force)
     contact = Contact(friction_law=friction_law, **(_SOFT if is_soft else {}))  # type: ignore[arg-type]
     setup = prepare(
         read_rig("mokhtar2017"), 150.0, contact=contact, integrator=Integrator(), samples_per_revolution=32
     )
     assert isinstance(setup, ModalSetup)
     motion = PiecewiseMotion(setup, 1.0, 0.3, State.at_rest(setup.model))
+    if type(motion.march) is EventDrivenMarch:
+        change_pressed(motion.march.bodies, 0, 0, motion.start.copy())
     motion.march.change(motion.states, 1, 0.0, motion.start.copy())
     motion.revolve(motion.start, motion.states)
 
