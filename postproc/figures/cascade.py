@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 _ROWS = 60  # of a waterfall: more overlap at column width
 _PIXELS = (800, 500)  # of an intensity picture at column width and 300 dpi
 _DECADES = 3.0
+_NAMES_HIGH = 0.07  # of the rows' span, above the highest line, for the names of orders
 _NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
 
 
@@ -133,7 +134,7 @@ def waterfall(
         ax.plot(at, rows[i] + line, color="C0", linewidth=0.5, zorder=order)
     ax.set(xlim=(_start(spectra, limit), limit), xlabel=_NAMES[abscissa], ylabel=label)
     below_rows = 0.1 if _start(spectra, limit) < 0 else 0.04  # room for the senses of whirl
-    ax.set_ylim(rows.min() - below_rows * span, rows.max() + (height + 0.02) * span)
+    ax.set_ylim(rows.min() - below_rows * span, rows.max() + (height + 0.02 + _NAMES_HIGH) * span)
     ax.set_yticks([t for t in ax.get_yticks() if abs(t - rows.mean()) <= 0.55 * span])
     _name_decades(ax, spectra)
     tick_levels(ax, "y", spectra[spectra.dims[0]], rows)
@@ -216,7 +217,7 @@ def _scale_bar(spectra: xr.DataArray, ax: Axes, peak: float, gain: float) -> Non
     shown = peak * scale.factor
     decade = 10 ** math.floor(math.log10(shown))
     size = max(m for m in (1, 2, 5) if m * decade <= shown) * decade
-    top = ax.get_ylim()[1] - 0.02 * float(np.ptp(ax.get_ylim()))
+    top = ax.get_ylim()[1] - 0.06 * float(np.ptp(ax.get_ylim()))  # below the names of orders
     x = 0.975 * ax.get_xlim()[1]
     ends = [top - gain * size / scale.factor, top]
     ax.plot([x, x], ends, color="k", linewidth=1.2, zorder=7, solid_capstyle="butt")

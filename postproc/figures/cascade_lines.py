@@ -34,7 +34,7 @@ def draw_orders(
 
     In full spectra each has its twin on the backward side. `ground` is the colour behind their names.
     """
-    rows, rate = _rows_and_rate(spectra)
+    rows, rate = _to_the_top(*_rows_and_rate(spectra), ax.get_ylim()[1])
     left, right = ax.get_xlim()
     style: dict[str, Any] = {"color": color, "linewidth": 0.4, "linestyle": (0, (4, 3)), "zorder": 2.5}
     tagged: list[float] = []
@@ -110,6 +110,19 @@ def _rows_and_rate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], NDArray[
     ascending = np.argsort(rows)
     rate = np.broadcast_to(spectra["spin_speed"].values, rows.shape) / (2 * math.pi)
     return rows[ascending], rate[ascending]
+
+
+def _to_the_top(
+    rows: NDArray[np.float64], rate: NDArray[np.float64], top: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Ordinates and spin rates with one more at the top of the axes, beyond the spectra, for names.
+
+    The rate goes on as between the last two rows.
+    """
+    if rows.size < 2 or not top > rows[-1]:
+        return rows, rate
+    slope = (rate[-1] - rate[-2]) / (rows[-1] - rows[-2])
+    return np.append(rows, top), np.append(rate, rate[-1] + slope * (top - rows[-1]))
 
 
 def _tag(ax: Axes, x: float, y: float, text: str, color: str, ground: str, ha: str) -> None:

@@ -223,6 +223,18 @@ def test_an_order_line_runs_through_its_lines(spectra, ax):
     assert x == pytest.approx(2 * synthetic_store.FIRST_LATERAL * y)
 
 
+def test_names_of_orders_stand_above_the_spectra(spectra, ax):
+    """The highest line, at twice the highest speed, would lie under its own name."""
+    waterfall(spectra, ax, 260.0)
+    highest = max(line.get_ydata().max() for line in ax.lines[:-1])  # the last is the bar of the scale
+    bar = ax.lines[-1].get_ydata()
+    draw_orders(ax, spectra, [Fraction(1)])
+    ax.figure.canvas.draw()
+    (name,) = [text for text in ax.texts if text.get_text() == "1X"]
+    lowest = ax.transData.inverted().transform(name.get_window_extent())[0, 1]
+    assert lowest > max(highest, *bar)
+
+
 def test_the_waterfall_has_a_curve_for_each_finished_case(ax):
     whole = select(
         synthetic_store.make(), {"friction": 0.1, "stator_youngs_modulus": 3e9, "clearance": 70e-6}
