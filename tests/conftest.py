@@ -162,6 +162,19 @@ LONG = (
     "validation/test_rub.py::test_finer_integration_gives_the_same_orbit[central-difference-two_lobes]",
     "validation/test_rub.py::test_rub_is_the_same_at_every_angle_around_the_rim[central-difference-updated]",
     "validation/test_rub.py::test_rub_is_the_same_at_every_angle_around_the_rim[modal-updated]",
+    "figures/test_figure_commands.py::test_each_command_leaves_its_figure_and_says_where[cascade-args1]",
+    "figures/test_figure_commands.py::test_each_command_leaves_its_figure_and_says_where[cascade-args3]",
+    "figures/test_figure_commands.py::test_each_command_leaves_its_figure_and_says_where[spectrum-args10]",
+    "storage/test_shards.py::test_blocks_that_are_not_packed_are_read_all_the_same[1]",
+    "validation/test_carrier.py::test_the_modal_scheme_agrees_with_the_central_difference[{'law'",
+    "validation/test_full_order.py::test_case_follows_the_full_order_solution"
+    "[a ring, and one at another node-fixed-c",
+    "validation/test_full_order.py::test_case_follows_the_full_order_solution[at two nodes-fixed-c",
+    "validation/test_full_order.py::test_case_follows_the_full_order_solution[three, one set back-fixed-c",
+    "validation/test_full_order.py::test_case_follows_the_full_order_solution[three, one set back-updated",
+    "validation/test_modal_accuracy.py::test_orbit_is_that_of_the_central_difference[period_2]",
+    "validation/test_rub.py::test_finer_integration_gives_the_same_orbit[central-difference-steady]",
+    "validation/test_rub.py::test_rub_is_the_same_at_every_angle_around_the_rim[central-difference-fixed]",
 )
 # Files of more than ten seconds each, begun first: else one of them may be left for the end.
 LONGEST = (

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import synthetic_store
 import xarray as xr
+from running import run
 
 from postproc.cases.reduction import computed, envelope, histogram, mean_spectrum, open_in_pieces, quantiles
 from postproc.store.open import open_store
@@ -235,13 +236,9 @@ def test_command_reduces_and_draws(
 
 
 @pytest.mark.parametrize("on_ranks", [False, pytest.param(True, marks=pytest.mark.long)])
-def test_command_refuses_bad_input_in_a_line(on_ranks: bool, path: Path, tmp_path: Path) -> None:
-    command = [*COMMAND, path, "--over", "sped_ratio"]
-    if on_ranks:
-        command = [Path(sys.executable).with_name("mpirun"), "-n", "3", *command, "--on", "mpi"]
-    done = subprocess.run(
-        command, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False
-    )
+def test_command_refuses_bad_input_in_a_line(on_ranks: bool, path: Path) -> None:
+    arguments = ["reduce", path, "--over", "sped_ratio"]
+    done = run(*arguments, "--on", "mpi", ranks=3) if on_ranks else run(*arguments)
     assert done.returncode == 2
     told = [line for line in done.stderr.splitlines() if line.startswith("rubhpc:")]
     assert told == [f"rubhpc: {path}: no axis sped_ratio; did you mean speed_ratio?"]

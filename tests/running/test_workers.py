@@ -45,13 +45,13 @@ def workers_of(job: subprocess.Popen[str]) -> list[psutil.Process]:
 
 
 def test_workers_store_the_bytes_of_one_process(tmp_path, whole):
-    done = run(write_slow_study(tmp_path), "--workers", 3)
+    done = run(write_slow_study(tmp_path), "--workers", 2)
     assert done.returncode == 0, done.stderr
     assert "12 done" in done.stdout
     assert stored_bytes(tmp_path / "tiny.zarr") == whole
     journals = [*(tmp_path / "tiny.zarr" / ".rubhpc" / "journal").glob("*rank*")]
-    assert len(journals) == 3
-    assert sum(len(path.read_bytes().splitlines()) > 1 for path in journals) >= 2  # they shared the work
+    assert len(journals) == 2
+    assert sum(len(path.read_bytes().splitlines()) > 1 for path in journals) == 2  # they shared the work
 
 
 def test_a_script_needs_no_main_guard(tmp_path):

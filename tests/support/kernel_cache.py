@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 KERNELS = ROOT / "rubhpc" / "kernels"
 CACHES = ROOT / ".pytest_cache" / "kernels"
 SCHEMES = (  # of two processes; those that share most are compiled by one
-    ("events", "neighbours", "periodic", "stick and slip", "periodic stick and slip"),
+    ("events", "neighbours", "periodic", "stick and slip", "periodic stick and slip", "run-up"),
     ("curved gaps", "short steps", "central differences"),
 )
 
@@ -48,6 +48,8 @@ def use(scheme: str) -> None:
     }
     if scheme == "neighbours":
         _use_neighbours()
+    elif scheme == "run-up":
+        rubhpc.run_up("mokhtar2017", start="1500 rpm", stop="1600 rpm", time="0.1 s", clearance="0.1 mm")
     elif scheme.startswith("periodic"):
         law = {"friction_law": "coulomb"} if scheme.endswith("slip") else {}
         rubhpc.periodic("mokhtar2017", **case, clearance_ratio=0.9, **law)

@@ -198,7 +198,7 @@ def test_bearings_have_their_coefficients_at_the_speed_reached():
         node=1, speed=(0.0, 400.0), stiffness=(2e4, 1.4e5), damping=(60.0, 10.0), interpolation="linear"
     )
     rig = replace(RIG, rotor=replace(RIG.rotor, bearing=(table,), gravity=9.81))
-    law = {"start": 150.0, "stop": 240.0, "time": 2.0}
+    law = {"start": 150.0, "stop": 195.0, "time": 1.0}
     found = run_up(
         rig,
         **law,
