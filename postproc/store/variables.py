@@ -55,7 +55,7 @@ def require_measure(store: xr.Dataset, name: str) -> None:
 def require_results(values: ArrayLike, store: xr.Dataset) -> None:
     """Check that at least one value is finite; InputError where no selected case is done."""
     if not np.isfinite(np.asarray(values, dtype=float)).any():
-        fix = "run the study to its end, or select other cases"
+        fix = "run the study to its end, or select cases that did not fail or diverge (`rubhpc status`)"
         raise InputError(f"{source(store)}: no selected case is done; {fix}")
 
 
