@@ -20,6 +20,7 @@ from rubhpc.study.initial import Initial
 from rubhpc.study.study import Contact, Integrator, Recording
 
 ALL_MODES = Integrator(accuracy=1e-12)
+OVERHUNG = {"rotor.bearing.2.node": 2, "rotor.gravity": "9.81 m/s^2"}  # the disc beyond both bearings, below
 
 
 def ring_of(count):
@@ -35,11 +36,12 @@ def ring_of(count):
         (trial_rig(3), 1.3, 0.8, 0.1),
         (with_keys(trial_rig(2), {"rotor.gravity": "9.81 m/s^2"}), 1.2, 0.7, 0.2),
         (trial_rig(2, lateral=False), -1.3, 0.7, 0.2),
+        pytest.param(with_keys(trial_rig(2), OVERHUNG), 1.25, 0.5, 0.2, marks=pytest.mark.long),
         pytest.param(ring_of(3), 1.25, 0.85, 0.05, marks=pytest.mark.long),
         pytest.param(ring_of(5), 1.25, 0.8, 0.05, marks=pytest.mark.long),
         pytest.param(ring_of(16), 1.25, 0.8, 0.05, marks=pytest.mark.long),
     ],
-    ids=["one", "three", "gravity", "backward", "ring of 3", "ring of 5", "ring of 16"],
+    ids=["one", "three", "gravity", "backward", "overhung", "ring of 3", "ring of 5", "ring of 16"],
 )
 def test_periodic_motion_and_its_monodromy_are_those_of_all_degrees_of_freedom(
     rig, ratio, clearance_ratio, friction
