@@ -62,7 +62,7 @@ class Scheme(Enum):
     """How a case is integrated."""
 
     EVENT_DRIVEN = "event-driven"  # closed-form motion from event to event
-    CURVED = "curved"  # closed-form flights from event to event, steps of order 4 where gaps are closed
+    CURVED = "curved"  # closed-form flights from event to event, steps of order 8 where gaps are closed
     CONTACT_STEPPING = "contact-stepping"  # closed-form motion between short steps of contact
     CENTRAL_DIFFERENCE = "central-difference"  # the paper's
 

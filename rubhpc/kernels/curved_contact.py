@@ -3,9 +3,8 @@
 The gap of a pair is that along its stator's axis, plus h, which curvature adds. While the pair is closed, h
 follows from the tangential and the bending displacements alone. The tables of the fixed normal hold for the
 motion plus E h, where E moves one gap and no force of contact; h, its rate and what a turning normal changes
-of the forces act on their coordinates as loads, which are quadratic in time over a step. Their response is
-exact, and the loads are found by iteration: collocation at the beginning, the middle and the end (Lobatto),
-of order 4.
+of the forces act on their coordinates as loads, which are polynomials of degree 4 in time over a step. Their
+response is exact, and the loads are found by iteration: collocation at Lobatto's five points, of order 8.
 """
 
 from __future__ import annotations
@@ -25,8 +24,20 @@ Ints = NDArray[np.int64]
 ALONG, ACROSS, BENDING = range(3)
 # Loads of a pair: h, its rate, and the changes of the contact force along, across and on each bending.
 HEIGHT, HEIGHT_RATE, LOAD_ALONG, LOAD_ACROSS, LOAD_BENDING = range(5)
-N_NODE = 3  # beginning, middle and end of a step
-BEFORE, LARGEST, RESOLVED = range(3)  # of `CurvedWork.span`; last the time that resolves force and slip, s
+N_NODE = 5  # of a step, its beginning and end among them
+_ASIDE = 0.5 * np.sqrt(3.0 / 7.0)
+NODES = np.array([0.0, 0.5 - _ASIDE, 0.5, 0.5 + _ASIDE, 1.0])  # over its length (Lobatto)
+# Coefficients of the polynomials that are 1 at a node each and 0 at the others, by powers of time.
+LAGRANGE = np.ascontiguousarray(np.linalg.inv(NODES[:, None] ** np.arange(N_NODE)).T)
+# Their integrals over the step, and from each node to the next.
+LOBATTO = np.array([1.0 / 20.0, 49.0 / 180.0, 16.0 / 45.0, 49.0 / 180.0, 1.0 / 20.0])
+PARTS = np.ascontiguousarray(
+    np.diff(NODES[:, None] ** np.arange(1, N_NODE + 1) / np.arange(1, N_NODE + 1), axis=0) @ LAGRANGE.T
+)
+# Of `CurvedWork.span`: length of the step before (0: none), largest force of the contact, time that resolves
+# force and slip, whether `secant` holds anything (0: no; 2: it failed once), steps before one may be longer.
+BEFORE, LARGEST, RESOLVED, LEARNT, PATIENCE = range(5)
+MOST_UNKNOWNS = 64  # loads of a step that are found by a secant method; more are found by sweeps
 
 
 class CurvedPairs(NamedTuple):
@@ -35,7 +46,6 @@ class CurvedPairs(NamedTuple):
     row: Floats  # (q, 3 + b, n), motions of each pair; rad/m^0.5 of a bending displacement, twist in rad
     gram: Floats  # (q, 3 + b, q, 3 + b), products of the rows: what unit loads on one do to another, 1/kg
     output: Floats  # (3, o, n), outputs of `ModeTables`, of displacements, velocities and accelerations
-    resisting: Floats  # (n, n), symmetric part of the damping
     skew: Floats  # (n, n), skew part of the stiffness; without rows where there is none
     radius: Floats  # (q,), m
     clearance: Floats  # (q,), at rest, m
@@ -59,28 +69,34 @@ class CurvedTables(NamedTuple):
     accel_rate: Floats  # (p, q, d, q), 1/s, that a unit rate of h adds
     load_re: Floats  # (p, q, 4 + b, m), rates of the coordinates under unit loads
     load_im: Floats
-    weight_re: Floats  # (p, n_level, 2, 3, m), s, response in the middle and at the end to loads at the nodes
+    node_re: Floats  # (p, n_level, 4, m), exponential of each coordinate up to the nodes after the first
+    node_im: Floats
+    weight_re: Floats  # (p, n_level, 4, 5, m), s, response at those nodes to loads at all of them
     weight_im: Floats
-    reach: Floats  # (p, n_level, 2, 3, 3 d + 1, 4 + b), what the loads add to what is read of a lone pair
-    half_re: Floats  # (p, m), exponential of each coordinate over half a tick
-    half_im: Floats
+    lone: Floats  # (p, 2, m, 3 d + 1), what is read of a lone pair, of real and imaginary parts
+    reach: Floats  # (p, n_level, 4, 5 (4 + b), 3 d + 1), what the loads add to that
     inverse_re: Floats  # (p, m), s, inverse of each exponent; 0 where that is 0
     inverse_im: Floats
+    drain: Floats  # (p, 2, m, r + 2), of real and imaginary parts: what squares to the loss by damping, and
+    # the force of the unbalance times the velocities, with the cosine and the sine of the shaft's angle
+    sign: Floats  # (p, r), of the squares
+    drain_moved: Floats  # (p, r + 2, q), what a unit rate of h takes off
 
 
 class CurvedWork(NamedTuple):
     """Work space, and what a closed contact carries from step to step."""
 
-    h: Floats  # (3, q), m, at the nodes of the step
-    rate: Floats  # (3, q), m/s
-    force: Floats  # (3, q), N
-    slip: Floats  # (3, q), m/s
-    load: Floats  # (3, q, 4 + b)
-    before: Floats  # (3, q, 4 + b), loads of the step before
-    gap: Floats  # (2, 3, q), of open pairs at the nodes, m, and their rates
-    span: Floats  # (3,), s, length of the step before (0: none); largest force of the contact, N; `RESOLVED`
+    h: Floats  # (5, q), m, at the nodes of the step
+    rate: Floats  # (5, q), m/s
+    force: Floats  # (5, q), N
+    slip: Floats  # (5, q), m/s
+    load: Floats  # (5, q, 4 + b)
+    loads: Floats  # the same in one row
+    before: Floats  # (5, q, 4 + b), loads of the step before
+    gap: Floats  # (2, 5, q), of open pairs at the nodes, m, and their rates
+    span: Floats  # (5,), see above
     motion: Floats  # (3, q, 3 + b), displacements, rates and free accelerations at a node
-    free: Floats  # (2, 3 d + 1), what is read in the middle and at the end without the loads, of one pair
+    free: Floats  # (4, 3 d + 1), what is read of one pair at the nodes, without the loads to be found
     normal: Floats  # (2, q), along and across
     jacobian: Floats  # (q, 3 + b), of the gaps in the motions
     direction: Floats  # (q, 3 + b), of the forces
@@ -88,33 +104,38 @@ class CurvedWork(NamedTuple):
     opening: Floats  # (q,)
     active: NDArray[np.bool_]  # (q,)
     elimination: Floats  # (q, q + 1)
-    last: Floats  # (q, 4 + b), loads at a node before they are computed again
-    transient: Floats  # (2, m), coordinates that go on by themselves, of the motion that loads leave
-    later: Floats  # (2, m), the same at a later node
-    driven: Floats  # (2, m), the others, at a node
-    power: Floats  # (3, 2), W, of damping and of the unbalance at the nodes, in the driven motion
-    crossed: Floats  # (3, 2, m), power that damping takes of the transient for a unit of each coordinate
+    ahead: Floats  # (4, 5), what the loads of the step before count for at the nodes
+    secant: Floats  # (2, u, u), how loads move for a unit of what they are missed by; as kept in between
+    point: Floats  # (7, 4 q (4 + b)), rows of `curved_secant`
+    transient: Floats  # (2, m), coordinates but for what follows the loads
+    seen: Floats  # (r + 2,), of `CurvedTables.drain`
+    whole: Floats  # (3 d + 1,), what is read of one pair at a node
+    power: Floats  # (5, 2), W, of damping and of the unbalance at the nodes
     state: Floats  # (2 n,), displacements and velocities at a node
     acceleration: Floats  # (n,), at a sample
-    response: Floats  # (3, 2, m), rates of the coordinates under the loads at the nodes
-    middle: Floats  # (2, m)
+    response: Floats  # (5, 2, m), rates of the coordinates under the loads at the nodes
+    middle: Floats  # (2, m), coordinates at a node
     shape: Floats  # (2, q, n), Jacobian and directions of an event
 
 
-def curved_work(q: int, n_row: int, n: int, m: int) -> CurvedWork:
-    """Work space for q pairs of `n_row` motions, n reduced degrees and m coordinates."""
+def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int) -> CurvedWork:
+    """Work space for q pairs of `n_row` motions, n reduced degrees, m coordinates and r losses."""
     nodes = np.zeros((4, N_NODE, q))
+    n_unknown = (N_NODE - 1) * q * (n_row + 1)
+    n_learnt = min(n_unknown, MOST_UNKNOWNS)
+    load = np.zeros((N_NODE, q, n_row + 1))
     return CurvedWork(
         h=nodes[0].copy(),
         rate=nodes[1].copy(),
         force=nodes[2].copy(),
         slip=nodes[3].copy(),
-        load=np.zeros((N_NODE, q, n_row + 1)),
+        load=load,
+        loads=load.reshape(-1),
         before=np.zeros((N_NODE, q, n_row + 1)),
         gap=np.zeros((2, N_NODE, q)),
-        span=np.zeros(3),
+        span=np.zeros(5),
         motion=np.zeros((3, q, n_row)),
-        free=np.zeros((2, 3 * n_row - 2)),
+        free=np.zeros((N_NODE - 1, 3 * n_row - 2)),
         normal=np.zeros((2, q)),
         jacobian=np.zeros((q, n_row)),
         direction=np.zeros((q, n_row)),
@@ -122,12 +143,13 @@ def curved_work(q: int, n_row: int, n: int, m: int) -> CurvedWork:
         opening=np.zeros(q),
         active=np.zeros(q, dtype=np.bool_),
         elimination=np.zeros((q, q + 1)),
-        last=np.zeros((q, n_row + 1)),
+        ahead=np.zeros((N_NODE - 1, N_NODE)),
+        secant=np.zeros((2, n_learnt, n_learnt)),
+        point=np.zeros((7, n_unknown)),
         transient=np.zeros((2, m)),
-        later=np.zeros((2, m)),
-        driven=np.zeros((2, m)),
+        seen=np.zeros(n_loss + 2),
+        whole=np.zeros(3 * n_row - 2),
         power=np.zeros((N_NODE, 2)),
-        crossed=np.zeros((N_NODE, 2, m)),
         state=np.zeros(2 * n),
         acceleration=np.zeros(n),
         response=np.zeros((N_NODE, 2, m)),

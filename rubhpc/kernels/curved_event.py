@@ -11,6 +11,7 @@ from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
+    NONE,
     UNDER_WAY,
     Clock,
     Progress,
@@ -52,9 +53,10 @@ def take_curved_event(
     mode = progress.mode
     closed = int(tables.mask[mode])
     place(tables, curved, mode, z[0], z[1], work.h[0], work.rate[0], motion)
-    alone = z if closed == 0 else work.transient
+    if closed != 0:
+        progress.energy_from = NONE  # they are added up step by step
     if not end_mode(
-        tables, reduced, clock, is_recorded, progress, alone, motion, events.impulse, recorder, accumulator
+        tables, reduced, clock, is_recorded, progress, z, motion, events.impulse, recorder, accumulator
     ):
         return DIVERGED
     angle = shaft_angle(clock, progress.tick)

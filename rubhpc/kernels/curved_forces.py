@@ -229,11 +229,67 @@ def find_forces(
     is_finite = True
     for i in range(q):
         if work.active[i]:
-            force = work.force[node, i]
-            is_finite = is_finite and np.isfinite(force)
-            work.load[node, i, HEIGHT], work.load[node, i, HEIGHT_RATE] = work.h[node, i], work.rate[node, i]
-            work.load[node, i, LOAD_ALONG] = force * (work.direction[i, ALONG] - 1.0)
-            work.load[node, i, LOAD_ACROSS] = force * (work.direction[i, ACROSS] - pairs.friction[i])
-            for j in range(BENDING, d):
-                work.load[node, i, j + 2] = force * work.direction[i, j]
+            is_finite = is_finite and np.isfinite(work.force[node, i])
+            fill_loads(pairs, i, d, node, work)
     return is_finite
+
+
+@jit_lean_sum
+def fill_loads(pairs: CurvedPairs, i: int, d: int, node: int, work: CurvedWork) -> None:
+    """Fill the loads of pair i at a node, of which the geometry is filled and the force is known."""
+    force, load, direction = work.force[node, i], work.load[node, i], work.direction[i]
+    load[HEIGHT], load[HEIGHT_RATE] = work.h[node, i], work.rate[node, i]
+    load[LOAD_ALONG] = force * (direction[ALONG] - 1.0)
+    load[LOAD_ACROSS] = force * (direction[ACROSS] - pairs.friction[i])
+    for j in range(BENDING, d):
+        load[j + 2] = force * direction[j]
+
+
+@jit_inline_sum
+def find_lone_forces(
+    pairs: CurvedPairs, tables: CurvedTables, rim_speed: Floats, mode: int, node: int, work: CurvedWork
+) -> bool:
+    """`find_forces` of the only pair, which is closed: its h by Newton's method, the rest without systems."""
+    d = tables.bound.shape[2]
+    motion, rates, free = work.motion[0, 0], work.motion[1, 0], work.motion[2, 0]
+    jacobian, direction, radius = work.jacobian[0], work.direction[0], pairs.radius[0]
+    moved = tables.moved[mode, 0]
+    h, steep = work.h[node, 0], 0.0
+    for _ in range(MOST_PASSES):
+        across = motion[ACROSS] + pairs.aside[0] - moved[ACROSS, 0] * h
+        value = curvature(radius, across, pairs.is_round)
+        steep = across / np.sqrt(radius * radius - across * across) if pairs.is_round else 0.0
+        slope = -steep * moved[ACROSS, 0]
+        for j in range(BENDING, d):
+            at = motion[j] - moved[j, 0] * h
+            value += 0.5 * at * at
+            slope -= at * moved[j, 0]
+        change = (value - h) / (1.0 - slope)
+        h += change
+        if abs(change) <= EXACT:
+            break
+    follows, answers = steep * rates[ACROSS], 1.0 + steep * moved[ACROSS, 0]
+    for j in range(d):
+        motion[j] -= moved[j, 0] * h
+        if j >= BENDING:
+            follows += motion[j] * rates[j]
+            answers += motion[j] * moved[j, 0]
+    rate = follows / answers
+    for j in range(d + 1):
+        rates[j] -= moved[j, 0] * rate
+    _, bends = fill_geometry(pairs, 0, d, work)
+    for j in range(d):
+        accel = free[j] + tables.accel[mode, 0, j, 0] * h + tables.accel_rate[mode, 0, j, 0] * rate
+        bends += jacobian[j] * accel
+    give = 0.0
+    for a in range(d + 1):
+        row = pairs.gram[0, a, 0]
+        total = 0.0
+        for c in range(d + 1):
+            total += row[c] * direction[c]
+        give += jacobian[a] * total
+    force = -bends / give if give != 0.0 else np.inf
+    work.h[node, 0], work.rate[node, 0], work.force[node, 0] = h, rate, force
+    work.slip[node, 0] = slip_of(pairs, 0, d, rim_speed[0], work)
+    fill_loads(pairs, 0, d, node, work)
+    return bool(np.isfinite(force))

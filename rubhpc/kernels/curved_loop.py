@@ -1,4 +1,4 @@
-"""The modal integrator for curved gaps: closed-form flights, and steps of order 4 while contacts are closed.
+"""The modal integrator for curved gaps: closed-form flights, and steps of order 8 while contacts are closed.
 
 As `event_loop`, but for what is closed: there the motion has no closed form, and `curved_step` takes steps
 with control of their error. In flight the gap is a convex function of the motion, so that it is never smaller
@@ -30,6 +30,8 @@ from rubhpc.kernels.curved_contact import (
     ALONG,
     BEFORE,
     LARGEST,
+    LEARNT,
+    PATIENCE,
     RESOLVED,
     CurvedPairs,
     CurvedTables,
@@ -47,7 +49,7 @@ from rubhpc.kernels.curved_measuring import (
 from rubhpc.kernels.curved_search import closed_crossing, curved_free_interval, open_crossing
 from rubhpc.kernels.curved_step import go_on, take_step
 from rubhpc.kernels.event_steps import choose_step, contact_age, end_record, longest_step, sample_step
-from rubhpc.kernels.measuring import Recorder, begin_span, end_span, resolved_contact
+from rubhpc.kernels.measuring import Recorder, begin_span, resolved_contact
 from rubhpc.kernels.mode_change import product
 
 if TYPE_CHECKING:
@@ -107,7 +109,7 @@ def advance_curved(
                 begin_span(tables, z, progress, recorder)
             else:
                 angle = shaft_angle(clock, progress.tick)
-                begin_curved_span(reduced, pairs, tables, curved, angle, z, progress, work, recorder)
+                begin_curved_span(pairs, tables, curved, angle, z, progress, work)
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
         is_end = progress.tick >= last_tick
         is_last = is_end and is_recorded and progress.tick == clock.n_sample << clock.sample_level
@@ -134,7 +136,7 @@ def advance_curved(
             if is_recorded and closed == 0:
                 end_record(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
             elif is_last:
-                end_span(tables, clock, work.transient, progress, recorder, accumulator)
+                progress.energy_from = NONE
             return FINISHED
         is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
         if progress.n_step > last_step and not is_at_event:
@@ -164,7 +166,6 @@ def advance_curved(
                 if age != progress.contact_age:
                     progress.contact_age = age
                     work.span[RESOLVED] = resolved_contact(tables, mode, work.transient[0], work.transient[1])
-                level = min(level, clock.contact_level)
                 while level > FORCED_LEVEL and (1 << level) * clock.tick > work.span[RESOLVED]:
                     level -= 1
             is_event_free = progress.tick - progress.entered < 1 << FORCED_LEVEL  # so that time goes on
@@ -184,7 +185,7 @@ def advance_curved(
                 progress.resolved_level = level + 1
             progress.is_after_event = 0
             if not is_event_free:
-                crossing = closed_crossing(closed, step, work)
+                crossing = closed_crossing(closed, work)
         if crossing != 0 and level > 0:
             progress.halving_level = level - 1
             continue
@@ -214,9 +215,7 @@ def advance_curved(
         if closed != 0:
             step = (1 << level) * clock.tick
             if is_recorded:
-                observe_energies(
-                    reduced, pairs, tables, curved, clock, level, z_next, progress, work, accumulator
-                )
+                observe_energies(pairs, tables, curved, clock, level, z, z_next, progress, work, accumulator)
                 i_sample = progress.tick >> clock.sample_level
                 observe_curved_step(
                     reduced,
@@ -267,7 +266,7 @@ def enter_curved(
     progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
     progress.resolved_level, progress.halving_level, progress.is_after_event = FORCED_LEVEL, NONE, 1
     progress.contact_age = NONE
-    work.span[BEFORE], work.span[LARGEST] = 0.0, 0.0
+    work.span[BEFORE], work.span[LARGEST], work.span[LEARNT], work.span[PATIENCE] = 0.0, 0.0, 0.0, 0.0
     if closed == 0:
         return True
     return evaluate(pairs, curved, reduced.rim_speed, found, closed, 0, z[0], z[1], work)

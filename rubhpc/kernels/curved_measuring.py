@@ -27,12 +27,21 @@ from rubhpc.kernels.contact_modes import (
     TWIST_ACCELERATION_ROW,
     ModeTables,
     Reduced,
+    add_rows,
     dot,
-    propagate,
 )
-from rubhpc.kernels.curved_contact import N_NODE, CurvedPairs, CurvedTables, CurvedWork, is_closed
-from rubhpc.kernels.curved_response import respond
-from rubhpc.kernels.measuring import Recorder, begin_span, widen_extrema
+from rubhpc.kernels.curved_contact import (
+    LOBATTO,
+    N_NODE,
+    NODES,
+    PARTS,
+    CurvedPairs,
+    CurvedTables,
+    CurvedWork,
+    is_closed,
+)
+from rubhpc.kernels.curved_response import move_coordinates, respond
+from rubhpc.kernels.measuring import Recorder, widen_extrema
 from rubhpc.kernels.mode_change import product
 
 Floats = NDArray[np.float64]
@@ -62,7 +71,6 @@ def place(
 
 @jit_lean_sum
 def begin_curved_span(
-    reduced: Reduced,
     pairs: CurvedPairs,
     tables: ModeTables,
     curved: CurvedTables,
@@ -70,26 +78,24 @@ def begin_curved_span(
     z: Floats,
     progress: Progress,
     work: CurvedWork,
-    recorder: Recorder,
 ) -> None:
     """Begin to add up energies amid closed contacts, the shaft at an angle (rad).
 
-    The motion is taken apart. Its transient goes on by itself from here, fast or not, so that its losses have
-    a closed form; the rest, which the loads drive, begins where the loads hold it still, and is slow.
+    What goes on by itself from here is set apart, the coordinates but for where the loads hold them: steps
+    must resolve that alone.
     """
-    mode = progress.mode
-    respond(curved, mode, int(tables.mask[mode]), 0, work)
+    mode, transient = progress.mode, work.transient
+    respond(curved, mode, int(tables.mask[mode]), 1, work)
     for k in range(z.shape[1]):
         a, b = curved.inverse_re[mode, k], curved.inverse_im[mode, k]
         re, im = work.response[0, 0, k], work.response[0, 1, k]
-        work.transient[0, k], work.transient[1, k] = z[0, k] + a * re - b * im, z[1, k] + a * im + b * re
-    begin_span(tables, work.transient, progress, recorder)
-    observe_power(reduced, pairs, tables, curved, mode, 0, angle, z, work.transient, work)
+        transient[0, k], transient[1, k] = z[0, k] + a * re - b * im, z[1, k] + a * im + b * re
+    observe_power(pairs, tables, curved, mode, 0, angle, z, work)
+    progress.energy_from = progress.tick
 
 
 @jit_lean_sum
 def observe_power(
-    reduced: Reduced,
     pairs: CurvedPairs,
     tables: ModeTables,
     curved: CurvedTables,
@@ -97,91 +103,64 @@ def observe_power(
     node: int,
     angle: float,
     z: Floats,
-    transient: Floats,
     work: CurvedWork,
 ) -> None:
-    """Power (W) that damping takes and the unbalance gives at a node of a step, the shaft at an angle (rad).
-
-    That of the transient alone is left out; what damping takes of it in the driven motion is filled into
-    `work.crossed`.
-    """
-    n, m = reduced.damping.shape[0], z.shape[1]
-    driven, state, crossed = work.driven, work.state, work.crossed[node]
-    for part in range(2):
-        for k in range(m):
-            driven[part, k] = z[part, k] - transient[part, k]
-            crossed[part, k] = 0.0
-    place(tables, curved, mode, driven[0], driven[1], work.h[node], work.rate[node], state)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    loss, gain = 0.0, 0.0
-    has_skew = pairs.skew.shape[0] > 0
-    for k in range(n):
-        drawn = product(pairs.resisting[k], state[n:])
-        leaning, along = 0.0, 0.0
-        if has_skew:
-            leaning, along = product(pairs.skew[k], state[:n]), -product(pairs.skew[k], state[n:])
-        loss += state[n + k] * (drawn + leaning)
-        gain += state[n + k] * (reduced.force_cosine[k] * cosine + reduced.force_sine[k] * sine)
-        rate_re, rate_im = tables.motion_re[mode, n + k], tables.motion_im[mode, n + k]
-        taken = 2.0 * drawn + leaning
-        for j in range(m):
-            crossed[0, j] += taken * rate_re[j]
-            crossed[1, j] += taken * rate_im[j]
-        if has_skew:
-            shape_re, shape_im = tables.motion_re[mode, k], tables.motion_im[mode, k]
-            for j in range(m):
-                crossed[0, j] += along * shape_re[j]
-                crossed[1, j] += along * shape_im[j]
+    """Power (W) that damping takes and the unbalance gives at a node, the shaft at an angle (rad)."""
+    seen, n_loss = work.seen, curved.sign.shape[1]
+    for r in range(n_loss + 2):
+        seen[r] = 0.0
+    add_rows(curved.drain[mode, 0], z[0], seen)
+    add_rows(curved.drain[mode, 1], z[1], seen)
+    for i in range(work.h.shape[1]):
+        rate = work.rate[node, i]
+        for r in range(n_loss + 2):
+            seen[r] -= curved.drain_moved[mode, r, i] * rate
+    loss, gain = 0.0, seen[n_loss] * np.cos(angle) + seen[n_loss + 1] * np.sin(angle)
+    for r in range(n_loss):
+        loss += curved.sign[mode, r] * seen[r] * seen[r]
+    if pairs.skew.shape[0] > 0:
+        n, state = pairs.skew.shape[0], work.state
+        place(tables, curved, mode, z[0], z[1], work.h[node], work.rate[node], state)
+        for k in range(n):
+            loss += state[n + k] * product(pairs.skew[k], state[:n])
     work.power[node, 0], work.power[node, 1] = loss, gain
 
 
 @jit_lean_sum
 def observe_energies(
-    reduced: Reduced,
     pairs: CurvedPairs,
     tables: ModeTables,
     curved: CurvedTables,
     clock: Clock,
     level: int,
+    z: Floats,
     z_next: Floats,
     progress: Progress,
     work: CurvedWork,
     accumulator: Accumulator,
 ) -> None:
-    """Add what damping takes and the unbalance gives in a step of 2^level ticks from the tick reached on.
-
-    The driven motion alone is integrated by Simpson's rule. What it and the transient do together is that of
-    a parabola times exponentials, of which `CurvedTables.weight` has the integrals.
-    """
+    """Add what damping takes and the unbalance gives in a step of 2^level ticks from `z`."""
     mode = progress.mode
     step = (1 << level) * clock.tick
-    w_re, w_im, later = work.transient[0], work.transient[1], work.later
-    half_re, half_im = curved.half_re[mode], curved.half_im[mode]
-    if level > 0:
-        half_re, half_im = tables.power_re[mode, level - 1], tables.power_im[mode, level - 1]
-    angle = shaft_angle(clock, progress.tick) + 0.5 * clock.spin * step
-    propagate(half_re, half_im, w_re, w_im, later[0], later[1])
-    observe_power(reduced, pairs, tables, curved, mode, 1, angle, work.middle, later, work)
-    angle += 0.5 * clock.spin * step
-    propagate(tables.power_re[mode, level], tables.power_im[mode, level], w_re, w_im, later[0], later[1])
-    observe_power(reduced, pairs, tables, curved, mode, 2, angle, z_next, later, work)
-    for a, kind in ((0, DAMPING_LOSS), (1, UNBALANCE_WORK)):
-        whole = work.power[0, a] + 4.0 * work.power[1, a] + work.power[2, a]
-        accumulator.energy[kind] += whole * step / 6.0
-    taken = 0.0
-    for node in range(N_NODE):  # the weights count time from the end of a step
-        g_re = curved.weight_re[mode, level, 1, N_NODE - 1 - node]
-        g_im = curved.weight_im[mode, level, 1, N_NODE - 1 - node]
-        y_re, y_im = work.crossed[node, 0], work.crossed[node, 1]
-        for k in range(w_re.size):
-            re, im = w_re[k] * g_re[k] - w_im[k] * g_im[k], w_re[k] * g_im[k] + w_im[k] * g_re[k]
-            taken += re * y_re[k] - im * y_im[k]
-    accumulator.energy[DAMPING_LOSS] += taken
-    for part in range(2):
-        for k in range(w_re.size):
-            work.transient[part, k] = later[part, k]
-            work.crossed[0, part, k] = work.crossed[2, part, k]
-        work.power[0, part] = work.power[2, part]
+    begun = shaft_angle(clock, progress.tick)
+    loss, gain = LOBATTO[0] * work.power[0, 0], LOBATTO[0] * work.power[0, 1]
+    for node in range(1, N_NODE):
+        there = z_next
+        if node < N_NODE - 1:
+            there = work.middle
+            move_coordinates(curved, mode, level, node, z, work, there)
+        angle = begun + NODES[node] * clock.spin * step
+        observe_power(pairs, tables, curved, mode, node, angle, there, work)
+        loss += LOBATTO[node] * work.power[node, 0]
+        gain += LOBATTO[node] * work.power[node, 1]
+    accumulator.energy[DAMPING_LOSS] += loss * step
+    accumulator.energy[UNBALANCE_WORK] += gain * step
+    for a in range(2):
+        work.power[0, a] = work.power[N_NODE - 1, a]
+    p_re, p_im, transient = tables.power_re[mode, level], tables.power_im[mode, level], work.transient
+    for k in range(z.shape[1]):
+        re, im = transient[0, k], transient[1, k]
+        transient[0, k], transient[1, k] = p_re[k] * re - p_im[k] * im, p_re[k] * im + p_im[k] * re
 
 
 @jit_lean_sum
@@ -196,25 +175,30 @@ def observe_curved_step(
     samples: Samples,
     accumulator: Accumulator,
 ) -> None:
-    """Add a step (s) of the closed pairs by Simpson's rule; the rest as in `measuring.observe_step`."""
+    """Add a step (s) of the closed pairs by Lobatto's rule; the rest as in `measuring.observe_step`."""
     for i in range(reduced.radius.size):
         if not is_closed(mask, i):
             continue
-        first, middle, last = work.force[0, i], work.force[1, i], work.force[2, i]
-        impulse = (first + 4.0 * middle + last) * step / 6.0
-        friction_work = (
-            first * work.slip[0, i] + 4.0 * middle * work.slip[1, i] + last * work.slip[2, i]
-        ) * (reduced.friction[i] * step / 6.0)
+        impulse, friction_work = 0.0, 0.0
+        for node in range(N_NODE):
+            force, slip = work.force[node, i], work.slip[node, i]
+            impulse += LOBATTO[node] * force
+            friction_work += LOBATTO[node] * force * slip
+            accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
+            if slip != 0.0:
+                observe_sense(i, 1 if slip > 0.0 else -1, accumulator)
+        impulse, friction_work = impulse * step, friction_work * reduced.friction[i] * step
         samples.force[i, i_sample] += impulse * share
         accumulator.contact_time[i] += step
         accumulator.impulse[i] += impulse
         accumulator.friction_work[i] += friction_work
-        observe_force(i, begin, step, impulse, first, last, accumulator)
-        for node in range(N_NODE):
-            slip = work.slip[node, i]
-            accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
-            if slip != 0.0:
-                observe_sense(i, 1 if slip > 0.0 else -1, accumulator)
+        for node in range(N_NODE - 1):
+            part = 0.0
+            for k in range(N_NODE):
+                part += PARTS[node, k] * work.force[k, i]
+            length = (NODES[node + 1] - NODES[node]) * step
+            first, last = work.force[node, i], work.force[node + 1, i]
+            observe_force(i, begin + NODES[node] * step, length, part * step, first, last, accumulator)
         accumulator.energy[FRICTION_LOSS] += friction_work
         accumulator.energy[DRIVE_WORK] += reduced.friction[i] * reduced.rim_speed[i] * impulse
 

@@ -7,7 +7,14 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.contact_modes import ModeTables, bounded, dot, event_free_interval
-from rubhpc.kernels.curved_contact import CurvedPairs, CurvedTables, CurvedWork, is_closed
+from rubhpc.kernels.curved_contact import (
+    N_NODE,
+    NODES,
+    CurvedPairs,
+    CurvedTables,
+    CurvedWork,
+    is_closed,
+)
 from rubhpc.kernels.curved_forces import fill_geometry, read_motion
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
 
@@ -80,23 +87,31 @@ def open_crossing(
 
 
 @jit_lean_sum
-def closed_crossing(closed: int, step: float, work: CurvedWork) -> int:
-    """Set of the pairs whose force or, of those open, gap is negative at a node of a step (s)."""
+def closed_crossing(closed: int, work: CurvedWork) -> int:
+    """Set of the pairs whose force or, of those open, gap is negative at or between the nodes of a step."""
     crossing = int(np.int64(0))
     for i in range(work.h.shape[1]):
-        if is_closed(closed, i):
-            first, middle, last = work.force[0, i], work.force[1, i], work.force[2, i]
-            if min(middle, last) < 0.0 or lowest(first, middle, last) < 0.0 < first:
-                crossing |= 1 << i
-        elif min(work.gap[0, 1, i], work.gap[0, 2, i]) < -GAP_TOLERANCE:
+        least = np.inf
+        for node in range(1, N_NODE):
+            if is_closed(closed, i):
+                least = min(least, work.force[node, i])
+            else:
+                least = min(least, work.gap[0, node, i] + GAP_TOLERANCE)
+        if is_closed(closed, i) and work.force[0, i] > 0.0:
+            for node in range(2):
+                least = min(least, lowest(work.force[:, i], 2 * node))
+        if least < 0.0:
             crossing |= 1 << i
     return crossing
 
 
 @jit_lean_sum
-def lowest(first: float, middle: float, last: float) -> float:
-    """Least value of the parabola through the beginning, middle and end of a step, within it."""
-    slope, bend = 4.0 * middle - 3.0 * first - last, 2.0 * (first - 2.0 * middle + last)
-    if bend > 0.0 and 0.0 < -slope < 2.0 * bend:
-        return first - 0.25 * slope * slope / bend
-    return min(first, middle, last)
+def lowest(value: Floats, first: int) -> float:
+    """Least value, between the first and the third, of the parabola through three values at nodes."""
+    a, b = NODES[first + 1] - NODES[first], NODES[first + 2] - NODES[first]
+    rise, whole = (value[first + 1] - value[first]) / a, (value[first + 2] - value[first]) / b
+    bend = (whole - rise) / (b - a)
+    slope = rise - a * bend
+    if bend > 0.0 and 0.0 < -slope < 2.0 * b * bend:
+        return float(value[first] - 0.25 * slope * slope / bend)
+    return float(min(value[first], value[first + 2]))

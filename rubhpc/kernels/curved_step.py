@@ -2,39 +2,67 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_lean_sum
-from rubhpc.kernels.contact_modes import ModeTables, propagate
 from rubhpc.kernels.curved_contact import (
     BEFORE,
     LARGEST,
+    LEARNT,
     N_NODE,
+    PATIENCE,
     CurvedPairs,
     CurvedTables,
     CurvedWork,
     is_closed,
 )
-from rubhpc.kernels.curved_forces import evaluate, find_forces
+from rubhpc.kernels.curved_forces import evaluate, find_lone_forces
 from rubhpc.kernels.curved_response import (
-    add_responses,
-    load_change,
     lone_pair,
+    move_coordinates,
     predict_loads,
     read_free,
     read_loaded,
     respond,
 )
+from rubhpc.kernels.curved_secant import (
+    FORCES,
+    GUESS,
+    IMAGE,
+    LOADS,
+    MISSED,
+    MOVE,
+    SAID,
+    forget,
+    give_loads,
+    keep_or_forget,
+    learn,
+    move_loads,
+    size_of,
+    take_loads,
+    weigh_loads,
+)
+
+if TYPE_CHECKING:
+    from rubhpc.kernels.contact_modes import ModeTables
 
 Floats = NDArray[np.float64]
 
-MOST_SWEEPS = 5  # over the nodes
-# A parabola through the loads errs by less than this share of what the one before has missed them by, as it
-# went on: |t (t - 1/2) (t - 1)| is at most 0.048 within a step, 3 a step further.
-INTERPOLATED = 0.016
-SETTLED = 0.01  # share of the loads' tolerance to which the iteration goes
-EASY = 0.05  # share of the tolerance below which the next step may be twice as long
+MOST_SWEEPS = 12  # over the nodes
+# A polynomial through the loads errs by less than this share of what the one before has missed them by, as it
+# went on: |t (t - 1/2) (t - 1) (t^2 - t + 1/7)| is at most 0.0029 within a step, 6.4 a step further.
+INTERPOLATED = 5e-4
+SETTLED = 0.1  # share of the loads' tolerance to which the iteration goes
+EASY = 0.02  # share of the tolerance below which the next step may be twice as long
+HOPELESS, FALLEN = (
+    6,
+    0.1,
+)  # sweeps after which the loads are to be missed by less than this share of the first
+PATIENT = 16  # steps, after one whose loads were not found, before a longer one is tried
+QUICK = 5  # sweeps that a step took which may do for one twice as long
 LEAST_TRAVEL = 0.01  # of the clearance: errors are relative to a force that moves the tip so far, or more
 
 
@@ -54,7 +82,7 @@ def take_step(
 ) -> tuple[bool, bool]:
     """Take a step of 2^level ticks (s) from coordinates `z` to `z_next`, by collocation.
 
-    `work` holds forces and loads at the beginning, and is left with those in the middle and at the end.
+    `work` holds forces and loads at the beginning, and is left with those at the other nodes.
 
     Parameters
     ----------
@@ -64,7 +92,7 @@ def take_step(
     Returns
     -------
     bool
-        Whether the loads are found, and a parabola follows them. A step of one tick has no error to speak of.
+        Whether the loads are found, and a polynomial follows them; a step of one tick has no error.
     bool
         Whether the next step may be twice as long.
     """
@@ -76,53 +104,87 @@ def take_step(
     allowed = tolerance * scale
     predict_loads(mask, step, work)
     is_lone = lone_pair(mask, pairs.radius.size) == 0
-    p_re, p_im = tables.power_re[mode, level], tables.power_im[mode, level]
-    half_re, half_im = curved.half_re[mode], curved.half_im[mode]
-    if level > 0:
-        half_re, half_im = tables.power_re[mode, level - 1], tables.power_im[mode, level - 1]
     if is_lone:
-        read_free(curved, mode, half_re, half_im, z[0], z[1], work.free[0])
-        read_free(curved, mode, p_re, p_im, z[0], z[1], work.free[1])
-    else:
-        for node in range(N_NODE):
-            respond(curved, mode, mask, node, work)
-    missed, moved = 0.0, np.inf
-    for sweep in range(MOST_SWEEPS):
-        moved = 0.0
-        for node in range(1, N_NODE):
-            for i in range(work.load.shape[1]):
-                for a in range(work.load.shape[2]):
-                    work.last[i, a] = work.load[node, i, a]
-            if is_lone:
-                read_loaded(curved, mode, level, node, work)
-                is_found = find_forces(pairs, curved, rim_speed, mode, mask, node, work)
-            else:
-                re, im = (work.middle[0], work.middle[1]) if node == 1 else (z_next[0], z_next[1])
-                if node == 1:
-                    propagate(half_re, half_im, z[0], z[1], re, im)
-                else:
-                    propagate(p_re, p_im, z[0], z[1], re, im)
-                add_responses(curved, mode, level, node, work.response, re, im)
-                is_found = evaluate(pairs, curved, rim_speed, mode, mask, node, re, im, work)
-                respond(curved, mode, mask, node, work)
-            if not is_found:
-                return False, False
-            moved = max(moved, load_change(pairs, mask, node, work.last, work))
-        if sweep == 0:
-            missed = INTERPOLATED * moved
-            if missed > 2.0 * allowed and level > 0:
-                return False, False
-        if moved <= SETTLED * allowed:
+        read_free(curved, mode, level, z[0], z[1], work)
+    point, n_load = work.point, work.load.shape[2]
+    weigh_loads(pairs, mask, step, work)
+    n = take_loads(mask, work, point[LOADS])
+    for j in range(n):
+        point[GUESS, j] = point[LOADS, j]
+    if work.span[LEARNT] == 0.0:
+        forget(n, work)
+    moved, first, sweep = np.inf, np.inf, 0
+    while True:
+        if is_lone:
+            is_found = sweep_alone(pairs, curved, rim_speed, mode, level, work)
+        else:
+            is_found = sweep_all(pairs, curved, rim_speed, mode, mask, level, z, work)
+        if not is_found:
+            keep_or_forget(n, False, work)
+            return False, False
+        take_loads(mask, work, point[IMAGE])
+        for j in range(n):
+            point[MISSED, j] = point[IMAGE, j] - point[LOADS, j]
+        moved = size_of(point[MISSED], n, n_load, point[FORCES])
+        if moved <= SETTLED * allowed or sweep == MOST_SWEEPS:
             break
-    if is_lone:
-        for node in range(N_NODE):
-            respond(curved, mode, mask, node, work)
-        propagate(half_re, half_im, z[0], z[1], work.middle[0], work.middle[1])
-        add_responses(curved, mode, level, 1, work.response, work.middle[0], work.middle[1])
-        propagate(p_re, p_im, z[0], z[1], z_next[0], z_next[1])
-        add_responses(curved, mode, level, 2, work.response, z_next[0], z_next[1])
-    is_followed = level == 0 or (moved <= 4.0 * SETTLED * allowed and missed <= allowed)
-    return is_followed, missed <= EASY * allowed
+        first = moved if sweep == 0 else first
+        if sweep >= HOPELESS and not moved <= FALLEN * first:
+            break
+        if sweep > 0:
+            learn(n, work)
+        for j in range(n):
+            point[SAID, j] = point[MISSED, j]
+        move_loads(n, work)
+        if sweep == 0 and level > 0:
+            missed = INTERPOLATED * size_of(point[MOVE], n, n_load, point[FORCES])
+            if missed > 4.0 * allowed:
+                return False, False
+        give_loads(mask, work)
+        sweep += 1
+    take_loads(mask, work, point[LOADS])
+    for j in range(n):
+        point[MOVE, j] = point[LOADS, j] - point[GUESS, j]
+    missed = INTERPOLATED * size_of(point[MOVE], n, n_load, point[FORCES])
+    is_settled = moved <= SETTLED * allowed
+    keep_or_forget(n, is_settled, work)
+    work.span[PATIENCE] = max(work.span[PATIENCE] - 1.0, 0.0) if is_settled else 1.0 * PATIENT
+    respond(curved, mode, mask, N_NODE, work)
+    move_coordinates(curved, mode, level, N_NODE - 1, z, work, z_next)
+    is_easy = missed <= EASY * allowed and sweep <= QUICK and work.span[PATIENCE] == 0.0
+    return level == 0 or (is_settled and missed <= allowed), is_easy
+
+
+@jit_lean_sum
+def sweep_alone(
+    pairs: CurvedPairs, curved: CurvedTables, rim_speed: Floats, mode: int, level: int, work: CurvedWork
+) -> bool:
+    """Loads of the only pair at the nodes, each under those found so far; False without forces."""
+    is_found = True
+    for node in range(1, N_NODE):
+        read_loaded(curved, mode, level, node, work)
+        is_found = is_found and find_lone_forces(pairs, curved, rim_speed, mode, node, work)
+    return is_found
+
+
+@jit_lean_sum
+def sweep_all(
+    pairs: CurvedPairs,
+    curved: CurvedTables,
+    rim_speed: Floats,
+    mode: int,
+    mask: int,
+    level: int,
+    z: Floats,
+    work: CurvedWork,
+) -> bool:
+    """Loads of all closed pairs at the nodes, as `sweep_alone`, from the coordinates `z` on."""
+    respond(curved, mode, mask, N_NODE, work)
+    for node in range(1, N_NODE):
+        move_coordinates(curved, mode, level, node, z, work, work.middle)
+        if not evaluate(pairs, curved, rim_speed, mode, mask, node, work.middle[0], work.middle[1], work):
+            return False
+    return True
 
 
 @jit_lean_sum
@@ -135,8 +197,8 @@ def go_on(mask: int, step: float, work: CurvedWork) -> None:
                     work.before[node, i, a] = work.load[node, i, a]
                 work.span[LARGEST] = max(work.span[LARGEST], work.force[node, i])
             for a in range(work.load.shape[2]):
-                work.load[0, i, a] = work.load[2, i, a]
-        work.h[0, i], work.rate[0, i] = work.h[2, i], work.rate[2, i]
-        work.force[0, i], work.slip[0, i] = work.force[2, i], work.slip[2, i]
-        work.gap[0, 0, i], work.gap[1, 0, i] = work.gap[0, 2, i], work.gap[1, 2, i]
+                work.load[0, i, a] = work.load[-1, i, a]
+        work.h[0, i], work.rate[0, i] = work.h[-1, i], work.rate[-1, i]
+        work.force[0, i], work.slip[0, i] = work.force[-1, i], work.slip[-1, i]
+        work.gap[0, 0, i], work.gap[1, 0, i] = work.gap[0, -1, i], work.gap[1, -1, i]
     work.span[BEFORE] = step

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.input.reading import plain
 from rubhpc.rig.reading import with_keys
+from rubhpc.rig.stators import has_bent_stator
 from rubhpc.study import contact_axes, initial
 from rubhpc.study.axes import (
     DRIVE_AXES,
@@ -27,6 +28,7 @@ DIRECT = 2  # transient = "direct"
 CHANGING_SPEED = 3  # run-ups and drives
 COULOMB = 1  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
+CURVED = 1  # method = "modal" with gaps that are curved
 MANY_STATORS = 1  # more than five, whose sets of closed contacts or states may be more than 256
 ALONG_SPEED = 1  # branches along a speed
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
@@ -46,9 +48,17 @@ def physics_of(study: Study) -> int:
         + CHANGING_SPEED * bool(study.run_up or study.drive)
         + COULOMB * ("coulomb" in friction_laws)
         + SOFT_FRICTION * is_soft
+        + CURVED * (study.integrator.method == "modal" and _is_curved(study))
         + MANY_STATORS * (len(study.rig.stator) > 5)
         + ALONG_SPEED * (study.branch is not None and study.branch.along in SPEED_AXES)
     )
+
+
+def _is_curved(study: Study) -> bool:
+    """Whether a stator is bent, or any case has a normal that turns under steady sliding."""
+    turns = "updated" in _laws(study, "normal")
+    slides = "sliding" in _laws(study, "friction_law") and "lagrange" in _laws(study, "law")
+    return has_bent_stator(study.rig.stator) or (turns and slides)
 
 
 def _laws(study: Study, key: str) -> set[str]:

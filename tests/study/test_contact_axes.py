@@ -68,6 +68,9 @@ def test_each_case_takes_its_own_contact(tmp_path):
         ('"contact.friction_law" = ["sliding", "coulomb"]', 'law = "penalty"\nstiffness = 1e7', 2),
         ('"contact.law" = ["lagrange", "penalty"]', 'friction_law = "coulomb"\nstiffness = 1e7', 2),
         ("", 'friction_law = "coulomb"', 1),
+        ("", 'normal = "updated"', 1),
+        ('"contact.normal" = ["fixed", "updated"]', "", 1),
+        ("", 'normal = "updated"\nlaw = "penalty"\nstiffness = 1e7', 0),
         ("", 'friction_law = "stribeck"\nstribeck_speed = 1.0\nstatic_friction_ratio = 1.5', 0),
     ],
 )

@@ -1,4 +1,4 @@
-"""A case whose gaps are curved: flights in closed form, closed contacts in steps of order 4."""
+"""A case whose gaps are curved: flights in closed form, closed contacts in steps of order 8."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class CurvedMarch(EventDrivenMarch):
 
     def _make_work(self) -> None:
         _, n_row, n = self._pairs.row.shape
-        self._work = curved_work(self._clearance.size, n_row, n, self._z.shape[1])
+        self._work = curved_work(self._clearance.size, n_row, n, self._z.shape[1], self._curved.sign.shape[1])
 
     def motion(self) -> Floats:
         """Reduced displacements, then velocities (2 n,), at the sample reached."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,7 +10,16 @@ import numpy as np
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W, rim_sense
-from rubhpc.kernels.curved_contact import ACROSS, ALONG, BENDING, CurvedPairs, CurvedTables
+from rubhpc.kernels.curved_contact import (
+    ACROSS,
+    ALONG,
+    BENDING,
+    LAGRANGE,
+    N_NODE,
+    NODES,
+    CurvedPairs,
+    CurvedTables,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,8 +33,8 @@ if TYPE_CHECKING:
 
 UNBENT = 1e-8  # bending displacement over the largest of a stator, below which it is none
 LONGEST_STEP = 1e-3  # s, of closed contacts
-# Parabolas through values at the beginning, middle and end of a step, by powers of time over its length.
-_PARABOLAS = np.array([[1.0, -3.0, 2.0], [0.0, 4.0, -4.0], [0.0, -1.0, 2.0]])
+SERIES, N_TERM = 3.0, 32  # |x| below which the phi functions are series, which cancel less there; their terms
+UNDAMPED = 1e-14  # eigenvalue of the damping over the largest, below which it is none
 
 
 def curved_pairs(
@@ -39,7 +49,6 @@ def curved_pairs(
         row=row,
         gram=(flat @ flat.T).reshape(*row.shape[:2], *row.shape[:2]),
         output=_outputs(reduced),
-        resisting=0.5 * (reduced.damping + reduced.damping.T),
         skew=skew if np.any(skew) else skew[:0],
         radius=np.array([stator.radius for stator in model.stators]),
         clearance=clearance,
@@ -149,9 +158,14 @@ def tabulate_curved(
     weight = np.array([_weights(exponent, tick * 2.0**level) for level in range(n_level)])
     growth = np.exp(np.maximum(exponent.real, 0.0) * tick * 2.0 ** (n_level - 1))
     inverse = np.divide(1.0, exponent, out=np.zeros_like(exponent), where=exponent != 0.0)
-    reach = np.zeros((n_level, 2, 3, read.shape[1], d + 2))
+    steps = tick * 2.0 ** np.arange(n_level)
+    node = np.exp(np.multiply.outer(np.multiply.outer(steps, NODES[1:]), exponent))
+    reach = np.zeros((n_level, N_NODE - 1, N_NODE, d + 2, read.shape[1]))
     if q == 1 and closed:
-        reach = np.einsum("rm,lakm,jm->lakrj", read[0], weight, load[0], optimize=True).real
+        reach = np.einsum("rm,lakm,jm->lakjr", read[0], weight, load[0], optimize=True).real
+    size, shape = _losses(reduced)
+    forces = np.concatenate([np.sqrt(np.abs(size)) * shape, reduced.force.T], axis=1).T  # (r + 2, n)
+    drain = forces @ motion[n:]
     table = CurvedTables(
         read_re=read.real,
         read_im=read.imag,
@@ -164,11 +178,15 @@ def tabulate_curved(
         load_im=load.imag,
         weight_re=weight.real,
         weight_im=weight.imag,
-        reach=reach,
-        half_re=np.exp(0.5 * exponent * tick).real,
-        half_im=np.exp(0.5 * exponent * tick).imag,
+        node_re=node.real,
+        node_im=node.imag,
+        lone=np.stack([read[0].real.T, -read[0].imag.T]),
+        reach=reach.reshape(n_level, N_NODE - 1, -1, read.shape[1]),
         inverse_re=inverse.real,
         inverse_im=inverse.imag,
+        drain=np.stack([drain.real.T, -drain.imag.T]),
+        sign=np.sign(size),
+        drain_moved=forces @ shift.T,
     )
     fields: list[Any] = [np.array(field[None], order="C") for field in table]
     return CurvedTables(*fields)
@@ -188,36 +206,42 @@ def _outputs(reduced: ReducedModel) -> Floats:
     return np.ascontiguousarray(np.swapaxes(np.array(rows), 0, 1))
 
 
+def _losses(reduced: ReducedModel) -> tuple[Floats, Floats]:
+    """Eigenvalues (r,) of the symmetric damping that are not 0, and their shapes (n, r)."""
+    size, shape = np.linalg.eigh(0.5 * (reduced.damping + reduced.damping.T))
+    keep = np.abs(size) > UNDAMPED * np.abs(size).max()
+    return size[keep], shape[:, keep]
+
+
 def _weights(exponent: Complexes, step: float) -> Complexes:
-    """Response in the middle and at the end of a step to loads at its three nodes, (2, 3, m), s.
+    """Response at the nodes of a step after the first to loads at all of them, (4, 5, m), s.
 
     That of a coordinate with the exponent l to the load (s / h)^k is `h c^(k+1) k! phi_(k+1)(c l h)` at the
     time c h.
     """
-    weights = np.zeros((2, 3, exponent.size), dtype=complex)
-    for a, share in enumerate((0.5, 1.0)):
+    weights = np.zeros((N_NODE - 1, N_NODE, exponent.size), dtype=complex)
+    for a, share in enumerate(NODES[1:]):
         phi = phi_functions(share * step * exponent)
-        for power, factorial in enumerate((1.0, 1.0, 2.0)):
-            term = step * share ** (power + 1) * factorial * phi[power]
-            weights[a] += np.outer(_PARABOLAS[:, power], term)
+        for power in range(N_NODE):
+            term = step * share ** (power + 1) * math.factorial(power) * phi[power]
+            weights[a] += np.outer(LAGRANGE[:, power], term)
     return weights
 
 
 def phi_functions(x: Complexes) -> Complexes:
-    """phi_1, phi_2, phi_3 (3, m): `phi_k = (phi_(k-1) - 1 / (k - 1)!) / x`, phi_0 the exponential."""
-    phi = np.zeros((3, x.size), dtype=complex)
-    is_small = np.abs(x) < 1.0
+    """phi_1 to phi_5 (5, m): `phi_k = (phi_(k-1) - 1 / (k - 1)!) / x`, phi_0 the exponential."""
+    phi = np.zeros((N_NODE, x.size), dtype=complex)
+    is_small = np.abs(x) < SERIES
     small, large = x[is_small], x[~is_small]
-    for k in range(3):
-        term = np.full(small.shape, 1.0 / float(np.prod(np.arange(1.0, k + 2))), dtype=complex)
+    for k in range(N_NODE):
+        term = np.full(small.shape, 1.0 / math.factorial(k + 1), dtype=complex)
         total = term.copy()
-        for j in range(1, 20):
+        for j in range(1, N_TERM):
             term = term * small / (k + 1 + j)
             total += term
         phi[k, is_small] = total
-    before, inverse_factorial = np.exp(large), 1.0
-    for k in range(3):
-        before = (before - inverse_factorial) / large
+    before = np.exp(large)
+    for k in range(N_NODE):
+        before = (before - 1.0 / math.factorial(k)) / large
         phi[k, ~is_small] = before
-        inverse_factorial /= k + 1
     return phi
