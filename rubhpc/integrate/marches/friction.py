@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+_LEAST = float(np.finfo(float).tiny)  # N, of a closed pair
 AT_REST = 1e-4  # of the rim speed: a pair that slips less than that at the beginning of a case has stuck
 
 
@@ -85,13 +86,14 @@ class FrictionMarch(EventDrivenMarch):
             raise NoClosedForm
         self._entered_with = np.append(self._clearance, 1.0)
         self.bodies = self.bodies._replace(clearance=self._entered_with)
-        pairs = setup.friction_pairs(friction)
-        self._friction = FrictionBodies(
-            sliding=np.full(q, friction),
-            static=np.full(q, friction * pairs.static_ratio),
-            rim_speed=pairs.rim_speed,
-        )
+        self._friction = FrictionBodies(*self._coefficients, rim_speed=self.bodies.rim_speed)
         return setup.friction_library(friction)
+
+    @cached_property
+    def _coefficients(self) -> tuple[Floats, Floats]:
+        """Of sliding and of static friction, (q,)."""
+        sliding = np.full(self._clearance.size, self._coefficient)
+        return sliding, sliding * self._setup.law.static_friction_ratio
 
     @cached_property
     def _work(self) -> FrictionWork:
@@ -115,13 +117,13 @@ class FrictionMarch(EventDrivenMarch):
 
         `further` are bits of the set of states beyond two a pair.
         """
-        n = self.bodies.stiffness.shape[0]
-        slip = self._friction.rim_speed + self.bodies.slip @ self._motion[n:]
-        sliding = np.where(slip >= 0.0, FORWARD, BACKWARD)
-        states = np.where(
-            is_pressed, np.where(np.abs(slip) <= AT_REST * self._friction.rim_speed, STUCK, sliding), OPEN
-        )
-        found = self.change(mask_of(states.tolist()) | further, 0, angle, self._motion)
+        n, rim_speed = self.bodies.stiffness.shape[0], self._friction.rim_speed
+        slips = rim_speed + self.bodies.slip @ self._motion[n:]
+        states = []  # arrays would take longer for a few pairs, which a run-up asks of every piece
+        for slip, speed, presses in zip(slips.tolist(), rim_speed.tolist(), is_pressed.tolist(), strict=True):
+            sliding = FORWARD if slip >= 0.0 else BACKWARD
+            states.append((STUCK if abs(slip) <= AT_REST * speed else sliding) if presses else OPEN)
+        found = self.change(mask_of(states) | further, 0, angle, self._motion)
         if found < 0:
             raise NoClosedForm
         return found
@@ -204,7 +206,12 @@ class FrictionMarch(EventDrivenMarch):
         """Normal forces (q,), N, at coordinates (2, m) of a contact mode, by its index in the tables."""
         q, tables = self._clearance.size, self.tables
         value = (tables.switch_re[mode] @ z[0] - tables.switch_im[mode] @ z[1]).reshape(q, 2)
-        states = np.array(states_of(int(tables.mask[mode]), q))
-        static = np.where(self._friction.static > 0.0, self._friction.static, 1.0)
-        pressed = np.where(states == STUCK, 0.5 * value.sum(axis=1) / static, value[:, 0])
-        return np.where(states == OPEN, 0.0, np.maximum(pressed, np.finfo(float).tiny))
+        force = np.zeros(q)
+        for i, state in enumerate(states_of(int(tables.mask[mode]), q)):
+            if state == OPEN:
+                continue
+            pressed, turned = value[i].tolist()
+            if state == STUCK:
+                pressed = 0.5 * (pressed + turned) / (float(self._friction.static[i]) or 1.0)
+            force[i] = max(pressed, _LEAST)
+        return force
