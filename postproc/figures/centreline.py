@@ -48,7 +48,7 @@ def draw_centreline(data: xr.Dataset, ax: Axes, where: str = "the disc") -> Axes
         ylabel=scale.label("Vertical mean position"),
     )
     ax.plot(x, y, linewidth=0.9)
-    name_speeds(ax, x, y, speed)
+    name_speeds(ax, [(x, y)], speed)
     draw_rotation(ax)
     ax.set_title(f"Centreline of {where}, speeds in rpm", fontsize=8)
     return ax

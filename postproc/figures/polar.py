@@ -84,7 +84,7 @@ def draw_polar(
         )
         ax.plot(x, y, label=case, linewidth=0.9)
         curves.append((x, y, own.values))
-    name_speeds(ax, *curves[0])
+    name_speeds(ax, [(x, y) for x, y, _ in curves], curves[0][2])
     style: dict[str, Any] = {"marker": "D", "markersize": 4, "linestyle": "", "color": "k"}
     passed: set[float] = set()
     for x, y, at in curves:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +14,13 @@ from postproc.store.rig_of_case import rig_axes, rig_of
 from rubhpc.rig.reading import rig_from_dict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     import xarray as xr
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
 
 RPM = 30.0 / math.pi
 _STEPS = 60  # of speed, on which modes are followed
@@ -59,34 +62,89 @@ def written_speeds(speeds: Iterable[float]) -> str:
     return f"critical speed{'s' if len(numbers) > 1 else ''}, {', '.join(numbers)} rpm"
 
 
-def name_speeds(ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], speed: NDArray[np.float64]) -> None:
-    """Mark speeds (rad/s) along a curve, with the rpm, where they are far enough apart to be read."""
+def name_speeds(ax: Axes, curves: Sequence[tuple[Floats, Floats]], speed: Floats) -> None:
+    """Mark speeds (rad/s) along the first curve, with the rpm, where they are far enough apart to be read.
+
+    Each is written where it covers least of curves and of other labels, with a leader where that is far.
+    """
+    x, y = curves[0]
     size = math.hypot(np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()))
     taken: list[tuple[float, float]] = []
     middle = 0.5 * sum(ax.get_xlim()), 0.5 * sum(ax.get_ylim())
     finite = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     if not finite.size:
         return
+    written = _Written(ax, curves)
     inner = finite[np.linspace(0, finite.size - 1, 41).round().astype(int)]
     for i in (finite[0], finite[-1], *inner):
         if any(math.hypot(x[i] - a, y[i] - b) < 0.085 * size for a, b in taken):
             continue
         taken.append((float(x[i]), float(y[i])))
-        across, up = x[i] - middle[0], y[i] - middle[1]
-        length = math.hypot(across, up) or 1.0
         ax.plot(x[i], y[i], ".", color="k", markersize=3, zorder=4)
-        style: dict[str, Any] = {
-            "ha": "left" if across > 0 else "right",
-            "va": "bottom" if up > 0 else "top",
-            "fontsize": 6,
-        }
+        text = f"{RPM * speed[i]:.0f}"
+        away = np.array([x[i] - middle[0], y[i] - middle[1]])
+        offset, is_far = written.place(text, np.array([x[i], y[i]]), away / (np.hypot(*away) or 1.0))
         ax.annotate(
-            f"{RPM * speed[i]:.0f}",
+            text,
             (x[i], y[i]),
-            xytext=(3 * across / length, 3 * up / length),
+            xytext=tuple(offset),
             textcoords="offset points",
-            **style,
+            ha="center",
+            va="center",
+            fontsize=6,
+            arrowprops=_LEADER if is_far else None,
         )
+
+
+_GAP = 2.5  # points, of a label from its mark in each direction
+_LETTER, _HEIGHT = 3.9, 6.0  # points, of a letter and its margin at the size of labels
+_FARTHER = (0.0, 10.0, 22.0)  # points
+_LEADER = {"arrowstyle": "-", "linewidth": 0.4, "color": "0.4", "shrinkA": 1.0, "shrinkB": 1.5}
+_AROUND = [(across, up) for across in (-1, 0, 1) for up in (-1, 0, 1) if across or up]
+
+
+class _Written:
+    """Curves and labels of a plot, in points from its lower left corner."""
+
+    def __init__(self, ax: Axes, curves: Sequence[tuple[Floats, Floats]]) -> None:
+        self._low = np.array([ax.get_xlim()[0], ax.get_ylim()[0]])
+        spans = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
+        box = np.array(ax.bbox.size) * 72.0 / ax.figure.dpi
+        self._scale = float(np.min(box / spans))  # axes of equal scale
+        self._size = spans * self._scale
+        self._points = np.concatenate([self._at(_filled(np.column_stack(curve))) for curve in curves])
+        self._boxes: list[Floats] = []
+
+    def place(self, text: str, at: Floats, away: Floats) -> tuple[Floats, bool]:
+        """Where the middle of a label goes from its point, points, if possible the way `away`.
+
+        And whether that is so far that it needs a leader.
+        """
+        half = 0.5 * np.array([_LETTER * len(text), _HEIGHT])
+        found, least = half, math.inf
+        for farther, direction in itertools.product(_FARTHER, _AROUND):
+            offset = np.array(direction) * (_GAP + half + farther)
+            middle = self._at(at) + offset
+            covered = np.all(np.abs(self._points - middle) < half, axis=1).sum()
+            covered += 200 * sum(bool(np.all(np.abs(box - middle) < 2.0 * half)) for box in self._boxes)
+            covered += 200 * bool(np.any(middle < half) or np.any(middle > self._size - half))
+            cost = float(covered) + farther - float(away @ direction) / math.hypot(*direction)
+            if cost < least:
+                found, least, is_far, box = offset, cost, farther > 0.0, middle
+        self._boxes.append(box)
+        return found, is_far
+
+    def _at(self, points: Floats) -> Floats:
+        """Data, (..., 2), in points."""
+        placed: Floats = (points - self._low) * self._scale
+        return placed
+
+
+def _filled(points: Floats) -> Floats:
+    """A curve (n, 2) with points between its own, those left out that are not finite."""
+    points = points[np.all(np.isfinite(points), axis=1)]
+    at = np.linspace(0.0, len(points) - 1, 2000)
+    return np.column_stack([np.interp(at, np.arange(len(points)), column) for column in points.T])
 
 
 def draw_rotation(ax: Axes) -> None:

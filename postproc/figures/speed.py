@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from postproc.figures.options import Axis
 
 
+_NEAR = 0.07  # of the axis: critical speeds that share a label
+
+
 def speed(cases: xr.Dataset, *, over: Axis | None = None) -> Drawing:
     """Spin speed over the time, with the torques of a driven rotor.
 
@@ -57,23 +60,37 @@ def draw_speed(data: xr.Dataset, axes: list[Axes], critical: Sequence[float] = (
     top.ticklabel_format(axis="y", style="plain", useOffset=False)
     if len(times) > 1:
         top.legend(loc="best", fontsize=6)
-    for value in critical:
-        top.axhline(RPM * value, color="0.6", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0.5)
-        top.annotate(
-            f"critical, {RPM * value:.0f} rpm",
-            (1.0, RPM * value),
-            xycoords=("axes fraction", "data"),
-            xytext=(-7, 1),
-            textcoords="offset points",
-            ha="right",
-            va="bottom",
-            fontsize=6,
-            color="0.35",
-        )
+    known = [case.values[np.isfinite(case.values)] for _, case in overlaid(data["speed"], "revolution")]
+    ends = np.array([case[[0, -1]] for case in known if case.size])
+    _draw_critical(top, RPM * np.array(sorted(critical)), RPM * ends)
     if "driving_torque" in data:
         _draw_torques(data, times, bottom)
     bottom.set_xlabel("Time (s)")
     top.figure.align_ylabels(axes)
+
+
+def _draw_critical(ax: Axes, speeds: NDArray[np.float64], ends: NDArray[np.float64]) -> None:
+    """Draw critical speeds, rpm; those too close together for a label each share one.
+
+    `ends` (n_case, 2) are the first and last speeds of the cases.
+    """
+    near = _NEAR * float(np.ptp(ax.get_ylim()))
+    for value in speeds:
+        ax.axhline(value, color="0.6", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0.5)
+    for group in np.split(speeds, np.flatnonzero(np.diff(speeds) > near) + 1) if speeds.size else []:
+        from_first, from_last = np.abs(ends - group[-1]).min(axis=0)
+        is_left = bool(from_first > from_last)  # where the curves are far
+        ax.annotate(
+            f"critical, {', '.join(f'{value:.0f}' for value in group)} rpm",
+            (0.0 if is_left else 1.0, group[-1]),
+            xycoords=("axes fraction", "data"),
+            xytext=(7 if is_left else -7, 1),
+            textcoords="offset points",
+            ha="left" if is_left else "right",
+            va="bottom",
+            fontsize=6,
+            color="0.35",
+        )
 
 
 def _draw_torques(data: xr.Dataset, times: Sequence[NDArray[np.float64]], ax: Axes) -> None:

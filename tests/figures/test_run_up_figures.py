@@ -1,8 +1,10 @@
 """Figures of run-ups: what a signal of known orders and a known offset becomes in them."""
 
+import itertools
 import math
 from types import SimpleNamespace
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,7 +12,7 @@ import xarray as xr
 from postproc.figures.bode import bode
 from postproc.figures.centreline import centreline
 from postproc.figures.polar import polar
-from postproc.figures.run_up_marks import critical_speeds
+from postproc.figures.run_up_marks import critical_speeds, name_speeds
 from postproc.figures.speed import speed
 from postproc.figures.waterfall import waterfall
 from postproc.signals.run_up_spectra import mean_positions, run_up_spectra
@@ -101,6 +103,29 @@ def test_a_centreline_is_the_mean_of_each_revolution():
     scale = 1e9 if "nm" in ax.get_ylabel() else 1e6
     assert ax.lines[0].get_ydata() == pytest.approx(expected * scale, rel=1e-6)
     assert ax.lines[0].get_xdata() == pytest.approx(0.0, abs=1e-9 * scale)
+
+
+@pytest.mark.parametrize("turns", [0.7, 1.6, 3.0])
+def test_speeds_are_written_beside_curve_and_one_another(turns):
+    """A spiral, whose ends and bends are where labels would fall on the curve."""
+    at = np.linspace(0.02, 1.0, 300) * np.exp(2j * math.pi * turns * np.linspace(0.0, 1.0, 300))
+    figure, ax = plt.subplots(figsize=(3.4, 3.4))
+    ax.set(xlim=(-1.2, 1.2), ylim=(-1.2, 1.2))
+    ax.plot(at.real, at.imag)
+    name_speeds(ax, [(at.real, at.imag)], np.linspace(100.0, 300.0, 300))
+    figure.canvas.draw()
+    points = ax.transData.transform(np.column_stack([at.real, at.imag]))
+    boxes = [text.get_window_extent().padded(-0.5) for text in ax.texts]
+    assert len(boxes) > 3
+    assert not any(box.count_contains(points) for box in boxes)
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+
+
+def test_critical_speeds_that_lie_together_share_a_label():
+    cases = run_up(rig=mass_of_1_kg(1e4, 1.02e4).as_dict())
+    cases["time"] = "revolution", np.linspace(0.0, 4.0, TURNS)
+    (ax,) = speed(cases).show()
+    assert [text.get_text() for text in ax.texts] == ["critical, 955, 964 rpm"]
 
 
 def mass_of_1_kg(*stiffness):
