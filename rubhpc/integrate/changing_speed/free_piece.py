@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rubhpc.integrate.changing_speed.passing import Passed, Passing, state_at
-from rubhpc.integrate.changing_speed.piece_setup import Pieces
+from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.measuring.measures import lift_samples, new_accumulator
 from rubhpc.integrate.start import start_of
 from rubhpc.kernels.accumulators import (

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.changing_speed.passing import Passing, state_at
-from rubhpc.integrate.changing_speed.piece_setup import Pieces
+from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.turns import Turns
 from rubhpc.integrate.measuring.measures import empty_samples, lift_samples, new_accumulator
 from rubhpc.integrate.record import State

@@ -9,7 +9,7 @@ from full_order_machine import Machine, driven_machine
 
 from rubhpc import Carrier, LumpedStator, Rig, Unbalance, run_up
 from rubhpc.integrate.changing_speed.passing import Passing
-from rubhpc.integrate.changing_speed.piece_setup import Pieces
+from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.study.drive_law import DriveLaw
 

@@ -1,0 +1,183 @@
+"""Matrices held over ranges of speed and acceleration, and the set-ups of a run-up's pieces in them."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from rubhpc.fem.assemble import model_at
+from rubhpc.fem.free_spin import unit_rotation
+from rubhpc.fem.statics import sag_under
+from rubhpc.integrate.changing_speed.held_matrices import WIDEST, WIDEST_TABULATED, held_range
+from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, sagging, with_values
+from rubhpc.integrate.packing import whole_system
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+    from rubhpc.integrate.setup import ModalSetup
+
+    Floats = NDArray[np.float64]
+
+SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the speed is taken
+LONGEST_FALL = 1.0 / 3.0  # half of the range over the first speed of a coast-down, which stays above 0
+MOST_HELD = 4  # matrices kept, of a spin that swings between them
+MOST_BYTES = 2**25  # of contact modes, with which matrices are kept for other cases
+
+# Of each set-up, the matrices by speed and acceleration, the latest last: other cases may have them too.
+_KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[float, float], HeldMatrices]] = WeakKeyDictionary()
+
+
+class Pieces:
+    """The set-ups of the pieces of a run-up, from that at its highest speed, which keeps the most modes.
+
+    Where the spin is free (`ModalSetup.free_spin`), the drive's torque twists the shaft, not its
+    acceleration, and `phi'' G u / 2` takes the place of `phi'' G u`, as Lagrange's equations have it.
+    """
+
+    def __init__(self, fastest: ModalSetup) -> None:
+        for known in _KNOWN.values():
+            for key in [key for key, held in known.items() if held.n_byte > MOST_BYTES]:
+                del known[key]
+        self._fastest = fastest
+        self._basis = fastest.reduced.basis
+        self._held: list[HeldMatrices] = []  # the latest first
+        model = fastest.model
+        rotor = model.rotor
+        self._inertia = rotor.mass @ unit_rotation(rotor)
+        n, n_all = rotor.n_dof, model.body_start[-1]
+        momentum = np.zeros((n_all, n_all))
+        momentum[:n, :n] = rotor.gyroscopic if fastest.free_spin is None else 0.5 * rotor.gyroscopic
+        self._momentum = self._basis.T @ momentum @ self._basis
+        phasor = (model.unbalance_cosine - 1j * model.unbalance_sine) @ self._basis[:n]
+        self._phasor = phasor.astype(np.complex128)
+
+    def setup(
+        self, speed: float, acceleration: float, angle: float, duration: float, torque: float = 0.0
+    ) -> PieceSetup:
+        """The set-up of a piece: mean speed (rad/s), acceleration (rad/s^2), first angle, duration (s).
+
+        `torque` (N m) is that of the drive of a free spin.
+        """
+        held, fastest = self._find(speed, acceleration), self._fastest
+        asked = speed, acceleration, duration, torque
+        if angle == 0.0 and held.first is not None and held.first[0] == asked:
+            return held.first[1]
+        lag = acceleration * duration**2 / 12.0
+        factor = (speed**2 - 1j * acceleration) * cmath.exp(1j * (angle - lag))
+        phasor = self._phasor * factor
+        force = np.empty((2, phasor.size))
+        force[0], force[1] = phasor.real, -phasor.imag
+        model = held.model if fastest.free_spin is None else held.driven(torque, acceleration)
+        interval = 2.0 * math.pi / (abs(speed) * fastest.samples_per_revolution)
+        found = with_values(
+            held.template,
+            model=model,
+            reduced=with_values(held.reduced, spin=speed, force=force),
+            spin=speed,
+            interval=interval,
+            tick=interval / (1 << held.sample_level),
+            factor=factor,
+            _curved_libraries={},  # which are of this speed alone
+            _open_tables={},
+        )
+        if angle == 0.0:
+            held.first = asked, found
+        return found
+
+    def _find(self, speed: float, acceleration: float) -> HeldMatrices:
+        """Matrices that may be held at a speed and an acceleration."""
+        for i, held in enumerate(self._held):
+            if held.serve(speed, acceleration):
+                if i:
+                    self._held.insert(0, self._held.pop(i))
+                return held
+        known = _KNOWN.setdefault(self._fastest, {})
+        found = known.pop((speed, acceleration), None) or self._hold(speed, acceleration)
+        known[speed, acceleration] = found
+        if len(known) > MOST_HELD:
+            del known[next(iter(known))]
+        self._held = [found, *self._held[: MOST_HELD - 1]]
+        return found
+
+    def _hold(self, speed: float, acceleration: float) -> HeldMatrices:
+        """Matrices for a speed at the near end of the range over which they may be held.
+
+        That of a free spin, which may turn back, is in the middle of the range.
+        """
+        fastest, free = self._fastest, self._fastest.free_spin
+        model, damping, stiffness = self._matrices(speed, acceleration)
+        _, next_damping, next_stiffness = self._matrices(speed * (1.0 + SPEED_STEP), acceleration)
+        step = SPEED_STEP * speed
+        drift = (next_stiffness - stiffness) / step, (next_damping - damping) / step
+        reach, swing = held_range(
+            stiffness,
+            damping,
+            drift,
+            speed,
+            acceleration,
+            accuracy=fastest.accuracy,
+            momentum=self._momentum,
+            widest=WIDEST_TABULATED if fastest.model.rotor.tabulated_speeds else WIDEST,
+        )
+        if free is None:
+            if acceleration > 0.0:  # no farther than the law goes
+                reach = min(reach, max(0.5 * (fastest.spin - speed), 0.0))
+            else:
+                reach = min(reach, LONGEST_FALL * speed)
+            speed += np.sign(acceleration) * reach
+            model, damping, stiffness = self._matrices(speed, acceleration)
+            model = sagging(model, sag_under(model.rotor, model.load - acceleration * self._inertia))
+        else:
+            model = sagging(model, sag_under(model.rotor, model.load))
+        phasor = self._phasor * speed**2
+        reduced = replace(
+            fastest.reduced,
+            spin=speed,
+            stiffness=stiffness,
+            damping=damping,
+            force=np.stack([phasor.real, -phasor.imag]),
+        )
+        for name in ("translations", "project"):  # which need no computing anew
+            reduced.__dict__[name] = getattr(fastest.reduced, name)
+        near_end = reach * (1.0 + 1e-9)  # rounding apart
+        slowest = replace(fastest, spin=abs(speed) - reach)
+        ranges = near_end, swing
+        held = HeldMatrices(model, reduced, self._phasor, acceleration, ranges, slowest.sample_level)
+        held.template = PieceSetup(
+            scheme=fastest.scheme,
+            model=model,
+            reduced=reduced,
+            spin=speed,
+            step=fastest.step,
+            contact_step=fastest.contact_step,
+            samples_per_revolution=fastest.samples_per_revolution,
+            is_updated=fastest.is_updated,
+            law=fastest.law,
+            accuracy=fastest.accuracy,
+            displacement_limit=fastest.displacement_limit,
+            held=held,
+            factor=complex(speed**2),
+            most_energy=fastest.energy_limit,
+        )
+        for name in ("energy_limit", "sample_level"):  # for `with_values`, which takes them along
+            getattr(held.template, name)
+        if free is not None:
+            held.twist = sag_under(model.rotor, -free.share)
+            held.lean = sag_under(model.rotor, -0.5 * model.rotor.gyroscopic @ model.sag)
+        return held
+
+    def _matrices(self, speed: float, acceleration: float) -> tuple[Model, Floats, Floats]:
+        """The model at a speed, within the tables of its bearings, its damping and its stiffness."""
+        model = self._fastest.model
+        if speeds := model.rotor.tabulated_speeds:
+            model = model_at(model, float(np.clip(speed, speeds[0], speeds[-1])))
+        _, damping, stiffness, _ = whole_system(model, speed)
+        stiffness = self._basis.T @ stiffness @ self._basis + acceleration * self._momentum
+        return model, self._basis.T @ damping @ self._basis, stiffness
