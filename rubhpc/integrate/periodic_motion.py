@@ -143,7 +143,7 @@ def find_periodic_motion(
     if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
         raise InputError(
             "periodic: it needs motion in closed form between events; take method modal, normal fixed, "
-            "and friction_law sliding or coulomb"
+            "stators of linear geometry, and friction_law sliding or coulomb"
         )
     try:
         piecewise, orbit = _search(setup, clearance, friction, period, recording, initial)

@@ -99,8 +99,9 @@ def check_branch(
     recording: Recording,
     *,
     is_sampled: bool,
+    is_bent: bool,
 ) -> None:
-    """Refuse what cannot be followed."""
+    """Refuse what cannot be followed; `is_bent` where a stator is of the second order."""
     if all(axis.name != keys.along for axis in axes):
         raise InputError(f"[branch] along: {keys.along} is no axis of the grid; add it as {{ start, stop }}")
     if is_sampled:
@@ -108,10 +109,11 @@ def check_branch(
     if any(axis.sweep != FROM_REST for axis in axes):
         raise InputError("[branch] along: branches need no sweep; remove sweep from the axes")
     varied: dict[str, Any] = {axis.name: axis for axis in axes if axis.is_contact_key}
-    if integrator.method != "modal" or contact.closed_form == "never" or "contact.law" in varied:
+    is_closed = integrator.method == "modal" and contact.closed_form != "never" and not is_bent
+    if not is_closed or "contact.law" in varied:
         raise InputError(
             "[branch] along: branches need motion in closed form between events; take method modal, normal "
-            "fixed, and friction_law sliding or coulomb"
+            "fixed, stators of linear geometry, and friction_law sliding or coulomb"
         )
     if recording.probe:
         raise InputError("[branch] along: branches have no probes; remove [[record.probe]]")

@@ -144,6 +144,7 @@ class Study:
                 self.integrator,
                 self.recording,
                 is_sampled=self.sample is not None,
+                is_bent=has_bent_stator(self.rig.stator),
             )
         check_rigs(self.rig, self.axes, self.recording.probe)
         if has_bent_stator(self.rig.stator):

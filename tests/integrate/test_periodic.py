@@ -100,6 +100,7 @@ def test_motion_without_contact_is_the_steady_response():
             "it needs motion in closed form",
         ),
         ({"normal": "updated"}, "it needs motion in closed form"),
+        ({"overrides": {"stator.geometry": "second_order"}}, "normal fixed, stators of linear geometry"),
         ({"method": "central-difference"}, "it needs motion in closed form"),
         ({"initial": 1.0}, "periodic: initial: 1.0 is neither a State nor a dict"),
         ({"friction": -1.0}, "periodic: friction: -1 is out of range"),

@@ -158,6 +158,11 @@ def test_multipliers_are_drawn(store):
         ('step = "4 um"', "step = 0", "step: 0 is out of range"),
         ("sweeps = 1", "sweep = 1", "unknown key; did you mean sweeps"),
         ("[record]", '[contact]\nnormal = "updated"\n[record]', "branches need motion in closed form"),
+        (
+            "[record]",
+            '[override]\n"stator.geometry" = "second_order"\n[record]',
+            "stators of linear geometry",
+        ),
         ("[record]", "[sample]\nn = 8\n[record]", "a sample has no axis to follow"),
         ("[0.74, 0.75]", '{ values = [0.74, 0.75], sweep = "up" }', "branches need no sweep"),
     ],

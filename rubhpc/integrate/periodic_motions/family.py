@@ -221,7 +221,7 @@ class Family:
             if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
                 raise InputError(
                     f"{self.along}: branches need motion in closed form between events; take method modal, "
-                    "normal fixed, and friction_law sliding or coulomb"
+                    "normal fixed, stators of linear geometry, and friction_law sliding or coulomb"
                 )
             self._setups[key] = setup
             if len(self._setups) > MOST_KEPT:
