@@ -155,7 +155,7 @@ def tabulate_curved(
         columns = [elastic[:, i], damped[:, i], *flat[i]]
         load[i, :, : mode.n_eigenmode] = (entry @ np.array(columns).T).T
     n_level = min(n_level, max(1, int(np.log2(LONGEST_STEP / tick))))
-    weight = np.array([_weights(exponent, tick * 2.0**level) for level in range(n_level)])
+    weight = _weights(exponent, np.ldexp(tick, np.arange(n_level)))
     growth = np.exp(np.maximum(exponent.real, 0.0) * tick * 2.0 ** (n_level - 1))
     inverse = np.divide(1.0, exponent, out=np.zeros_like(exponent), where=exponent != 0.0)
     steps = tick * 2.0 ** np.arange(n_level)
@@ -213,18 +213,20 @@ def _losses(reduced: ReducedModel) -> tuple[Floats, Floats]:
     return size[keep], shape[:, keep]
 
 
-def _weights(exponent: Complexes, step: float) -> Complexes:
-    """Response at the nodes of a step after the first to loads at all of them, (4, 5, m), s.
+def _weights(exponent: Complexes, steps: Floats) -> Complexes:
+    """Response at the nodes of steps after the first to loads at all of them, (step, 4, 5, m), s.
 
     That of a coordinate with the exponent l to the load (s / h)^k is `h c^(k+1) k! phi_(k+1)(c l h)` at the
     time c h.
     """
-    weights = np.zeros((N_NODE - 1, N_NODE, exponent.size), dtype=complex)
+    weights = np.zeros((steps.size, N_NODE - 1, N_NODE, exponent.size), dtype=complex)
     for a, share in enumerate(NODES[1:]):
-        phi = phi_functions(share * step * exponent)
+        # All steps at once: for one of them NumPy takes longer to begin than to compute.
+        phi = phi_functions(np.outer(share * steps, exponent).ravel())
         for power in range(N_NODE):
-            term = step * share ** (power + 1) * math.factorial(power) * phi[power]
-            weights[a] += np.outer(LAGRANGE[:, power], term)
+            scale = steps * share ** (power + 1) * math.factorial(power)
+            term = scale[:, np.newaxis] * phi[power].reshape(steps.size, exponent.size)
+            weights[:, a] += LAGRANGE[:, power, np.newaxis] * term[:, np.newaxis]
     return weights
 
 
