@@ -24,7 +24,8 @@ from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.measuring.measures import new_accumulator
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.record import State
-from rubhpc.integrate.setup import ModalSetup, Scheme, prepare
+from rubhpc.integrate.scheme import Scheme
+from rubhpc.integrate.setup import ModalSetup, prepare
 from rubhpc.kernels._jit import cache_of, plain
 from rubhpc.kernels.flow import follow_piece
 from rubhpc.kernels.force_average import add_force

@@ -38,7 +38,8 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.shared_motions import shared_motions
 from rubhpc.integrate.record import Record, State
-from rubhpc.integrate.setup import ModalSetup, Scheme
+from rubhpc.integrate.scheme import Scheme
+from rubhpc.integrate.setup import ModalSetup
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.schema import DONE, SECTION_NAMES, lyapunov_variables

@@ -18,7 +18,8 @@ from rubhpc.integrate.marches.event_driven import NoClosedForm
 from rubhpc.integrate.periodic_motions.piecewise_motion import Change, PiecewiseMotion
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.record import Record, State
-from rubhpc.integrate.setup import ModalSetup, Scheme
+from rubhpc.integrate.scheme import Scheme
+from rubhpc.integrate.setup import ModalSetup
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions
 from rubhpc.schema import REGIME

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, field
-from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -15,9 +14,9 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.free_spin import release
 from rubhpc.fem.probes import with_probes
-from rubhpc.fem.response import step_limit
+from rubhpc.integrate.central_difference_setup import CentralDifferenceSetup, prepare_steps
 from rubhpc.integrate.measuring.divergence import energy_limit
-from rubhpc.integrate.packing import Packed, law_of, pack
+from rubhpc.integrate.packing import law_of
 from rubhpc.integrate.reduced_model.contact_mode import ContactMode, confine, solve_contact_mode, solve_parts
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
@@ -31,10 +30,10 @@ from rubhpc.integrate.reduced_model.mode_tables import tabulate
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies, reduce_model
 from rubhpc.integrate.reduced_model.truncation import MOST_MODES, kept_modes, modal_error, sufficient_accuracy
+from rubhpc.integrate.scheme import Scheme, scheme_of
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.laws import MULTIPLIER
-from rubhpc.schema import SCHEMES
-from rubhpc.study.tables import SEARCH_STEP, check_bent
+from rubhpc.study.tables import SEARCH_STEP
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,58 +55,6 @@ if TYPE_CHECKING:
 L = TypeVar("L", bound=ModeLibrary)
 FINEST_TICK = 1.5e-9  # s
 FEWEST_STEPS = 16  # a revolution: none is longer than the power of two below it
-
-
-class Scheme(Enum):
-    """How a case is integrated."""
-
-    EVENT_DRIVEN = "event-driven"  # closed-form motion from event to event
-    CURVED = "curved"  # closed-form flights from event to event, steps of order 8 where gaps are closed
-    CONTACT_STEPPING = "contact-stepping"  # closed-form motion between short steps of contact
-    CENTRAL_DIFFERENCE = "central-difference"  # the paper's
-
-    @property
-    def flag(self) -> int:
-        """The scheme's number in a store."""
-        return SCHEMES.index(self.value.replace("-", "_"))
-
-
-def scheme_of(contact: Contact, integrator: Integrator, *, is_bent: bool = False) -> Scheme:
-    """Return the scheme with which a case of a study begins; `is_bent`: a stator's gap knows its bending.
-
-    Raises
-    ------
-    InputError
-        For a bent stator with laws or an integrator that have none.
-    """
-    if is_bent:
-        check_bent(contact, integrator)
-    if integrator.method == "central-difference":
-        return Scheme.CENTRAL_DIFFERENCE
-    if contact.is_smooth and (is_bent or contact.normal == "updated"):
-        return Scheme.CURVED
-    return Scheme.CONTACT_STEPPING if contact.closed_form == "never" else Scheme.EVENT_DRIVEN
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class CentralDifferenceSetup:
-    """All that the cases of one rig and speed share."""
-
-    scheme: ClassVar[Scheme] = Scheme.CENTRAL_DIFFERENCE
-    model: Model
-    packed: Packed
-    spin: float  # rad/s
-    step: float  # s
-    steps_per_sample: int
-    samples_per_revolution: int
-    is_updated: bool  # normal
-    displacement_limit: float  # m
-    law: Law = MULTIPLIER
-
-    @cached_property
-    def energy_limit(self) -> float:
-        """Mechanical energy, J, beyond which a motion has diverged."""
-        return energy_limit(self.model, self.spin, self.displacement_limit)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -334,8 +281,7 @@ def prepare(
 
     `model` is that of the rig, where it has been assembled already, `probes` what is measured of it, `drive`
     what turns it where its speed is free, `reduced` what it is in modal coordinates, where that is known.
-    What is followed and never recorded need not be measured. The step is shortened so that a whole number of
-    steps fills a sample's interval.
+    What is followed and never recorded need not be measured.
 
     Raises
     ------
@@ -369,23 +315,11 @@ def prepare(
             law=law_of(contact),
             displacement_limit=rig.rotor.displacement_limit,
         )
-    limit = step_limit(model)
-    if integrator.step is not None and integrator.step >= limit:
-        raise InputError(
-            f"[integrator] step: {integrator.step:.4g} s is above the stability limit of rig {rig.name}; "
-            f"take less than {limit:.4g} s"
-        )
-    interval = 2.0 * math.pi / (abs(speed) * samples_per_revolution)
-    steps_per_sample = math.ceil(interval / integrator.step_within(limit) * (1.0 - 1e-12))
-    step = interval / steps_per_sample
-    return CentralDifferenceSetup(
-        model=model,
-        packed=pack(model, speed, step),
-        spin=speed,
-        step=step,
-        steps_per_sample=steps_per_sample,
+    return prepare_steps(
+        model,
+        rig,
+        speed,
+        contact=contact,
+        integrator=integrator,
         samples_per_revolution=samples_per_revolution,
-        is_updated=contact.normal == "updated",
-        law=law_of(contact),
-        displacement_limit=rig.rotor.displacement_limit,
     )

@@ -13,7 +13,8 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import first_lateral_frequency
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches.friction import FrictionMarch
-from rubhpc.integrate.setup import Scheme, prepare
+from rubhpc.integrate.scheme import Scheme
+from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DIVERGED, DONE
 from rubhpc.study.study import Contact, Integrator, Recording

@@ -11,7 +11,7 @@ from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.curved_tables import curved_pairs
-from rubhpc.kernels.case_progress import MODE_WANTED, ask_for, begin_in
+from rubhpc.kernels.case_progress import ask_for, begin_in
 from rubhpc.kernels.curved_contact import curved_work
 from rubhpc.kernels.curved_loop import advance_curved
 
@@ -112,30 +112,26 @@ class CurvedMarch(EventDrivenMarch):
         begin_in(self._bare_progress, mode)
         ask_for(self.progress, int(self.tables.mask[mode]))
 
-    def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
-        while True:
-            outcome = advance_curved(
-                self.tables,
-                self._curved,
-                self._pairs,
-                self.bodies,
-                self.clock,
-                LOAD_TOLERANCE * self._setup.accuracy,
-                last_tick,
-                is_recorded,
-                self._bare_progress,
-                self._z,
-                self._z_next,
-                self._motion,
-                self._work,
-                self._event_work,
-                self._recorder,
-                samples,
-                accumulator,
-            )
-            if outcome != MODE_WANTED:
-                return outcome
-            self.find(self.progress.wanted)
+    def _advance(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        return advance_curved(
+            self.tables,
+            self._curved,
+            self._pairs,
+            self.bodies,
+            self.clock,
+            LOAD_TOLERANCE * self._setup.accuracy,
+            last_tick,
+            is_recorded,
+            self._bare_progress,
+            self._z,
+            self._z_next,
+            self._motion,
+            self._work,
+            self._event_work,
+            self._recorder,
+            samples,
+            accumulator,
+        )
 
     def _unsolved(self) -> str:
         if self._is_bent:  # short steps know nothing of a bent stator

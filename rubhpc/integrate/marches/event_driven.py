@@ -190,25 +190,27 @@ class EventDrivenMarch(ModalMarch):
         self.find(mask)
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
-        while True:
-            outcome = advance(
-                self.tables,
-                self.bodies,
-                self.clock,
-                last_tick,
-                is_recorded,
-                self._bare_progress,
-                self._z,
-                self._z_next,
-                self._motion,
-                self._event_work,
-                self._recorder,
-                samples,
-                accumulator,
-            )
-            if outcome != MODE_WANTED:
-                return outcome
+        while (outcome := self._advance(last_tick, samples, accumulator, is_recorded)) == MODE_WANTED:
             self.find_wanted()
+        return outcome
+
+    def _advance(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        """Advance as `_kernel` does, up to a contact mode that the tables lack."""
+        return advance(
+            self.tables,
+            self.bodies,
+            self.clock,
+            last_tick,
+            is_recorded,
+            self._bare_progress,
+            self._z,
+            self._z_next,
+            self._motion,
+            self._event_work,
+            self._recorder,
+            samples,
+            accumulator,
+        )
 
     def _unsolved(self) -> str:
         raise NoClosedForm

@@ -16,7 +16,6 @@ from rubhpc.integrate.reduced_model.friction_mode import mask_of, states_of
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     FINISHED,
-    MODE_WANTED,
     ask_for,
     follow,
     shaft_angle,
@@ -152,28 +151,28 @@ class FrictionMarch(EventDrivenMarch):
                 outcome = self._step_on(last_tick, samples, accumulator, is_recorded)
                 if outcome != FINISHED:
                     return outcome
-            outcome = advance_with_friction(
-                self.tables,
-                self.bodies,
-                self._friction,
-                self.clock,
-                last_tick,
-                is_recorded,
-                self._bare_progress,
-                self._z,
-                self._z_next,
-                self._motion,
-                self._work,
-                self._recorder,
-                samples,
-                accumulator,
-            )
-            if outcome == MODE_WANTED:
-                self.find_wanted()
-            elif outcome == CONTACT_UNSOLVED:
-                self._hand_over()
-            else:
+            outcome = super()._kernel(last_tick, samples, accumulator, is_recorded)
+            if outcome != CONTACT_UNSOLVED:
                 return outcome
+            self._hand_over()
+
+    def _advance(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        return advance_with_friction(
+            self.tables,
+            self.bodies,
+            self._friction,
+            self.clock,
+            last_tick,
+            is_recorded,
+            self._bare_progress,
+            self._z,
+            self._z_next,
+            self._motion,
+            self._work,
+            self._recorder,
+            samples,
+            accumulator,
+        )
 
     def _hand_over(self) -> None:
         """Go over to short steps, from the motion at the tick reached."""

@@ -16,7 +16,8 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, 
 from rubhpc.integrate.periodic_motions.saltation import by_clearance
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.along_speeds import AlongSpeeds
-from rubhpc.integrate.setup import ModalSetup, Scheme, prepare
+from rubhpc.integrate.scheme import Scheme
+from rubhpc.integrate.setup import ModalSetup, prepare
 from rubhpc.rig.reading import with_keys
 
 if TYPE_CHECKING:

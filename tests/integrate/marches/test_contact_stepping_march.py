@@ -10,7 +10,7 @@ from trial_rig import trial_rig
 from rubhpc import simulate
 from rubhpc.integrate import case
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
-from rubhpc.integrate.setup import Scheme
+from rubhpc.integrate.scheme import Scheme
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from rubhpc.integrate import case
 from rubhpc.integrate.marches import curved as curved_march
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.reduced_model import curved_tables
-from rubhpc.integrate.setup import Scheme
+from rubhpc.integrate.scheme import Scheme
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.stators import LumpedStator, Stator
 

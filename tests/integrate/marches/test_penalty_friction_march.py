@@ -10,7 +10,8 @@ from rubhpc.integrate import case
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.saltation import by_clearance, monodromy
-from rubhpc.integrate.setup import Scheme, prepare
+from rubhpc.integrate.scheme import Scheme
+from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, state_of
 from rubhpc.schema import SCHEMES
 from rubhpc.study.study import Contact, Integrator

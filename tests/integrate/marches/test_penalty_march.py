@@ -11,7 +11,8 @@ from rubhpc.integrate import case
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.saltation import monodromy
-from rubhpc.integrate.setup import Scheme, prepare
+from rubhpc.integrate.scheme import Scheme
+from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.penalty_events import change_pressed, pressed_pairs
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import REGIME, SCHEMES

@@ -1,0 +1,43 @@
+"""How a case is integrated: the scheme that its contact and integrator ask for."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from rubhpc.schema import SCHEMES
+from rubhpc.study.tables import check_bent
+
+if TYPE_CHECKING:
+    from rubhpc.study.study import Contact, Integrator
+
+
+class Scheme(Enum):
+    """How a case is integrated."""
+
+    EVENT_DRIVEN = "event-driven"  # closed-form motion from event to event
+    CURVED = "curved"  # closed-form flights from event to event, steps of order 8 where gaps are closed
+    CONTACT_STEPPING = "contact-stepping"  # closed-form motion between short steps of contact
+    CENTRAL_DIFFERENCE = "central-difference"  # the paper's
+
+    @property
+    def flag(self) -> int:
+        """The scheme's number in a store."""
+        return SCHEMES.index(self.value.replace("-", "_"))
+
+
+def scheme_of(contact: Contact, integrator: Integrator, *, is_bent: bool = False) -> Scheme:
+    """Return the scheme with which a case of a study begins; `is_bent`: a stator's gap knows its bending.
+
+    Raises
+    ------
+    InputError
+        For a bent stator with laws or an integrator that have none.
+    """
+    if is_bent:
+        check_bent(contact, integrator)
+    if integrator.method == "central-difference":
+        return Scheme.CENTRAL_DIFFERENCE
+    if contact.is_smooth and (is_bent or contact.normal == "updated"):
+        return Scheme.CURVED
+    return Scheme.CONTACT_STEPPING if contact.closed_form == "never" else Scheme.EVENT_DRIVEN
