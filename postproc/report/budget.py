@@ -88,7 +88,11 @@ def _load_records(page: Page, load: Load, room: float) -> None:
     cases = page.cases
     done = [int(i) for i in cases.done]
     if not cases.kept:
-        load.notes.append("The store contains no waveforms, spectra or sections.")
+        load.notes.append(
+            "Of cases that change speed the page shows measures and pictures over their revolutions."
+            if page.is_run_up
+            else "The store contains no waveforms, spectra or sections."
+        )
         return
     if not done:
         return

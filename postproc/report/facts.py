@@ -11,6 +11,7 @@ import xarray as xr
 from postproc.cases.maps import VALIDITY, monitors
 from postproc.cases.saltelli import drawn_ranges
 from postproc.report.grid import plain
+from postproc.report.settings import setting_rows
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.units import Scale, scale_for, short_name
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS, VARIABLES
@@ -153,16 +154,7 @@ def drawn_rows(store: xr.Dataset) -> list[dict[str, str]]:
 def study_rows(store: xr.Dataset) -> list[tuple[str, str]]:
     """Return how speed, contact, integration and recording were set, from the attributes of the store."""
     study = store.attrs.get("study")
-    tables = study if isinstance(study, dict) else {}
-    rows = []
-    for table in ("run_up", "drive", "contact", "integrator", "record"):
-        settings = tables.get(table)
-        if isinstance(settings, dict):
-            text = ", ".join(
-                f"{k.replace('_', ' ')} {_value(v)}" for k, v in settings.items() if v is not None
-            )
-            rows.append((table.replace("_", "-").capitalize(), text))
-    return rows
+    return setting_rows(study) if isinstance(study, dict) else []
 
 
 def run_rows(store: xr.Dataset, measures: Measures) -> list[tuple[str, str]]:
@@ -205,9 +197,3 @@ def seconds_text(seconds: float) -> str:
 def free_axes(store: xr.Dataset) -> list[str]:
     """Return the axes of several values, the longest first."""
     return sorted((a for a in axes_of(store) if store.sizes[a] > 1), key=lambda a: -store.sizes[a])
-
-
-def _value(value: object) -> str:
-    if isinstance(value, list):
-        return " and ".join(str(v) for v in value) or "nothing"
-    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -45,11 +45,18 @@ _SCRIPTS = ("data.js", "chart.js", "map.js", "panels.js", "page.js")
 
 
 class Page:
-    """A page on the current state of a store; `measures` and `cases` are what it shows."""
+    """A page on the current state of a store; `measures` and `cases` are what it shows.
+
+    Attributes
+    ----------
+    is_run_up : bool
+        Whether its cases change speed.
+    """
 
     def __init__(self, store: xr.Dataset) -> None:
         self._whole = store
-        if is_run_up(store):  # the maps show measures, pictures the revolutions
+        self.is_run_up = is_run_up(store)
+        if self.is_run_up:  # the maps show measures, pictures the revolutions
             store = measures_alone(store)
         self._store = store
         self.measures = Measures(store)
@@ -127,6 +134,7 @@ class Page:
             "nStator": store.sizes.get("stator", 1),
             "signals": self.measures.described_signals(store),
             "kept": self.cases.kept,
+            "isRunUp": self.is_run_up,
             "places": self._places(),
             "frequencies": self._frequencies(),
             "validity": {code: validity_text(code) for code in codes},

@@ -11,7 +11,7 @@ import rubhpc
 from postproc.figures.bode import bode
 from postproc.figures.orbit import orbit
 from postproc.figures.spectrum import spectrum
-from postproc.report.page import Page
+from postproc.report.budget import write_report
 from postproc.signals.sections import section_of
 from postproc.signals.waveforms import waveform_data
 from rubhpc.errors import InputError
@@ -114,11 +114,14 @@ def test_figures_of_one_case_see_its_signals(folder):
             spectrum(store, signal)
 
 
-def test_a_report_shows_measures_and_pictures(folder, monkeypatch):
+def test_a_report_shows_measures_and_pictures(folder, monkeypatch, tmp_path):
     monkeypatch.setattr("postproc.report.run_ups.MOST_DRAWN", 1)
-    page = Page(rubhpc.open(folder / "run_ups.zarr")).html()
+    load = write_report(rubhpc.open(folder / "run_ups.zarr"), tmp_path / "report.html", 20e6)
+    told = "Of cases that change speed the page shows measures and pictures over their revolutions."
+    assert load.notes == [told]
+    page = (tmp_path / "report.html").read_text()
     assert "peak_contact_force" in page
-    assert "start 188.496, stop 157.08" in page
+    assert "start 1800 rpm, stop 1500 rpm" in page
     assert page.count('alt="Speed, ') == page.count('alt="Bode plot, ') == 1
     assert 'alt="Waterfall' not in page  # of 13 revolutions at most
     assert "Bode plot and waterfall of left; the first 1 of 4 cases are drawn." in page

@@ -264,7 +264,7 @@ async function begin() {
   Object.assign(panels, { orbit: new Orbit("orbit"), section: new Section("section"), spectrum: new Spectrum("spectrum"), waveform: new Waveform("waveform") });
   for (const panel of Object.values(panels)) await panel.begin();
   if (!facts.kept.length) {
-    byId("right").replaceChildren(element("p", { className: "note", textContent: "The store contains only measures, no waveforms, spectra or sections. To see orbits, run the study with [record] keep = [\"waveform\"]." }));
+    byId("right").replaceChildren(element("p", { className: "note", textContent: facts.isRunUp ? "The pictures above show the revolutions of each case; its waveforms are in the store: rubhpc orbit, bode, polar and waterfall draw them." : "The store contains only measures, no waveforms, spectra or sections. To see orbits, run the study with [record] keep = [\"waveform\"]." }));
     for (const name of Object.keys(panels)) delete panels[name];
   }
   if (state.x === null) {
