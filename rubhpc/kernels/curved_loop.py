@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-OBSERVED = 1e-4  # of the tolerance of loads, while recording: energies are summed up by Simpson's rule
+OBSERVED = 1e-4  # of the tolerance of loads, while recording, so that energies balance
 
 
 @jit_lean_sum

@@ -57,10 +57,8 @@ MOST_SWEEPS = 12  # over the nodes
 INTERPOLATED = 5e-4
 SETTLED = 0.1  # share of the loads' tolerance to which the iteration goes
 EASY = 0.02  # share of the tolerance below which the next step may be twice as long
-HOPELESS, FALLEN = (
-    6,
-    0.1,
-)  # sweeps after which the loads are to be missed by less than this share of the first
+HOPELESS = 6  # sweeps after which loads are to be missed by less than `FALLEN` of what they first were
+FALLEN = 0.1
 PATIENT = 16  # steps, after one whose loads were not found, before a longer one is tried
 QUICK = 5  # sweeps that a step took which may do for one twice as long
 LEAST_TRAVEL = 0.01  # of the clearance: errors are relative to a force that moves the tip so far, or more

@@ -47,7 +47,9 @@ class AlongSpeeds:
             completed(part, reduce(np.logical_or, of)) for part, of in zip(parts, choices, strict=True)
         ]
         self._fastest = reduce_to(model, spins[-1], accuracy, are_kept)
-        basis, *_ = self._fastest.basis, self._fastest.project, self._fastest.translations
+        basis = self._fastest.basis
+        for name in ("project", "translations"):  # found once, for `at` to copy
+            getattr(self._fastest, name)
         _, still, _, _ = whole_system(model, 0.0)
         _, _, _, force = whole_system(model, 1.0)
         self._damping = basis.T @ still @ basis
