@@ -5,10 +5,13 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
+import re
 import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -35,10 +38,30 @@ _SUM_FLAGS: dict[str, Any] = {**_FLAGS, "fastmath": {"contract", "nsz", "reassoc
 # so that a kernel which changes over may change the last bits of what it computes.
 _LEAN_FLAGS: dict[str, Any] = {**_FLAGS, "_nrt": False}
 _LEAN_SUM_FLAGS: dict[str, Any] = {**_SUM_FLAGS, "_nrt": False}
-_SOURCES = hashlib.sha256(
-    b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
-).hexdigest()
-_MOST_CACHES = 4  # of other sources that are kept
+_PACKAGE = re.escape(__package__)
+_IMPORTS = re.compile(rf"\b{_PACKAGE}\.(\w+)|\bfrom {_PACKAGE} import ([\w ,]+|\([^)]*\))")
+_MOST_CACHES = 4  # of a module that are kept, of other sources each
+
+
+@cache
+def _imported_by(path: Path) -> frozenset[Path]:
+    """Files of this package that one of them names in its imports."""
+    words = " ".join(chain.from_iterable(_IMPORTS.findall(path.read_text())))
+    return frozenset(
+        file for word in re.findall(r"\w+", words) if (file := path.with_name(f"{word}.py")).exists()
+    )
+
+
+@cache
+def _sources_of(path: Path) -> str:
+    """Digest of all sources that the kernels of a file are compiled from: its own, and what it imports."""
+    found: set[Path] = set()
+    waiting = {path}
+    while waiting:
+        found |= waiting
+        waiting = {file for known in waiting for file in _imported_by(known)} - found
+    sources = b"".join(file.read_bytes() for file in sorted(found))
+    return hashlib.sha256(sources).hexdigest()
 
 
 class Compilation:
@@ -100,13 +123,14 @@ def _wait_for(lock: Path) -> None:
 
 def _drop_old(folder: Path) -> None:
     """Remove all but the latest caches of other sources."""
-    others = [path for path in folder.parent.glob("kernels-*") if path != folder and path.is_dir()]
+    name, _, _ = folder.name.rpartition("-")
+    others = [path for path in folder.parent.glob(f"{name}-*") if path != folder and path.is_dir()]
     for path in sorted(others, key=lambda path: path.stat().st_mtime)[: -(_MOST_CACHES - 1)]:
         shutil.rmtree(path, ignore_errors=True)
 
 
 def _stamped(compiled: Any) -> Any:
-    """Cache a kernel by the content of all kernels' sources, and compile it in one process at a time.
+    """Cache a kernel by the content of its sources, and compile it in one process at a time.
 
     Numba compares the date of a function's own file, though what it calls from other files is compiled into
     it, and an installation renews all dates. Each state of the sources has a folder of its own, so that
@@ -116,11 +140,13 @@ def _stamped(compiled: Any) -> Any:
     file = getattr(cache, "_cache_file", None)
     if cache is None or file is None:  # nothing is compiled under NUMBA_DISABLE_JIT
         return compiled
-    folder = Path(file._cache_path) / f"kernels-{_SOURCES[:16]}"
+    source = Path(compiled.py_func.__code__.co_filename)
+    sources = _sources_of(source)
+    folder = Path(file._cache_path) / f"{source.stem}-{sources[:16]}"
     compiled.lock = folder / f"{file._index_name}.lock"
     cache._cache_path = file._cache_path = str(folder)
     file._index_path = str(folder / file._index_name)
-    file._source_stamp = _SOURCES
+    file._source_stamp = sources
     compile_or_load = compiled.compile
 
     def compile_once(signature: Any) -> Any:

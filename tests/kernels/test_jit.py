@@ -71,6 +71,23 @@ def test_change_of_a_callee_in_another_file_outdates_the_cache(probe):
     assert end(probe(5, "jit_inline")) == ["10", "0", "twice"]
 
 
+def test_change_of_what_a_kernel_does_not_import_leaves_its_cache(probe, tmp_path):
+    assert end(probe(3)) == ["6", "0", "twice"]
+    (tmp_path / "probe" / "stranger.py").write_text("other = 1")
+    assert end(probe(3)) == ["6", "1"]
+
+
+@pytest.mark.parametrize(
+    "imports",
+    ["from probe.between import value", "from probe import between\nvalue = between.value"],
+)
+def test_change_of_what_is_imported_by_another_outdates_the_cache(probe, tmp_path, imports):
+    (tmp_path / "probe" / "between.py").write_text("from probe.callee import value")
+    (tmp_path / "probe" / "caller.py").write_text(CALLER.replace("from probe.callee import value", imports))
+    assert end(probe(3)) == ["6", "0", "twice"]
+    assert end(probe(4)) == ["8", "0", "twice"]
+
+
 def test_what_only_kernels_call_lies_in_no_cache(probe, tmp_path):
     """It is compiled into its callers, which are cached."""
     end(probe(3))
@@ -85,7 +102,7 @@ def test_versions_that_take_turns_keep_their_caches(probe, tmp_path):
     assert end(probe(3)) == ["6", "1"]
     for value in (5, 6, 7):
         end(probe(value))
-    assert len([*tmp_path.rglob("kernels-*")]) == 4
+    assert len([*tmp_path.rglob("caller-*")]) == 4
     assert end(probe(7)) == ["14", "1"]
 
 
