@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.figures.orbit import draw_stators
-from postproc.store.units import displayed, scale_for
+from postproc.store.units import displayed
+from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -19,11 +19,12 @@ from postproc.figures.small_multiples import legend_below
 from postproc.figures.ticks import tick_levels
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.select import first_of_rest
-from postproc.store.units import displayed, scale_for, written_value
+from postproc.store.units import displayed, written_value
 from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE, REGIME
 from rubhpc.study.sampling import CASE
+from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from postproc.figures.branch_lines import draw_branches
-from postproc.figures.cells import is_geometric
+from postproc.figures.cells import cell_edges, hatch_cells, is_geometric
 from postproc.figures.drawing import Drawing
-from postproc.figures.palette import categories
+from postproc.figures.palette import NOT_DONE, categories
 from postproc.figures.ticks import tick_levels
 from postproc.signals.sections import section_of, sections_along
 from postproc.store.axes import axes_of, find_axis, ordered_axes, source
@@ -20,8 +20,8 @@ from postproc.store.units import displayed, meanings, scale_of, short_name
 from postproc.store.variables import require_results, require_variables
 from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
-from rubhpc.schema import HAS_VALUES
-from rubhpc.study.axes import DIRECTION
+from rubhpc.schema import HAS_VALUES, INFERRED
+from rubhpc.study.axes import DIRECTION, DIRECTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -38,6 +38,7 @@ _SIZES = 0.6, 3.5  # of the points, pt
 _LEAST_RANGE = 0.02  # of the largest value: points of one motion differ by rounding over all cases
 _UNDER = "0.6", "0.35"  # simulated points under branches: greys of up, or both, and of down
 _WAYS = (("^", "#E69F00", 2.4), ("v", "#0072B2", 1.2))  # up and down: marker, colour, size
+_LEANS = "/", "\\"  # of the hatch where up, and where down, has no result
 
 
 def bifurcation(
@@ -50,8 +51,9 @@ def bifurcation(
 ) -> Drawing:
     """Bifurcation diagram: section points of a signal along an axis.
 
-    There is a point a revolution, coloured by regime, period or direction of the sweep. Of a branch study the
-    branches are drawn: stable parts full, unstable ones dashed, with their events.
+    There is a point a revolution, coloured by regime, period or direction of the sweep. Cases without a
+    result are hatched by their status. Of a branch study the branches are drawn: stable parts full, unstable
+    ones dashed, with their events.
 
     Parameters
     ----------
@@ -80,6 +82,9 @@ def bifurcation(
         cases = at_most_loaded_stator(cases)
     cases, notes = first_of_rest(cases, kept, name)
     shown = sections_along(cases, signal, axis, over)
+    if n_inferred := int((shown["status"] == INFERRED).sum()):
+        n_shown = shown["status"].size
+        notes = [*notes, f"{n_inferred} of {n_shown} cases were inferred, not computed, and have no points"]
     return Drawing(
         shown=shown,
         draw=lambda axes: draw_bifurcation(shown, signal, axes[0], coloring),
@@ -183,15 +188,16 @@ def draw_bifurcation(
             rasterized=section.size > _MOST_DRAWN,
             **style,
         )
-    if color is not None and has_legend:
-        ax.figure.legend(
-            loc="outside upper right", ncols=16, markerscale=4.0 / size, handletextpad=0.2, columnspacing=1.0
-        )
     ax.margins(x=0.01)
     if is_geometric(x):
         ax.set_xscale("log")
     tick_levels(ax, "x", data[along])
     _widen(ax, section.values * scale.factor)
+    _hatch(ax, x, data["status"].values)
+    if ax.get_legend_handles_labels()[1] and has_legend:
+        ax.figure.legend(
+            loc="outside upper right", ncols=16, markerscale=4.0 / size, handletextpad=0.2, columnspacing=1.0
+        )
     ax.set(xlabel=x_label, ylabel=scale.label(f"{short_name(section)},\nonce a revolution"))
     return ax
 
@@ -218,6 +224,20 @@ def _directions(
         marker, shade, larger = _WAYS[i]
         style = {"marker": marker, "color": shade, "markersize": larger * size, "label": name}
         yield style, np.ones(section.shape[1], bool), section.values[i]
+
+
+def _hatch(ax: Axes, x: NDArray[np.float64], status: NDArray[np.int8]) -> None:
+    """Hatch the cases without a result, of `status` (n_x,), or (2, n_x) where swept both ways."""
+    edges = cell_edges(x), np.array([0.0, 1.0])  # of the whole height
+    over = ax.get_xaxis_transform()
+    for code, (name, shade, hatch) in NOT_DONE.items():
+        if status.ndim == 1:
+            hatch_cells(ax, edges, (status == code)[None], name, hatch, facecolor=shade, transform=over)
+            continue
+        for of_way, way, lean, (_, color, _) in zip(status, DIRECTIONS, _LEANS, _WAYS, strict=True):
+            label = f"{name}, {way}"
+            hatch_cells(ax, edges, (of_way == code)[None], label, 4 * lean, color=color, transform=over)
+    ax.autoscale_view(scaley=False)  # such cases may lie at the ends
 
 
 def _widen(ax: Axes, y: NDArray[np.float64]) -> None:

@@ -11,8 +11,9 @@ from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import RPM, critical_speeds, written_speeds
 from postproc.signals.orders import order_over_speed
 from postproc.store.run_ups import is_run_up
-from postproc.store.units import scale_for, short_name
+from postproc.store.units import short_name
 from postproc.store.variables import require_results
+from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

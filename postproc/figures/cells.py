@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.transforms import Transform
     from numpy.typing import NDArray
 
 
@@ -35,8 +36,12 @@ def hatch_cells(
     hatch: str,
     facecolor: str = "none",
     color: str = "0.25",
+    transform: Transform | None = None,
 ) -> list[Artist]:
-    """Hatch the cells of a mask (n_y, n_x) as one patch; return it for a legend, or [] where none is."""
+    """Hatch the cells of a mask (n_y, n_x) as one patch; return it for a legend, or [] where none is.
+
+    The edges are in the coordinates of the data, or of a `transform`.
+    """
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
@@ -58,7 +63,15 @@ def hatch_cells(
         axis=1,
     ).reshape(-1, 2)
     codes = np.tile([Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY], row.size)
-    style = {"hatch": hatch, "facecolor": facecolor, "edgecolor": color, "linewidth": 0.0, "label": label}
+    style: dict[str, Any] = {
+        "hatch": hatch,
+        "facecolor": facecolor,
+        "edgecolor": color,
+        "linewidth": 0.0,
+        "label": label,
+    }
+    if transform is not None:
+        style["transform"] = transform
     return [ax.add_patch(PathPatch(Path(corners, codes), **style))]
 
 

@@ -10,7 +10,7 @@ from postproc.figures.drawing import Drawing
 from postproc.figures.run_up_marks import draw_rotation, name_speeds
 from postproc.signals.run_up_spectra import mean_positions
 from postproc.signals.waveforms import seen_by_two
-from postproc.store.units import scale_for
+from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,8 +13,9 @@ from postproc.figures.small_multiples import legend_below
 from postproc.signals.spectra import samples_per_revolution
 from postproc.signals.waveforms import orbit_data
 from postproc.store.rig_of_case import rig_of, stator_places
-from postproc.store.units import scale_for, short_name
+from postproc.store.units import short_name
 from postproc.store.variables import require_results
+from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     import xarray as xr

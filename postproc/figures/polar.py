@@ -12,9 +12,9 @@ from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import critical_speeds, draw_rotation, name_speeds, written_speeds
 from postproc.signals.orders import order_over_speed
 from postproc.store.run_ups import is_run_up
-from postproc.store.units import scale_for
 from postproc.store.variables import probe_of, probes_of, require_results
 from rubhpc.schema import PROBE
+from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,8 +10,8 @@ from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import RPM, critical_speeds
 from postproc.signals.spin import spin_over_time
-from postproc.store.units import scale_for
 from postproc.store.variables import require_results
+from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

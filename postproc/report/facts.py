@@ -13,8 +13,9 @@ from postproc.cases.saltelli import drawn_ranges
 from postproc.report.grid import plain
 from postproc.report.settings import setting_rows
 from postproc.store.axes import axes_of, drawn_axes
-from postproc.store.units import Scale, scale_for, short_name
+from postproc.store.units import short_name
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS, VARIABLES
+from rubhpc.units import Scale, scale_for
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,9 +11,10 @@ from postproc.cases.maps import MAPPABLE, VALIDITY, is_mappable, validity
 from postproc.figures.cells import cell_edges, is_geometric
 from postproc.figures.palette import categories
 from postproc.store.axes import axes_of, drawn_axes
-from postproc.store.units import Scale, displayed, meanings, scale_for, short_name
+from postproc.store.units import displayed, meanings, short_name
 from postproc.store.worst import worst_word
 from rubhpc.schema import DIVERGED, HAS_VALUES, PROBE, SIGNAL_NAMES, VARIABLES
+from rubhpc.units import Scale, scale_for
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,12 +6,12 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any
 
-from postproc.store.units import scale_for
 from rubhpc.rig.probes import Probe
 from rubhpc.study.contact_keys import Contact
 from rubhpc.study.drive_keys import DriveKeys
 from rubhpc.study.run_up_keys import RunUpKeys
 from rubhpc.study.tables import Integrator, Recording
+from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

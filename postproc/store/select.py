@@ -10,13 +10,14 @@ import numpy as np
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.branch_points import is_of_points
 from postproc.store.run_ups import is_run_up, steady_view
-from postproc.store.units import meanings, scale_of, typed
+from postproc.store.units import meanings
 from postproc.store.variables import require_variables
 from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.study.axes import coordinate_of
 from rubhpc.study.sampling import CASE
+from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -139,8 +140,7 @@ def _typed(axis: xr.DataArray, value: float) -> str:
     names = meanings(axis)
     if 0 <= value < len(names) and value == int(value):
         return names[int(value)]
-    scale = scale_of(axis.copy(data=np.full(axis.shape, value)))  # speeds in rpm
-    return f"{value * scale.factor:.6g} {typed(scale.unit)}".rstrip()
+    return typed_quantity(value, str(axis.attrs.get("units", "1")))
 
 
 def _positions(

@@ -4,42 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.schema import PROBE
+from rubhpc.units import RPM, scale_for
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-# Units as a store spells them, as an axis does, and the prefixes that engineers put before them.
-_WRITTEN = {
-    "m": ("m", "mµn"),
-    "rad": ("rad", "mµn"),
-    "N": ("N", "kM"),
-    "N s": ("N s", "mµ"),
-    "J": ("J", "kmµ"),
-    "s": ("s", "mµ"),
-    "Pa": ("Pa", "GMk"),
-    "Hz": ("Hz", "kM"),
-    "kg": ("kg", ""),
-    "kg m-3": ("kg m⁻³", ""),
-    "kg/m^3": ("kg m⁻³", ""),
-    "m s-1": ("m s⁻¹", "mµ"),
-    "rad s-1": ("rad s⁻¹", ""),
-    "rad/s": ("rad s⁻¹", ""),
-    "rad s-2": ("rad s⁻²", ""),
-    "m s-2": ("m s⁻²", ""),
-    "N m-1": ("N m⁻¹", "MGk"),
-    "N/m": ("N m⁻¹", "MGk"),
-}
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_LOWERED = {raised: plain for plain, raised in _RAISED.items()}
-_MICRO_UP_TO = 2e-3  # orbits stay in µm, and twists in µrad, a little beyond a thousand of them
+    from rubhpc.units import Scale
 
 # Names for axes, where a long name does not fit, and symbols of the paper.
 _SHORT = {
@@ -114,59 +90,15 @@ _SYMBOLS = {
 }
 
 
-@dataclass(frozen=True)
-class Scale:
-    """How a unit is displayed: multiply by `factor`, write `unit`."""
-
-    factor: float
-    unit: str
-
-    def label(self, text: str) -> str:
-        """Return `text` with the unit in brackets; without a unit, `text`."""
-        return f"{text} ({self.unit})" if self.unit else text
-
-
-_SPEEDS = ("speed", "spin_speed")
+_SPEEDS = ("speed", "spin_speed", "drive_start")
 _CAPTION_WIDTH = 56  # characters that a column takes
 _MARKUP = re.compile(r"[$\\_]")  # of symbols, which takes no room
-_RPM = Scale(60 / (2 * math.pi), "rpm")  # as speeds are read on a test bench
-
-
-def scale_for(unit: str, size: float) -> Scale:
-    """Return the scale in which a quantity of magnitude `size` (SI) reads between 1 and 1000."""
-    if unit in ("", "1", "dimensionless"):
-        return Scale(1.0, "")
-    written, prefixes = _WRITTEN.get(unit, (typeset(unit), ""))
-    if not math.isfinite(size) or size <= 0:
-        return Scale(1.0, written)
-    if "µ" in prefixes and 1e-6 <= size <= _MICRO_UP_TO and unit in ("m", "rad"):
-        return Scale(1e6, f"µ{written}")
-    # The largest prefix that leaves at least one whole unit; below the smallest prefix, the smallest.
-    offered = [(value, sign) for value, sign in _PREFIXES if sign == "" or sign in prefixes]
-    value, sign = next(
-        ((value, sign) for value, sign in offered if size >= value * (1 - 1e-9)),
-        offered[-1],
-    )
-    return Scale(1 / value, f"{sign}{written}")
-
-
-def typeset(unit: str) -> str:
-    """Return a unit with raised powers: `N m s⁻¹` for `N m s-1`."""
-    return re.sub(r"(?<=[A-Za-z])-?\d+", lambda power: power.group().translate(_RAISED), unit)
-
-
-def typed(unit: str) -> str:
-    """Return a displayed unit as a keyboard types it, and as a study file or `--select` reads it."""
-    powers = re.sub(
-        r"[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda power: f"**{power.group().translate(_LOWERED)}", unit.replace("µ", "u")
-    )
-    return powers.replace(" ", "*") if "**" in powers else powers
 
 
 def scale_of(data: xr.DataArray, unit: str | None = None) -> Scale:
     """Return the scale that suits the largest finite magnitude in `data`; speeds are read in rpm."""
     if data.name in _SPEEDS and unit is None:
-        return _RPM
+        return RPM
     values = np.abs(np.asarray(data.values, dtype=float))
     finite = values[np.isfinite(values)]
     size = float(finite.max()) if finite.size else 0.0
@@ -205,7 +137,7 @@ def written_value(coordinate: xr.DataArray) -> str:
     unit = str(coordinate.attrs.get("units", "1"))
     if name.endswith("angle") and unit == "rad":
         return f"{name.replace('_', ' ')} = {math.degrees(value):.4g}°"
-    scale = _RPM if name in _SPEEDS else scale_for(unit, abs(value))
+    scale = RPM if name in _SPEEDS else scale_for(unit, abs(value))
     symbol = f"${_SYMBOLS[name]}$" if name in _SYMBOLS else name.replace("_", " ")
     text = f"{symbol} = {value * scale.factor:.4g} {scale.unit}".rstrip()
     return f"{text} ({of_stators})" if (of_stators := coordinate.attrs.get("of_stators")) else text

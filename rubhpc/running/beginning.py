@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.errors import InputError, StoppedEarly, StoreError
+from rubhpc.errors import StoppedEarly, StoreError
 from rubhpc.storage.journal import next_run
 from rubhpc.storage.lock import InUse
 from rubhpc.storage.parts import Shares
@@ -73,9 +73,6 @@ def begin_part(
     """Begin a part: lock it, bring the store up to date if no other part is at work; also its cases."""
     part, stopping, parts = request.part, request.stopping, store.parts
     assert part is not None
-    if request.study.refine is not None:
-        why = "the levels of a refined map need the results of all parts"
-        raise InputError(f"part {part}: {why}; use --workers or mpirun, or remove [refine]")
     with ExitStack() as alone:
         try:
             alone.enter_context(parts.alone(part, stopping.look))

@@ -24,7 +24,7 @@ from rubhpc.schema import MISSING
 from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.manifest import PRIVATE
 from rubhpc.storage.store import Store
-from rubhpc.study.parts import Part
+from rubhpc.study.parts import Part, check_parts
 from rubhpc.study.study import Study, read_study
 from rubhpc.threads import on_one_thread
 
@@ -96,6 +96,8 @@ def run(
 
     def resolve() -> Study:
         found = study if isinstance(study, Study) else read_study(Path(study), trust_rig=trust_rig)
+        if chosen is not None:
+            check_parts(chosen, found)
         limits = replace(
             found.run,
             time_limit=found.run.time_limit if time_limit is None else time_limit,

@@ -21,7 +21,7 @@ from rubhpc.storage.parts import Shares
 from rubhpc.storage.refined import Refinement, status_of
 from rubhpc.storage.resume import cases_without_files, grid_for, is_store, missing_share
 from rubhpc.storage.store import Store
-from rubhpc.study.parts import Part, share_out
+from rubhpc.study.parts import Part, check_parts, share_out
 from rubhpc.study.sampling import CASE
 from rubhpc.threads import on_one_thread
 
@@ -183,6 +183,8 @@ def make_plan(study: Study, part: str | None = None) -> Plan:
         The store at its output is of another study.
     """
     chosen = None if part is None else Part.parse(part)
+    if chosen is not None:
+        check_parts(chosen, study)
     grid = grid_for(study)
     manifest = manifest_of(grid)
     blocks = grid.blocks()

@@ -11,6 +11,7 @@ from rubhpc.input.fields import check_value, quantity
 from rubhpc.input.messages import brief, nearest, place
 from rubhpc.study import contact_axes, initial
 from rubhpc.study.contact_axes import choices_of, contact_field
+from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
     from rubhpc.input.ranges import Range
@@ -172,10 +173,10 @@ def meanings_of(name: str) -> tuple[str, ...]:
 
 
 def written(name: str, value: float, unit: str) -> str:
-    """Return a value on an axis for people, as in `friction=0.3`."""
+    """Return a value on an axis for people, as in `friction=0.3` or `speed=1200 rpm`."""
     if meanings := meanings_of(name):
         return f"{name}={meanings[int(value)]}"
-    return f"{name}={value:.6g}" + (f" {unit}" if unit not in ("", "1") else "")
+    return f"{name}={typed_quantity(value, unit)}"
 
 
 def why_not_swept(name: str) -> str:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.study.cases import CaseGrid
+    from rubhpc.study.study import Study
 
 MOST_PARTS = 100_000
 
@@ -52,6 +53,19 @@ class Part(NamedTuple):
         if not 1 <= part.number <= part.total:
             raise InputError(f"part {part}: is out of range; parts count from 1 to {part.total}")
         return part
+
+
+def check_parts(part: Part, study: Study) -> None:
+    """Check that a study can be computed in parts.
+
+    Raises
+    ------
+    InputError
+        It cannot.
+    """
+    if study.refine is not None:
+        why = "the levels of a refined map need the results of all parts"
+        raise InputError(f"part {part}: {why}; use --workers or mpirun, or remove [refine]")
 
 
 def share_out(grid: CaseGrid, total: int) -> NDArray[np.int32]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import synthetic_store
+import xarray as xr
 from click.testing import CliRunner
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
@@ -15,7 +16,7 @@ from postproc.store.open import open_store
 from postproc.store.select import select
 from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
-from rubhpc.schema import DONE, REGIME
+from rubhpc.schema import DIVERGED, DONE, REGIME
 
 COMMAND = figure_command(figures()["bifurcation"])
 
@@ -73,6 +74,43 @@ def test_cases_that_are_not_done_leave_no_point(synthetic_path, ax):
     values = synthetic_store.make()["status"].values[:, 0, 0, 0]
     there = np.concatenate(list(drawn(ax).values()))
     assert sorted(there) == [s for s, status in zip(SPEEDS, values, strict=True) if status == DONE]
+
+
+def hatched(ax):
+    """Where along the axis the patches end, by their names in the legend."""
+    return {
+        patch.get_label(): (
+            np.min(patch.get_path().vertices[:, 0]),
+            np.max(patch.get_path().vertices[:, 0]),
+        )
+        for patch in ax.patches
+    }
+
+
+def test_cases_without_a_result_are_hatched_and_named(synthetic_path, ax):
+    one = {"clearance": "70 um", "friction": 0.1, "stator.youngs_modulus": "3 GPa"}
+    data = sections_along(select(open_store(synthetic_path), one), "vertical", "speed_ratio")
+    draw_bifurcation(data, "vertical", ax)
+    middle = (np.array(SPEEDS[1:]) + SPEEDS[:-1]) / 2
+    assert {name: pytest.approx(ends) for name, ends in hatched(ax).items()} == {
+        "diverged": (SPEEDS[0] - (middle[0] - SPEEDS[0]), middle[0]),
+        "failed": (middle[0], middle[1]),
+        "missing": (middle[1], middle[2]),
+    }
+    named = [text.get_text() for text in ax.figure.legends[0].get_texts()]
+    assert set(hatched(ax)) <= set(named)
+    assert ax.get_xlim()[0] < SPEEDS[0]  # though no point is there
+    assert ax.get_ylim()[1] < 400  # µm: the hatch has the height of the panel, whatever it is
+
+
+def test_of_a_sweep_both_ways_those_of_each_are_hatched(synthetic_path, ax):
+    one = {"clearance": "84 um", "friction": 0.1, "stator.youngs_modulus": "3 GPa"}
+    data = sections_along(select(open_store(synthetic_path), one), "vertical", "speed_ratio").load()
+    flags = xr.DataArray([0, 1], dims="direction", attrs={"flag_meanings": "up down"})
+    data = data.expand_dims(direction=[0, 1]).copy(deep=True).assign_coords(direction=flags)
+    data["status"][1, -1] = DIVERGED
+    draw_bifurcation(data, "vertical", ax, "direction")
+    assert list(hatched(ax)) == ["diverged, down"]
 
 
 def test_points_are_read_lazily(synthetic_path):

@@ -265,6 +265,9 @@ def test_a_packed_store_is_the_same(tmp_path, physics):
 def test_a_part_is_refused(tmp_path, physics):
     with pytest.raises(InputError, match="the levels of a refined map need the results of all parts"):
         run(study_of(tmp_path), quiet=True, part="1/2")
+    assert not study_of(tmp_path).output.exists()
+    with pytest.raises(InputError, match="the levels of a refined map need the results of all parts"):
+        make_plan(study_of(tmp_path), "1/2")
 
 
 def test_the_plan_has_a_bound_and_an_estimate(tmp_path, physics):

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from postproc.store.units import caption, displayed, scale_for, typed, typeset
+from postproc.store.units import caption, displayed
 from rubhpc.input.quantity import parse_quantity
+from rubhpc.units import scale_for, typed, typed_quantity, typeset
 
 
 @pytest.mark.parametrize(
@@ -82,3 +83,25 @@ def test_a_displayed_unit_can_be_typed_back(unit):
     assert spelt.isascii()
     known = typed(typeset(unit))  # in pint's spelling
     assert parse_quantity(f"{scale.factor:.17g} {spelt}", known, "here") == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (40 * np.pi, "rad s-1", "1200 rpm"),
+        (84e-6, "m", "84 um"),
+        (0.04, "m", "40 mm"),
+        (-np.pi / 4, "rad", "-45 deg"),
+        (3e9, "Pa", "3 GPa"),
+        (1157.0, "kg m-3", "1157 kg/m^3"),
+        (2e6, "N m-1", "2 MN/m"),
+        (350.0, "N s m-1", "350 N*s/m"),
+        (0.01, "kg m2", "0.01 kg*m^2"),
+        (0.7, "1", "0.7"),
+        (0.0, "m", "0 m"),
+    ],
+)
+def test_a_setting_is_written_as_a_study_file_may_state_it(value, unit, text):
+    assert typed_quantity(value, unit) == text
+    if unit != "1":
+        assert parse_quantity(text, typed(typeset(unit)), "here") == pytest.approx(value)

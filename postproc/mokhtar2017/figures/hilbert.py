@@ -9,7 +9,8 @@ from postproc.figures.waveform import shade_contacts
 from postproc.mokhtar2017.figures.panels import legend, tidy
 from postproc.signals.hilbert_huang import hilbert_huang
 from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
-from postproc.store.units import scale_for, scale_of, short_name
+from postproc.store.units import scale_of, short_name
+from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -13,7 +13,8 @@ from postproc.figures.waveform import draw_waveform, shade_contacts
 from postproc.signals.lines import strongest_lines
 from postproc.signals.spectra import last_revolutions, samples_per_revolution, spectrum_data
 from postproc.signals.waveforms import waveform_data
-from postproc.store.units import scale_for, scale_of, short_name
+from postproc.store.units import scale_of, short_name
+from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
