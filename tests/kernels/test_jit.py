@@ -49,7 +49,11 @@ def probe(tmp_path):
         return subprocess.Popen(
             [sys.executable, "-c", "import probe.caller"],
             cwd=tmp_path,
-            env=environment(PYTHONPATH="", NUMBA_CACHE_DIR=str(tmp_path / "cache")),
+            env=environment(
+                PYTHONPATH="",
+                NUMBA_CACHE_DIR=str(tmp_path / "cache"),
+                PYTHONDONTWRITEBYTECODE="1",  # Python tells sources apart by their second and size
+            ),
             stdout=subprocess.PIPE,
             text=True,
         )
@@ -71,20 +75,14 @@ def test_change_of_a_callee_in_another_file_outdates_the_cache(probe):
     assert end(probe(5, "jit_inline")) == ["10", "0", "twice"]
 
 
-def test_change_of_what_a_kernel_does_not_import_leaves_its_cache(probe, tmp_path):
+def test_change_of_what_is_imported_by_another_outdates_the_cache(probe, tmp_path):
+    """That of what is not imported leaves it."""
+    (tmp_path / "probe" / "between.py").write_text("from probe.callee import value")
+    imports = "from probe import between\nvalue = between.value"
+    (tmp_path / "probe" / "caller.py").write_text(CALLER.replace("from probe.callee import value", imports))
     assert end(probe(3)) == ["6", "0", "twice"]
     (tmp_path / "probe" / "stranger.py").write_text("other = 1")
     assert end(probe(3)) == ["6", "1"]
-
-
-@pytest.mark.parametrize(
-    "imports",
-    ["from probe.between import value", "from probe import between\nvalue = between.value"],
-)
-def test_change_of_what_is_imported_by_another_outdates_the_cache(probe, tmp_path, imports):
-    (tmp_path / "probe" / "between.py").write_text("from probe.callee import value")
-    (tmp_path / "probe" / "caller.py").write_text(CALLER.replace("from probe.callee import value", imports))
-    assert end(probe(3)) == ["6", "0", "twice"]
     assert end(probe(4)) == ["8", "0", "twice"]
 
 
@@ -108,8 +106,8 @@ def test_versions_that_take_turns_keep_their_caches(probe, tmp_path):
 
 def test_processes_that_need_a_kernel_at_once_compile_it_once(probe):
     """The others wait for the first and load what it has compiled."""
-    shown = [end(process) for process in [probe(3) for _ in range(4)]]
-    assert sorted(words[1] for words in shown) == ["0", "1", "1", "1"]
+    shown = [end(process) for process in [probe(3) for _ in range(3)]]
+    assert sorted(words[1] for words in shown) == ["0", "1", "1"]
     assert {words[0] for words in shown} == {"6"}
 
 
