@@ -38,7 +38,7 @@ _SIZES = 0.6, 3.5  # of the points, pt
 _LEAST_RANGE = 0.02  # of the largest value: points of one motion differ by rounding over all cases
 _UNDER = "0.6", "0.35"  # simulated points under branches: greys of up, or both, and of down
 _WAYS = (("^", "#E69F00", 2.4), ("v", "#0072B2", 1.2))  # up and down: marker, colour, size
-_LEANS = "/", "\\"  # of the hatch where up, and where down, has no result
+_IN_A_ROW = 6  # names in the legend
 
 
 def bifurcation(
@@ -196,7 +196,11 @@ def draw_bifurcation(
     _hatch(ax, x, data["status"].values)
     if ax.get_legend_handles_labels()[1] and has_legend:
         ax.figure.legend(
-            loc="outside upper right", ncols=16, markerscale=4.0 / size, handletextpad=0.2, columnspacing=1.0
+            loc="outside upper right",
+            ncols=_IN_A_ROW,
+            markerscale=4.0 / size,
+            handletextpad=0.2,
+            columnspacing=1.0,
         )
     ax.set(xlabel=x_label, ylabel=scale.label(f"{short_name(section)},\nonce a revolution"))
     return ax
@@ -230,13 +234,15 @@ def _hatch(ax: Axes, x: NDArray[np.float64], status: NDArray[np.int8]) -> None:
     """Hatch the cases without a result, of `status` (n_x,), or (2, n_x) where swept both ways."""
     edges = cell_edges(x), np.array([0.0, 1.0])  # of the whole height
     over = ax.get_xaxis_transform()
+    ways = np.atleast_2d(status)
     for code, (name, shade, hatch) in NOT_DONE.items():
-        if status.ndim == 1:
-            hatch_cells(ax, edges, (status == code)[None], name, hatch, facecolor=shade, transform=over)
+        has_none = np.all(ways == code, axis=0)
+        hatch_cells(ax, edges, has_none[None], name, hatch, facecolor=shade, transform=over)
+        if len(ways) == 1:
             continue
-        for of_way, way, lean, (_, color, _) in zip(status, DIRECTIONS, _LEANS, _WAYS, strict=True):
-            label = f"{name}, {way}"
-            hatch_cells(ax, edges, (of_way == code)[None], label, 4 * lean, color=color, transform=over)
+        for of_way, way, (_, color, _) in zip(ways, DIRECTIONS, _WAYS, strict=True):
+            of_one = (of_way == code) & ~has_none
+            hatch_cells(ax, edges, of_one[None], f"{name}, {way}", hatch, color=color, transform=over)
     ax.autoscale_view(scaley=False)  # such cases may lie at the ends
 
 
