@@ -21,7 +21,7 @@ import numba
 
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
-from rubhpc.integrate.measuring.measures import new_accumulator
+from rubhpc.integrate.measuring.samples import new_accumulator
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.record import State
 from rubhpc.integrate.scheme import Scheme

@@ -21,12 +21,12 @@ from rubhpc.integrate.marches.curved import CurvedMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.carried import carrier_displacement, tip_deflection
-from rubhpc.integrate.measuring.measures import (
+from rubhpc.integrate.measuring.diverged_record import diverged_record
+from rubhpc.integrate.measuring.measures import measures_of
+from rubhpc.integrate.measuring.samples import (
     add_sag,
     by_name,
-    diverged_record,
     empty_samples,
-    measures_of,
     new_accumulator,
     probe_extents,
     samples_within,

@@ -9,8 +9,8 @@ import numpy as np
 
 from rubhpc.integrate.lyapunov import N_ALIGNING
 from rubhpc.integrate.marches.event_driven import NoClosedForm
-from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
 from rubhpc.integrate.measuring.regimes import N_MOST
+from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
+from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.kernels.accumulators import HORIZONTAL, TWIST, VERTICAL
 
 if TYPE_CHECKING:

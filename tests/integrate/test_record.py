@@ -9,7 +9,7 @@ import pytest
 from rubhpc import read_rig
 from rubhpc.fem.assemble import assemble
 from rubhpc.integrate import record_variables
-from rubhpc.integrate.measuring.measures import diverged_record
+from rubhpc.integrate.measuring.diverged_record import diverged_record
 from rubhpc.integrate.record import Record, State
 from rubhpc.schema import DIVERGED, VARIABLES
 from rubhpc.study.study import Recording

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rubhpc.integrate.measuring.measures import following_accumulator, new_accumulator
+from rubhpc.integrate.measuring.samples import following_accumulator, new_accumulator
 from rubhpc.kernels.accumulators import Accumulator
 from rubhpc.kernels.force_average import AVERAGING_TIME, MOST_PIECES, add_force
 

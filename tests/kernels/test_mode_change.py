@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rubhpc.integrate.measuring.measures import new_accumulator
+from rubhpc.integrate.measuring.samples import new_accumulator
 from rubhpc.kernels.accumulators import DRIVE_WORK, FRICTION_LOSS, IMPACT, IMPACT_LOSS, PRESSING
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.mode_change import change_contacts

@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.marches.workspace import workspace
-from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
+from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.integrate.packing import pack, pairs_of
 from rubhpc.kernels.central_difference import advance
 from rubhpc.kernels.laws import MULTIPLIER

@@ -24,7 +24,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.annular import annular_rub
 from rubhpc.fem.modes import modes
 from rubhpc.integrate.measuring.carried import tip_deflection
-from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
+from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.rig.reading import rig_from_dict
 
 BASE = read_rig("mokhtar2017")

@@ -14,7 +14,7 @@ from rubhpc.integrate.changing_speed.driven import DrivenRun, integrate_driven
 from rubhpc.integrate.changing_speed.run_up import integrate_run_up
 from rubhpc.integrate.changing_speed.turns import contact_measures
 from rubhpc.integrate.compilation import seconds_compiling
-from rubhpc.integrate.measuring.measures import by_name, probe_extents
+from rubhpc.integrate.measuring.samples import by_name, probe_extents
 from rubhpc.integrate.setup import ModalSetup
 from rubhpc.schema import AMPLITUDE, DIVERGED, DONE, ORDERS, PHASE, PROBE, TRACKED, case_measures
 from rubhpc.spectra import track_orders

@@ -25,7 +25,8 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.changing_speed.free_piece import Spin
 from rubhpc.integrate.changing_speed.run_up import RunUp
 from rubhpc.integrate.changing_speed.turns import Turns
-from rubhpc.integrate.measuring.measures import LEAST_EXCHANGE, empty_samples
+from rubhpc.integrate.measuring.measures import LEAST_EXCHANGE
+from rubhpc.integrate.measuring.samples import empty_samples
 from rubhpc.study.speed_law import LAG, LONGEST_PIECE
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.passing import Passed, Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
-from rubhpc.integrate.measuring.measures import lift_samples, new_accumulator
+from rubhpc.integrate.measuring.samples import lift_samples, new_accumulator
 from rubhpc.integrate.start import start_of
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,

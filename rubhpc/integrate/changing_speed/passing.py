@@ -12,7 +12,7 @@ from rubhpc.integrate.case import march_of
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.marches.modal import ModalMarch, Place
-from rubhpc.integrate.measuring.measures import empty_samples, following_accumulator
+from rubhpc.integrate.measuring.samples import empty_samples, following_accumulator
 from rubhpc.integrate.record import State
 from rubhpc.kernels.accumulators import Accumulator, Samples  # noqa: TC001 - of a NamedTuple
 

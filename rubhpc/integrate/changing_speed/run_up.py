@@ -19,7 +19,7 @@ import numpy as np
 from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.turns import Turns
-from rubhpc.integrate.measuring.measures import empty_samples, lift_samples, new_accumulator
+from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_accumulator
 from rubhpc.integrate.record import State
 from rubhpc.integrate.start import start_of
 from rubhpc.study.initial import Initial

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.integrate.measuring.carried import carrier_displacement, tip_deflection
-from rubhpc.integrate.measuring.measures import empty_samples, foreshortening_ratio, new_accumulator
+from rubhpc.integrate.measuring.measures import foreshortening_ratio
+from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

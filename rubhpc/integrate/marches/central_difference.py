@@ -9,7 +9,7 @@ import numpy as np
 from rubhpc.integrate.marches.march import NO_FORCES, March
 from rubhpc.integrate.marches.workspace import workspace
 from rubhpc.integrate.measuring.divergence import displacement_reason, energy_reason
-from rubhpc.integrate.measuring.measures import empty_samples, new_accumulator
+from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.integrate.packing import pairs_of
 from rubhpc.integrate.record import State
 from rubhpc.kernels import central_difference as kernel

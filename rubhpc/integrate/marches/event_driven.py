@@ -9,7 +9,7 @@ import numpy as np
 
 from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.modal import ModalMarch
-from rubhpc.integrate.measuring.measures import new_accumulator
+from rubhpc.integrate.measuring.samples import new_accumulator
 from rubhpc.kernels.case_progress import MODE_WANTED
 from rubhpc.kernels.contact_modes import FORCED_LEVEL
 from rubhpc.kernels.event_loop import advance, event_work

@@ -1,4 +1,4 @@
-"""From the kernels' sums and samples to named signals and measures of the schema."""
+"""From the kernels' sums and samples to the measures of the schema."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from rubhpc.integrate.measuring.orbit_measures import period, whirl_ratio
 from rubhpc.integrate.measuring.regimes import regime
 from rubhpc.integrate.measuring.settling import settled
-from rubhpc.integrate.record import Record, State
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     DRIVE_WORK,
@@ -18,152 +17,23 @@ from rubhpc.kernels.accumulators import (
     HORIZONTAL,
     IMPACT_LOSS,
     TWIST,
-    TWIST_ACCELERATION,
     UNBALANCE_WORK,
     VERTICAL,
     Accumulator,
-    Samples,
 )
-from rubhpc.kernels.force_average import LAST, MOST_PIECES
-from rubhpc.schema import DIVERGED, PROBE, VARIABLES, lyapunov_variables, probe_variables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from numpy.typing import NDArray
 
-    from rubhpc.fem.model import Model, StatorModel
+    from rubhpc.fem.model import StatorModel
     from rubhpc.integrate.measuring.regimes import Solution
-    from rubhpc.schema import Variable
-    from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
 
 
-_WIDEST = np.array([[-np.inf] * 3, [np.inf] * 3])  # extrema before anything is seen
 LEAST_EXCHANGE = 1e-6  # of the mechanical energy: a motion that exchanges less is balanced against that
-
-
-def empty_samples(n_place: int, n_sample: int, n_probe: int = 0) -> Samples:
-    """Room for the samples of a record: one array, so that their spectra are taken together.
-
-    Places (`Model.n_place`) are the stators, then the carriers, whose vertical motion stands for the axial
-    one, and whose horizontal motion for the lateral one, then their rotations, as lateral motion.
-    """
-    first_probe = 4 + 3 * n_place
-    whole = np.zeros((first_probe + n_probe, n_sample))
-    axial, lateral, force = whole[4:first_probe].reshape(3, n_place, n_sample)
-    return Samples(
-        rotor=whole[:4],
-        axial=axial,
-        lateral=lateral,
-        force=force,
-        probe=whole[first_probe:],
-        whole=whole,
-    )
-
-
-def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
-    """Sums at zero, extrema at their neutral ends; places as in `empty_samples`, by default the stators."""
-    return _accumulator(
-        n_stator,
-        n_stator if n_place is None else n_place,
-        force_piece=np.zeros((n_stator, LAST + 1, MOST_PIECES)),
-        force_held=np.zeros((n_stator, 2), dtype=np.int64),
-        origin=np.zeros(1),
-    )
-
-
-def following_accumulator(before: Accumulator, passed: float) -> Accumulator:
-    """Sums of what follows in a march that counts its time anew, after `passed` (s) of the march before.
-
-    Means of the contact force reach back beyond it.
-    """
-    return _accumulator(
-        before.impulse.size,
-        before.peak_lateral.size,
-        force_piece=before.force_piece.copy(),
-        force_held=before.force_held.copy(),
-        origin=before.origin + passed,
-    )
-
-
-def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
-    """Sums at zero, but for the window of the mean force; a run-up takes one a revolution."""
-    contact_time, impulse, stick_time, friction_work, peak_force, least_slip = np.zeros((6, n_stator))
-    n_contact, sense, reversals = np.zeros((3, n_stator), dtype=np.int64)
-    highest, lowest = _WIDEST.copy()
-    least_slip[:] = np.inf
-    return Accumulator(
-        highest=highest,
-        lowest=lowest,
-        is_touching=np.zeros(n_stator, dtype=np.bool_),
-        n_contact=n_contact,
-        contact_time=contact_time,
-        impulse=impulse,
-        stick_time=stick_time,
-        sense=sense,
-        reversals=reversals,
-        friction_work=friction_work,
-        least_slip=least_slip,
-        peak_force=peak_force,
-        peak_lateral=np.zeros(n_place),
-        energy=np.zeros(5),
-        pivots=np.zeros(1, dtype=np.int64),
-        residual=np.zeros((3, 2)),
-        **window,
-    )
-
-
-def add_sag(samples: Samples, accumulator: Accumulator, model: Model) -> None:
-    """Count what output node and probes see from the shaft without loads, not from where it sags to."""
-    if not model.sag.any():
-        return
-    lift_samples(samples.whole, model)
-    sag = model.output_sag
-    accumulator.highest[:] += sag
-    accumulator.lowest[:] += sag
-
-
-def lift_samples(whole: Floats, model: Model) -> None:
-    """Count samples (`Samples.whole`) from the shaft without loads."""
-    if not model.sag.any():
-        return
-    if model.probe is not None:
-        whole[4 + 3 * model.n_place :] += model.probe.constant[:, np.newaxis]
-    whole[:3] += model.output_sag[:, np.newaxis]
-
-
-def samples_within(samples: Samples, n_taken: int, limit: float) -> int:
-    """Count the samples up to the first whose lateral displacement passes a limit, m, of those taken."""
-    lateral = samples.rotor[[VERTICAL, HORIZONTAL], : max(n_taken, 0)]
-    beyond = np.flatnonzero(~np.all(np.abs(lateral) <= limit, axis=0))
-    return int(beyond[0]) if beyond.size else lateral.shape[1]
-
-
-def by_name(whole: Floats, model: Model) -> dict[str, Floats]:
-    """Rows of `Samples.whole`, or their spectra, by their names in the schema: (n,) or (n_stator, n)."""
-    first_probe, n = 4 + 3 * model.n_place, whole.shape[1]
-    axial, lateral, force = whole[4:first_probe].reshape(3, model.n_place, n)[:, : len(model.stators)]
-    probes = () if model.probe is None else model.probe.probes
-    return {
-        "vertical": whole[VERTICAL],
-        "horizontal": whole[HORIZONTAL],
-        "torsion": whole[TWIST],
-        "torsion_acceleration": whole[TWIST_ACCELERATION],
-        "stator_axial": axial,
-        "stator_lateral": lateral,
-        "contact_force": force,
-    } | {f"{PROBE}{probe.name}": whole[first_probe + i] for i, probe in enumerate(probes)}
-
-
-def probe_extents(signals: dict[str, Floats]) -> dict[str, float]:
-    """Peak to peak of what each probe has sampled."""
-    return {
-        f"peak_to_peak_{name}": float(np.ptp(signal))
-        for name, signal in signals.items()
-        if name.startswith(PROBE)
-    }
 
 
 def measures_of(
@@ -276,57 +146,3 @@ def foreshortening_ratio(
         if compression > 0.0:
             ratio[i] = (drawn + away) * deflection[i] ** 2 / compression
     return ratio
-
-
-def diverged_record(
-    reason: str,
-    n_stator: int,
-    recording: Recording,
-    settings: dict[str, float],
-    final: State,
-    reached: dict[str, Floats] | None = None,
-) -> Record:
-    """Record of a case that ran away: its signals as far as it got, and not-a-number elsewhere.
-
-    `reached` holds the samples (..., n) until then; sections are read from them. Spectra and measures are
-    those of whole records: a diverged case has none.
-    """
-    per_revolution = recording.samples_per_revolution
-    n_sample = recording.revolutions * per_revolution
-    length = {
-        "stator": n_stator,
-        "sample": n_sample,
-        "order": n_sample // 2 + 1,
-        "section": recording.revolutions,
-    }
-    groups: dict[str, dict[str, Any]] = {"waveform": {}, "spectrum": {}, "section": {}, "measure": {}}
-    for name, variable in _variables_of(recording).items():
-        if variable.role == "measure" and not variable.dims:
-            groups["measure"][name] = -1 if variable.dtype.startswith("int") else np.nan
-        elif variable.role == "measure" or variable.role in recording.keep:
-            groups[variable.role][name] = np.full([length[dim] for dim in variable.dims], np.nan)
-    groups["measure"]["regime"] = -1
-    for name, values in (reached or {}).items():
-        if name in groups["waveform"]:
-            groups["waveform"][name][..., : values.shape[-1]] = values
-        if f"section_{name}" in groups["section"]:
-            once = values[..., ::per_revolution]
-            groups["section"][f"section_{name}"][: once.size] = once
-    return Record(
-        status=DIVERGED,
-        reason=reason,
-        samples_per_revolution=per_revolution,
-        signals=groups["waveform"],
-        spectra=groups["spectrum"],
-        sections=groups["section"],
-        measures=groups["measure"],
-        settings=settings,
-        final=final,
-        probed=recording.probed,
-        n_exponent=recording.lyapunov,
-    )
-
-
-def _variables_of(recording: Recording) -> dict[str, Variable]:
-    """Variables of a case that is recorded so."""
-    return VARIABLES | probe_variables(recording.probed) | lyapunov_variables(recording.lyapunov)
