@@ -22,7 +22,9 @@ from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.final_states import check_start, count_state
 from rubhpc.study.identity import identity_parts
 from rubhpc.study.operating_points import OperatingPoints
+from rubhpc.study.point_checks import check_gap, check_points
 from rubhpc.study.points import Points, boxed
+from rubhpc.study.predicted_steps import predicted_steps
 from rubhpc.study.warnings import warnings_of
 
 if TYPE_CHECKING:
@@ -115,6 +117,7 @@ class CaseGrid:
         self.n_stator = len(study.rig.stator)
         with _named(study):
             self._operating_points = OperatingPoints(study)
+            check_points(self._operating_points)
             self.continuation = continuation_of(study.axes)
             keeps_state = self.continuation is not None or STATE in study.recording.keep
             self.n_degree = count_state(study) if keeps_state and study.branch is None else 0
@@ -164,7 +167,7 @@ class CaseGrid:
         """Return all blocks, the longest first."""
         starts = [range(0, n, c) for n, c in zip(self.shape, self.chunk, strict=True)]
         sizes = [[min(c, n - s) for s in at] for n, c, at in zip(self.shape, self.chunk, starts, strict=True)]
-        cost: NDArray[np.float64] = self._operating_points.steps
+        cost: NDArray[np.float64] = predicted_steps(self._operating_points)
         for i, at in enumerate(starts):
             if cost.shape[i] == self.shape[i]:
                 cost = np.add.reduceat(cost, np.array(at), axis=i)
@@ -208,6 +211,7 @@ class CaseGrid:
         """
         with _named(self.study):
             found = self._operating_points.arrays()
+            check_gap(self._operating_points, float(found["clearance"][1].min()))
         return {name: (tuple(self.dims[i] for i in dims), values) for name, (dims, values) in found.items()}
 
     def warnings(self) -> tuple[str, ...]:

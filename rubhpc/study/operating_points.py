@@ -1,20 +1,18 @@
-"""Operating points: rig, spin speed, clearance, contact-free amplitude and predicted steps of each case."""
+"""Operating points: rig, spin speed, clearance and contact-free amplitude of each case."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
-from rubhpc.fem.constraints import find_rigid_body_mode
 from rubhpc.fem.free_spin import release
 from rubhpc.fem.response import (
-    check_response_node,
     contact_free_amplitude,
     first_lateral_frequency,
     step_limit,
@@ -24,11 +22,11 @@ from rubhpc.fem.statics import sag_at_stators
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.axes import CLEARANCE_AXES, DRIVE_AXES, DRIVE_PREFIX, RUN_UP_TIME, SPEED_AXES
 from rubhpc.study.contact_axes import choices_of, contact_at
-from rubhpc.study.initial import CONTACT_FREE, KNOCKED, initial_at
+from rubhpc.study.initial import CONTACT_FREE, initial_at
 from rubhpc.study.points import Points
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
@@ -41,8 +39,6 @@ if TYPE_CHECKING:
     from rubhpc.study.speed_law import SpeedLaw
     from rubhpc.study.study import Study
 
-_EVENT_STEPS = 60  # that the modal scheme takes a revolution, samples apart
-_TOUCHING = 0.15  # share of the time in contact, where it takes short steps there
 _MOST_RIGS = 256  # whose time step is determined, 1 ms each; with more, that of the first is used for all
 
 
@@ -61,12 +57,8 @@ class OperatingPoints:
         Whether clearances are given as shares of the contact-free amplitude.
     costly_dims : list of int
         The dimensions along which speed, rig or contact change: cases that differ there share no setup.
-
-    Raises
-    ------
-    InputError
-        When the time step exceeds the stability limit of a rig, or the modal scheme meets a rig with a
-        rigid-body mode.
+    rig_axes, response_axes : list of int
+        Axes that set the rig, and those of them that set the contact-free response.
     """
 
     def __init__(self, study: Study) -> None:
@@ -82,17 +74,17 @@ class OperatingPoints:
         self.is_clearance_ratio = names[self._clearance_axis] == "clearance_ratio"
         self._contact_axes = [i for i, axis in enumerate(study.axes) if axis.is_contact_key]
         self._initial_axes = [i for i, axis in enumerate(study.axes) if axis.is_initial_key]
-        self._rig_axes = [i for i, axis in enumerate(study.axes) if axis.is_rig_key]
+        self.rig_axes = [i for i, axis in enumerate(study.axes) if axis.is_rig_key]
         self._run_up_axes = [i for i, name in enumerate(names) if name == RUN_UP_TIME]
         self._drive_axes = [i for i, name in enumerate(names) if name in DRIVE_AXES]
-        rotor_axes = [i for i in self._rig_axes if names[i].startswith("rotor.")]
+        rotor_axes = [i for i in self.rig_axes if names[i].startswith("rotor.")]
         # The contact-free response depends on the rotor, and on the stator's node, at which it is evaluated.
         node_axes = [
-            i for i in self._rig_axes if names[i].startswith("stator.") and names[i].endswith(".node")
+            i for i in self.rig_axes if names[i].startswith("stator.") and names[i].endswith(".node")
         ]
-        self._response_axes = sorted(rotor_axes + node_axes)
+        self.response_axes = sorted(rotor_axes + node_axes)
         self._speed_setters = [*(rotor_axes if self._is_speed_ratio else ()), self._speed_axis]
-        self.costly_dims = self._dims(self._speed_axis, *self._rig_axes, *self._contact_axes)
+        self.costly_dims = self.dims(self._speed_axis, *self.rig_axes, *self._contact_axes)
         # Cached by value, not by index: of axes that share a dimension only some may matter here.
         self._rig_at = lru_cache(maxsize=256)(self._make_rig)
         self._contact_at = lru_cache(maxsize=4096)(self._make_contact)
@@ -103,33 +95,39 @@ class OperatingPoints:
         self._fastest_at = lru_cache(maxsize=65536)(self._make_fastest)
         self._response_at = lru_cache(maxsize=65536)(self._make_response)
         self._limit_at = lru_cache(maxsize=4096)(self._make_limit)
-        if study.integrator.step is not None and study.integrator.method == "central-difference":
-            self._check_step(study.integrator.step)
-        if study.integrator.method == "modal":
-            self._check_held()
-        self._check_knocks()
 
     def rig(self, index: Index) -> Rig:
         """Rig of a case."""
-        return self._rig_at(self._on(self._rig_axes, index))
+        return self._rig_at(self._on(self.rig_axes, index))
 
     def response(self, index: Index) -> tuple[float, float]:
         """Spin speed (rad/s) and contact-free amplitude (m; NaN of an unstable rotor) of a case."""
-        return self._response_at(self._on(self._response_axes, index), self._on([self._speed_axis], index)[0])
+        return self._response_at(self._on(self.response_axes, index), self._on([self._speed_axis], index)[0])
 
     def instability(self, index: Index) -> str:
         """How the rotor of a case is unstable at its speed; "" where it is stable."""
-        return instability_message(
-            self._model_at(self._on(self._response_axes, index)), self.response(index)[0]
-        )
+        return instability_message(self.model(index), self.response(index)[0])
 
     def sag_beyond(self, index: Index, clearance: float) -> float:
         """How far constant loads bend the rotor of a case into a stator, m; negative where they do not."""
-        model = self._model_at(self._on(self._response_axes, index))
-        model = model_at(model, self.response(index)[0])
+        model = model_at(self.model(index), self.response(index)[0])
         nearer, _ = sag_at_stators(model)
         offset = [stator.clearance_offset for stator in self.rig(index).stator]
         return float(max(nearer - offset)) - clearance if model.sag.any() else -math.inf
+
+    def model(self, index: Index) -> Model:
+        """Model of a case's rotor, with stators at the same nodes."""
+        return self._model_at(self._on(self.response_axes, index))
+
+    def step_limit(self, index: Index) -> float:
+        """Stability limit of the central difference's step, s."""
+        return self._limit_at(self._on(self.rig_axes, index))
+
+    def speed_of(self, index: Index, like: Index) -> float:
+        """Spin speed of a case, rad/s, without its sign, with the rotor of another."""
+        return abs(self._on([self._speed_axis], index)[0]) * self._unit_speed_at(
+            self._on(self.response_axes, like)
+        )
 
     def clearance(self, index: Index) -> float:
         """Radial clearance at rest of a case, m."""
@@ -153,7 +151,7 @@ class OperatingPoints:
 
     def fastest(self, index: Index) -> float:
         """Speed, rad/s, that a driven case does not pass."""
-        return self._fastest_at(self._on(self._response_axes, index), self._on(self._drive_axes, index))
+        return self._fastest_at(self._on(self.response_axes, index), self._on(self._drive_axes, index))
 
     def initial(self, index: Index) -> Initial:
         """Where a case starts."""
@@ -161,7 +159,7 @@ class OperatingPoints:
 
     def with_each_law(self, index: Index) -> list[Index]:
         """Index of a case and of those that differ from it in the words on contact axes only."""
-        laws = set(self._dims(*(i for i in self._contact_axes if choices_of(self.study.axes[i].name))))
+        laws = set(self.dims(*(i for i in self._contact_axes if choices_of(self.study.axes[i].name))))
         options = (
             range(n) if dim in laws else index[dim : dim + 1] for dim, n in enumerate(self.points.shape)
         )
@@ -171,74 +169,47 @@ class OperatingPoints:
         """Return name -> (dimensions that set it, values along them, SI units), for all cases.
 
         `spin_speed` in rad/s, `clearance` and `contact_free_amplitude` in m.
-
-        Raises
-        ------
-        InputError
-            When a clearance leaves no gap at a stator.
         """
-        along = sorted(self._dims(self._speed_axis, *self._response_axes))
+        along = sorted(self.dims(self._speed_axis, *self.response_axes))
         pairs = np.array([self.response(index) for index in self._indices(along)])
         table = pairs.reshape(*(self.points.shape[dim] for dim in along), 2)
         amplitude = table[..., 1]
-        along_speed = sorted(self._dims(*self._speed_setters))
+        along_speed = sorted(self.dims(*self._speed_setters))
         speed = table[tuple(slice(None) if dim in along_speed else 0 for dim in along)][..., 0]
-        along_clearance = self._dims(self._clearance_axis)
+        along_clearance = self.dims(self._clearance_axis)
         clearance = np.array(self._values[self._clearance_axis], dtype=np.float64)
         if self.is_clearance_ratio:
             whole = sorted({*along, *along_clearance})
             clearance = self._laid(clearance, along_clearance, whole) * self._laid(amplitude, along, whole)
             along_clearance = whole
-        self._check_gap(float(clearance.min()))
         return {
             "spin_speed": (along_speed, speed),
             "clearance": (along_clearance, clearance),
             "contact_free_amplitude": (along, amplitude),
         }
 
-    @cached_property
-    def steps(self) -> NDArray[np.float64]:
-        """Predicted integration steps of a case, of length 1 along the dimensions that do not change them."""
-        rig_axes = self._rig_axes if self._is_few else []
-        along = self._dims(self._speed_axis, *rig_axes, *self._contact_axes, *self._run_up_axes)
-        recording = self.study.recording
-        turns = recording.longest_transient + recording.revolutions
-
-        is_modal = self.study.integrator.method == "modal"
-        modal_steps = recording.longest_transient * _EVENT_STEPS + recording.revolutions * (
-            _EVENT_STEPS + recording.samples_per_revolution
-        )
-        first = (0,) * len(self.points.dims)
-        per_revolution = _EVENT_STEPS + recording.samples_per_revolution
-
-        def predict(index: Index) -> float:
-            contact = self.contact(index)
-            if self.study.changes_speed:
-                return float(self.speed_law(index).n_revolution * per_revolution)
-            if is_modal and (contact.closed_form == "always" or contact.is_smooth):
-                return float(modal_steps)
-            unit = self._unit_speed_at(self._on(self._response_axes, index if self._is_few else first))
-            speed = abs(self._on([self._speed_axis], index)[0]) * unit
-            duration = turns * 2 * math.pi / speed
-            if is_modal:
-                return modal_steps + _TOUCHING * duration / self.study.integrator.contact_step(contact)
-            return duration / self._step_at(self._on(self._rig_axes, index if self._is_few else first))
-
-        shape = [n if dim in along else 1 for dim, n in enumerate(self.points.shape)]
-        return self._tabulated(along, predict).reshape(shape)
+    @property
+    def axes_of_steps(self) -> list[int]:
+        """Axes that set how many steps a case takes."""
+        rig_axes = self.rig_axes if self.has_few_rigs else []
+        return [self._speed_axis, *rig_axes, *self._contact_axes, *self._run_up_axes]
 
     @property
-    def _is_few(self) -> bool:
+    def has_few_rigs(self) -> bool:
         """Whether every rig of the study can be assembled before the run."""
-        return math.prod(self.points.shape[dim] for dim in self._dims(*self._rig_axes)) <= _MOST_RIGS
+        return math.prod(self.points.shape[dim] for dim in self.dims(*self.rig_axes)) <= _MOST_RIGS
 
-    def _dims(self, *axes: int) -> list[int]:
+    def dims(self, *axes: int) -> list[int]:
         """Dimensions of some axes, each once."""
         return list(dict.fromkeys(self.points.place[i] for i in axes))
 
     def _on(self, axes: Iterable[int], index: Index) -> Values:
         """Values of a case on some axes."""
         return tuple([self._values[i][index[self.points.place[i]]] for i in axes])
+
+    def along(self, axes: Iterable[int]) -> Iterable[Index]:
+        """Every index along some axes, the first place of the others."""
+        return self._indices(self.dims(*axes))
 
     def _indices(self, dims: Iterable[int]) -> Iterable[Index]:
         """Every index along some dimensions, the first place of the others."""
@@ -249,13 +220,7 @@ class OperatingPoints:
         """A table over some dimensions, of length 1 along the others among which it is to lie."""
         return table.reshape([self.points.shape[dim] if dim in dims else 1 for dim in among])
 
-    def _tabulated(self, dims: list[int], value: Callable[[Index], float]) -> NDArray[np.float64]:
-        """Values along some dimensions, taken at the first place of the others."""
-        shape = [self.points.shape[dim] for dim in sorted(dims)]
-        table = np.fromiter(map(value, self._indices(dims)), dtype=np.float64, count=math.prod(shape))
-        return table.reshape(shape)
-
-    def _named(self, axes: Iterable[int], index: Index) -> str:
+    def named(self, axes: Iterable[int], index: Index) -> str:
         """Values of a case on some axes, for messages."""
         names = (self.study.axes[i].name for i in axes)
         pairs = zip(names, self._on(axes, index), strict=True)
@@ -263,7 +228,7 @@ class OperatingPoints:
 
     def _make_rig(self, values: Values) -> Rig:
         """Rig with these values on the rig axes."""
-        keys = (self.study.axes[i].name for i in self._rig_axes)
+        keys = (self.study.axes[i].name for i in self.rig_axes)
         return with_keys(self.study.rig, dict(zip(keys, values, strict=True)))
 
     def _make_contact(self, values: Values) -> Contact:
@@ -278,8 +243,8 @@ class OperatingPoints:
 
     def _make_model(self, values: Values) -> Model:
         """Model with these values on the response axes, and the first ones on the other rig axes."""
-        chosen = dict(zip(self._response_axes, values, strict=True))
-        return assemble(self._rig_at(tuple([chosen.get(i, self._values[i][0]) for i in self._rig_axes])))
+        chosen = dict(zip(self.response_axes, values, strict=True))
+        return assemble(self._rig_at(tuple([chosen.get(i, self._values[i][0]) for i in self.rig_axes])))
 
     def _drive_law(self, values: Values) -> DriveLaw:
         """Drive with these values on the drive axes."""
@@ -316,49 +281,6 @@ class OperatingPoints:
             raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead")
         return speed, amplitude
 
-    def _step_at(self, values: Values) -> float:
-        """Time step, s, with these values on the rig axes."""
-        return self.study.integrator.step_within(self._limit_at(values))
-
     def _make_limit(self, values: Values) -> float:
         """Stability limit of the step, s, with these values on the rig axes."""
         return step_limit(assemble(self._rig_at(values)))
-
-    def _check_step(self, step: float) -> None:
-        for index in self._indices(self._dims(*self._rig_axes) if self._is_few else ()):
-            limit = self._limit_at(self._on(self._rig_axes, index))
-            if step >= limit:
-                where = self._named(self._rig_axes, index)
-                problem = f"{step:g} s is above the stability limit{f' at {where}' if where else ''}"
-                raise InputError(f"[integrator] step: {problem}; take less than {limit:.3g} s")
-
-    def _check_held(self) -> None:
-        """Refuse the modal scheme for a body that nothing holds: it has no constant response."""
-        for index in self._indices(self._dims(*self._response_axes) if self._is_few else ()):
-            if free := find_rigid_body_mode(self._model_at(self._on(self._response_axes, index))):
-                where = self._named(self._response_axes, index)
-                problem = f"modal needs bodies that are held, and {free}{f' at {where}' if where else ''}"
-                # Friction turns a free rotor back for ever: it has no steady twist.
-                hold = "give it a stiffness, however soft" if "torsion" in free else "hold it"
-                raise InputError(
-                    f'[integrator] method: {problem}; {hold}, or take method = "central-difference"'
-                )
-
-    def _check_knocks(self) -> None:
-        """Refuse an impulse on a node that does not move sideways."""
-        names = [axis.name for axis in self.study.axes]
-        nodes = self._values[names.index(KNOCKED)] if KNOCKED in names else [self.study.initial.impulse_node]
-        where = f"[grid] {KNOCKED}" if KNOCKED in names else "[initial] impulse_node"
-        first = self._model_at(self._on(self._response_axes, (0,) * len(self.points.dims)))
-        for node in nodes:
-            if node is not None:
-                check_response_node(first, int(node), where)
-
-    def _check_gap(self, least: float) -> None:
-        """Refuse a least clearance that a stator's own offset closes."""
-        names = [axis.name for axis in self.study.axes]
-        varied = self._dims(*(i for i in self._rig_axes if names[i].endswith("offset")))
-        offset = min(s.clearance_offset for at in self._indices(varied) for s in self.rig(at).stator)
-        if least + offset <= 0:
-            problem = f"{least:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
-            raise InputError(f"[grid] {names[self._clearance_axis]}: {problem}; take a larger one")

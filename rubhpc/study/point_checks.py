@@ -1,0 +1,72 @@
+"""What operating points must satisfy: a step within its limit, bodies held, nodes that move, a gap."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rubhpc.errors import InputError
+from rubhpc.fem.constraints import find_rigid_body_mode
+from rubhpc.fem.response import check_response_node
+from rubhpc.study.initial import KNOCKED
+
+if TYPE_CHECKING:
+    from rubhpc.study.operating_points import OperatingPoints
+
+
+def check_points(points: OperatingPoints) -> None:
+    """Check what is known before clearances are.
+
+    Raises
+    ------
+    InputError
+        When the time step exceeds the stability limit of a rig, the modal scheme meets a rig with a
+        rigid-body mode, or an impulse acts on a node that does not move sideways.
+    """
+    integrator = points.study.integrator
+    if integrator.step is not None and integrator.method == "central-difference":
+        _check_step(points, integrator.step)
+    if integrator.method == "modal":
+        _check_held(points)
+    _check_knocks(points)
+
+
+def check_gap(points: OperatingPoints, least: float) -> None:
+    """Refuse a least clearance, m, that a stator's own offset closes."""
+    varied = [i for i in points.rig_axes if points.study.axes[i].name.endswith("offset")]
+    offset = min(s.clearance_offset for at in points.along(varied) for s in points.rig(at).stator)
+    if least + offset <= 0:
+        problem = f"{least:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
+        name = "clearance_ratio" if points.is_clearance_ratio else "clearance"
+        raise InputError(f"[grid] {name}: {problem}; take a larger one")
+
+
+def _check_step(points: OperatingPoints, step: float) -> None:
+    for index in points.along(points.rig_axes) if points.has_few_rigs else ():
+        limit = points.step_limit(index)
+        if step >= limit:
+            where = points.named(points.rig_axes, index)
+            problem = f"{step:g} s is above the stability limit{f' at {where}' if where else ''}"
+            raise InputError(f"[integrator] step: {problem}; take less than {limit:.3g} s")
+
+
+def _check_held(points: OperatingPoints) -> None:
+    """Refuse the modal scheme for a body that nothing holds: it has no constant response."""
+    for index in points.along(points.response_axes) if points.has_few_rigs else ():
+        if free := find_rigid_body_mode(points.model(index)):
+            where = points.named(points.response_axes, index)
+            problem = f"modal needs bodies that are held, and {free}{f' at {where}' if where else ''}"
+            # Friction turns a free rotor back for ever: it has no steady twist.
+            hold = "give it a stiffness, however soft" if "torsion" in free else "hold it"
+            raise InputError(f'[integrator] method: {problem}; {hold}, or take method = "central-difference"')
+
+
+def _check_knocks(points: OperatingPoints) -> None:
+    """Refuse an impulse on a node that does not move sideways."""
+    study = points.study
+    axis = next((axis for axis in study.axes if axis.name == KNOCKED), None)
+    nodes = [study.initial.impulse_node] if axis is None else axis.values
+    where = "[initial] impulse_node" if axis is None else f"[grid] {KNOCKED}"
+    first = points.model((0,) * len(points.points.dims))
+    for node in nodes:
+        if node is not None:
+            check_response_node(first, int(node), where)
