@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.lyapunov import Neighbours
     from rubhpc.integrate.marches.march import March
+    from rubhpc.integrate.periodic_motions.shooting import Orbit
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
     from rubhpc.study.study import Recording
@@ -164,11 +165,13 @@ def _integrate(
     settings = {"spin_speed": setup.spin, "clearance": clearance}
 
     begin = partial(_solve_from, setup, clearance, friction)
+    begun_on: tuple[PiecewiseMotion, Orbit] | None = None
     if recording.is_transient_direct and isinstance(march, EventDrivenMarch) and march.has_closed_form:
         passed, record = _pass_directly(march, start, begin, initial, setup, clearance, friction, recording)
         if record is not None:
             return record
         march, reason, n_transient, n_step = passed.march, passed.reason, passed.n_revolution, passed.n_step
+        begun_on = passed.found
     else:
         reason, n_transient = pass_transient(march, recording)
     if reason is not None:  # what led to it is the record
@@ -196,7 +199,7 @@ def _integrate(
     else:
         add_sag(samples, accumulator, setup.model)
         signals, final = by_name(samples.whole, setup.model), march.final()
-        solver = _solver(march, setup, clearance, friction, final)
+        solver = _solver(march, setup, clearance, friction, final, begun_on)
         record = Record(
             status=DONE,
             samples_per_revolution=per_revolution,
@@ -287,10 +290,17 @@ def _spectrum(
     return dict.fromkeys(lyapunov_variables(n_exponent), math.nan)
 
 
-def _solver(march: March, setup: Setup, clearance: float, friction: float, final: State) -> Solver | None:
+def _solver(
+    march: March,
+    setup: Setup,
+    clearance: float,
+    friction: float,
+    final: State,
+    begun_on: tuple[PiecewiseMotion, Orbit] | None,
+) -> Solver | None:
     """What finds periodic motions next to where a march has ended; None where it has no closed form."""
     if isinstance(march, EventDrivenMarch) and march.has_closed_form and isinstance(setup, ModalSetup):
-        return Solver(setup, clearance, friction, final)
+        return Solver(setup, clearance, friction, final, begun_on)
     return None
 
 

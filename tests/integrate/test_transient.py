@@ -151,7 +151,7 @@ def test_what_simulation_cannot_resolve_has_arrived():
             **LIGHT | {"overrides": {"stator.youngs_modulus": "28 GPa"}},
         ).final,
     )  # fmt: skip
-    assert found.transient_revolutions == 32
+    assert found.transient_revolutions == direct.FIRST
     assert found.period == 1
 
 
@@ -208,7 +208,7 @@ def size_of(at):
 def test_motion_that_draws_near_loses_its_distance_as_the_linear_theory_says(monkeypatch, change, after):
     monkeypatch.setattr(direct, "Onward", lambda *_: SimpleNamespace(keeps_contacts=lambda *_: True))
     walk = Spiral(change)
-    is_near, reason = draws_near(walk, STILL, ORBIT, walk.at + ORBIT.motion, 100)
+    is_near, reason = draws_near(walk, STILL, ORBIT, [walk.at + ORBIT.motion], 100)
     assert reason is None
     assert is_near == (after is not None)
     if after is not None:
@@ -217,9 +217,22 @@ def test_motion_that_draws_near_loses_its_distance_as_the_linear_theory_says(mon
         assert walk.n_revolution >= 100
 
 
+def test_last_revolutions_show_that_a_motion_draws_near(monkeypatch):
+    """16 of them: the case is simulated no further."""
+    monkeypatch.setattr(direct, "Onward", lambda *_: SimpleNamespace(keeps_contacts=lambda *_: True))
+    for n_passed, further in ((17, 0), (13, 4)):
+        walk = Spiral(lambda at: 0.98 * TURN @ at)
+        passed = [walk.at + ORBIT.motion]
+        for _ in range(n_passed - 1):
+            walk.at = walk.change(walk.at)
+            passed.append(walk.at + ORBIT.motion)
+        assert draws_near(walk, STILL, ORBIT, passed, 100) == (True, None)
+        assert walk.n_revolution == further
+
+
 def test_transient_ends_before_a_motion_has_drawn_near():
     walk = Spiral(lambda at: 0.98 * TURN @ at, most=12)
-    assert draws_near(walk, STILL, ORBIT, walk.at + ORBIT.motion, 100) == (False, None)
+    assert draws_near(walk, STILL, ORBIT, [walk.at + ORBIT.motion], 100) == (False, None)
     assert walk.n_revolution == 12
 
 
@@ -242,7 +255,7 @@ def test_motion_that_would_meet_another_contact_is_watched_until_it_would_not(mo
 
     monkeypatch.setattr(direct, "Onward", lambda *_: SimpleNamespace(keeps_contacts=keeps_contacts))
     walk = Spiral(lambda at: 0.98 * TURN @ at)
-    assert draws_near(walk, STILL, ORBIT, walk.at + ORBIT.motion, 100) == (True, None)
+    assert draws_near(walk, STILL, ORBIT, [walk.at + ORBIT.motion], 100) == (True, None)
     assert walk.n_revolution == pytest.approx(56, abs=8)  # 0.3 x 0.98^55 = 0.1
     assert len(asked) == 5
     assert all(n_period == pytest.approx(np.log(0.1) / np.log(0.98), abs=1) for _, n_period in asked)

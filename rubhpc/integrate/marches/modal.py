@@ -72,7 +72,7 @@ class ModalMarch(March):
         self._bare_records = bare(records)
         self._bare_progress = self._bare_records[0]  # the same, for kernels
         self._take(setup)
-        self._motion = self._reduce(initial)
+        self._motion = self.reduced(initial)
         self._recorder = recorder(setup.model.n_place, setup.model.n_probe)
 
     def reached(self) -> Place:
@@ -205,8 +205,8 @@ class ModalMarch(March):
             return energy_reason(setup.energy_limit)
         return None
 
-    def _reduce(self, state: State) -> Floats:
-        """Reduced coordinates and velocities of a state."""
+    def reduced(self, state: State) -> Floats:
+        """Reduced displacements, then velocities (2 n,), of a state."""
         project = self._setup.reduced.project
         displacement = state.displacement
         displacement[: self._setup.model.sag.size] -= self._setup.model.sag

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from itertools import count
+from itertools import count, islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.measuring.orbit_measures import LONGEST_PERIOD
+from rubhpc.integrate.periodic_motions.extrapolation import extrapolated
 from rubhpc.integrate.periodic_motions.known_motions import (
     HALF,
     LINEAR,
@@ -35,10 +36,14 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-FIRST, LONGER = 32, 2.0  # revolutions before the first search, and by what those before the next are more
+FIRST, LONGER = 24, 2.0  # revolutions before the first search, and by what those before the next are more
+KEPT = 16  # revolutions before a search whose motions say where it begins
+CLOSING = 0.3  # of its size, by which a motion may fail to close where a search begins
+FURTHER = 2.0  # times the revolutions at which a motion was found, until which a case may draw near to it
 WATCHED = 16  # revolutions, at least, in which a case must draw near
 SLOWER = 2  # times the periods that the linear theory needs for that, in which it must have done so
 NEARER = 0.3  # of its distance after one revolution: a return as near as that speaks for a longer period
+PATIENCE = 16  # such periods that are simulated before it is sought: a search costs several times as much
 MOST_ITERATIONS, LEAST_STEP = 10, 1 / 4  # of Newton's method
 LOST = 3 / 4  # of what the linear theory takes from its distance, that it loses at least
 FAR = 1e-2  # of the square of its distance, until which the linear theory must keep its contacts
@@ -68,19 +73,20 @@ class _Walk:
         self.march, self._start, self._recording = march, start, recording
         self._idle = idle_of(march)
         self.n_revolution = self.n_step = 0
-        self.passed: list[Floats] = []
+        self.passed: list[Floats] = []  # without a gap, the present one last
 
     def on(self, n_revolution: int) -> str | None:
         """Go on, at most to the longest transient, and keep the last motions; returns why the case cannot."""
         n_revolution = min(n_revolution, self._recording.longest_transient - self.n_revolution)
-        kept = min(n_revolution, LONGEST_PERIOD + 1)
-        if n_revolution > kept and (reason := self._pass(n_revolution - kept)) is not None:
+        singly = min(n_revolution, KEPT)
+        if n_revolution > singly and (reason := self._pass(n_revolution - singly)) is not None:
             return reason
-        self.passed = []
-        for _ in range(kept):
+        passed = self.passed or [self.march.motion()]
+        for _ in range(singly):
             if (reason := self._pass(1)) is not None:
                 return reason
-            self.passed.append(self.march.motion())
+            passed.append(self.march.motion())
+        self.passed = passed[-KEPT - 1 :]
         return None
 
     def repeat(self, period: int) -> tuple[Floats | None, str | None]:
@@ -92,15 +98,15 @@ class _Walk:
 
     def _pass(self, n_revolution: int) -> str | None:
         self.n_revolution += n_revolution
+        self.passed = []
         return pass_revolutions(self.march, self._recording, n_revolution, self._idle)
 
-    def begin_at(self, state: State) -> Floats:
-        """Take another state, or the same with tables that may have been filled anew; returns its motion."""
+    def begin_at(self, state: State) -> None:
+        """Take another state, or the same with tables that may have been filled anew."""
         self.n_step += self.march.n_step
         march = self._start(state)
         assert isinstance(march, EventDrivenMarch)
         self.march = march
-        return self.march.motion()
 
     def arrive(self, known: KnownMotions, wanted: int) -> tuple[int | None, str | None]:
         """Go on to a known motion, or to a number of revolutions: its place, and why the case cannot go on.
@@ -156,11 +162,11 @@ def pass_directly(
 ) -> Passed:
     """March until a stable periodic motion is found that the case draws near to; go on from that motion.
 
-    After 32, 64, 128, ... revolutions the periodic motion is solved for from where the case stands, and the
-    case is simulated further to see whether it draws near (`draws_near`). Where it does not, or none is
-    found, it goes on, at the latest to the longest transient. The next search comes 32 revolutions after the
-    last one has failed, or later. Where motions are known, the case is compared with them first
-    (`_Walk.arrive`), and the first one is solved for after 64 revolutions.
+    After 24, 48, 96, ... revolutions the periodic motion is solved for from where the last 16 lead to
+    (`extrapolation`), if that nearly closes. Where the case is seen to draw near to it, in these revolutions
+    or in further ones (`draws_near`), it goes over; else it goes on, at the latest to the longest transient.
+    Where motions are known, the case is compared with them first (`_Walk.arrive`), and the first one is
+    solved for after 64 revolutions.
 
     Parameters
     ----------
@@ -176,23 +182,24 @@ def pass_directly(
     walk, wanted = _Walk(march, start, recording), FIRST_BESIDE if known else FIRST
     while True:
         if known is not None:
-            reached, reason = walk.arrive(known, wanted - LONGEST_PERIOD - 1)
+            reached, reason = walk.arrive(known, wanted - KEPT)
             if reached is not None or reason is not None:
                 return walk.ended(reason, reached)
         reason = walk.on(wanted - walk.n_revolution)
         if reason is not None or walk.n_revolution >= recording.longest_transient:
             return walk.ended(reason)
         wanted = int(LONGER * walk.n_revolution)
-        state = walk.march.final()
-        found = _search(solve_from, state, walk.passed)
-        motion = walk.begin_at(state)
+        state, passed = walk.march.final(), walk.passed
+        found = _search(solve_from, state, passed, walk.n_revolution)
+        walk.begin_at(state)
         if found is None:
+            walk.passed = passed
             continue
         piecewise, orbit = found
         force = piecewise.contact_force(orbit.states, orbit.motion)
         aim = piecewise.march.state_of(orbit.motion, force)
-        wanted = int(LONGER * wanted)  # to look at a motion that is known costs less than to search
-        is_near, reason = draws_near(walk, piecewise, orbit, motion, wanted - LONGEST_PERIOD)
+        until = int(FURTHER * walk.n_revolution)
+        is_near, reason = draws_near(walk, piecewise, orbit, passed, until)
         if is_near and known is not None and (same := known.nearest(orbit.motion, SAME)) is not None:
             return walk.ended(reason, same)
         if is_near:
@@ -203,17 +210,18 @@ def pass_directly(
 
 
 def draws_near(
-    walk: _Walk, piecewise: PiecewiseMotion, orbit: Orbit, motion: Floats, until: int
+    walk: _Walk, piecewise: PiecewiseMotion, orbit: Orbit, passed: list[Floats], until: int
 ) -> tuple[bool, str | None]:
-    """Simulate a case further: whether it draws near to a stable motion, or why it cannot go on.
+    """Whether a case draws near to a stable motion, in its last revolutions or further ones.
 
-    Its distance (`Approach`) is to fall from one look to the next, four revolutions or a period later, and
-    for 16 revolutions or more to be at each look where the linear theory takes it from the one before, to a
-    tenth of its distance; and what it has strayed from the theory in these looks (root of the sum of
-    squares) is to be less than half of what it loses by it, of which three quarters are to be lost. Then the
-    theory is believed if it keeps the contacts: until a tenth of the distance is left, none may come or go
-    that the motion has not (`Onward`). A motion that beats about another one, or only passes by, does not
-    draw near so. Where the distance does not fall it is watched anew, until so many revolutions have passed.
+    Returned with why it cannot go on. Its distance (`Approach`) is to fall from one look to the next, four
+    revolutions or a period later, and for 16 revolutions or more to be at each look where the linear theory
+    takes it from the one before, to a tenth of its distance; and what it has strayed from the theory in these
+    looks (root of the sum of squares) is to be less than half of what it loses by it, of which three quarters
+    are to be lost. Then the theory is believed if it keeps the contacts: until a tenth of the distance is
+    left, none may come or go that the motion has not (`Onward`). A motion that beats about another one, or
+    only passes by, does not draw near so. Where the distance does not fall it is watched anew, until so many
+    revolutions have passed.
     """
     approach = Approach(orbit.monodromy, np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n))
     stride = max(1, LOOK // orbit.period)  # periods from one look to the next
@@ -221,16 +229,18 @@ def draws_near(
     least = -(-WATCHED // (stride * orbit.period))
     there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
     theory: Onward | None = None
-    apart = motion - orbit.motion
+    span = stride * orbit.period
+    past = passed[::-1][::span][::-1]  # one at each look
+    apart = past.pop(0) - orbit.motion
     untried = math.inf  # square of the distance at which contacts are looked at next
-    while walk.n_revolution < until:
+    while past or walk.n_revolution < until:
         last = approach.square(apart)
         most = max(least, -(-SLOWER * approach.periods_to(HALF, apart) // stride))
         looks: list[tuple[float, float, float]] = []  # what it strays, is to lose and loses, as shares
         for _ in range(most):
             if piecewise.size(apart) <= there:
                 return True, None
-            reached, reason = walk.repeat(stride * orbit.period)
+            reached, reason = (past.pop(0), None) if past else walk.repeat(span)
             if reached is None:
                 return False, reason
             foreseen, apart = onward @ apart, reached - orbit.motion
@@ -257,40 +267,58 @@ def _agree(looks: list[tuple[float, float, float]], least: int) -> bool:
 
 
 def _search(
-    solve_from: Callable[[State], PiecewiseMotion], state: State, passed: list[Floats]
+    solve_from: Callable[[State], PiecewiseMotion], state: State, passed: list[Floats], n_revolution: int
 ) -> tuple[PiecewiseMotion, Orbit] | None:
-    """Return the stable periodic motion next to a state: of one revolution, or of the period of its returns.
+    """Return the stable periodic motion that the last ones lead to: of one revolution, or as they return.
 
-    Of two the nearer one. An unstable motion whose disturbances change sides in every period is followed to
-    twice its period.
+    The first that they follow to, else of two the nearer one. An unstable motion whose disturbances change
+    sides in every period is followed to twice its period.
     """
     try:
         piecewise = solve_from(state)
     except NoClosedForm:
         return None
-    back = np.array([piecewise.size(passed[-1] - motion) for motion in passed[-2::-1]])
-    nearest = 1 + int(np.argmin(back)) if back.size else 1
     found: list[tuple[float, Orbit]] = []
-    for period in [1, nearest] if nearest > 1 and back[nearest - 1] <= NEARER * back[0] else [1]:
-        orbit = _solved(piecewise, asked := period)
+    for period in _periods(piecewise, passed, n_revolution):
+        orbit = _solved(piecewise, passed, asked := period)
         while orbit and orbit.multipliers[0].real < -1.0 and (asked := 2 * asked) <= LONGEST_PERIOD:
-            orbit = _solved(piecewise, asked)
+            orbit = _solved(piecewise, passed, asked)
         if orbit and abs(orbit.multipliers[0]) < 1.0:
-            found.append((piecewise.size(orbit.motion - piecewise.start), orbit))
+            if _follows(piecewise, orbit, passed):
+                return piecewise, orbit
+            found.append((piecewise.size(orbit.motion - passed[-1]), orbit))
     return (piecewise, min(found, key=lambda one: one[0])[1]) if found else None
 
 
-def _solved(piecewise: PiecewiseMotion, period: int) -> Orbit | None:
-    """Periodic motion next to where a piecewise motion begins; None where none is found."""
+def _periods(piecewise: PiecewiseMotion, passed: list[Floats], n_revolution: int) -> list[int]:
+    """1, and the least number of revolutions after which the motion comes back far nearer than after one."""
+    back = [piecewise.size(passed[-1] - motion) for motion in passed[-2::-1]]
+    longest = min(len(back), n_revolution // PATIENCE)
+    nearer = (n for n in range(2, longest + 1) if back[n - 1] <= NEARER * back[0])
+    return [1, *islice(nearer, 1)]
+
+
+def _follows(piecewise: PiecewiseMotion, orbit: Orbit, passed: list[Floats]) -> bool:
+    """Whether the last period is what the linear theory about a periodic motion makes of the one before."""
+    if len(passed) <= orbit.period:
+        return False
+    before, apart = passed[-1 - orbit.period] - orbit.motion, passed[-1] - orbit.motion
+    return piecewise.size(apart - orbit.monodromy @ before) <= LINEAR * piecewise.size(before)
+
+
+def _solved(piecewise: PiecewiseMotion, passed: list[Floats], period: int) -> Orbit | None:
+    """Periodic motion that the last ones lead to, a period apart; None where none is found."""
+    energy = np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n)
     try:
         return shoot(
             piecewise,
-            piecewise.start,
+            extrapolated(np.array(passed[::-1][::period][::-1]), energy),
             piecewise.states,
             period,
             most_iterations=MOST_ITERATIONS,
             least_step=LEAST_STEP,
             most_events=MOST_EVENTS[0] + MOST_EVENTS[1] * (piecewise.q - 1),
+            most_residual=CLOSING,
         )
     except (NoClosedForm, NotConverged):
         return None

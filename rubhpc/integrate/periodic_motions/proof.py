@@ -9,6 +9,7 @@ import numpy as np
 from rubhpc.integrate.marches.event_driven import NoClosedForm
 from rubhpc.integrate.measuring.regimes import Solution
 from rubhpc.integrate.packing import output_degrees
+from rubhpc.integrate.periodic_motions.known_motions import nothing
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 
@@ -27,10 +28,18 @@ MOST_EVENTS = 160  # in a period; the time that a proof takes goes with them
 class Solver:
     """Solves for periodic motions from where a case has ended."""
 
-    def __init__(self, setup: ModalSetup, clearance: float, friction: float, final: State) -> None:
-        """Take the end of a case in closed form."""
+    def __init__(
+        self,
+        setup: ModalSetup,
+        clearance: float,
+        friction: float,
+        final: State,
+        known: tuple[PiecewiseMotion, Orbit] | None = None,
+    ) -> None:
+        """Take the end of a case in closed form, and the stable motion that it was begun on, if any."""
         self._case = setup, clearance, friction, final
         self._piecewise: PiecewiseMotion | None = None
+        self._known = known
 
     @property
     def has_begun(self) -> bool:
@@ -39,6 +48,8 @@ class Solver:
 
     def __call__(self, period: int) -> Solution | None:
         """Return the motion that closes after this many revolutions, or fewer; None where none is found."""
+        if (held := self._held(period)) is not None:
+            return held
         try:
             if self._piecewise is None:
                 self._piecewise = PiecewiseMotion(*self._case)
@@ -55,6 +66,20 @@ class Solver:
         except (NoClosedForm, NotConverged):
             return None
         return Solution(orbit.period, complex(orbit.multipliers[0]), self._section(piecewise, orbit))
+
+    def _held(self, period: int) -> Solution | None:
+        """Return the motion that the case was begun on, if it has that period and still is there."""
+        if self._known is None or period % self._known[1].period:
+            return None
+        piecewise, orbit = self._known
+        end = piecewise.march.reduced(self._case[3])
+        begun = [orbit.motion, *(revolution.end for revolution in orbit.revolutions[:-1])]
+        away = [piecewise.size(end - motion) for motion in begun]
+        k = int(np.argmin(away))
+        if away[k] > nothing(piecewise.setup) * piecewise.size(begun[k]):
+            return None
+        section = np.roll(self._section(piecewise, orbit), -k, axis=0)
+        return Solution(orbit.period, complex(orbit.multipliers[0]), section)
 
     def _section(self, piecewise: PiecewiseMotion, orbit: Orbit) -> Floats:
         """Displacement of the output node where revolutions begin."""

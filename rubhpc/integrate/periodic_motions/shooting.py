@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -102,6 +103,7 @@ def shoot(
     most_iterations: int = MOST_ITERATIONS,
     least_step: float = LEAST_STEP,
     most_events: int = MOST_EVENTS,
+    most_residual: float = math.inf,
 ) -> Orbit:
     """Find the periodic motion near a beginning.
 
@@ -118,6 +120,8 @@ def shoot(
         Share of Newton's step that is tried last.
     most_events : int
         In a revolution; a motion with more is not followed.
+    most_residual : float
+        Of the beginning: from one that is farther from closing nothing is sought.
 
     Returns
     -------
@@ -134,6 +138,8 @@ def shoot(
         trial = _Trial(piecewise, motion, states, period, most_events)
     except Unfollowed as problem:
         raise NotConverged(str(problem)) from None
+    if not trial.residual <= most_residual:
+        raise NotConverged(f"the beginning is far from closing, residual {trial.residual:.2g}")
     derivative, is_fresh = None, False
     for iteration in range(most_iterations):
         if trial.end_states == trial.states and trial.residual <= CONVERGED:

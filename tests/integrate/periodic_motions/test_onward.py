@@ -12,13 +12,13 @@ from rubhpc.simulate import simulate
 
 @pytest.fixture(scope="module")
 def settled():
-    """A lightly damped case: piecewise motion, periodic motion, and how far it was when that was found."""
+    """A lightly damped case: piecewise motion, periodic motion, and how far from that it is at first."""
     found = []
     draws_near = direct.draws_near
 
-    def note(walk, piecewise, orbit, motion, until):
-        found.append((piecewise, orbit, motion - orbit.motion))
-        return draws_near(walk, piecewise, orbit, motion, until)
+    def note(walk, piecewise, orbit, passed, until):
+        found.append((piecewise, orbit))
+        return draws_near(walk, piecewise, orbit, passed, until)
 
     case = {
         "speed_ratio": 1.6, "clearance_ratio": 0.74, "friction": 0.33, "samples_per_revolution": 64,
@@ -27,7 +27,9 @@ def settled():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(direct, "draws_near", note)
         simulate("mokhtar2017", transient="direct", **case)
-    return found[-1]
+    piecewise, orbit = found[-1]
+    first = simulate("mokhtar2017", transient=31, **case).final
+    return piecewise, orbit, piecewise.march.reduced(first) - orbit.motion
 
 
 def sequence(piecewise, orbit, apart):
