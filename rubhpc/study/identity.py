@@ -30,6 +30,7 @@ COULOMB = 1  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 1  # method = "modal" with gaps that are curved
 MANY_STATORS = 1  # more than five, whose sets of closed contacts or states may be more than 256
+BRANCHES = 1  # [branch]: grazing beside a fold
 ALONG_SPEED = 1  # branches along a speed
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
@@ -50,6 +51,7 @@ def physics_of(study: Study) -> int:
         + SOFT_FRICTION * is_soft
         + CURVED * (study.integrator.method == "modal" and _is_curved(study))
         + MANY_STATORS * (len(study.rig.stator) > 5)
+        + BRANCHES * (study.branch is not None)
         + ALONG_SPEED * (study.branch is not None and study.branch.along in SPEED_AXES)
     )
 

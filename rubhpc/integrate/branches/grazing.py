@@ -28,6 +28,7 @@ BESIDE = (
     1e-2,
     0.1,
 )  # shares of a step from a grazing, at which the motion with more contacts is sought
+MISSED = 1e-4  # of a step, short of which the least gap must have been followed to where it vanishes
 MEETING, NEIGHBOURS = 0.5, 2.0  # of a step, within which the motions on both sides of a grazing lie
 WITHIN_REACH = 3.0  # steps, in which a distance to grazing would vanish
 
@@ -136,7 +137,7 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
     """Locate the grazing between two points with one contact more or less.
 
     On the side with fewer contacts the least gap falls linearly to zero, along which it is sought; else the
-    place is halved.
+    place is halved. None where that side is lost before the gap has vanished, as by a fold close by.
     """
     change = branching.difference(a, b)
     n_touch = [touches(point).total() for point in (a, b)]
@@ -146,7 +147,7 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
     tolerance = tolerance_of(branching, a, b)
     ends = {a.sequence: 0.0, b.sequence: 1.0}
     free: list[tuple[float, Point]] = [(0.0, a) if is_first_free else (1.0, b)]
-    root = None
+    root, missing = None, np.inf
 
     def impacting(at: float) -> Point:
         """The motion with more contacts that is nearest to the grazing."""
@@ -164,6 +165,8 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
     for _ in range(MOST_TRIALS):
         near, far = free[-1][0], ends[b.sequence if is_first_free else a.sequence]
         root = _root(free) or root  # a gap of rounding is not seen any more
+        if root is not None:
+            missing = min(missing, abs(root - near))
         if root is None or not min(near, far) < root < max(near, far):
             share = 0.5 * (near + far)
         elif abs(root - near) < tolerance:
@@ -171,7 +174,8 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
         else:
             share = root + APPROACH * (near - root)
         if abs(near - far) < tolerance:
-            return Grazing(free[-1][1], impacting(near))
+            is_missed = MISSED < missing < np.inf
+            return None if is_missed else Grazing(free[-1][1], impacting(near))
         try:
             ahead = _ahead(branching, free, change)
             trial = branching.correct(free[-1][1], (share - near) * ahead, direction)
