@@ -24,6 +24,7 @@ from rubhpc.integrate.reduced_model.mode_library import (
     FrictionLibrary,
     ModeLibrary,
     PenaltyLibrary,
+    Shared,
     width_without_modes,
 )
 from rubhpc.integrate.reduced_model.mode_tables import tabulate
@@ -149,17 +150,19 @@ class ModalSetup:
         return self._curved_libraries[friction]
 
     def _make_library(self, kind: type[L], friction: float) -> L:
-        return kind(
-            self.reduced,
-            self.model,
-            friction,
-            opened=self._opened,
-            known=self._known_of_ring,
-            tick=self.tick,
-            sample_level=self.sample_level,
-            n_level=self._n_level,
-            is_measured=self.is_measured,
-        )
+        return kind(self.reduced, self.model, friction, **self._shared)
+
+    @property
+    def _shared(self) -> Shared:
+        """What all libraries take; that of Coulomb's law has parts of its own."""
+        return {
+            "opened": self._opened,
+            "known": self._known_of_ring,
+            "tick": self.tick,
+            "sample_level": self.sample_level,
+            "n_level": self._n_level,
+            "is_measured": self.is_measured,
+        }
 
     @cached_property
     def _known(self) -> Solved:
@@ -190,17 +193,9 @@ class ModalSetup:
         """Contact modes of a friction whose slip may turn, shared by its cases."""
         if friction not in self._friction_libraries:
             pairs = self.friction_pairs(friction)
-            self._friction_libraries[friction] = FrictionLibrary(
-                self.reduced,
-                self.model,
-                pairs,
-                opened=solve_friction_mode(self.reduced, pairs, 0, self._known),
-                known=self._known,
-                tick=self.tick,
-                sample_level=self.sample_level,
-                n_level=self._n_level,
-                is_measured=self.is_measured,
-            )
+            opened = solve_friction_mode(self.reduced, pairs, 0, self._known)
+            shared: Shared = {**self._shared, "opened": opened, "known": self._known}
+            self._friction_libraries[friction] = FrictionLibrary(self.reduced, self.model, pairs, **shared)
         return self._friction_libraries[friction]
 
     @property
@@ -229,17 +224,9 @@ class ModalSetup:
         """Contact modes of a friction under a penalty, shared by its cases."""
         if friction not in self._penalty_libraries:
             gap_jacobian, force_direction, _ = directions(self.reduced, self.model, friction)
+            penalty = Penalty(self.law.stiffness, self.law.damping, gap_jacobian, force_direction)
             self._penalty_libraries[friction] = PenaltyLibrary(
-                self.reduced,
-                self.model,
-                friction,
-                penalty=Penalty(self.law.stiffness, self.law.damping, gap_jacobian, force_direction),
-                opened=self._opened,
-                known=self._known_of_ring,
-                tick=self.tick,
-                sample_level=self.sample_level,
-                n_level=self._n_level,
-                is_measured=self.is_measured,
+                self.reduced, self.model, friction, penalty=penalty, **self._shared
             )
         return self._penalty_libraries[friction]
 

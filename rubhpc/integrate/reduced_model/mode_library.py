@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -29,6 +29,17 @@ LANES = 8  # coordinates are padded to whole vectors
 # first case: that of the tables decides in which order sums are taken, and so the last bits of every case.
 SPARE = 8
 MOST_FRICTION_MODES = 1024  # sets of states of one speed and friction: up to four for each of closed pairs
+
+
+class Shared(TypedDict, total=False):
+    """What a library takes besides the bodies and the law, as `ModeLibrary` describes it."""
+
+    opened: Any
+    known: Solved
+    tick: float
+    sample_level: int
+    n_level: int
+    is_measured: bool
 
 
 class ModeLibrary:
@@ -176,26 +187,11 @@ class PenaltyLibrary(ModeLibrary):
         friction: float,
         *,
         penalty: Penalty,
-        opened: ContactMode,
-        known: Solved,
-        tick: float,
-        sample_level: int,
-        n_level: int,
-        is_measured: bool = True,
+        **shared: Unpack[Shared],
     ) -> None:
         """Start as `ModeLibrary` does."""
         self._penalty = penalty
-        super().__init__(
-            reduced,
-            model,
-            friction,
-            opened=opened,
-            known=known,
-            tick=tick,
-            sample_level=sample_level,
-            n_level=n_level,
-            is_measured=is_measured,
-        )
+        super().__init__(reduced, model, friction, **shared)
 
     def _solved(self, mask: int) -> ContactMode:
         return solve_penalty_mode(self.reduced, self._penalty, self._opened, mask, self._known)
@@ -221,27 +217,11 @@ class FrictionLibrary(ModeLibrary):
         reduced: ReducedModel,
         model: Model,
         pairs: FrictionPairs,
-        *,
-        opened: FrictionMode,
-        known: Solved,
-        tick: float,
-        sample_level: int,
-        n_level: int,
-        is_measured: bool = True,
+        **shared: Unpack[Shared],
     ) -> None:
         """Start as `ModeLibrary` does, with one pair sliding forward."""
         self._pairs = pairs
-        super().__init__(
-            reduced,
-            model,
-            pairs.friction,
-            opened=opened,
-            known=known,
-            tick=tick,
-            sample_level=sample_level,
-            n_level=n_level,
-            is_measured=is_measured,
-        )
+        super().__init__(reduced, model, pairs.friction, **shared)
 
     _closed = FORWARD
 
