@@ -114,7 +114,7 @@ def computed(lazy: xr.Dataset, *, show_progress: bool = True) -> xr.Dataset:
         lazy = lazy.persist()
         if show_progress:
             sys.modules["distributed"].progress(lazy, notebook=False)
-    elif show_progress:
+    elif show_progress and sys.stdout.isatty():
         from dask.diagnostics.progress import ProgressBar
 
         with ProgressBar():  # type: ignore[no-untyped-call]  # dask leaves it untyped

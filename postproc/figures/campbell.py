@@ -24,7 +24,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "axial": {"color": "C3", "linestyle": (0, (1, 1.2))},
 }
 ORDERS = (1, 2)
-_NEAR = 0.03  # of the abscissa: critical speeds closer than this share a number
+_SIZE, _DIGIT, _LINE, _GAP = 6.0, 3.8, 8.0, 3.0  # pt: numbers, width of a digit, height of a line, gap
 _CRITICAL: dict[str, Any] = {
     "linestyle": "", "marker": "o", "markersize": 3, "color": "k", "markerfacecolor": "white", "zorder": 3,
 }  # fmt: skip
@@ -49,6 +49,7 @@ def campbell_diagram(
     # an overdamped mode and a rigid body's do not oscillate: their curves are broken
     oscillates = (abs(curves["damping_ratio"]) < 1.0) & (curves["frequency"] > 0.0)
     frequency = curves["frequency"].where(oscillates).values
+    top = limit or 1.05 * float(np.nanmax(frequency))
     drawn = set()
     for i_mode, kind in enumerate(curves["kind"].values):
         words = [whirl if kind == "lateral" else kind for whirl in curves["whirl"].values[i_mode]]
@@ -56,8 +57,9 @@ def campbell_diagram(
             continue
         for word, part in _stretches(words):
             ax.plot(rpm[part], frequency[i_mode, part], **STYLES[word])
-            drawn.add(word)
-    ax.set(xlim=(rpm.min(), rpm.max()), ylim=(0, limit or 1.05 * float(np.nanmax(frequency))))
+            if np.any(frequency[i_mode, part] < top):
+                drawn.add(word)
+    ax.set(xlim=(rpm.min(), rpm.max()), ylim=(0, top))
     for order in ORDERS:
         _draw_order(ax, order)
     if critical:
@@ -87,23 +89,41 @@ def _stretches(words: list[str]) -> Iterator[tuple[str, slice]]:
 
 
 def _number(ax: Axes, speeds: NDArray[np.float64]) -> None:
-    """Write each critical speed, rpm, below its marker; of those that nearly coincide only the first."""
-    right = ax.get_xlim()[1]
-    last = -math.inf
+    """Write each critical speed, rpm, below its marker; those whose numbers would meet share a line."""
+    left, right = ax.get_xlim()
+    box = ax.get_window_extent()
+    per_rpm, per_hertz = (  # points
+        72.0 / ax.figure.dpi * size / span
+        for size, span in ((box.width, right - left), (box.height, np.ptp(ax.get_ylim())))
+    )
+    lines: list[list[float]] = []
     for rpm in sorted(30 / math.pi * speeds):
-        if not last < rpm - _NEAR * right or rpm > right:
+        if not left <= rpm <= right:
             continue
-        last = rpm
-        is_right = rpm > (1 - _NEAR) * right
+        last = lines[-1] if lines else [-math.inf]
+        is_beside = (rpm - last[-1]) * per_rpm < _DIGIT * len(_line(last)) + _GAP
+        is_level = (rpm - last[-1]) / 60 * per_hertz < _LINE
+        if is_beside and is_level:
+            last.append(rpm)
+        else:
+            lines.append([rpm])
+    for line in lines:
+        is_right = (right - line[-1]) * per_rpm < _DIGIT * len(_line(line)) + _GAP
+        at = line[0] if is_right else line[-1]
         ax.annotate(
-            f"{rpm:.0f}",
-            (rpm, rpm / 60),
-            xytext=(-3 if is_right else 3, -2),
+            _line(line),
+            (at, at / 60),
+            xytext=(-_GAP if is_right else _GAP, _GAP if is_right else -2),
             textcoords="offset points",
             ha="right" if is_right else "left",
-            va="top",
-            fontsize=6,
+            va="bottom" if is_right else "top",
+            fontsize=_SIZE,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.3},
         )
+
+
+def _line(speeds: list[float]) -> str:
+    return ", ".join(f"{rpm:.0f}" for rpm in speeds)
 
 
 def _draw_order(ax: Axes, order: int) -> None:

@@ -125,8 +125,10 @@ def waterfall(
     span = float(np.ptp(rows)) or 1.0
     gain = height * span / (peak or 1.0)
     x = np.broadcast_to(spectra[abscissa].values, spectra.shape)
+    has_result = np.isfinite(spectra.values).any(axis=1)
     for i in np.argsort(-rows):  # from the back to the front: each hides what lies behind it
-        if not np.isfinite(spectra.values[i]).any():
+        if not has_result[i]:
+            ax.axhline(rows[i], color="0.6", linewidth=0.5, linestyle=(0, (1, 2)), zorder=2)
             continue
         at, line = spikes(x[i], gain * np.nan_to_num(spectra.values[i]), SPIKE * limit)
         order = 3 + (rows.max() - rows[i]) / span
@@ -139,6 +141,9 @@ def waterfall(
     _name_decades(ax, spectra)
     tick_levels(ax, "y", spectra[spectra.dims[0]], rows)
     _scale_bar(spectra, ax, peak, gain)
+    if not has_result.all():
+        style: dict[str, Any] = {"color": "0.4", "fontsize": 6.0, "ha": "right", "va": "bottom", "zorder": 7}
+        ax.text(0.95 * limit, rows[~has_result].max(), "no result", **style)  # of all dotted ones
     _name_senses(ax)
     return ax
 

@@ -197,6 +197,8 @@ def _add_bar(ax: Axes, beside: list[Axes], mesh: ScalarMappable) -> None:
 
 def _medians(shown: xr.Dataset, mode: int) -> Iterator[str]:
     middle = float(median_frequency(shown, mode))
+    if not math.isfinite(middle):  # the drawing refuses such spans, with the reason
+        return
     each = ", ".join(f"{f:.1f}" for f in span_frequencies(shown, mode).dropna("span").values)
     yield f"median frequency out of contact {middle:.2f} Hz (span by span: {each})"
     spread = {str(name): float(width) for name, width in contact_bandwidth(shown, mode).items()}

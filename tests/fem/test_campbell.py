@@ -97,7 +97,7 @@ def test_diagram_draws_each_motion_in_its_own_style(overhung, curves):
     numbers = {f"{30 / math.pi * speed:.0f}" for _, speed in critical}
     texts = {text.get_text() for text in ax.texts}
     assert texts > {"1X", "2X"}
-    assert texts - {"1X", "2X"} < numbers  # two nearly coincide
+    assert texts - {"1X", "2X"} == numbers
     marks = next(line for line in ax.lines if line.get_marker() == "o")
     # on the 1X line: as many turns a second as hertz
     assert marks.get_xdata() / 60 == pytest.approx(marks.get_ydata())
@@ -107,6 +107,14 @@ def test_diagram_draws_each_motion_in_its_own_style(overhung, curves):
     assert {mpl.colors.to_hex(line.get_color()) for line in whole} == {
         mpl.colors.to_hex(color) for color in ("C0", "C1", "C2")
     }
+
+
+@pytest.mark.parametrize(("gap", "written"), [(0.02, {"4000, 4080"}), (0.5, {"4000", "6000"})])
+def test_critical_speeds_whose_numbers_would_meet_share_a_line(curves, gap, written):
+    ax = Figure(figsize=(3.5, 2.4)).subplots()
+    critical = [(0, 4000 * math.pi / 30), (1, 4000 * (1 + gap) * math.pi / 30)]
+    campbell_diagram(curves.isel(mode=slice(5)), ax, critical, limit=300.0)
+    assert {text.get_text() for text in ax.texts} - {"1X", "2X"} == written
 
 
 def test_diagram_breaks_the_curve_where_a_mode_does_not_oscillate(curves):

@@ -240,7 +240,16 @@ def test_the_waterfall_has_a_curve_for_each_finished_case(ax):
         synthetic_store.make(), {"friction": 0.1, "stator_youngs_modulus": 3e9, "clearance": 70e-6}
     )
     waterfall(cascade(whole), ax, 260.0)
-    assert len(ax.lines) == 2 + 1  # three of five are not done; the bar of the scale
+    assert sum(line.get_color() == "C0" for line in ax.lines) == 2  # three of five are not done
+
+
+def test_rows_without_a_result_are_dotted_and_named(ax):
+    spectra = made([[0, 1e-4, 0], [np.nan] * 3, [0, 1e-4, 0], [np.nan] * 3], [10.0, 11.0, 12.0, 13.0])
+    waterfall(spectra, ax, 10.0)
+    dotted = [line.get_ydata()[0] for line in ax.lines if line.get_color() == "0.6"]
+    assert dotted == [13.0, 11.0]
+    named = [text for text in ax.texts if text.get_text() == "no result"]
+    assert [text.get_position()[1] for text in named] == [13.0]
 
 
 def test_an_unfinished_cascade_says_so(spectra, ax):

@@ -10,7 +10,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 from postproc.catalogue import figures
-from postproc.figures.hht import draw_panels, energy_time_frequency
+from postproc.figures.hht import draw_panels, energy_time_frequency, hht
 from postproc.figures.style import house_style, new_figure
 from postproc.signals.hilbert_huang import (
     analytic,
@@ -21,6 +21,7 @@ from postproc.signals.hilbert_huang import (
     median_frequency,
     span_frequencies,
 )
+from postproc.store.select import select
 from rubhpc import simulate
 from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
@@ -238,6 +239,11 @@ def test_a_figure_without_oscillation_is_refused():
         _, (ax,) = new_figure()
     with pytest.raises(InputError, match="does not oscillate between contacts"):
         energy_time_frequency(hht, ax)
+
+
+def test_no_median_of_nothing_is_given():
+    choice = {"speed_ratio": 1.5, "clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
+    assert hht(select(synthetic_store.make(), choice), mode=7).lines == ()
 
 
 ONE = ["speed_ratio=1.5", "clearance=84 um", "friction=0.3", "stator.youngs_modulus=3 GPa"]
