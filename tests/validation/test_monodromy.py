@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from full_order_flow import FullOrder
+from full_order_stick import OPEN, STUCK, FullOrderStick
 from trial_rig import trial_rig
 
 from rubhpc import LumpedStator
@@ -83,3 +84,56 @@ def test_periodic_motion_and_its_monodromy_are_those_of_all_degrees_of_freedom(
         behind, _ = follow(start - step)
         change = piecewise.size((ahead - behind) / 2 - mono @ step)
         assert change < 1e-5 * piecewise.size(mono @ step)
+
+
+@pytest.mark.parametrize(
+    ("rig", "ratio", "clearance_ratio"),
+    [
+        pytest.param(trial_rig(1), 1.2, 0.5, id="stuck at the section"),
+        pytest.param(trial_rig(2), 0.6, 0.8, id="one after the other", marks=pytest.mark.long),
+        pytest.param(trial_rig(2), 1.7, 0.5, id="both at once", marks=pytest.mark.long),
+    ],
+)
+def test_monodromy_under_coulombs_law_is_that_of_all_degrees_of_freedom(rig, ratio, clearance_ratio):
+    """Pairs touch, stick, slip and part; neighbours pass through the same states.
+
+    What sticks forgets its slip. Neighbours of what is closed or stuck at the section are so too.
+    """
+    model = assemble(rig)
+    spin = ratio * first_lateral_frequency(model)
+    clearance = clearance_ratio * contact_free_amplitude(model, spin)
+    setup = prepare(
+        rig, spin, contact=Contact(friction_law="coulomb"), integrator=ALL_MODES, samples_per_revolution=64,
+        model=model,
+    )  # fmt: skip
+    case = {"clearance": clearance, "friction": 1.0}
+    motion = find_periodic_motion(
+        setup, **case, period=1, repeat=1, recording=Recording(transient=60, keep=()), initial=Initial()
+    )
+    assert {event.kind for event in motion.events} == {"touch", "stick", "slip", "release"}
+    piecewise = PiecewiseMotion(setup, clearance, 1.0, motion.state)
+    whole = FullOrderStick(model_at(model, spin), spin, clearance - sag_at_stators(model)[0], 1.0)
+    basis, n, start = setup.reduced.basis, piecewise.n, piecewise.start
+    size, scale = piecewise.size(start), np.repeat([1 / abs(spin), 1.0], n)
+    begun = np.concatenate([basis @ start[:n], basis @ start[n:], [1.0, 0.0, 1.0]])
+    is_closed = motion.state.contact_force > 0
+    states = whole.going_on(begun, tuple(np.where(is_closed, STUCK, OPEN).tolist()))
+
+    def follow(reduced):
+        u, v, passed = whole.revolve(basis @ reduced[:n], basis @ reduced[n:], states)
+        return np.concatenate([setup.reduced.project @ u, setup.reduced.project @ v]), passed
+
+    end, passed = follow(start)
+    assert any(STUCK in one for one in passed)
+    assert piecewise.size(end - start) < 1e-8 * size
+    mono = monodromy(piecewise, [piecewise.revolve(start, piecewise.states)])
+    random = np.random.default_rng(1)
+    for _ in range(2):
+        direction = random.standard_normal(2 * n) * scale
+        if is_closed.any():
+            direction = piecewise.mode(piecewise.states).propagator(0.0) @ direction
+        step = 1e-6 * size / piecewise.size(direction) * direction
+        (ahead, passed_ahead), (behind, passed_behind) = follow(start + step), follow(start - step)
+        assert passed_ahead == passed_behind == passed
+        change = piecewise.size((ahead - behind) / 2 - mono @ step)
+        assert change < 1e-6 * piecewise.size(mono @ step)
