@@ -19,6 +19,7 @@ _PARTS = {
     "advance_by_steps": "for contact in short steps",
     "advance_curved": "for curved gaps",
     "follow_piece": "for periodic motions",
+    "advance_pieces": "for run-ups",
     "part": "for neighbouring motions, which distinguish chaos from order",
 }
 _announced: set[str] = set()

@@ -32,6 +32,7 @@ from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies, reduce_model
 from rubhpc.integrate.reduced_model.truncation import MOST_MODES, kept_modes, modal_error, sufficient_accuracy
 from rubhpc.integrate.scheme import Scheme, scheme_of
+from rubhpc.kernels.case_progress import Clock
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.study.tables import SEARCH_STEP
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
 
 L = TypeVar("L", bound=ModeLibrary)
 FINEST_TICK = 1.5e-9  # s
+CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
 FEWEST_STEPS = 16  # a revolution: none is longer than the power of two below it
 
 
@@ -120,6 +122,20 @@ class ModalSetup:
     def tick(self) -> float:
         """Resolution of events, s."""
         return self.interval / (1 << self.sample_level)
+
+    @cached_property
+    def clock(self) -> Clock:
+        """How time is counted, from the shaft's angle 0 on, before a record is asked for."""
+        turn = self.interval * self.samples_per_revolution
+        return Clock(
+            spin=self.spin,
+            tick=self.tick,
+            sample_level=self.sample_level,
+            samples_per_revolution=self.samples_per_revolution,
+            search_level=self.level_within(self.step),
+            contact_level=math.floor(math.log2(min(self.interval, turn / CONTACT_STEPS) / self.tick)),
+            n_sample=0,
+        )
 
     def level_within(self, step: float) -> int:
         """Largest level at which 2^level ticks are no longer than a step, s, and than a sample's interval."""

@@ -69,10 +69,11 @@ def bare(progress: Any) -> Any:
 
 def restart_clock(record: Any, tick: int, sample: int, *, is_recorded: bool) -> None:
     """Count time anew: the case of a bare record stands at `tick`, where `sample` is due."""
-    passed = tick - int(record["tick"])
-    record["entered"] += passed
-    record["counted_from"] += passed
-    record["tick"], record["next_sample"], record["n_event"] = tick, sample, 0
+    if passed := tick - int(record["tick"]):
+        record["entered"] += passed
+        record["counted_from"] += passed
+        record["tick"] = tick
+    record["next_sample"], record["n_event"] = sample, 0
     if not is_recorded:
         record["energy_from"] = NONE
 

@@ -36,10 +36,10 @@ def seconds_of(integrate, setup, recording, *law):
     return time.process_time() - began
 
 
-@pytest.mark.parametrize(("seconds", "most"), [(20.0, 3.0), (4.0, 6.0)])
+@pytest.mark.parametrize("seconds", [20.0, 4.0])
 @on_one_thread
-def test_a_run_up_over_constant_speed(seconds, most, capsys):
-    """From 1200 to 2400 rpm, contact from 1400 rpm on; asked 3. Signals, spectra or orders, and measures."""
+def test_a_run_up_over_constant_speed(seconds, capsys):
+    """From 1200 to 2400 rpm, contact from 1400 rpm on: 3 at most. Signals, orders, and measures."""
     speed_law = SpeedLaw(time=(0.0, seconds), speed=(1200 * RPM, 2400 * RPM))
     recording = Recording(transient=0, revolutions=speed_law.n_revolution, samples_per_revolution=SAMPLES)
     lines, ratios = [], []
@@ -55,4 +55,4 @@ def test_a_run_up_over_constant_speed(seconds, most, capsys):
         lines.append(f"{name:18} {1e3 * rise:7.1f} ms for {1e3 * at_constant:6.1f}: {ratios[-1]:.2f}")
     with capsys.disabled():
         print(f"\n{speed_law.n_revolution} revolutions in {seconds:g} s\n" + "\n".join(lines))
-    assert max(ratios) < most
+    assert max(ratios) < 3.0

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.case import march_of
+from rubhpc.integrate.changing_speed.stretch import Stretch, take_stretch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.marches.modal import ModalMarch, Place
@@ -17,8 +18,9 @@ from rubhpc.integrate.record import State
 from rubhpc.kernels.accumulators import Accumulator, Samples  # noqa: TC001 - of a NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+    from rubhpc.fem.model import Model
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
 
 Floats = NDArray[np.float64]
@@ -66,6 +68,22 @@ class Passing:
             steps = ContactSteppingMarch(setup, *self._case, state_at(begun, setup), self._check)
             return self._pass(steps, setup, n_sample, earlier, is_balanced)
 
+    def take_several(
+        self,
+        setups: Sequence[PieceSetup],
+        first: int,
+        n_sample: int,
+        begun: State | Place,
+        earlier: tuple[Accumulator, float],
+    ) -> Stretch | None:
+        """Take pieces with the same matrices from `first` on, as many as the kernel can; None for none."""
+        if self._march is None or not isinstance(begun, Place):
+            return None
+        if self._check is not None:
+            self._check()
+        room = self._room_for(setups[first].model, n_sample)
+        return take_stretch(self._march, setups, first, room, begun, earlier, self._check)
+
     def _begin(self, setup: PieceSetup, begun: State | Place) -> ModalMarch:
         """The march that stands where a piece begins."""
         march = self._march
@@ -87,9 +105,7 @@ class Passing:
         is_balanced: bool,
     ) -> Passed:
         model = setup.model
-        if n_sample not in self._room:
-            self._room[n_sample] = empty_samples(model.n_place, n_sample, model.n_probe)
-        samples = self._room[n_sample]
+        samples = self._room_for(model, n_sample)
         samples.whole[:] = 0.0
         before = march.energy() if is_balanced else math.nan
         accumulators: list[Accumulator] = []
@@ -104,6 +120,11 @@ class Passing:
                 break
         gained = march.energy() - before if is_balanced else math.nan
         return Passed(samples.whole, accumulators, march.n_step, march.reached(), gained, reason or "")
+
+    def _room_for(self, model: Model, n_sample: int) -> Samples:
+        if n_sample not in self._room:
+            self._room[n_sample] = empty_samples(model.n_place, n_sample, model.n_probe)
+        return self._room[n_sample]
 
 
 def state_at(begun: State | Place, setup: PieceSetup) -> State:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.kernels.contact_modes import Reduced
+    from rubhpc.kernels.retuning import Speeds
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -57,7 +58,7 @@ class HeldMatrices:
         self._phasor, self._reach, self._acceleration = phasor, reach, acceleration
         self._libraries: dict[tuple[str, float], RetunedLibrary] = {}
         self._pairs: dict[float, FrictionPairs] = {}
-        self.first: tuple[tuple[float, ...], PieceSetup] | None = None  # of a case, and what it is of
+        self.first: tuple[tuple[float, ...], list[PieceSetup]] | None = None  # of a case, by what was asked
 
     @property
     def n_byte(self) -> int:
@@ -95,7 +96,7 @@ class HeldMatrices:
             )
         library = self._libraries[key]
         assert isinstance(library, kind)
-        library.tune(piece.spin, piece.factor, piece.tick)
+        library.tune(piece.speeds, piece.place)
         return library
 
     def pairs(self, friction: float, make: Callable[[float], FrictionPairs]) -> FrictionPairs:
@@ -110,7 +111,8 @@ class PieceSetup(ModalSetup):
     """A set-up at the speed of a piece, whose matrices are those of other pieces too."""
 
     held: HeldMatrices
-    factor: complex  # 1/s^2, by which the unbalance at unit speed acts
+    speeds: Speeds  # of this piece and of others that have the same matrices
+    place: int  # of this piece among them
     most_energy: float  # J, beyond which the motion has diverged, at the highest speed
 
     @cached_property
@@ -139,15 +141,15 @@ class PieceSetup(ModalSetup):
     def bodies(self, friction: float, clearance: Floats) -> Reduced:
         """The reduced bodies of a case as kernels take them; clearance (q,), m."""
         known = self.held.bodies
-        if friction not in known:
-            known[friction] = super().bodies(friction, clearance)
+        if friction not in known or known[friction].clearance is not clearance:
+            made = super().bodies(friction, clearance)
+            known[friction] = made._replace(
+                force_cosine=made.force_cosine.copy(), force_sine=made.force_sine.copy()
+            )
         of_pieces = known[friction]
-        return of_pieces._replace(
-            force_cosine=self.reduced.force[0].copy(),
-            force_sine=self.reduced.force[1].copy(),
-            rim_speed=of_pieces.radius * abs(self.spin),
-            clearance=clearance,
-        )
+        of_pieces.force_cosine[:], of_pieces.force_sine[:] = self.reduced.force
+        np.multiply(of_pieces.radius, abs(self.spin), out=of_pieces.rim_speed)
+        return of_pieces
 
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, which serve until another piece asks for them."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -15,23 +14,38 @@ from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.statics import sag_under
 from rubhpc.integrate.changing_speed.held_matrices import WIDEST, WIDEST_TABULATED, held_range
 from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, sagging, with_values
+from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE, speeds_of
 from rubhpc.integrate.packing import whole_system
+from rubhpc.kernels.case_progress import Clock
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.setup import ModalSetup
 
     Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
 
 SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the speed is taken
 LONGEST_FALL = 1.0 / 3.0  # half of the range over the first speed of a coast-down, which stays above 0
-MOST_HELD = 4  # matrices kept, of a spin that swings between them
-MOST_BYTES = 2**25  # of contact modes, with which matrices are kept for other cases
+MOST_HELD = 4  # matrices at hand, of a spin that swings between them
+MOST_BYTES = 2**28  # of contact modes that are kept, with their matrices, for other cases
 
 # Of each set-up, the matrices by speed and acceleration, the latest last: other cases may have them too.
 _KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[float, float], HeldMatrices]] = WeakKeyDictionary()
+
+
+def forget_most() -> None:
+    """Forget matrices whose contact modes take more memory than is to be kept, those used long ago first."""
+    for known in _KNOWN.values():
+        n_byte = 0
+        for key in reversed(list(known)):
+            n_byte += known[key].n_byte
+            if n_byte > MOST_BYTES:
+                del known[key]
 
 
 class Pieces:
@@ -42,9 +56,7 @@ class Pieces:
     """
 
     def __init__(self, fastest: ModalSetup) -> None:
-        for known in _KNOWN.values():
-            for key in [key for key, held in known.items() if held.n_byte > MOST_BYTES]:
-                del known[key]
+        forget_most()
         self._fastest = fastest
         self._basis = fastest.reduced.basis
         self._held: list[HeldMatrices] = []  # the latest first
@@ -65,29 +77,69 @@ class Pieces:
 
         `torque` (N m) is that of the drive of a free spin.
         """
-        held, fastest = self._find(speed, acceleration), self._fastest
-        asked = speed, acceleration, duration, torque
-        if angle == 0.0 and held.first is not None and held.first[0] == asked:
+        held = self._find(speed, acceleration)
+        model = held.model if self._fastest.free_spin is None else held.driven(torque, acceleration)
+        columns = np.array([[speed], [acceleration], [angle], [duration]])
+        return self._in_held(held, model, columns, torque)[0]
+
+    def blocks(
+        self, speed: Floats, acceleration: Floats, angle: Floats, duration: Floats, n_sample: Ints
+    ) -> Iterator[list[PieceSetup]]:
+        """The set-ups of the pieces of a prescribed run-up, together where they share matrices.
+
+        As `setup`, (n_piece,) each; `n_sample` are the samples in each piece, the same in those together.
+        """
+        first = 0
+        while first < speed.size:
+            held, last = self._find(float(speed[first]), float(acceleration[first])), first + 1
+            while (
+                last < min(speed.size, first + AT_ONCE)
+                and n_sample[last] == n_sample[first]
+                and held.serve(speed[last], acceleration[last])
+            ):
+                last += 1
+            columns = np.stack([speed, acceleration, angle, duration])[:, first:last]
+            yield self._in_held(held, held.model, columns)
+            first = last
+
+    def _in_held(
+        self, held: HeldMatrices, model: Model, columns: Floats, torque: float = 0.0
+    ) -> list[PieceSetup]:
+        """The set-ups of pieces that all have the same matrices; columns as the arguments of `setup`."""
+        speed, acceleration, angle, duration = columns
+        asked = (torque, *columns.ravel().tolist())
+        if angle[0] == 0.0 and held.first is not None and held.first[0] == asked:
             return held.first[1]
         lag = acceleration * duration**2 / 12.0
-        factor = (speed**2 - 1j * acceleration) * cmath.exp(1j * (angle - lag))
-        phasor = self._phasor * factor
-        force = np.empty((2, phasor.size))
-        force[0], force[1] = phasor.real, -phasor.imag
-        model = held.model if fastest.free_spin is None else held.driven(torque, acceleration)
-        interval = 2.0 * math.pi / (abs(speed) * fastest.samples_per_revolution)
-        found = with_values(
-            held.template,
-            model=model,
-            reduced=with_values(held.reduced, spin=speed, force=force),
-            spin=speed,
-            interval=interval,
-            tick=interval / (1 << held.sample_level),
-            factor=factor,
-            _curved_libraries={},  # which are of this speed alone
-            _open_tables={},
-        )
-        if angle == 0.0:
+        factor = (speed**2 - 1j * acceleration) * np.exp(1j * (angle - lag))
+        phasor = factor[:, np.newaxis] * self._phasor
+        force = np.stack([phasor.real, -phasor.imag], axis=1)
+        interval = 2.0 * math.pi / (np.abs(speed) * self._fastest.samples_per_revolution)
+        tick = interval / (1 << held.sample_level)
+        speeds = speeds_of(speed, factor, tick, held.reduced.spin, held.sample_level)
+        template, found = held.template, []
+        steady = template.clock
+        longest = np.floor(np.log2(template.step / tick)).astype(int)
+        search_level = np.clip(longest, 0, held.sample_level)
+        lists = (column.tolist() for column in (speed, interval, tick, search_level))
+        for place, (spin, every, resolution, search, pushing) in enumerate(zip(*lists, force, strict=True)):
+            reduced = with_values(held.reduced, spin=spin, force=pushing)
+            found.append(
+                with_values(
+                    template,
+                    model=model,
+                    reduced=reduced,
+                    spin=spin,
+                    interval=every,
+                    tick=resolution,
+                    clock=Clock(spin, resolution, *steady[2:4], search, *steady[5:]),
+                    speeds=speeds,
+                    place=place,
+                    _curved_libraries={},  # which are of this speed alone
+                    _open_tables={},
+                )
+            )
+        if angle[0] == 0.0:
             held.first = asked, found
         return found
 
@@ -101,8 +153,6 @@ class Pieces:
         known = _KNOWN.setdefault(self._fastest, {})
         found = known.pop((speed, acceleration), None) or self._hold(speed, acceleration)
         known[speed, acceleration] = found
-        if len(known) > MOST_HELD:
-            del known[next(iter(known))]
         self._held = [found, *self._held[: MOST_HELD - 1]]
         return found
 
@@ -163,10 +213,11 @@ class Pieces:
             accuracy=fastest.accuracy,
             displacement_limit=fastest.displacement_limit,
             held=held,
-            factor=complex(speed**2),
+            speeds=speeds_of([speed], [complex(speed**2)], [1.0], speed, held.sample_level),
+            place=0,
             most_energy=fastest.energy_limit,
         )
-        for name in ("energy_limit", "sample_level"):  # for `with_values`, which takes them along
+        for name in ("energy_limit", "sample_level", "clock"):  # for `with_values`, which takes them along
             getattr(held.template, name)
         if free is not None:
             held.twist = sag_under(model.rotor, -free.share)

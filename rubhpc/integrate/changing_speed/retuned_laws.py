@@ -135,9 +135,9 @@ class RetunedFrictionLibrary(RetunedLibrary):
         damping = pairs.damped(reduced, mode.mask).damping
         return Linear(tangent @ (project @ self._phasor), switch, reaction, across, damping)
 
-    def _hold(self, mode: ContactMode) -> HeldMode:
+    def _hold(self, mode: ContactMode, place: int) -> HeldMode:
         assert isinstance(mode, FrictionMode)
-        held, place, tables = super()._hold(mode), len(self._held), self.tables()
+        held, tables = super()._hold(mode, place), self.tables()
         q = len(self.slip)
         one = mode.n_eigenmode + 1 + q
         switch = mode.switch[:, one].copy()

@@ -1,7 +1,7 @@
 """Contact modes whose matrices stay while the spin speed changes: only the unbalance response is renewed.
 
-`MatrixModes` holds the contact modes of a set of matrices, and tunes them to the speed of each piece of a
-run-up (`kernels.retuning`).
+A library holds the contact modes of a set of matrices, and tunes them to the speeds of a run-up's pieces
+(`kernels.retuning`), several of them at once.
 """
 
 from __future__ import annotations
@@ -9,17 +9,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
+from numpy.typing import ArrayLike, NDArray  # noqa: TC002 - of a NamedTuple
 
 from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
 from rubhpc.integrate.reduced_model.mode_tables import TableStack
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
-from rubhpc.kernels.retuning import HeldMode, retune
+from rubhpc.kernels.retuning import HeldMode, Speeds, retune
 from rubhpc.kernels.retuning_laws import NO_RIM, RimPart, Springs
 
 NOT_TUNED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
+AT_ONCE = 8  # pieces to whose speeds a contact mode is tuned at once
+MOST_BYTES = 2**22  # of its tables for so many pieces; where they are more, pieces take turns in one
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
+    Ints = NDArray[np.int64]
 
 
 class RetunedLibrary(ModeLibrary):
@@ -65,16 +68,41 @@ class RetunedLibrary(ModeLibrary):
         self.width = self._width_of(model, friction)
         self._tables = TableStack(1 + len(self.gap_jacobian), self._most_modes)
         self._exponents = {}
-        self._place: dict[int, int] = {}  # of each set of closed pairs in the tables
-        self._held: list[HeldMode] = []
-        self.masks = []
-        self._spin, self._factor = reduced.spin, complex(reduced.spin**2)
+        self.n_room = 0  # tables that each mode has, for as many pieces
+        self._place: dict[int, int] = {}  # of each set of closed pairs: the first of its tables
+        self._held: dict[int, HeldMode] = {}  # by place
+        self._tuned: dict[int, int] = {}  # by place: up to which piece of those at hand
+        self._speeds = speeds_of(
+            [reduced.spin], [complex(reduced.spin**2)], [tick], reduced.spin, sample_level
+        )
+        self._at = 0  # piece among those at hand
+        self.masks: list[int] = []
         self.add(0)
 
-    def tune(self, spin: float, factor: complex, tick: float) -> None:
-        """Begin at another speed, rad/s, with the unbalance at unit speed times `factor`: with no mode."""
-        self._spin, self._factor, self._tick = spin, factor, tick
-        self.masks = [NOT_TUNED] * len(self._held)
+    @property
+    def n_most(self) -> int:
+        """Contact modes that there is room for."""
+        return self._tables.n_most // max(1, self.n_room)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether there is no room for another contact mode."""
+        return len(self._held) >= self.n_most
+
+    def unmet(self, met: set[int]) -> list[int]:
+        """None: each piece begins with no mode."""
+        return []
+
+    def tune(self, speeds: Speeds, piece: int) -> None:
+        """Begin a piece, given by its place among the speeds: with no mode."""
+        if speeds is not self._speeds or piece <= self._at:
+            self._speeds, self._tuned = speeds, {}
+        self.reach(piece)
+
+    def reach(self, piece: int) -> None:
+        """Go on to a later piece of those at hand, with no mode, though some may be tuned already."""
+        self._at = piece
+        self.masks = [NOT_TUNED] * len(self.masks)
         self.tables().mask[:] = NOT_TUNED
 
     def add(self, mask: int) -> bool:
@@ -83,23 +111,41 @@ class RetunedLibrary(ModeLibrary):
             mode = self._solved(mask)
             if mode.exponent.size > self.width:
                 return False
-            self._place[mask] = len(self._held)
-            self._tabulate(mode)
-            self._held.append(self._hold(mode))
-            self.masks.append(mask)
-        place = self._place[mask]
-        interval = self._tick * 2.0**self._sample_level
-        tables, share = self.tables(), abs(self._spin / self.reduced.spin)
-        retune(tables, place, self._held[place], self._spin, share, self._factor, self._tick, interval)
-        self.masks[place] = tables.mask[place] = mask
+            self._take_in(mode)
+        first, at, speeds = self._place[mask], self._at, self._speeds
+        place = first + (at if self.n_room > 1 else 0)
+        if self._tuned.get(first, 0) <= at:
+            end = min(speeds.spin.size, self.n_room) if self.n_room > 1 else at + 1
+            retune(self.tables(), place - at, self._held[first], speeds, at, end)
+            self._tuned[first] = end
+        self.masks[place] = self.tables().mask[place] = mask
         return True
+
+    def tuned(self, met: set[int]) -> Ints:
+        """Sets of closed pairs of the tables that are tuned to this piece or to later ones, of those met."""
+        found = np.full(len(self.masks), NOT_TUNED)
+        for mask, first in self._place.items():
+            if mask in met:
+                found[first + self._at : first + self._tuned.get(first, 0)] = mask
+        return found
+
+    def _take_in(self, mode: ContactMode) -> None:
+        """Make room for a mode that is met for the first time."""
+        place = len(self.masks)
+        self._tabulate(mode)
+        self.n_room = self.n_room or (AT_ONCE if AT_ONCE * self._tables.n_byte_of_one <= MOST_BYTES else 1)
+        self._place[mode.mask] = place
+        self._held[place] = self._hold(mode, place)
+        self._tables.repeat(self.n_room - 1)
+        self.masks += [NOT_TUNED] * self.n_room
+        self.tables().mask[place:] = NOT_TUNED
 
     def forget(self) -> None:
         """Make room: keep no mode but that with every pair open."""
         self._tables.clear()
         self._exponents.clear()
-        self._place.clear()
-        self._held.clear()
+        for known in (self._place, self._held, self._tuned):
+            known.clear()
         self.masks = []
         self.add(0)
 
@@ -129,8 +175,8 @@ class RetunedLibrary(ModeLibrary):
         across[:, closed] = (self.force_direction - self.gap_jacobian)[closed].T
         return Linear(tangent @ (project @ self._phasor), switch, reaction, across, reduced.damping)
 
-    def _hold(self, mode: ContactMode) -> HeldMode:
-        """What the spin speed leaves alone of a mode."""
+    def _hold(self, mode: ContactMode, place: int) -> HeldMode:
+        """What the spin speed leaves alone of a mode, whose tables are at `place`."""
         reduced, m, width = self.reduced, mode.n_eigenmode, self.width
         linear, slip = self._linear(mode), self._slip_rows()
         n = slip.shape[1]
@@ -171,6 +217,18 @@ class RetunedLibrary(ModeLibrary):
     def _springs_of(self, mode: ContactMode) -> Springs:
         """Springs that press in a mode."""
         return Springs(0.0, self.gap_jacobian[:0], np.zeros((0, 2 * self.width)))
+
+
+def speeds_of(
+    spin: ArrayLike, factor: ArrayLike, tick: ArrayLike, held_spin: float, sample_level: int
+) -> Speeds:
+    """Speeds (rad/s) to which modes are tuned whose matrices are those at `held_spin`.
+
+    `factor` (1/s^2) is what the unbalance at unit speed acts by, `tick` (s) the resolution of events.
+    """
+    spins, ticks = np.asarray(spin, dtype=np.float64), np.asarray(tick, dtype=np.float64)
+    factors = np.asarray(factor, dtype=np.complex128)
+    return Speeds(spins, np.abs(spins / held_spin), factors, ticks, ticks * 2.0**sample_level)
 
 
 _NONE = np.zeros(0, dtype=np.complex128)

@@ -28,8 +28,8 @@ class RetunedSoftFrictionLibrary(RetunedFrictionLibrary):
         rows = overlap_rows(self.gap_jacobian, closed, mode, self.width)
         return Springs(0.5 * self._pairs.stiffness, np.ascontiguousarray(self.gap_jacobian[closed]), rows)
 
-    def _hold(self, mode: ContactMode) -> HeldMode:
-        held, place = super()._hold(mode), len(self._held)
+    def _hold(self, mode: ContactMode, place: int) -> HeldMode:
+        held = super()._hold(mode, place)
         m, one = held.is_pair.size, held.rim.one
         moving = [m, self.width + m] if one == NO_RIM else [m, one, self.width + m, self.width + one]
         still = held.springs.overlap.copy()

@@ -10,7 +10,6 @@ alternates. The error falls with the square of the piece.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -99,7 +98,7 @@ def integrate_run_up(
     model, per_revolution = fastest.model, fastest.samples_per_revolution
     cuts = cut(law, per_revolution, pieces_per_revolution)
     n_stator, n = len(model.stators), law.n_revolution
-    angles = 2.0 * np.pi / per_revolution * cuts
+    angles = 2.0 * np.pi / per_revolution * cuts.astype(np.float64)
     times, _, _ = law.at_angle(angles)
     _, _, accelerations = law.at_angle(0.5 * (angles[1:] + angles[:-1]))
     begins, _, _ = law.at_angle(2.0 * np.pi * np.arange(n + 1))
@@ -107,26 +106,43 @@ def integrate_run_up(
     gathered = Turns(n, model)
     pieces, passing = Pieces(fastest), Passing(clearance, friction, check)
     reached: State | Place | None = initial if isinstance(initial, State) else None
-    n_step, reason, n_done, before = 0, "", n, 0.0
+    n_step, reason, n_done = 0, "", n
     earlier = new_accumulator(n_stator, model.n_place)
     sagging, begun = model, 0  # whose sag the samples from there on are about
-    for i, (first, last) in enumerate(itertools.pairwise(cuts)):
-        duration = times[i + 1] - times[i]
-        setup = pieces.setup((angles[i + 1] - angles[i]) / duration, accelerations[i], angles[i], duration)
+    durations, sizes = np.diff(times), np.diff(cuts)
+    before = np.concatenate([[0.0], durations[:-1]])
+    speeds: Floats = np.diff(angles) / durations
+    piece = 0
+    for setups in pieces.blocks(speeds, accelerations, angles[:-1], durations, sizes):
+        setup, size, block = setups[0], int(sizes[piece]), piece
         if setup.model is not sagging:
-            lift_samples(whole[:, begun:first], sagging)
-            sagging, begun = setup.model, first
-        if reached is None:
-            reached = start_of(initial, setup, clearance) if isinstance(initial, Initial) else initial
-        passed = passing.take(setup, last - first, reached, (earlier, before))
-        reached, earlier, before = passed.end, passed.accumulators[-1], duration
-        n_step += passed.n_step
-        whole[:, first:last] = passed.whole
-        for turn, accumulator in enumerate(passed.accumulators, first // per_revolution):
-            gathered.add(turn, accumulator)
-        if passed.reason:
-            n_done = first // per_revolution + len(passed.accumulators) - 1
-            reason = f"{passed.reason} in revolution {n_done + 1}"
+            lift_samples(whole[:, begun : cuts[piece]], sagging)
+            sagging, begun = setup.model, cuts[piece]
+        while not reason and (place := piece - block) < len(setups):
+            first = int(cuts[piece])
+            if reached is None:
+                reached = start_of(initial, setup, clearance) if isinstance(initial, Initial) else initial
+            stretch = passing.take_several(setups, place, size, reached, (earlier, before[piece]))
+            if stretch is not None:
+                part = min(size, per_revolution)
+                parts = np.arange(first, first + stretch.n_piece * size, part)
+                gathered.add_all(parts // per_revolution, stretch.sums)
+                whole[:, first : first + stretch.n_piece * size] = stretch.whole
+                reached, earlier = stretch.end, stretch.last
+                n_step += stretch.n_step
+                piece += stretch.n_piece
+                continue
+            passed = passing.take(setups[place], size, reached, (earlier, before[piece]))
+            reached, earlier = passed.end, passed.accumulators[-1]
+            n_step += passed.n_step
+            whole[:, first : first + size] = passed.whole
+            for i, accumulator in enumerate(passed.accumulators):
+                gathered.add(first // per_revolution + i, accumulator)
+            if passed.reason:
+                n_done = first // per_revolution + len(passed.accumulators) - 1
+                reason = f"{passed.reason} in revolution {n_done + 1}"
+            piece += 1
+        if reason:
             break
     lift_samples(whole[:, begun : n_done * per_revolution], sagging)
     gathered.sum_up()

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator
 
     Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
 
 _SUMMED = ("n_contact", "contact_time", "impulse", "stick_time")
 MOST_WAITING = 128  # revolutions that are added at once
@@ -52,11 +53,17 @@ class Turns:
         if not self._waiting:
             return
         turns, accumulators = zip(*self._waiting, strict=True)
-        self._waiting, together, at = [], self.together, list(turns)
-        new = {
-            name: np.array([getattr(accumulator, name) for accumulator in accumulators])
-            for name in (*_SUMMED, "friction_work", "least_slip", "peak_force", "peak_lateral")
-        }
+        self._waiting = []
+        names = (*_SUMMED, "friction_work", "least_slip", "peak_force", "peak_lateral")
+        new = {name: np.array([getattr(one, name) for one in accumulators]) for name in names}
+        self._add(list(turns), new)
+
+    def add_all(self, turns: Ints, sums: Accumulator) -> None:
+        """Add what parts of a record have gathered, (n,) revolutions and (n, ...) sums."""
+        self._add(turns, sums._asdict())
+
+    def _add(self, at: Any, new: dict[str, Any]) -> None:
+        together = self.together
         np.add.at(self.contact_time, at, new["contact_time"])
         np.add.at(self.friction_work, at, new["friction_work"])
         np.maximum.at(self.peak_force, at, new["peak_force"])

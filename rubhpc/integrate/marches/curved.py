@@ -36,6 +36,7 @@ class CurvedMarch(EventDrivenMarch):
     """A case from one contact mode to another, of which only flights have a closed form."""
 
     has_closed_form = False
+    has_piece_loop = False
     is_foreseeing = False  # contact modes are solved for each piece
 
     def __init__(

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-FORESEEN, MOST_FORESEEN = 4, 4  # pieces for which a set of contacts is found again at their beginning; sets
+FORESEEN, MOST_FORESEEN = 8, 4  # pieces for which a set of contacts is found again at their beginning; sets
 MOST_REFILLS = 8  # of tables that one case may meet; where it meets more, short steps cost less
 
 
@@ -44,6 +44,7 @@ class EventDrivenMarch(ModalMarch):
     """A case that goes from one contact mode to another; `NoClosedForm` leaves it to contact stepping."""
 
     has_closed_form = True  # of its closed contacts
+    has_piece_loop = True  # whether a kernel begins pieces of a changing speed
     is_foreseeing = True  # whether pieces begin with sets of contacts that those before have met
     take_change: ClassVar[Callable[..., int]] = staticmethod(change_contacts)  # kernel that takes an event
 
@@ -66,7 +67,7 @@ class EventDrivenMarch(ModalMarch):
         """Begin anew at another speed in the same reduced coordinates, from where a march has come."""
         self.n_step, self.sample, self._stride = 0, 0, ALL_SAMPLES
         self._take(setup)
-        self._motion = place.motion.copy()
+        self._motion[:] = place.motion
         if place.sag is not setup.model.sag and (moved := place.sag - setup.model.sag).any():
             n = self.bodies.stiffness.shape[0]
             self._motion[:n] += setup.reduced.project[:, : moved.size] @ moved
@@ -84,6 +85,42 @@ class EventDrivenMarch(ModalMarch):
         mask = self._first_mask(contact_force)
         self.find(mask)
         self._start(self._library.masks.index(mask))
+
+    def begin_tuned(self, setup: ModalSetup, place: Place) -> ModeLibrary | None:
+        """Begin where a kernel takes piece after piece; None where pieces are begun one by one."""
+        if not self.has_piece_loop:
+            return None
+        self.begin(setup, place)
+        return self._library
+
+    @property
+    def begun_motion(self) -> Floats:
+        """Reduced displacements, then velocities (2 n,), with which a piece begins."""
+        return self._motion
+
+    @property
+    def met(self) -> set[int]:
+        """Sets of closed contacts that this piece has met, or is expected to meet."""
+        return self._met
+
+    def advance_through(
+        self, kernel: Callable[..., int], pieces: Any, samples: Samples, sums: Accumulator
+    ) -> int:
+        """Advance through several pieces by a kernel that begins them (`kernels.piece_loop`)."""
+        return kernel(
+            self.tables,
+            self.bodies,
+            self.clock,
+            pieces,
+            self._bare_progress,
+            self._z,
+            self._z_next,
+            self._motion,
+            self._event_work,
+            self._recorder,
+            samples,
+            sums,
+        )
 
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs are closed, (q,)."""
@@ -174,8 +211,7 @@ class EventDrivenMarch(ModalMarch):
             if not self._library.add(mask):
                 raise NoClosedForm
         tables = self._library.tables()
-        met, masks = self._met, self._library.masks
-        unmet = [mode for mode, known in enumerate(masks) if known >= 0 and known not in met]
+        unmet = self._library.unmet(self._met)
         if unmet:
             shown = tables.mask.copy()
             shown[unmet] = -1

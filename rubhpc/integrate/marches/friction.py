@@ -51,6 +51,7 @@ class FrictionMarch(EventDrivenMarch):
     short steps; then the case goes on from event to event.
     """
 
+    has_piece_loop = False
     most_pairs = MOST_PAIRS
     take_change = staticmethod(change_states)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,7 +16,6 @@ from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
     FINISHED,
-    Clock,
     bare,
     begin_in,
     new_progress,
@@ -38,7 +36,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 _BEGUN = bare(new_progress(1))
-CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
 
 
 class Place(NamedTuple):
@@ -67,6 +64,7 @@ class ModalMarch(March):
         offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
         self._at_rest, self._coefficient = clearance + offsets, friction
         self._model: Model | None = None  # to which the clearances belong
+        self._ended: Floats | None = None  # motion where the last call has ended
         records = new_progress(1)
         self.progress: Progress = records[0]
         self._bare_records = bare(records)
@@ -77,23 +75,15 @@ class ModalMarch(March):
 
     def reached(self) -> Place:
         """Where the case stands, for another speed to go on from."""
-        return Place(self.motion().copy(), self._setup.model.sag, self._contact_force())
+        motion = self._ended if self._ended is not None else self.motion()
+        return Place(motion, self._setup.model.sag, self._contact_force())
 
     def _take(self, setup: ModalSetup) -> None:
         """Count time from 0, at the speed of a set-up."""
         if self._model is not setup.model:
             self._model, self._clearance = setup.model, self._at_rest - sag_at_stators(setup.model)[0]
-        self._setup = setup
-        turn = setup.interval * setup.samples_per_revolution
-        self.clock = Clock(
-            spin=setup.spin,
-            tick=setup.tick,
-            sample_level=setup.sample_level,
-            samples_per_revolution=setup.samples_per_revolution,
-            search_level=setup.level_within(setup.step),
-            contact_level=math.floor(math.log2(min(setup.interval, turn / CONTACT_STEPS) / setup.tick)),
-            n_sample=0,
-        )
+        self._setup, self._ended = setup, None
+        self.clock = setup.clock
         self.bodies = setup.bodies(self._coefficient, self._clearance)
         self._bare_records[:] = _BEGUN
         self._entered_with = self._clearance  # values of the coordinates that do not move
@@ -164,6 +154,7 @@ class ModalMarch(March):
         assert self._setup.is_measured
         sample_level = self.clock.sample_level
         restart_clock(self._bare_progress, self.sample << sample_level, self.sample, is_recorded=is_recorded)
+        self._ended = None
         self.clock = self.clock._replace(n_sample=samples.rotor.shape[1])
         while True:
             outcome = self._kernel(stop << sample_level, samples, accumulator, is_recorded)
@@ -184,7 +175,7 @@ class ModalMarch(March):
         setup = self._setup
         limit, motion = setup.displacement_limit, self._motion
         if not is_at_event:
-            motion = self.motion()
+            motion = self._ended = self.motion().copy()
             if is_within(
                 motion,
                 self.bodies.translations,

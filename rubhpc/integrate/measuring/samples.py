@@ -71,6 +71,12 @@ def following_accumulator(before: Accumulator, passed: float) -> Accumulator:
     )
 
 
+def stacked_accumulators(n: int, before: Accumulator) -> Accumulator:
+    """Sums of n parts of a record, (n, ...) each, at zero, with as many pairs and places as `before`."""
+    new = new_accumulator(before.impulse.size, before.peak_lateral.size)
+    return Accumulator._make(np.repeat(field[np.newaxis], n, axis=0) for field in new)
+
+
 def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
     """Sums at zero, but for the window of the mean force; a run-up takes one a revolution."""
     contact_time, impulse, stick_time, friction_work, peak_force, least_slip = np.zeros((6, n_stator))

@@ -121,6 +121,10 @@ class ModeLibrary:
         self.masks = [0]
         self._tabulate(self._opened)
 
+    def unmet(self, met: set[int]) -> list[int]:
+        """Places in the tables of contact modes that are not among those that a case has met."""
+        return [place for place, mask in enumerate(self.masks) if mask not in met]
+
     def tables(self) -> kernel.ModeTables:
         """All contact modes as arrays."""
         tables: kernel.ModeTables = self._tables.view()

@@ -59,6 +59,13 @@ class TableStack:
         self._n_filled += 1
         self._view = None
 
+    def repeat(self, count: int) -> None:
+        """Take in the tables of the last mode `count` times more."""
+        last = self._n_filled - 1
+        row = self._kind(*(field[last : last + 1].copy() for field in self._room)) if count else None
+        for _ in range(count):
+            self.add(row)
+
     def clear(self) -> None:
         """Give all room back to contact modes to come."""
         self._n_filled, self._view = 0, None
@@ -67,6 +74,11 @@ class TableStack:
     def n_byte(self) -> int:
         """Memory that is held."""
         return sum(field.nbytes for field in self._room)
+
+    @property
+    def n_byte_of_one(self) -> int:
+        """Memory that the tables of one mode take."""
+        return sum(field[0].nbytes for field in self._room)
 
     def view(self) -> Any:
         """The tables of all contact modes."""

@@ -9,7 +9,7 @@ from trial_rig import trial_rig
 from rubhpc.case_arguments import case_of, read_probes
 from rubhpc.integrate.changing_speed.held_matrices import held_range
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
-from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary, speeds_of
 from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction_mode
@@ -124,12 +124,16 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
     )
     for mask in masks:
         library.add(mask)
-    library.tune(170.0, 0.5 + 0.3j, base.tick)
-    for mask in masks:  # nothing is left of the speed between
-        library.add(mask)
     spin, tick = 231.0, 0.9 * base.tick
     factor = (spin**2 - 40.0j) * np.exp(0.7j)
-    library.tune(spin, factor, tick)
+    columns = [170.0, spin], [0.5 + 0.3j, factor], [base.tick, tick]
+    speeds = speeds_of(*columns, base.spin, base.sample_level)
+    library.tune(speeds, 0)
+    for mask in masks:  # the next speed is tuned with this one where there is room
+        library.add(mask)
+    assert library.n_room > 1 or q > 1
+    assert (library.tuned(set(masks)) >= 0).sum() == min(2, library.n_room) * len(masks)
+    library.tune(speeds, 1)
     assert not any(mask >= 0 for mask in library.masks)  # they wait until they are met
     force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
     reduced = replace(base.reduced, spin=spin, force=force)

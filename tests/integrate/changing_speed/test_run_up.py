@@ -193,6 +193,28 @@ def test_a_law_of_constant_speed_is_a_simulation():
     assert mean.friction_work.values == pytest.approx(steady.friction_work, rel=1e-4)
 
 
+@pytest.mark.parametrize("contact", [{}, {"law": "penalty", "stiffness": 1e6, "damping": 20.0}])
+@pytest.mark.parametrize("pieces", [None, 8])
+def test_pieces_together_are_pieces_one_by_one(monkeypatch, contact, pieces):
+    """From before the contact on, with pieces of a part of a revolution, of one and of several."""
+    case = {"clearance": "60 um", "friction": 0.2, "samples_per_revolution": 64, **contact}
+    law = {"speed_law": [(0.0, 200.0), (0.6, 240.0), (3.0, 250.0)], "pieces_per_revolution": pieces}
+    together = run_up(trial_rig(2), **law, **case)
+    taken = []
+
+    def refuse(*args):
+        taken.append(args)
+
+    monkeypatch.setattr("rubhpc.integrate.changing_speed.passing.take_stretch", refuse)
+    apart = run_up(trial_rig(2), **law, **case)
+    assert taken
+    assert np.count_nonzero(apart.contact_fraction) > 10
+    for name in apart:
+        values = np.abs(apart[name].values)
+        scale = math.pi if name.startswith("phase") else values[np.isfinite(values)].max()
+        assert together[name].values == pytest.approx(apart[name].values, abs=1e-9 * scale, nan_ok=True), name
+
+
 def test_bearings_have_their_coefficients_at_the_speed_reached():
     table = BearingTable(
         node=1, speed=(0.0, 400.0), stiffness=(2e4, 1.4e5), damping=(60.0, 10.0), interpolation="linear"

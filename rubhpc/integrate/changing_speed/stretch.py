@@ -1,0 +1,111 @@
+"""Several pieces of a run-up in one kernel call: those with the same matrices and number of samples."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.marches.modal import Place
+from rubhpc.integrate.measuring.samples import stacked_accumulators
+from rubhpc.kernels.accumulators import Accumulator, Samples
+from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, PAUSED
+from rubhpc.kernels.piece_loop import PIECE, TO_BEGIN, Pieces, advance_pieces
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+
+Floats = NDArray[np.float64]
+
+
+class Stretch(NamedTuple):
+    """What pieces have yielded, one after the other."""
+
+    n_piece: int
+    whole: Floats  # (n_row, n_sample), about the sag
+    sums: Accumulator  # (n_part, ...), of each revolution, or of each piece where that is less
+    last: Accumulator  # of the last part
+    n_step: int
+    end: Place
+
+
+def take_stretch(
+    march: EventDrivenMarch,
+    setups: Sequence[PieceSetup],
+    first: int,
+    samples: Samples,
+    begun: Place,
+    earlier: tuple[Accumulator, float],
+    check: Callable[[], None] | None,
+) -> Stretch | None:
+    """Take the pieces from `first` on, as far as nothing stands against it; None where that is nowhere.
+
+    Parameters
+    ----------
+    march : EventDrivenMarch
+        Whose case it is; it stands nowhere afterwards, until it begins anew.
+    setups : sequence of PieceSetup
+        Of pieces of the same matrices.
+    samples : Samples
+        Room for those of one piece.
+    begun, earlier
+        As in `Passing.take`.
+    """
+    library = march.begin_tuned(setups[first], begun)
+    if not isinstance(library, RetunedLibrary) or library.n_room == 1:
+        return None
+    speeds, n_piece = setups[first].speeds, len(setups)
+    n_row, n_sample = samples.whole.shape
+    part = min(n_sample, setups[first].samples_per_revolution)
+    n_part = n_sample // part
+    q, n = march.bodies.gap_jacobian.shape
+    lasts = n_sample * speeds.interval
+    pieces = Pieces(
+        spin=speeds.spin,
+        tick=speeds.tick,
+        search_level=np.array([setup.clock.search_level for setup in setups]),
+        force=np.array([setup.reduced.force for setup in setups]),
+        since=np.array([earlier[1] if i == first else lasts[i - 1] for i in range(n_piece)]),
+        table=library.tuned(march.met),
+        n_room=library.n_room,
+        n_sample=n_sample,
+        n_part_sample=part,
+        energy_limit=setups[first].energy_limit,
+        at=np.array([first, 0, TO_BEGIN]),
+        motion=np.zeros((n_piece + 1, 2 * n)),
+        pressing=np.zeros((n_piece + 1, q)),
+        n_step=np.zeros(n_piece, dtype=np.int64),
+        whole=np.empty((n_row, n_piece * n_sample)),
+    )
+    pieces.motion[first], pieces.pressing[first] = march.begun_motion, begun.contact_force
+    sums = stacked_accumulators(1 + n_piece * n_part, earlier[0])
+    for field, before in zip(sums, earlier[0], strict=True):
+        field[first * n_part] = before
+    while True:
+        outcome = march.advance_through(advance_pieces, pieces, samples, sums)
+        if outcome not in (MODE_WANTED, PAUSED):
+            break
+        if check is not None:
+            check()
+        if outcome == MODE_WANTED:
+            library.reach(int(pieces.at[PIECE]))
+            march.find_wanted()
+            pieces = pieces._replace(table=library.tuned(march.met))
+    end = int(pieces.at[PIECE])
+    assert end == n_piece or outcome != FINISHED
+    if end == first:
+        return None
+    parts = slice(1 + first * n_part, 1 + end * n_part)
+    return Stretch(
+        n_piece=end - first,
+        whole=pieces.whole[:, first * n_sample : end * n_sample],
+        sums=Accumulator._make(field[parts] for field in sums),
+        last=Accumulator._make(field[end * n_part] for field in sums),
+        n_step=int(pieces.n_step.sum()),
+        end=Place(pieces.motion[end].copy(), setups[first].model.sag, pieces.pressing[end].copy()),
+    )
