@@ -215,7 +215,7 @@ def _parse_pairs(value: object, limits: Limits, where: str) -> tuple[tuple[float
     if isinstance(value, list) and all(isinstance(pair, list) and len(pair) == 2 for pair in value):
         return tuple((parse_quantity(a, key_unit, where), parse_quantity(b, unit, where)) for a, b in value)
     if not isinstance(value, dict):
-        raise InputError(f"{where}: {brief(value)} is not a table; write {{ 31.56 = 0.09 }}")
+        raise InputError(f"{where}: {brief(value)} holds no pairs; write {limits['example']}")
     flat: dict[str, object] = {}
     for key, entry in value.items():
         inner = entry.items() if isinstance(entry, dict) else [(None, entry)]

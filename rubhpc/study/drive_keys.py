@@ -12,6 +12,7 @@ from rubhpc.input.fields import FieldError, check_fields, count, quantity, serie
 from rubhpc.study.axes import DRIVE_AXES, DRIVE_PREFIX
 from rubhpc.study.changing_speed import check_changing
 from rubhpc.study.drive_law import DriveLaw
+from rubhpc.study.speed_law import MOST_REVOLUTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,7 +43,7 @@ class DriveKeys:
     start: float | None = quantity(
         "rad/s", doc="Spin speed at the beginning.", example='"1200 rpm"', default=None, above=0
     )
-    revolutions: int = count(doc="Revolutions recorded.", example="200", at_most=100_000)
+    revolutions: int = count(doc="Revolutions recorded.", example="200", at_most=MOST_REVOLUTIONS)
     inertia: float | None = quantity(
         "kg*m^2",
         doc="Polar inertia of drive and coupling; by default a thousandth of the rotor's.",

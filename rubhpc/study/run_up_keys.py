@@ -53,8 +53,13 @@ class RunUpKeys:
                 raise FieldError(name, "conflicts with law; give start, stop and time, or law")
             if not self.law and getattr(self, name) is None and name != "time":
                 raise FieldError(name, "missing; give start, stop and time, or law")
-        if self.law or self.time is not None:
+        if self.law:
             self.law_at(None)
+        elif self.time is not None:
+            try:
+                self.law_at(None)
+            except FieldError as error:
+                raise FieldError("time", error.problem) from None
 
     @property
     def highest(self) -> float:
@@ -66,7 +71,7 @@ class RunUpKeys:
 
         Raises
         ------
-        InputError
+        FieldError
             No speed follows from it.
         """
         if self.law:
@@ -104,5 +109,5 @@ def check_run_up(
     for time in next(axis for axis in axes if axis.name == RUN_UP_TIME).tried:
         try:
             keys.law_at(time)
-        except InputError as error:
-            raise InputError(f"[grid] {RUN_UP_TIME}: {time:g} s: {error}") from None
+        except FieldError as error:
+            raise InputError(f"[grid] {RUN_UP_TIME}: {time:g} s: {error.problem}") from None

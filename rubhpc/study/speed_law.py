@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
+from rubhpc.input.fields import FieldError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 LAG = 0.003  # rad, by which the shaft may depart from its angle within a piece
 LONGEST_PIECE = 16  # revolutions
+MOST_REVOLUTIONS = 100_000  # of a case whose speed changes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +34,11 @@ class SpeedLaw:
         Rising.
     speed : tuple of float, rad/s
         As many, all positive.
+
+    Raises
+    ------
+    FieldError
+        No shaft follows it, or it turns less than once or more than 100 000 times.
     """
 
     time: tuple[float, ...]
@@ -39,15 +46,20 @@ class SpeedLaw:
 
     def __post_init__(self) -> None:
         if len(self.time) < 2 or len(self.time) != len(self.speed):
-            raise InputError("law: needs a time and a speed of two points or more; write [[t, speed], ...]")
+            raise FieldError("law", "needs a time and a speed of two points or more; write [[t, speed], ...]")
         if any(a >= b for a, b in itertools.pairwise(self.time)):
-            raise InputError("law: its times do not rise; put its points in the order of time")
+            raise FieldError("law", "its times do not rise; put its points in the order of time")
         if min(self.speed) <= 0.0:
             problem = f"{min(self.speed):g} rad/s is out of range"
-            raise InputError(f"law: {problem}; sampling is locked to the shaft, which turns above 0")
+            raise FieldError("law", f"{problem}; sampling is locked to the shaft, which turns above 0")
+        turns = float(self._angle[-1]) / (2.0 * math.pi)
+        if turns > MOST_REVOLUTIONS:
+            raise FieldError(
+                "law",
+                f"the shaft turns by {turns:.6g} revolutions, above {MOST_REVOLUTIONS}; give it less time",
+            )
         if self.n_revolution < 1:
-            turns = self._angle[-1] / (2 * math.pi)
-            raise InputError(f"law: the shaft turns by {turns:.3g} of a revolution; give it more time")
+            raise FieldError("law", f"the shaft turns by {turns:.3g} of a revolution; give it more time")
 
     @property
     def n_revolution(self) -> int:
