@@ -22,6 +22,7 @@ CASE = {"clearance": 1e-4, "friction": 0.2, "initial": Initial(from_=CONTACT_FRE
 STEADY = (1300, 1500, 1700, 1900, 2100, 2300)  # rpm, of the range of the run-up
 PENALTY, COULOMB = {"law": "penalty", "stiffness": 1e6}, {"friction_law": "coulomb"}
 LAWS = {"sliding": {}, "Coulomb": COULOMB, "penalty": PENALTY, "Coulomb, penalty": COULOMB | PENALTY}
+LAWS["updated normal"] = {"normal": "updated"}
 REPEATED = 4
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
 from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
 from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import Solved
+    from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
     from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
@@ -51,6 +53,7 @@ class HeldMatrices:
         sample_level: int,
     ) -> None:
         self.model, self.reduced = model, reduced
+        self.at_hand = reduced  # at the speed of the piece under way
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
         self.kept = KeptParts()
         self.bodies: dict[float, Reduced] = {}  # of each friction, but for what a piece changes
@@ -154,6 +157,16 @@ class PieceSetup(ModalSetup):
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, which serve until another piece asks for them."""
         return self.held.tuned(RetunedLibrary, self, friction, dict)
+
+    def curved_library(self, friction: float) -> CurvedLibrary:
+        """The same with what curved gaps need."""
+        held = self.held
+
+        def at_piece() -> dict[str, Any]:
+            return {"at_piece": lambda: held.at_hand}
+
+        held.at_hand = self.reduced
+        return held.tuned(RetunedCurvedLibrary, self, friction, at_piece)
 
     def penalty_library(self, friction: float) -> ModeLibrary:
         """The same under a penalty."""

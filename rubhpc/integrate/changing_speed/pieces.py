@@ -135,8 +135,7 @@ class Pieces:
                     clock=Clock(spin, resolution, *steady[2:4], search, *steady[5:]),
                     speeds=speeds,
                     place=place,
-                    _curved_libraries={},  # which are of this speed alone
-                    _open_tables={},
+                    _open_tables={},  # which are of this speed alone
                 )
             )
         if angle[0] == 0.0:

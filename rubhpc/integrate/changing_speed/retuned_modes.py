@@ -46,6 +46,8 @@ class RetunedLibrary(ModeLibrary):
         As in `ModeLibrary`; levels stay, the tick changes with the speed.
     """
 
+    at_once = AT_ONCE
+
     def __init__(
         self,
         reduced: ReducedModel,
@@ -133,7 +135,8 @@ class RetunedLibrary(ModeLibrary):
         """Make room for a mode that is met for the first time."""
         place = len(self.masks)
         self._tabulate(mode)
-        self.n_room = self.n_room or (AT_ONCE if AT_ONCE * self._tables.n_byte_of_one <= MOST_BYTES else 1)
+        is_small = self.at_once * self._tables.n_byte_of_one <= MOST_BYTES
+        self.n_room = self.n_room or (self.at_once if is_small else 1)
         self._place[mode.mask] = place
         self._held[place] = self._hold(mode, place)
         self._tables.repeat(self.n_room - 1)

@@ -37,7 +37,7 @@ class CurvedMarch(EventDrivenMarch):
 
     has_closed_form = False
     has_piece_loop = False
-    is_foreseeing = False  # contact modes are solved for each piece
+    is_foreseeing = False  # their tables take long to make
 
     def __init__(
         self,

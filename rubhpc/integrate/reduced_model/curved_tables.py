@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.kernels._jit import plain
@@ -22,18 +23,17 @@ from rubhpc.kernels.curved_contact import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from rubhpc.fem.model import Model, StatorModel
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
-    Floats = NDArray[np.float64]
-    Complexes = NDArray[np.complex128]
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 UNBENT = 1e-8  # bending displacement over the largest of a stator, below which it is none
 LONGEST_STEP = 1e-3  # s, of closed contacts
-SERIES, N_TERM = 3.0, 32  # |x| below which the phi functions are series, which cancel less there; their terms
+SERIES, N_TERM = 3.0, 26  # |x| below which the phi functions are series, which cancel less there; their terms
+_SERIES = [1.0 / math.factorial(N_NODE + j) for j in range(N_TERM)]  # of the last phi function
 UNDAMPED = 1e-14  # eigenvalue of the damping over the largest, below which it is none
 
 
@@ -130,16 +130,39 @@ def tabulate_curved(
     n_level : int
         As in `mode_library.ModeLibrary`.
     """
-    n, q, end = reduced.stiffness.shape[0], len(row), mode.exponent.size
-    closed = [i for i in range(q) if mode.mask >> i & 1]
+    n, end = reduced.stiffness.shape[0], mode.exponent.size
     exponent = np.zeros(width, dtype=complex)
     exponent[:end] = mode.exponent
     motion = np.zeros((2 * n, width), dtype=complex)
     motion[:, :end] = mode.motion
-    force = np.zeros(width, dtype=complex)
-    force[mode.n_eigenmode] = 1.0
-    phasor = reduced.force[0] - 1j * reduced.force[1]
-    free = -reduced.stiffness @ motion[:n] - reduced.damping @ motion[n:] + np.outer(phasor, force)
+    n_level = min(n_level, max(1, int(np.log2(LONGEST_STEP / tick))))
+    still = still_parts(mode, reduced, row, directions, width)
+    table = tuned_tables(still, reduced, exponent, motion, np.ldexp(tick, np.arange(n_level)))
+    fields: list[Any] = [np.array(field[None], order="C") for field in table]
+    return CurvedTables(*fields)
+
+
+class StillParts(NamedTuple):
+    """What the spin speed leaves alone of a mode's tables, but for terms of the unbalance."""
+
+    row: Floats  # (q, 3 + b, n), `motion_rows`
+    first: int  # coordinate of the response to the unbalance
+    is_lone: bool  # whether the only pair is closed
+    shift: Floats  # (q, n), these as in `CurvedTables`
+    moved: Floats
+    accel: Floats
+    accel_rate: Floats
+    load: Complexes  # (q, 4 + b, m)
+    size: Floats  # (r,), eigenvalues of the damping
+    dampers: Floats  # (r, n), their shapes, times the roots of their sizes
+
+
+def still_parts(
+    mode: ContactMode, reduced: ReducedModel, row: Floats, directions: tuple[Floats, Floats], width: int
+) -> StillParts:
+    """Parts of the tables of a mode that belong to its matrices; arguments as of `tabulate_curved`."""
+    n, q = reduced.stiffness.shape[0], len(row)
+    closed = [i for i in range(q) if mode.mask >> i & 1]
     rate, along = directions[0][closed], directions[1][closed].T
     shift = np.zeros((q, n))
     if closed:
@@ -147,49 +170,75 @@ def tabulate_curved(
     elastic, damped = reduced.stiffness @ shift.T, reduced.damping @ shift.T
     d = row.shape[1] - 1
     flat = row[:, :d]
-    read = np.concatenate([flat @ motion[:n], row @ motion[n:], flat @ free], axis=1)
     project = np.eye(n) - shift[closed].T @ rate
     load = np.zeros((q, d + 2, width), dtype=complex)
     entry = mode.enter[:, n:] @ project
     for i in closed:
         columns = [elastic[:, i], damped[:, i], *flat[i]]
         load[i, :, : mode.n_eigenmode] = (entry @ np.array(columns).T).T
-    n_level = min(n_level, max(1, int(np.log2(LONGEST_STEP / tick))))
-    weight = _weights(exponent, np.ldexp(tick, np.arange(n_level)))
-    growth = np.exp(np.maximum(exponent.real, 0.0) * tick * 2.0 ** (n_level - 1))
-    inverse = np.divide(1.0, exponent, out=np.zeros_like(exponent), where=exponent != 0.0)
-    steps = tick * 2.0 ** np.arange(n_level)
-    node = np.exp(np.multiply.outer(np.multiply.outer(steps, NODES[1:]), exponent))
-    reach = np.zeros((n_level, N_NODE - 1, N_NODE, d + 2, read.shape[1]))
-    if q == 1 and closed:
-        reach = np.einsum("rm,lakm,jm->lakjr", read[0], weight, load[0], optimize=True).real
     size, shape = _losses(reduced)
-    forces = np.concatenate([np.sqrt(np.abs(size)) * shape, reduced.force.T], axis=1).T  # (r + 2, n)
-    drain = forces @ motion[n:]
-    table = CurvedTables(
-        read_re=read.real,
-        read_im=read.imag,
-        bound=np.abs(flat @ motion[:n]) * np.abs(exponent) ** 2 * growth,
+    return StillParts(
+        row=row,
+        first=mode.n_eigenmode,
+        is_lone=q == 1 and bool(closed),
         shift=shift,
         moved=row @ shift.T,
         accel=flat @ elastic,
         accel_rate=flat @ damped,
-        load_re=load.real,
-        load_im=load.imag,
+        load=load,
+        size=size,
+        dampers=(np.sqrt(np.abs(size)) * shape).T,
+    )
+
+
+def tuned_tables(
+    still: StillParts, reduced: ReducedModel, exponent: Complexes, motion: Complexes, steps: Floats
+) -> CurvedTables:
+    """Tables of a mode at the speed and the unbalance force of `reduced`.
+
+    Parameters
+    ----------
+    exponent, motion : (m,), (2 n, m)
+        Of its coordinates, that of the response included.
+    steps : (n_level,), s
+    """
+    row, n = still.row, reduced.stiffness.shape[0]
+    d = row.shape[1] - 1
+    flat = row[:, :d]
+    free = -reduced.stiffness @ motion[:n] - reduced.damping @ motion[n:]
+    free[:, still.first] += reduced.force[0] - 1j * reduced.force[1]
+    read = np.concatenate([flat @ motion[:n], row @ motion[n:], flat @ free], axis=1)
+    weight = _weights(exponent, steps)
+    growth = np.exp(np.maximum(exponent.real, 0.0) * steps[-1])
+    inverse = np.divide(1.0, exponent, out=np.zeros_like(exponent), where=exponent != 0.0)
+    node = np.exp(np.multiply.outer(np.multiply.outer(steps, NODES[1:]), exponent))
+    reach = np.zeros((steps.size, N_NODE - 1, N_NODE, d + 2, read.shape[1]))
+    if still.is_lone:
+        reach = np.einsum("rm,lakm,jm->lakjr", read[0], weight, still.load[0], optimize=True).real
+    forces = np.concatenate([still.dampers, reduced.force])  # (r + 2, n)
+    drain = forces @ motion[n:]
+    return CurvedTables(
+        read_re=read.real,
+        read_im=read.imag,
+        bound=np.abs(flat @ motion[:n]) * np.abs(exponent) ** 2 * growth,
+        shift=still.shift,
+        moved=still.moved,
+        accel=still.accel,
+        accel_rate=still.accel_rate,
+        load_re=still.load.real,
+        load_im=still.load.imag,
         weight_re=weight.real,
         weight_im=weight.imag,
         node_re=node.real,
         node_im=node.imag,
         lone=np.stack([read[0].real.T, -read[0].imag.T]),
-        reach=reach.reshape(n_level, N_NODE - 1, -1, read.shape[1]),
+        reach=reach.reshape(steps.size, N_NODE - 1, -1, read.shape[1]),
         inverse_re=inverse.real,
         inverse_im=inverse.imag,
         drain=np.stack([drain.real.T, -drain.imag.T]),
-        sign=np.sign(size),
-        drain_moved=forces @ shift.T,
+        sign=np.sign(still.size),
+        drain_moved=forces @ still.shift.T,
     )
-    fields: list[Any] = [np.array(field[None], order="C") for field in table]
-    return CurvedTables(*fields)
 
 
 def _outputs(reduced: ReducedModel) -> Floats:
@@ -219,29 +268,31 @@ def _weights(exponent: Complexes, steps: Floats) -> Complexes:
     That of a coordinate with the exponent l to the load (s / h)^k is `h c^(k+1) k! phi_(k+1)(c l h)` at the
     time c h.
     """
-    weights = np.zeros((steps.size, N_NODE - 1, N_NODE, exponent.size), dtype=complex)
-    for a, share in enumerate(NODES[1:]):
-        # All steps at once: for one of them NumPy takes longer to begin than to compute.
-        phi = phi_functions(np.outer(share * steps, exponent).ravel())
-        for power in range(N_NODE):
-            scale = steps * share ** (power + 1) * math.factorial(power)
-            term = scale[:, np.newaxis] * phi[power].reshape(steps.size, exponent.size)
-            weights[:, a] += LAGRANGE[:, power, np.newaxis] * term[:, np.newaxis]
+    reached = np.multiply.outer(steps, NODES[1:])
+    # All at once: of one step NumPy takes longer to begin than to compute.
+    phi = phi_functions(np.multiply.outer(reached, exponent).ravel())
+    scale = [reached * NODES[1:] ** power * math.factorial(power) for power in range(N_NODE)]
+    term = np.stack(scale)[..., np.newaxis] * phi.reshape(N_NODE, *reached.shape, exponent.size)
+    weights: Complexes = LAGRANGE @ np.moveaxis(term, 0, 2)
     return weights
 
 
 def phi_functions(x: Complexes) -> Complexes:
-    """phi_1 to phi_5 (5, m): `phi_k = (phi_(k-1) - 1 / (k - 1)!) / x`, phi_0 the exponential."""
+    """phi_1 to phi_5 (5, m): `phi_k = (phi_(k-1) - 1 / (k - 1)!) / x`, phi_0 the exponential.
+
+    Of small x the last one is a series, and `phi_(k-1) = x phi_k + 1 / (k - 1)!` gives those before.
+    """
     phi = np.zeros((N_NODE, x.size), dtype=complex)
     is_small = np.abs(x) < SERIES
     small, large = x[is_small], x[~is_small]
-    for k in range(N_NODE):
-        term = np.full(small.shape, 1.0 / math.factorial(k + 1), dtype=complex)
-        total = term.copy()
-        for j in range(1, N_TERM):
-            term = term * small / (k + 1 + j)
-            total += term
-        phi[k, is_small] = total
+    total = np.full(small.shape, _SERIES[-1], dtype=complex)
+    for coefficient in _SERIES[-2::-1]:
+        total *= small
+        total += coefficient
+    phi[-1, is_small] = total
+    for k in range(N_NODE - 1, 0, -1):
+        total = small * total + 1.0 / math.factorial(k)
+        phi[k - 1, is_small] = total
     before = np.exp(large)
     for k in range(N_NODE):
         before = (before - 1.0 / math.factorial(k)) / large

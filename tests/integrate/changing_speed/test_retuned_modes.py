@@ -8,10 +8,12 @@ from trial_rig import trial_rig
 
 from rubhpc.case_arguments import case_of, read_probes
 from rubhpc.integrate.changing_speed.held_matrices import held_range
+from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
 from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary, speeds_of
 from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
+from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_tables import tabulate
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
@@ -146,6 +148,37 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
             values, anew = getattr(found, name)[place], getattr(expected, name)[0]
             largest = np.abs(anew).max(initial=0.0)
             assert np.abs(values - anew).max(initial=0.0) <= 1e-9 * largest, name
+
+
+@pytest.mark.parametrize("q", [1, 3])
+def test_tables_of_curved_gaps_are_those_at_that_speed(q):
+    base = setup(q)
+    phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
+    spin, tick = 231.0, 0.9 * base.tick
+    factor = (spin**2 - 40.0j) * np.exp(0.7j)
+    force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
+    reduced = replace(base.reduced, spin=spin, force=force)
+    levels = {"known": {}, "sample_level": base.sample_level, "n_level": base._n_level}
+    case = base.model, 0.2
+    library = RetunedCurvedLibrary(
+        base.reduced, *case, phasor=phasor, at_piece=lambda: reduced, tick=base.tick, **levels
+    )
+    for mask in Sliding.masks[q]:
+        library.add(mask)
+    library.tune(speeds_of([spin], [factor], [tick], base.spin, base.sample_level), 0)
+    opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
+    anew = CurvedLibrary(reduced, *case, opened=opened, tick=tick, **levels)
+    for mask in Sliding.masks[q]:
+        library.add(mask)
+        if mask not in anew.masks:
+            anew.add(mask)
+        found, expected = library.curved_tables(), anew.curved_tables()
+        place, there = library.masks.index(mask), anew.masks.index(mask)
+        for name in expected._fields:
+            values, table = getattr(found, name)[place], getattr(expected, name)[there]
+            common = tuple(map(slice, np.minimum(values.shape, table.shape)))  # levels are those of the tick
+            largest = np.abs(table).max(initial=0.0)
+            assert np.abs(values[common] - table[common]).max(initial=0.0) <= 1e-9 * largest, name
 
 
 def test_matrices_are_held_while_the_response_errs_little():
