@@ -30,7 +30,7 @@ COULOMB = 1  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 2  # method = "modal" with gaps that are curved
 MANY_STATORS = 1  # more than five, whose sets of closed contacts or states may be more than 256
-BRANCHES = 1  # [branch]: grazing beside a fold
+BRANCHES = 2  # [branch]: grazing beside a fold, and at a sharp corner
 ALONG_SPEED = 1  # branches along a speed
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.

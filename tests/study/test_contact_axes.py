@@ -79,7 +79,7 @@ def test_a_version_of_some_laws_is_that_of_the_studies_that_take_them(tmp_path, 
     assert identity.physics_of(study_of(tmp_path, axes, contact)) == plain + further
 
 
-@pytest.mark.parametrize(("along", "further"), [("speed_ratio", 2), ("friction", 1)])
+@pytest.mark.parametrize(("along", "further"), [("speed_ratio", 3), ("friction", 2)])
 def test_branches_have_a_version_and_those_along_a_speed_one_more(tmp_path, along, further):
     plain = study_of(tmp_path)
     followed = replace(plain, branch=BranchKeys(along=along))

@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from trial_rig import trial_rig
 
 import rubhpc
 from rubhpc import LumpedStator, read_rig
 from rubhpc.rig.reading import with_keys
+from rubhpc.schema import REGIME
 
 PAPER = read_rig("mokhtar2017")
 OVERHUNG = with_keys(PAPER, {"rotor.bearing.2.node": 5})
@@ -121,3 +123,75 @@ def test_isolated_motion_of_period_three_ends_at_two_folds():
     assert graze.least_gap[0] < 1e-7 * 1e-4
     assert check_fold(PAPER, branch, 0, 4000, **case) < 0.0
     assert check_fold(PAPER, branch, 2, 4000, **case) > 0.0
+
+
+@pytest.mark.long
+def test_second_frequency_appears_where_an_overhung_disc_has_it():
+    """As motions solved for one by one; simulations draw near before it and leave behind it."""
+    case = {"clearance_ratio": 0.5, "friction": 0.2}
+    branch = followed(HANGING, 1.25, 1.22, largest_step=0.004, **case)
+    name, value = branch.events()[0]
+    assert name == "neimark_sacker"
+    state = branch.points[branch.values.tolist().index(value)].state
+
+    def solved(ratio):
+        return rubhpc.periodic(HANGING, speed_ratio=ratio, initial=state, keep="section", **case)
+
+    def excess(ratio):
+        return float(abs(solved(ratio).multipliers[0]) - 1.0)
+
+    assert brentq(excess, value - 1e-4, value + 1e-4, xtol=1e-12) == pytest.approx(value, abs=1e-8 * 0.03)
+    away = []
+    for change in (1e-3, -1e-3):
+        motion = solved(value * (1.0 + change)).record.sections["section_vertical"][0]
+        record = settled(HANGING, value * (1.0 + change), state, 0, 3000, **case)
+        away.append(np.abs(record.sections["section_vertical"] - motion) / abs(motion))
+    assert away[0][-50:].max() < 1e-4 * away[0][:50].max()
+    assert away[1][-50:].max() > 5 * away[1][:50].max()  # to a torus of 2.5 % of the motion
+    assert REGIME[record.regime] == "quasi_periodic"
+
+
+def test_unstable_motion_is_left_at_the_rate_of_its_largest_multiplier():
+    """From its own state, solved to 1e-10: a simulation spirals out by what the multipliers say."""
+    case = {"clearance_ratio": 0.5, "friction": 0.2}
+    stable = rubhpc.periodic(HANGING, speed_ratio=1.24, transient=300, keep=(), **case)
+    state = stable.state
+    for ratio in (1.235, 1.23, 1.225, 1.22):
+        motion = rubhpc.periodic(HANGING, speed_ratio=ratio, initial=state, keep=(), **case)
+        state = motion.state
+    assert not motion.is_stable
+    record = settled(HANGING, 1.22, state, 0, 220, **case)
+    section = record.sections["section_vertical"] + 1j * record.sections["section_horizontal"]
+    away = np.abs(section - section[0])
+    span = np.flatnonzero((away > 1e-11) & (away < 1e-6))
+    rate = np.polyfit(np.arange(span[0], span[-1]), np.log(away[span[0] : span[-1]]), 1)[0]
+    assert rate == pytest.approx(np.log(abs(motion.multipliers[0])), rel=0.02)
+
+
+@pytest.mark.long
+def test_overhung_disc_touches_once_more_behind_a_grazing():
+    case = {"clearance_ratio": 0.5, "friction": 0.2}
+    branch = followed(HANGING, 0.93, 0.99, largest_step=0.01, **case)
+    assert [name for name, _ in branch.events()] == ["grazing", "grazing"]
+    for (_, value), sense in zip(branch.events(), (1.0, -1.0), strict=True):
+        state = branch.points[branch.values.tolist().index(value)].state
+        contacts = [
+            settled(HANGING, value * (1.0 + sense * d), state, 1000, **case).contacts_per_revolution.sum()
+            for d in (-1e-6, 1e-6)
+        ]
+        assert contacts == [0.0, 1.0]
+
+
+@pytest.mark.long
+def test_sweeps_find_a_closed_branch_on_another_rig():
+    """A motion of period 3 of a rotor with one stator, which no branch of period 1 leads to."""
+    rig, case = trial_rig(1), {"clearance_ratio": 0.7, "friction": 0.3}
+    found = rubhpc.branch(
+        rig, along="speed_ratio", start=2.2, stop=1.8, sweeps=4, transient=200, doublings=0, most_points=80,
+        keep="section", **case,
+    )  # fmt: skip
+    (branch,) = (one for one in found if one.period == 3)
+    assert branch.end == "the branch is closed"
+    folds = [k for k, (name, _) in enumerate(one for one in branch.events() if one[0] == "fold")]
+    assert check_fold(rig, branch, folds[0], 4000, **case) < 0.0
+    assert check_fold(rig, branch, folds[-1], 4000, **case) > 0.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.branches.events import Event, half_change, halving
-from rubhpc.integrate.branches.grazing import grazing, passed
+from rubhpc.integrate.branches.grazing import grazing, grazing_beside, passed, touches
 from rubhpc.integrate.branches.point import away_from_events
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.shooting import SAME, NotConverged
@@ -113,12 +113,17 @@ def follow(
                         break
                 length *= 0.5
             if found is None:
-                point = grazing(branching, history, predict)
+                point, follower = grazing(branching, history, predict), None
+                if point is not None:
+                    follower = _beyond(branching, history[-2], base, point)
+                elif len(history) > 1 and (other := _beyond(branching, history[-2], base, base)):
+                    corner_there = grazing_beside(branching, base, other)  # behind a corner that is too sharp
+                    if corner_there and _is_close(branching, base, corner_there.point):
+                        point, follower = corner_there.point, other
                 if point is None:
                     end = "no motion is found that goes on from here"
                     break
                 add(Event.GRAZING, point)
-                follower = _beyond(branching, history[-2], base, point)
                 if follower is None:
                     end = "a contact grazes"
                     break
@@ -200,10 +205,15 @@ def _beyond(branching: Branching, before: Point, base: Point, grazing_point: Poi
                 found = branching.correct(grazing_point, guess, along, most=12)
             except NotConverged:
                 continue
-            is_other = len(found.sequence) != len(base.sequence)
+            is_other = touches(found) != touches(base)
             if is_other and np.linalg.norm(branching.difference(grazing_point, found)) < 1.0:
                 return found
     return None
+
+
+def _is_close(branching: Branching, base: Point, point: Point) -> bool:
+    """Whether a motion of other contacts is as near as a last short step."""
+    return bool(np.linalg.norm(branching.difference(base, point)) < SHORTEST)
 
 
 def _is_back(found: Point, base: Point) -> bool:

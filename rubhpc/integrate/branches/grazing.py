@@ -28,7 +28,7 @@ BESIDE = (
     1e-2,
     0.1,
 )  # shares of a step from a grazing, at which the motion with more contacts is sought
-MISSED = 1e-4  # of a step, short of which the least gap must have been followed to where it vanishes
+MISSED = 1e-4  # of a step, or of a gap, short of which it must have been followed to where it vanishes
 MEETING, NEIGHBOURS = 0.5, 2.0  # of a step, within which the motions on both sides of a grazing lie
 WITHIN_REACH = 3.0  # steps, in which a distance to grazing would vanish
 
@@ -174,7 +174,7 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
         else:
             share = root + APPROACH * (near - root)
         if abs(near - far) < tolerance:
-            is_missed = MISSED < missing < np.inf
+            is_missed = missing > MISSED and _is_apart(free[-1][1], b if is_first_free else a)
             return None if is_missed else Grazing(free[-1][1], impacting(near))
         try:
             ahead = _ahead(branching, free, change)
@@ -228,6 +228,13 @@ def grazing_beside(branching: Branching, a: Point, b: Point) -> Grazing | None:
         if len(pair) < 2 or abs(pair[-1][0] - pair[-2][0]) * branching.step > branching.family.span:
             return None
     return Grazing(pair[-1][1], other)
+
+
+def _is_apart(free: Point, other: Point) -> bool:
+    """Whether a motion is seen to be apart from the contacts that another one has more."""
+    more = list((touches(other) - touches(free)).keys())
+    gap, force = distances(free)[: 2 * free.case.q].reshape(2, -1)[:, more]
+    return bool(np.isfinite(np.concatenate([gap, force])).any() and not np.any(gap <= MISSED))
 
 
 def _ahead(branching: Branching, free: list[tuple[float, Point]], change: Floats) -> Floats:
