@@ -30,6 +30,7 @@ from postproc.report.packing import as_text
 from postproc.report.run_ups import run_up_facts
 from postproc.report.side_view import description, side_view
 from postproc.store.axes import source
+from postproc.store.branch_points import check_points
 from postproc.store.rig_of_case import natural_frequencies, rig_axes, rig_of, stator_places
 from postproc.store.run_ups import is_run_up, measures_alone
 from rubhpc.errors import RubError
@@ -54,6 +55,7 @@ class Page:
     """
 
     def __init__(self, store: xr.Dataset) -> None:
+        check_points(store)
         self._whole = store
         self.is_run_up = is_run_up(store)
         if self.is_run_up:  # the maps show measures, pictures the revolutions

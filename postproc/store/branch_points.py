@@ -33,6 +33,13 @@ def other_axes(points: xr.Dataset) -> list[str]:
     ]
 
 
+def check_points(store: xr.Dataset) -> None:
+    """Refuse a store of branches without a point."""
+    if store.sizes.get("point") == 0:
+        problem = "holds no point of a branch"
+        raise InputError(f"{source(store)}: {problem}; rubhpc status says whether any was found or computed")
+
+
 def one_case(points: xr.Dataset) -> tuple[xr.Dataset, str, list[str]]:
     """Return the points at the first value of every axis, the axis followed, and a line on each such axis.
 
@@ -43,8 +50,7 @@ def one_case(points: xr.Dataset) -> tuple[xr.Dataset, str, list[str]]:
     InputError
         There is no point.
     """
-    if not points.sizes["point"]:
-        raise InputError(f"{source(points)}: holds no point of a branch; run or resume its study")
+    check_points(points)
     notes = []
     for name in other_axes(points):
         values = np.unique(points[name].values)

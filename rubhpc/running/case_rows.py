@@ -51,8 +51,8 @@ def put_points(record: BranchRecord | RunUpRecord, data: Arrays, i_case: int) ->
     for name, values in data.items():
         values[i_case] = np.nan
         found = record.arrays.get(name, np.zeros(0))
-        place = tuple(slice(n) for n in found.shape)
-        values[i_case][place] = found
+        if found.size:  # a case without a point has no shape either
+            values[i_case][tuple(slice(n) for n in found.shape)] = found
 
 
 def packed_measures(record: Record | BranchRecord | RunUpRecord, kind: np.dtype[np.void]) -> NDArray[np.void]:

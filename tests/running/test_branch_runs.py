@@ -15,6 +15,7 @@ from postproc.report.page import Page
 from postproc.store.live import open_live
 from postproc.store.open import open_store
 from rubhpc.errors import InputError
+from rubhpc.integrate.branches import case
 from rubhpc.running.progress import Progress
 from rubhpc.study.study import read_study
 
@@ -195,6 +196,17 @@ def test_multipliers_beyond_the_plane_are_at_its_edge_in_their_direction():
 
 def test_store_without_points_is_refused(store):
     empty = rubhpc.open(store / "branches.zarr").isel(point=slice(0))
-    for figure in (bifurcation, multipliers):
+    for figure in (bifurcation, multipliers, Page):
         with pytest.raises(InputError, match="holds no point of a branch"):
             figure(empty)
+
+
+def test_case_without_a_motion_is_done_with_a_remark(store, tmp_path, monkeypatch):
+    """Its arrays hold NaN, those with a value a stator or a section too."""
+    monkeypatch.setattr(case, "starts", lambda *_: iter(()))
+    (tmp_path / "study.toml").write_text(STUDY)
+    rubhpc.run(read_study(tmp_path / "study.toml", tmp_path / "none.zarr"), quiet=True)
+    stored = xr.open_zarr(tmp_path / "none.zarr")
+    assert np.isnan(stored.point_multiplier_real).all()
+    assert np.isnan(stored.point_section_vertical).all()
+    assert rubhpc.open(tmp_path / "none.zarr").sizes["point"] == 0
