@@ -2,7 +2,7 @@
 
 A bracket of whole ticks is narrowed by Newton's method on the closed-form switch functions, from a parabola
 through what is known at both ends, and by bisection where that fails. Coordinates at a tick are reached by
-powers of two of ticks, the longest first, so that they are the same whatever was tried before.
+powers of two of ticks, the shortest first, so that they are the same whatever was tried before.
 """
 
 from __future__ import annotations
@@ -12,21 +12,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
-from rubhpc.kernels.contact_modes import ModeTables, bounded, dot
+from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels.contact_modes import ModeTables, dot, floor_log2, positive_interval
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
+from rubhpc.kernels.friction_coordinates import used_width
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
 
 if TYPE_CHECKING:
     from rubhpc.kernels.case_progress import Clock
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 NEWTON_TRIES = 6  # places tried before the bracket is halved instead
 
 
 @jit_inline_sum
-def change_free_interval(
+def free_until(
     states: int,
     mode: int,
     switch_re: Floats,
@@ -36,25 +38,47 @@ def change_free_interval(
     bound: Floats,
     z_re: Floats,
     z_im: Floats,
-) -> float:
-    """Time, s, before which no switch function (2 q, m) of a set of states can reach zero."""
-    proved = np.inf
-    for j in range(switch_re.shape[1]):
-        if j % 2 == 1 and state_of(states, j // 2) == OPEN:
-            continue
-        s = dot(switch_re[mode, j], switch_im[mode, j], z_re, z_im)
-        if not s > 0.0:
-            return 0.0
-        rate = dot(rate_re[mode, j], rate_im[mode, j], z_re, z_im)
-        bend = bounded(bound[mode, j], z_re, z_im)
-        # s + s' t - b t^2 / 2 > 0, asked of the interval that the others leave before its end is computed
-        if proved < np.inf and s + proved * (rate - 0.5 * bend * proved) > 0.0:
-            continue
-        if bend > 0.0:
-            proved = min(proved, (rate + np.sqrt(rate * rate + 2.0 * bend * s)) / bend)
-        elif rate < 0.0:
-            proved = min(proved, -s / rate)
-    return proved
+    now: int,
+    tick: float,
+    longest: int,
+    known: Ints,
+) -> int:
+    """Tick before which no switch function (2 q, m) of a set of states can reach zero.
+
+    Parameters
+    ----------
+    now : int
+        Tick at which the coordinates stand; each lasts `tick` (s).
+    longest : int
+        Ticks beyond which none is asked for.
+    known : (2 q,)
+        The same for each of them, as it was proved last: those alone are asked anew that come before the
+        others. In place.
+    """
+    first = -1
+    for j in range(known.size):
+        is_watched = j % 2 == 0 or state_of(states, j // 2) != OPEN
+        if is_watched and (first < 0 or known[j] < known[first]):
+            first = j
+    reached = now + longest
+    for turn in range(known.size):  # the one that comes first, then the others
+        j = (first + turn) % known.size
+        if known[j] < reached and (j % 2 == 0 or state_of(states, j // 2) != OPEN):
+            re, im, turning_re, turning_im = (
+                switch_re[mode, j],
+                switch_im[mode, j],
+                rate_re[mode, j],
+                rate_im[mode, j],
+            )
+            weight, value, rate, bend = bound[mode, j], 0.0, 0.0, 0.0
+            for k in range(z_re.size):  # in one loop: three would wait for their sums three times
+                a, b = z_re[k], z_im[k]
+                value += re[k] * a - im[k] * b
+                rate += turning_re[k] * a - turning_im[k] * b
+                bend += weight[k] * (abs(a) + abs(b))
+            known[j] = now + int(min(positive_interval(value, rate, bend) / tick, 1.0 * longest))
+            reached = min(reached, known[j])
+    return reached
 
 
 @jit_inline_sum
@@ -72,77 +96,79 @@ def find_change(
     return crossing
 
 
-@jit_lean_sum
+@jit_inline_sum
 def changes_at(tables: ModeTables, mode: int, z: Floats) -> int:
     """As `find_change`, for coordinates (2, m)."""
-    return int(find_change(tables.mask[mode], mode, tables.switch_re, tables.switch_im, z[0], z[1]))
+    used = used_width(tables, mode)
+    z_re, z_im = z[0, :used], z[1, :used]
+    return int(find_change(tables.mask[mode], mode, tables.switch_re, tables.switch_im, z_re, z_im))
 
 
 @jit_inline_sum
-def turn(re: Floats, im: Floats, z: Floats) -> None:
-    """Take modal coordinates (2, m) on by a tabulated step, in place."""
-    for k in range(z.shape[1]):
-        a, b = z[0, k], z[1, k]
-        z[0, k] = re[k] * a - im[k] * b
-        z[1, k] = re[k] * b + im[k] * a
+def turn_by(re: Floats, im: Floats, z_re: Floats, z_im: Floats) -> None:
+    """Take modal coordinates on by a tabulated step, in place."""
+    for k in range(z_re.size):
+        a, b = z_re[k], z_im[k]
+        z_re[k] = re[k] * a - im[k] * b
+        z_im[k] = re[k] * b + im[k] * a
 
 
-@jit_lean_sum
+@jit_inline_sum
 def move_ticks(
     tables: ModeTables, bodies: FrictionBodies, mode: int, count: int, tick: float, z: Floats, target: Floats
 ) -> None:
-    """Fill `target` (2, m) with the coordinates `count` ticks (s) after `z`."""
-    for k in range(z.shape[1]):
-        target[0, k], target[1, k] = z[0, k], z[1, k]
-    level = 0
-    while count >> (level + 1) > 0:
-        level += 1
+    """Fill `target` (2, m) with the coordinates `count` ticks (s) after `z`, as many as are used."""
+    used = used_width(tables, mode)
+    z_re, z_im = target[0, :used], target[1, :used]
+    for k in range(used):
+        z_re[k], z_im[k] = z[0, k], z[1, k]
     q = bodies.rim_speed.size
     states, first = tables.mask[mode], tables.n_eigenmode[mode] + 2 + q
-    while level >= 0:
+    for level in range(floor_log2(max(1, count)) + 1):  # downwards no compiler would prove them apart
         if (count >> level) & 1 == 1:
-            turn(tables.power_re[mode, level], tables.power_im[mode, level], target)
+            turn_by(tables.power_re[mode, level], tables.power_im[mode, level], z_re, z_im)
             if stuck_pairs(states) != 0:
                 for i in range(q):
                     if state_of(states, i) == STUCK:
-                        target[0, first + i] += bodies.rim_speed[i] * ((1 << level) * tick)
-        level -= 1
+                        z_re[first + i] += bodies.rim_speed[i] * ((1 << level) * tick)
 
 
-@jit_lean_sum
+@jit_inline_sum
 def root_ahead(tables: ModeTables, mode: int, crossing: int, tick: float, z: Floats) -> float:
     """Ticks (s) to the first root of the switch functions `crossing`, by Newton's method from `z` (2, m).
 
     -inf where one is not falling.
     """
-    states = tables.mask[mode]
+    states, used = tables.mask[mode], used_width(tables, mode)
+    z_re, z_im = z[0, :used], z[1, :used]
     found = np.inf
     for j in range(tables.switch_re.shape[1]):
         if (crossing >> j) & 1 == 0:
             continue
-        value = dot(tables.switch_re[mode, j], tables.switch_im[mode, j], z[0], z[1])
+        value = dot(tables.switch_re[mode, j], tables.switch_im[mode, j], z_re, z_im)
         value += GAP_TOLERANCE if state_of(states, j // 2) == OPEN else 0.0
-        rate = dot(tables.rate_re[mode, j], tables.rate_im[mode, j], z[0], z[1]) * tick
+        rate = dot(tables.rate_re[mode, j], tables.rate_im[mode, j], z_re, z_im) * tick
         found = min(found, -value / rate if rate < 0.0 else -np.inf)
     return found
 
 
-@jit_lean_sum
+@jit_inline_sum
 def root_between(
     tables: ModeTables, mode: int, crossing: int, count: int, tick: float, z: Floats, end: Floats
 ) -> float:
     """Ticks (s) after `z` (2, m) of the first root, by parabolas through both ends of `count` ticks."""
-    states = tables.mask[mode]
+    states, used = tables.mask[mode], used_width(tables, mode)
+    z_re, z_im, end_re, end_im = z[0, :used], z[1, :used], end[0, :used], end[1, :used]
     found = 1.0 * count
     for j in range(tables.switch_re.shape[1]):
         if (crossing >> j) & 1 == 0:
             continue
         re, im = tables.switch_re[mode, j], tables.switch_im[mode, j]
         offset = GAP_TOLERANCE if state_of(states, j // 2) == OPEN else 0.0
-        first, last = dot(re, im, z[0], z[1]) + offset, dot(re, im, end[0], end[1]) + offset
+        first, last = dot(re, im, z_re, z_im) + offset, dot(re, im, end_re, end_im) + offset
         if not first > 0.0:
             return 0.0
-        rate = dot(tables.rate_re[mode, j], tables.rate_im[mode, j], z[0], z[1]) * (tick * count)
+        rate = dot(tables.rate_re[mode, j], tables.rate_im[mode, j], z_re, z_im) * (tick * count)
         bend = last - first - rate  # the parabola first + rate x + bend x^2, x from 0 to 1
         root = np.sqrt(max(rate * rate - 4.0 * bend * first, 0.0))
         share = 2.0 * first / (root - rate) if rate <= 0.0 else (-rate - root) / (2.0 * bend)
@@ -150,7 +176,7 @@ def root_between(
     return found
 
 
-@jit_lean_sum
+@jit_inline_sum
 def approach_change(
     tables: ModeTables,
     bodies: FrictionBodies,
@@ -160,6 +186,7 @@ def approach_change(
     level: int,
     z: Floats,
     work: Floats,
+    kept: Floats,
 ) -> tuple[int, int]:
     """Go to the last tick before a switch function is negative, within a step of 2^level ticks.
 
@@ -171,6 +198,8 @@ def approach_change(
         Coordinates at its beginning; in place, those at that tick.
     work : (2, m)
         Those at its end; overwritten.
+    kept : (2, m)
+        Work space: those at the last tick that is known to lie before.
 
     Returns
     -------
@@ -180,6 +209,7 @@ def approach_change(
         Bits of the switch functions that are negative a tick later.
     """
     before, after = 0, 1 << level
+    used = used_width(tables, mode)
     root = root_between(tables, mode, crossing, after, clock.tick, z, work)
     tried = 0
     while after - before > 1:
@@ -193,11 +223,13 @@ def approach_change(
             after, crossing = place, found
         else:
             before = place
+            for k in range(used):
+                kept[0, k], kept[1, k] = work[0, k], work[1, k]
         # Where the root is between this tick and the next one, that is looked at; then this.
         root = place + root_ahead(tables, mode, crossing, clock.tick, work)
         if found == 0 and place <= root < place + 1.0:
             root = place + 1.0
-    move_ticks(tables, bodies, mode, before, clock.tick, z, work)
-    for k in range(z.shape[1]):
-        z[0, k], z[1, k] = work[0, k], work[1, k]
+    if before > 0:
+        for k in range(used):
+            z[0, k], z[1, k] = kept[0, k], kept[1, k]
     return before, crossing

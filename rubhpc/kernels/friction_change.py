@@ -17,10 +17,10 @@ from rubhpc.kernels.friction_events import (
     collide,
     observe_event,
     part_pairs,
+    rate_without_forces,
     solve_event,
 )
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
-from rubhpc.kernels.mode_change import product
 from rubhpc.kernels.soft_friction_events import press_pairs
 
 Floats = NDArray[np.float64]
@@ -49,25 +49,18 @@ def change_states(
     `_soften`.
     """
     q, n = reduced.gap_jacobian.shape
-    velocity, solver, acceleration = motion[n:], work.solver, work.acceleration
+    velocity, solver = motion[n:], work.solver
     is_soft = reduced.spring > 0.0
     remaining = int(np.int64(0))
     if is_soft:
         remaining = press_pairs(reduced, bodies, states, crossing, motion, work)
     elif not collide(reduced, bodies, states, crossing, velocity, is_recorded, work, accumulator):
         return -1
-    for k in range(n):
-        acceleration[k] = (
-            reduced.force_cosine[k] * cosine
-            + reduced.force_sine[k] * sine
-            - product(reduced.stiffness[k], motion[:n])
-            - product(reduced.damping[k], velocity)
-        )
     if is_soft:
         for i in range(q):
-            solver.slip[i] = work.slip[i] / moment + product(reduced.slip[i], acceleration)
+            solver.slip[i] = work.slip[i] / moment + rate_without_forces(bodies, q + i, cosine, sine, motion)
     else:
-        part_pairs(reduced, bodies, moment, velocity, work)
+        part_pairs(reduced, bodies, moment, cosine, sine, motion, work)
     pivots = solve_event(bodies, work, False)
     if pivots == UNSOLVED:
         return -1

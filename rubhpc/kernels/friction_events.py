@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_lean, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean
 from rubhpc.kernels.accumulators import (
     DRIVE_WORK,
     FRICTION_LOSS,
@@ -28,12 +28,12 @@ Floats = NDArray[np.float64]
 
 
 class FrictionWork(NamedTuple):
-    """Work space of an event, q pairs of n reduced degrees."""
+    """Work space of an event, q pairs."""
 
     solver: Workspace  # compliances are those of velocities, 1/kg
     rate: Floats  # (q,), of gaps, m/s
     slip: Floats  # (q,), m/s
-    acceleration: Floats  # (n,), without contact forces
+    free_until: NDArray[np.int64]  # (2 q,), tick before which each switch function cannot vanish
     impulse: Floats  # (q,), accumulated before the event, N s
     rest: Floats  # (2 q, 2 q), rates of the gaps, then slips, by impulses along them, 1/kg
     rest_speed: Floats  # (2 q,), m/s
@@ -42,13 +42,13 @@ class FrictionWork(NamedTuple):
     elimination: Floats  # (2 q, 2 q + 1)
 
 
-def friction_work(solver: Workspace, q: int, n: int) -> FrictionWork:
-    """Work space of the events of q pairs of n reduced degrees, with that of their laws."""
+def friction_work(solver: Workspace, q: int) -> FrictionWork:
+    """Work space of the events of q pairs, with that of their laws."""
     return FrictionWork(
         solver=solver,
         rate=np.zeros(q),
         slip=np.zeros(q),
-        acceleration=np.zeros(n),
+        free_until=np.zeros(2 * q, dtype=np.int64),
         impulse=np.zeros(q),
         rest=np.zeros((2 * q, 2 * q)),
         rest_speed=np.zeros(2 * q),
@@ -126,7 +126,7 @@ def observe_event(problem: int, pivots: int, solver: Workspace, accumulator: Acc
     observe_solution(problem, pivots, distance, moved, accumulator)
 
 
-@jit_lean_sum
+@jit_inline_sum
 def collide(
     reduced: Reduced,
     bodies: FrictionBodies,
@@ -177,30 +177,45 @@ def collide(
     return True
 
 
-@jit_lean_sum
+@jit_inline_sum
+def rate_without_forces(
+    bodies: FrictionBodies, row: int, cosine: float, sine: float, motion: Floats
+) -> float:
+    """What changes a gap's or a slip's rate, by its row of `bodies.pull`, without contact forces, m/s2."""
+    turned = bodies.turned[row]
+    return float(turned[0] * cosine + turned[1] * sine - product(bodies.pull[row], motion))
+
+
+@jit_inline_sum
 def part_pairs(
-    reduced: Reduced, bodies: FrictionBodies, moment: float, velocity: Floats, work: FrictionWork
+    reduced: Reduced,
+    bodies: FrictionBodies,
+    moment: float,
+    cosine: float,
+    sine: float,
+    motion: Floats,
+    work: FrictionWork,
 ) -> None:
     """Fill what the gaps and slips of rigid pairs do over a `moment` (s) without forces, m/s2.
 
     Those that part take no part in what goes on.
     """
-    solver, acceleration = work.solver, work.acceleration
-    for i in range(solver.force.size):
+    solver, q, velocity = work.solver, work.rate.size, motion[motion.size // 2 :]
+    for i in range(q):
         if solver.gap[i] < np.inf:
-            opening = product(reduced.gap_jacobian[i], acceleration)
+            opening = rate_without_forces(bodies, i, cosine, sine, motion)
             rate = product(reduced.gap_jacobian[i], velocity)
             # A pair that parts so slowly that it is pressed together again at once has not parted.
             if rate <= OPENING + max(-opening, 0.0) * moment:
                 solver.gap[i] = opening + (rate / moment if abs(rate) > OPENING else 0.0)
                 slip = bodies.rim_speed[i] + product(reduced.slip[i], velocity)
-                solver.slip[i] = slip / moment + product(reduced.slip[i], acceleration)
+                solver.slip[i] = slip / moment + rate_without_forces(bodies, q + i, cosine, sine, motion)
             else:
                 solver.gap[i] = np.inf
         solver.target[i] = 0.0
 
 
-@jit_lean_sum
+@jit_inline_sum
 def bring_to_rest(
     reduced: Reduced,
     bodies: FrictionBodies,

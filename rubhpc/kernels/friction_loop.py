@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -31,15 +31,14 @@ from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
     ModeTables,
     Reduced,
+    is_beyond,
     propagate,
 )
-from rubhpc.kernels.event_search import approach_change, change_free_interval, find_change
+from rubhpc.kernels.event_search import approach_change, find_change, free_until
 from rubhpc.kernels.event_steps import (
     choose_step,
     contact_age,
     end_record,
-    enter_wanted,
-    leave_mode,
     longest_step,
     note_resolved,
     record_event,
@@ -47,10 +46,17 @@ from rubhpc.kernels.event_steps import (
     sample_step,
 )
 from rubhpc.kernels.friction_change import change_states
+from rubhpc.kernels.friction_coordinates import (
+    begin_energies,
+    end_energies,
+    enter_states,
+    leave_states,
+    used_width,
+)
 from rubhpc.kernels.friction_events import FrictionWork, observe_states
 from rubhpc.kernels.friction_measuring import begin_friction, observe_friction, resolved_friction
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
-from rubhpc.kernels.measuring import Recorder, begin_span
+from rubhpc.kernels.measuring import Recorder  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -72,6 +78,7 @@ def advance_with_friction(
     progress: Progress,
     z: Floats,
     z_next: Floats,
+    z_kept: Floats,
     motion: Floats,
     work: FrictionWork,
     recorder: Recorder,
@@ -89,7 +96,6 @@ def advance_with_friction(
         `motion`: no forces obey the laws, or events follow one another without end.
     """
     # Tuples are opened here: a field read inside the loop would count a reference at every step.
-    z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
     mask, switch_re, switch_im = tables.mask, tables.switch_re, tables.switch_im
     rate_re, rate_im, bound = tables.rate_re, tables.rate_im, tables.bound
     power_re, power_im, n_eigenmode = tables.power_re, tables.power_im, tables.n_eigenmode
@@ -99,19 +105,21 @@ def advance_with_friction(
     highest_level = power_re.shape[1] - 1
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
-    free_to = renewed_at = progress.tick  # until when no event can be; from when that is asked anew
-    if is_recorded and progress.wanted < 0:
-        if progress.energy_from < 0:
-            begin_span(tables, z, progress, recorder)
-        begin_friction(tables, bodies, progress.mode, z, z_next, recorder)
-        observe_states(mask[progress.mode], accumulator)
+    is_new = True  # the contact mode, to this call
     while True:
         if progress.wanted >= 0:
-            if not enter_wanted(tables, reduced.clearance, clock, progress, motion, z):
+            if not enter_states(tables, reduced.clearance, clock, progress, motion, z):
                 return MODE_WANTED
-            free_to = renewed_at = progress.tick
+            is_new = True
+        if is_new:
+            is_new = False
+            free_to = renewed_at = progress.tick  # until when no event can be; from when that is asked anew
+            work.free_until[:] = progress.tick
+            used = used_width(tables, progress.mode)
+            z_re, z_im, next_re, next_im = z[0, :used], z[1, :used], z_next[0, :used], z_next[1, :used]
             if is_recorded:
-                begin_span(tables, z, progress, recorder)
+                if progress.energy_from < 0:
+                    begin_energies(tables, z, progress, recorder)
                 begin_friction(tables, bodies, progress.mode, z, z_next, recorder)
                 observe_states(mask[progress.mode], accumulator)
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
@@ -133,11 +141,22 @@ def advance_with_friction(
                 note_resolved(resolved, clock, highest_level, age, progress)
             longest = min(longest, clock.contact_level, max(age, FORCED_LEVEL), progress.resolved_level)
         if not is_at_event and progress.tick >= renewed_at and progress.tick + (1 << longest) > free_to:
-            interval_free = change_free_interval(
-                states, mode, switch_re, switch_im, rate_re, rate_im, bound, z_re, z_im
+            free_to = free_until(
+                states,
+                mode,
+                switch_re,
+                switch_im,
+                rate_re,
+                rate_im,
+                bound,
+                z_re,
+                z_im,
+                progress.tick,
+                clock.tick,
+                1 << highest_level,
+                work.free_until,
             )
-            free = int(min(interval_free / clock.tick, 1.0 * (1 << highest_level)))
-            free_to, renewed_at = progress.tick + free, progress.tick + free - free // WORTH_ASKING
+            renewed_at = free_to - (free_to - progress.tick) // WORTH_ASKING
         level, is_event_free = choose_step(clock, progress, longest, (free_to - progress.tick) * clock.tick)
         step = (1 << level) * clock.tick
         propagate(power_re[mode, level], power_im[mode, level], z_re, z_im, next_re, next_im)
@@ -154,10 +173,12 @@ def advance_with_friction(
             progress.halving_level = level - 1
             continue
         if is_sample:
-            sample_step(tables, clock, level, z_re, z_im, progress, recorder, samples, accumulator)
+            sample_step(tables, clock, level, z[0], z[1], progress, recorder, samples, accumulator)
         passed = 1 << level
         if crossing != 0:
-            passed, crossing = approach_change(tables, bodies, clock, mode, crossing, level, z, z_next)
+            passed, crossing = approach_change(
+                tables, bodies, clock, mode, crossing, level, z, z_next, z_kept
+            )
         else:
             for k in range(z_re.size):
                 z_re[k], z_im[k] = next_re[k], next_im[k]
@@ -198,7 +219,7 @@ def advance_with_friction(
                 return outcome
 
 
-@jit_lean_sum
+@jit_inline_sum
 def take_change(
     tables: ModeTables,
     reduced: Reduced,
@@ -224,10 +245,14 @@ def take_change(
     if progress.tick - progress.counted_from > clock.samples_per_revolution << clock.sample_level:
         progress.counted_from, progress.n_event = progress.tick, 0
     states = tables.mask[progress.mode]
-    if not leave_mode(
-        tables, reduced, clock, is_recorded, progress, z, motion, work.impulse, recorder, accumulator
-    ):
+    leave_states(tables, progress.mode, z, motion)
+    progress.n_event += 1
+    if is_beyond(reduced, motion):
         return DIVERGED
+    if is_recorded:
+        end_energies(tables, clock, z, progress, recorder, accumulator)
+        for i in range(work.impulse.size):
+            work.impulse[i] = accumulator.impulse[i]
     angle, moment = shaft_angle(clock, progress.tick), (1 << FORCED_LEVEL) * clock.tick
     cosine, sine = np.cos(angle), np.sin(angle)
     wanted = change_states(

@@ -26,6 +26,10 @@ class FrictionBodies(NamedTuple):
     sliding: Floats  # (q,), coefficient
     static: Floats  # (q,), coefficient of a pair that sticks
     rim_speed: Floats  # (q,), m/s, not negative
+    # How rates of gaps, then of slips change without contact forces, m/s2: by the motion (2 n,), negative,
+    # and by the unbalance
+    pull: Floats  # (2 q, 2 n)
+    turned: Floats  # (2 q, 2), times the cosine and the sine of the shaft's angle
 
 
 @jit_inline_sum

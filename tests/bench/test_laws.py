@@ -12,6 +12,7 @@ from rubhpc.integrate.case import run_case
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.threads import on_one_thread
 
 pytestmark = pytest.mark.bench
 ONE = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": 3e10})
@@ -44,6 +45,7 @@ def ring(count):
     return replace(ONE, stator=tuple(replace(stator, angle=2 * math.pi * i / count) for i in range(count)))
 
 
+@on_one_thread  # as every study is run; of two, one would wait at full speed
 def seconds_of(rig, cases, friction, law):
     """Processor time of a case of 93 revolutions, s, mean of `cases`; set-up and contact modes are shared."""
     total, law = 0.0, dict(law)

@@ -11,9 +11,18 @@ from rubhpc.kernels.friction_states import FORWARD, OPEN, FrictionBodies
 
 LEVEL, TICK = 10, 1e-6  # 1024 ticks
 N_TICK = 1 << LEVEL
-BODIES = FrictionBodies(np.zeros(1), np.zeros(1), np.zeros(1))
-NAMES = ("root_between", "root_ahead", "move_ticks", "changes_at", "find_change", "turn", "dot", "state_of")
-NAMES += ("stuck_pairs", "bounded")
+BODIES = FrictionBodies(np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((2, 0)), np.zeros((2, 2)))
+NAMES = (
+    "root_between",
+    "root_ahead",
+    "move_ticks",
+    "changes_at",
+    "find_change",
+    "turn_by",
+    "dot",
+    "state_of",
+)
+NAMES += ("stuck_pairs", "used_width", "floor_log2", "positive_interval")
 
 
 @pytest.fixture(autouse=True)
@@ -47,12 +56,15 @@ def values_of(exponents, rows, ticks):
 def search(exponents, rows, state=FORWARD):
     """Ticks passed, and what is negative a tick later; coordinates stand at that tick."""
     tables = tables_of(exponents, rows, state)
-    z, end = np.array([np.ones(exponents.size), np.zeros(exponents.size)]), np.empty((2, exponents.size))
+    z = np.array([np.ones(exponents.size), np.zeros(exponents.size)])
+    end, kept = np.empty((2, 2, exponents.size))
     plain(event_search.move_ticks)(tables, BODIES, 0, N_TICK, TICK, z, end)
     crossing = plain(event_search.changes_at)(tables, 0, end)
     assert crossing != 0
     clock = SimpleNamespace(tick=TICK)
-    passed, crossing = plain(event_search.approach_change)(tables, BODIES, clock, 0, crossing, LEVEL, z, end)
+    passed, crossing = plain(event_search.approach_change)(
+        tables, BODIES, clock, 0, crossing, LEVEL, z, end, kept
+    )
     assert z[0] + 1j * z[1] == pytest.approx(np.exp(exponents * TICK * passed), rel=1e-12)
     return passed, crossing
 
@@ -132,6 +144,14 @@ def test_no_function_changes_within_the_interval_that_is_promised():
         tables = tables_of(exponents, rows, FORWARD)
         z_re, z_im = np.ones(m), np.zeros(m)
         fields = (tables.switch_re, tables.switch_im, tables.rate_re, tables.rate_im, tables.bound)
-        free = plain(event_search.change_free_interval)(FORWARD, 0, *fields, z_re, z_im)
-        assert free > 0.0
-        assert values_of(exponents, rows, np.linspace(0.0, min(free / TICK, 1e4), 200)).min() > -1e-12
+        known = np.zeros(2, dtype=np.int64)
+        now, longest = 7, 10_000
+        free = plain(event_search.free_until)(FORWARD, 0, *fields, z_re, z_im, now, TICK, longest, known)
+        assert now <= free == known.min() <= now + longest
+        assert values_of(exponents, rows, np.linspace(0.0, free - now, 200)).min() > -1e-12
+        # What is known, and comes later than another, is not asked anew.
+        later = int(known.argmax())
+        known[later] = marked = known[later] + 1
+        asked = plain(event_search.free_until)(FORWARD, 0, *fields, z_re, z_im, now, TICK, longest, known)
+        assert asked == free
+        assert known[later] == marked

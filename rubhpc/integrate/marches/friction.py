@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.contact_pairs import Workspace
     from rubhpc.kernels.friction_events import FrictionWork
 
@@ -86,7 +87,7 @@ class FrictionMarch(EventDrivenMarch):
             raise NoClosedForm
         self._entered_with = np.append(self._clearance, 1.0)
         self.bodies = self.bodies._replace(clearance=self._entered_with)
-        self._friction = FrictionBodies(*self._coefficients, rim_speed=self.bodies.rim_speed)
+        self._friction = self._friction_bodies()
         return setup.friction_library(friction)
 
     @cached_property
@@ -104,7 +105,22 @@ class FrictionMarch(EventDrivenMarch):
         solver.matrix[:], solver.coupling[:] = gap_jacobian @ gap_jacobian.T, gap_jacobian @ along.T
         solver.tangential[:] = -along @ gap_jacobian.T, -along @ along.T
         self._soften(solver)
-        return friction_work(solver, q, self.bodies.stiffness.shape[0])
+        return friction_work(solver, q)
+
+    def _friction_bodies(self) -> FrictionBodies:
+        """What friction asks of the bodies at the speed that they turn at."""
+        bodies = self.bodies
+        rows = np.vstack([bodies.gap_jacobian, bodies.slip])
+        return FrictionBodies(
+            *self._coefficients,
+            rim_speed=bodies.rim_speed,
+            pull=np.hstack([rows @ bodies.stiffness, rows @ bodies.damping]),
+            turned=np.column_stack([rows @ bodies.force_cosine, rows @ bodies.force_sine]),
+        )
+
+    def _use(self, tables: ModeTables) -> None:
+        super()._use(tables)
+        self._z_kept = np.zeros_like(self._z)
 
     def _soften(self, solver: Workspace) -> None:
         """Change how normal forces follow from gaps: here they hold them, and nothing changes."""
@@ -168,6 +184,7 @@ class FrictionMarch(EventDrivenMarch):
             self._bare_progress,
             self._z,
             self._z_next,
+            self._z_kept,
             self._motion,
             self._work,
             self._recorder,

@@ -1,0 +1,142 @@
+"""Coordinates of a contact mode under set-valued friction: entered, left, and their energies.
+
+As `contact_modes.enter` and `measuring.energy_forms`, of the coordinates that a set of states uses alone:
+pairs that stick leave a quarter of the tables' width empty, and events cost what is read of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels.accumulators import DAMPING_LOSS, UNBALANCE_WORK, Accumulator
+from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_angle
+from rubhpc.kernels.contact_modes import ModeTables, add_rows, dot, find_mode
+from rubhpc.kernels.measuring import Recorder  # noqa: TC001 - part of a kernel's signature
+
+Floats = NDArray[np.float64]
+
+LANES = 8  # coordinates are used in whole vectors
+
+
+@jit_inline_sum
+def used_width(tables: ModeTables, mode: int) -> int:
+    """How many coordinates of a contact mode are used, in whole vectors; those behind them are zero.
+
+    Beside the eigenmodes: the unbalance response and a 1, and a clearance and a displacement of each pair.
+    """
+    used = tables.n_eigenmode[mode] + 2 + tables.switch_re.shape[1]
+    return int(min((used + LANES - 1) // LANES * LANES, tables.switch_re.shape[2]))
+
+
+@jit_inline_sum
+def enter_states(
+    tables: ModeTables, clearance: Floats, clock: Clock, progress: Progress, motion: Floats, z: Floats
+) -> bool:
+    """Enter the contact mode wanted with the reduced motion (2 n,); False where the mode is not tabulated."""
+    mode = find_mode(tables.mask, progress.wanted)
+    if mode < 0:
+        return False
+    angle = shaft_angle(clock, progress.tick)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    first, used = tables.n_eigenmode[mode], used_width(tables, mode)
+    for part in range(2):
+        rows = tables.enter_re[mode] if part == 0 else tables.enter_im[mode]
+        target = z[part, :used]
+        from_cosine, from_sine = tables.enter_cosine[mode, part], tables.enter_sine[mode, part]
+        for k in range(used):
+            target[k] = -from_cosine[k] * cosine - from_sine[k] * sine
+        for i in range(clearance.size):
+            source, constant = tables.enter_constant[mode, i, part], clearance[i]
+            for k in range(used):
+                target[k] -= source[k] * constant
+        add_rows(rows, motion, target)
+        z[part, used:] = 0.0
+    z[0, first], z[1, first] = cosine, sine
+    for i in range(clearance.size):
+        z[0, first + 1 + i], z[1, first + 1 + i] = clearance[i], 0.0
+    progress.mode, progress.wanted, progress.entered = mode, NONE, progress.tick
+    progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
+    return True
+
+
+@jit_inline_sum
+def leave_states(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
+    """Fill the reduced motion (2 n,) from the coordinates (2, m) of a contact mode."""
+    used = used_width(tables, mode)
+    z_re, z_im = z[0, :used], z[1, :used]
+    re, im, n_whole = tables.motion_re[mode], tables.motion_im[mode], motion.size - motion.size % 4
+    for row in range(0, n_whole, 4):  # four at a time: one would wait for its sum
+        first_re, second_re, third_re, fourth_re = re[row], re[row + 1], re[row + 2], re[row + 3]
+        first_im, second_im, third_im, fourth_im = im[row], im[row + 1], im[row + 2], im[row + 3]
+        first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
+        for k in range(used):
+            a, b = z_re[k], z_im[k]
+            first += first_re[k] * a - first_im[k] * b
+            second += second_re[k] * a - second_im[k] * b
+            third += third_re[k] * a - third_im[k] * b
+            fourth += fourth_re[k] * a - fourth_im[k] * b
+        motion[row], motion[row + 1], motion[row + 2], motion[row + 3] = first, second, third, fourth
+    for row in range(n_whole, motion.size):
+        motion[row] = dot(re[row], im[row], z_re, z_im)
+
+
+@jit_lean_sum
+def read_energies(tables: ModeTables, mode: int, z: Floats, entry: Floats) -> None:
+    """Fill `entry` (2,), J, with what grows by damping loss and unbalance work in a contact mode.
+
+    The form of the loss is symmetric: half of its diagonal blocks is read.
+    """
+    m, used, first = z.shape[1], used_width(tables, mode), tables.n_eigenmode[mode]
+    form, z_re, z_im = tables.loss[mode], z[0, :used], z[1, :used]
+    loss = 0.0
+    for k in range(used):
+        row, along = form[k], 0.0
+        for j in range(k):
+            along += row[j] * z_re[j]
+        loss += (2.0 * along + row[k] * z_re[k]) * z_re[k]
+        if z_im[k] != 0.0:
+            row, along, across = form[m + k], 0.0, 0.0
+            for j in range(used):
+                across += row[j] * z_re[j]
+            behind = row[m:]
+            for j in range(k):
+                along += behind[j] * z_im[j]
+            loss += (2.0 * (along + across) + behind[k] * z_im[k]) * z_im[k]
+    cosine, sine = z[0, first], z[1, first]
+    work = 0.0
+    for part in range(2):  # exp(i angle), then its conjugate
+        re, im = tables.work_re[mode, part], tables.work_im[mode, part]
+        real, imaginary = 0.0, 0.0
+        for k in range(used):
+            real += re[k] * z_re[k] - im[k] * z_im[k]
+            imaginary += re[k] * z_im[k] + im[k] * z_re[k]
+        work += cosine * real - (sine if part == 0 else -sine) * imaginary
+    entry[0], entry[1] = loss, work
+
+
+@jit_inline_sum
+def begin_energies(tables: ModeTables, z: Floats, progress: Progress, recorder: Recorder) -> None:
+    """Begin to add up energies at the tick reached, in the contact mode entered."""
+    read_energies(tables, progress.mode, z, recorder.entry)
+    progress.energy_from = progress.tick
+
+
+@jit_inline_sum
+def end_energies(
+    tables: ModeTables,
+    clock: Clock,
+    z: Floats,
+    progress: Progress,
+    recorder: Recorder,
+    accumulator: Accumulator,
+) -> None:
+    """Add what damping took and the unbalance gave since they began, in one contact mode all along."""
+    mode = progress.mode
+    time = (progress.tick - progress.energy_from) * clock.tick
+    loss, work = recorder.entry[0], recorder.entry[1]
+    read_energies(tables, mode, z, recorder.entry)
+    accumulator.energy[DAMPING_LOSS] += recorder.entry[0] - loss + tables.steady_power[mode, 0] * time
+    accumulator.energy[UNBALANCE_WORK] += recorder.entry[1] - work + tables.steady_power[mode, 1] * time
+    progress.energy_from = NONE
