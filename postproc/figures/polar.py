@@ -84,7 +84,8 @@ def draw_polar(
         )
         ax.plot(x, y, label=case, linewidth=0.9)
         curves.append((x, y, own.values))
-    name_speeds(ax, [(x, y) for x, y, _ in curves], curves[0][2])
+    curves_by_reach = sorted(curves, key=lambda curve: -float(np.nanmax(np.hypot(curve[0], curve[1]))))
+    name_speeds(ax, [(x, y) for x, y, _ in curves_by_reach], curves_by_reach[0][2])
     style: dict[str, Any] = {"marker": "D", "markersize": 4, "linestyle": "", "color": "k"}
     passed: set[float] = set()
     for x, y, at in curves:

@@ -22,10 +22,12 @@ def export(store: str, selection: tuple[str, ...], names: tuple[str, ...], outpu
 
     HDF5 (.h5, .hdf5, .nc), compressed, has all variables with names, dimensions, units and coordinates of the
     store, study and rig as attributes; h5py, MATLAB, and xarray as netCDF 4 read it. A table (.csv, .parquet)
-    has one row a case, with axes, settings and measures; Parquet needs `pip install 'rubhpc[parquet]'`.
+    has one row a case, with axes, settings and measures, or one a revolution where each --value is of the
+    revolutions of run-ups; Parquet needs `pip install 'rubhpc[parquet]'`.
     """
     from postproc.store.case_table import TABLES, case_table, write_table
     from postproc.store.export import HDF5, check_folder, write_hdf5
+    from postproc.store.revolution_table import has_revolutions, revolution_table
     from rubhpc.input.messages import nearest
 
     cases = open_cases(store, selection)
@@ -35,7 +37,8 @@ def export(store: str, selection: tuple[str, ...], names: tuple[str, ...], outpu
     path = check_folder(output or f"{Path(store).resolve().stem}.h5", (*HDF5, *TABLES))
     try:
         if path.suffix.lower() in TABLES:
-            write_table(case_table(cases, names), path)
+            rows = revolution_table if has_revolutions(cases, names) else case_table
+            write_table(rows(cases, names), path)
         else:
             write_hdf5(cases[list(names)] if names else cases, path)
     except OSError as error:

@@ -3,6 +3,7 @@
 from functools import partial
 
 import numpy as np
+import pandas as pd
 import pytest
 import running
 from running import check_a_lost_chunk
@@ -14,6 +15,8 @@ from postproc.figures.spectrum import spectrum
 from postproc.report.budget import write_report
 from postproc.signals.sections import section_of
 from postproc.signals.waveforms import waveform_data
+from postproc.store.case_table import write_table
+from postproc.store.revolution_table import revolution_table
 from rubhpc.errors import InputError
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
@@ -112,6 +115,30 @@ def test_figures_of_one_case_see_its_signals(folder):
     for signal in ("torsion", "probe_left"):
         with pytest.raises(InputError, match="the speed changes, and this figure needs a constant one"):
             spectrum(store, signal)
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_revolutions_are_exported_as_rows(folder, tmp_path, kind):
+    store, path = rubhpc.open(folder / "run_ups.zarr"), tmp_path / f"table.{kind}"
+    if kind == "parquet":
+        pytest.importorskip("pyarrow")
+    names = ["phase_probe_left", "revolution_peak_contact_force"]
+    write_table(revolution_table(store, names), path)
+    table = pd.read_csv(path) if kind == "csv" else pd.read_parquet(path)
+    of, unit = (lambda name, unit: f"{name} ({unit})") if kind == "csv" else (lambda name, unit: name), "rad"
+    case = table[(table[of("run_up_time", "s")] == 0.5) & (table[of("clearance", "m")] == 1e-4)]
+    turns = int(np.isfinite(store.speed.values[1, 0, 0]).sum())
+    assert turns > 10
+    assert len(table) == np.isfinite(store.speed.values).sum()
+    assert list(case["revolution"]) == list(range(turns))
+    expected = {
+        of("speed", "rad s-1"): store.speed,
+        of("time", "s"): store.time,
+        of("phase_probe_left_order_0.333", unit): store.phase_probe_left.isel(order=0),
+        of("revolution_peak_contact_force", "N"): store.revolution_peak_contact_force.isel(stator=0),
+    }
+    for name, values in expected.items():
+        np.testing.assert_array_equal(case[name], values.values[1, 0, 0, :turns])
 
 
 def test_a_report_shows_measures_and_pictures(folder, monkeypatch, tmp_path):
