@@ -34,9 +34,10 @@ LOBATTO = np.array([1.0 / 20.0, 49.0 / 180.0, 16.0 / 45.0, 49.0 / 180.0, 1.0 / 2
 PARTS = np.ascontiguousarray(
     np.diff(NODES[:, None] ** np.arange(1, N_NODE + 1) / np.arange(1, N_NODE + 1), axis=0) @ LAGRANGE.T
 )
-# Of `CurvedWork.span`: length of the step before (0: none), largest force of the contact, time that resolves
-# force and slip, whether `secant` holds anything (0: no; 2: it failed once), steps before one may be longer.
-BEFORE, LARGEST, RESOLVED, LEARNT, PATIENCE = range(5)
+# Of `CurvedWork.span`: length of the step that loads are continued from (0: none), largest force of the
+# contact, time that resolves force and slip, set of the pairs that `secant` is of, steps before one may be
+# longer, time since the step that loads are continued from began.
+BEFORE, LARGEST, RESOLVED, PAIRS, PATIENCE, PAST = range(6)
 MOST_UNKNOWNS = 64  # loads of a step that are found by a secant method; more are found by sweeps
 
 
@@ -73,8 +74,9 @@ class CurvedTables(NamedTuple):
     node_im: Floats
     weight_re: Floats  # (p, n_level, 4, 5, m), s, response at those nodes to loads at all of them
     weight_im: Floats
-    lone: Floats  # (p, 2, m, 3 d + 1), what is read of a lone pair, of real and imaginary parts
-    reach: Floats  # (p, n_level, 4, 5 (4 + b), 3 d + 1), what the loads add to that
+    # What is read of an only pair at those nodes, without columns where there are more pairs.
+    lone: Floats  # (p, n_level, 2, m, 4 (3 d + 1)), of real and imaginary parts at the beginning
+    reach: Floats  # (p, n_level, 5 (4 + b), 4 (3 d + 1)), of the loads
     inverse_re: Floats  # (p, m), s, inverse of each exponent; 0 where that is 0
     inverse_im: Floats
     drain: Floats  # (p, 2, m, r + 2), of real and imaginary parts: what squares to the loss by damping, and
@@ -92,11 +94,11 @@ class CurvedWork(NamedTuple):
     slip: Floats  # (5, q), m/s
     load: Floats  # (5, q, 4 + b)
     loads: Floats  # the same in one row
-    before: Floats  # (5, q, 4 + b), loads of the step before
+    before: Floats  # (5, q, 4 + b), loads of the step that they are continued from
     gap: Floats  # (2, 5, q), of open pairs at the nodes, m, and their rates
-    span: Floats  # (5,), see above
+    span: Floats  # (6,), see above
     motion: Floats  # (3, q, 3 + b), displacements, rates and free accelerations at a node
-    free: Floats  # (4, 3 d + 1), what is read of one pair at the nodes, without the loads to be found
+    free: Floats  # (4 (3 d + 1),), what is read of one pair at the nodes, without the loads to be found
     normal: Floats  # (2, q), along and across
     jacobian: Floats  # (q, 3 + b), of the gaps in the motions
     direction: Floats  # (q, 3 + b), of the forces
@@ -104,12 +106,14 @@ class CurvedWork(NamedTuple):
     opening: Floats  # (q,)
     active: NDArray[np.bool_]  # (q,)
     elimination: Floats  # (q, q + 1)
+    course: Floats  # (5,), coefficients of what crosses zero over a step
     ahead: Floats  # (4, 5), what the loads of the step before count for at the nodes
-    secant: Floats  # (2, u, u), how loads move for a unit of what they are missed by; as kept in between
+    secant: Floats  # (n_level, u, u), how loads move for a unit of what they are missed by
+    is_learnt: NDArray[np.bool_]  # (n_level,), whether that holds anything
     point: Floats  # (7, 4 q (4 + b)), rows of `curved_secant`
     transient: Floats  # (2, m), coordinates but for what follows the loads
     seen: Floats  # (r + 2,), of `CurvedTables.drain`
-    whole: Floats  # (3 d + 1,), what is read of one pair at a node
+    whole: Floats  # (4 (3 d + 1),), with them
     power: Floats  # (5, 2), W, of damping and of the unbalance at the nodes
     state: Floats  # (2 n,), displacements and velocities at a node
     acceleration: Floats  # (n,), at a sample
@@ -118,8 +122,8 @@ class CurvedWork(NamedTuple):
     shape: Floats  # (2, q, n), Jacobian and directions of an event
 
 
-def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int) -> CurvedWork:
-    """Work space for q pairs of `n_row` motions, n reduced degrees, m coordinates and r losses."""
+def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int, n_level: int) -> CurvedWork:
+    """Work space for q pairs of `n_row` motions, n reduced degrees, m coordinates, r losses, levels."""
     nodes = np.zeros((4, N_NODE, q))
     n_unknown = (N_NODE - 1) * q * (n_row + 1)
     n_learnt = min(n_unknown, MOST_UNKNOWNS)
@@ -133,9 +137,9 @@ def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int) -> CurvedWork:
         loads=load.reshape(-1),
         before=np.zeros((N_NODE, q, n_row + 1)),
         gap=np.zeros((2, N_NODE, q)),
-        span=np.zeros(5),
+        span=np.zeros(6),
         motion=np.zeros((3, q, n_row)),
-        free=np.zeros((N_NODE - 1, 3 * n_row - 2)),
+        free=np.zeros((N_NODE - 1) * (3 * n_row - 2)),
         normal=np.zeros((2, q)),
         jacobian=np.zeros((q, n_row)),
         direction=np.zeros((q, n_row)),
@@ -143,12 +147,14 @@ def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int) -> CurvedWork:
         opening=np.zeros(q),
         active=np.zeros(q, dtype=np.bool_),
         elimination=np.zeros((q, q + 1)),
+        course=np.zeros(N_NODE),
         ahead=np.zeros((N_NODE - 1, N_NODE)),
-        secant=np.zeros((2, n_learnt, n_learnt)),
+        secant=np.zeros((n_level, n_learnt, n_learnt)),
+        is_learnt=np.zeros(n_level, dtype=np.bool_),
         point=np.zeros((7, n_unknown)),
         transient=np.zeros((2, m)),
         seen=np.zeros(n_loss + 2),
-        whole=np.zeros(3 * n_row - 2),
+        whole=np.zeros((N_NODE - 1) * (3 * n_row - 2)),
         power=np.zeros((N_NODE, 2)),
         state=np.zeros(2 * n),
         acceleration=np.zeros(n),

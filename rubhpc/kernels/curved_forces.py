@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 
 MOST_PASSES = 8  # for h at given coordinates; two or three are taken
 EXACT = 1e-17  # m, change of h at which they end
+CLOSE = 1e-11  # m, the same of a method that squares the error
 
 
 @jit_inline_sum
@@ -266,7 +267,7 @@ def find_lone_forces(
             slope -= at * moved[j, 0]
         change = (value - h) / (1.0 - slope)
         h += change
-        if abs(change) <= EXACT:
+        if abs(change) <= CLOSE:
             break
     follows, answers = steep * rates[ACROSS], 1.0 + steep * moved[ACROSS, 0]
     for j in range(d):

@@ -25,12 +25,20 @@ from rubhpc.kernels.case_progress import (
     Progress,
     shaft_angle,
 )
-from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, enter, find_mode, propagate
+from rubhpc.kernels.contact_modes import (
+    FORCED_LEVEL,
+    ModeTables,
+    Reduced,
+    enter,
+    find_mode,
+    floor_log2,
+    propagate,
+)
 from rubhpc.kernels.curved_contact import (
     ALONG,
     BEFORE,
     LARGEST,
-    LEARNT,
+    PAST,
     PATIENCE,
     RESOLVED,
     CurvedPairs,
@@ -44,12 +52,19 @@ from rubhpc.kernels.curved_measuring import (
     begin_curved_span,
     observe_curved_step,
     observe_energies,
+    resolved_transient,
     take_curved_sample,
 )
-from rubhpc.kernels.curved_search import closed_crossing, curved_free_interval, open_crossing
-from rubhpc.kernels.curved_step import go_on, take_step
+from rubhpc.kernels.curved_search import (
+    closed_crossing,
+    curved_free_interval,
+    first_crossing,
+    next_crossing,
+    open_crossing,
+)
+from rubhpc.kernels.curved_step import follow_loads, go_on, take_step
 from rubhpc.kernels.event_steps import choose_step, contact_age, end_record, longest_step, sample_step
-from rubhpc.kernels.measuring import Recorder, begin_span, resolved_contact
+from rubhpc.kernels.measuring import Recorder, begin_span
 from rubhpc.kernels.mode_change import product
 
 if TYPE_CHECKING:
@@ -95,6 +110,8 @@ def advance_curved(
     last_step = progress.n_step + MOST_STEPS
     tolerance *= OBSERVED if is_recorded else 1.0
     progress.halving_level, progress.is_after_event = NONE, 0
+    due = int(np.int64(NONE))  # ticks to where a closed contact is expected to end, or another pair to touch
+    groping = int(np.int64(0))  # level of the next step once they have passed
     while True:
         if progress.wanted >= 0:
             found = find_mode(mask, progress.wanted)
@@ -138,7 +155,7 @@ def advance_curved(
             elif is_last:
                 progress.energy_from = NONE
             return FINISHED
-        is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
+        is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0 or due >= 0
         if progress.n_step > last_step and not is_at_event:
             return PAUSED
         is_ahead = is_sample and closed == 0
@@ -163,14 +180,15 @@ def advance_curved(
             level = min(longest, age if is_recorded else max(age, FORCED_LEVEL), progress.resolved_level)
             level = min(level, curved.weight_re.shape[1] - 1)
             if is_recorded:
-                if age != progress.contact_age:
-                    progress.contact_age = age
-                    work.span[RESOLVED] = resolved_contact(tables, mode, work.transient[0], work.transient[1])
+                begun = floor_log2(max(1, progress.tick - progress.energy_from))
+                if begun != progress.contact_age:
+                    progress.contact_age = begun
+                    work.span[RESOLVED] = resolved_transient(tables, mode, work)
                 while level > FORCED_LEVEL and (1 << level) * clock.tick > work.span[RESOLVED]:
                     level -= 1
             is_event_free = progress.tick - progress.entered < 1 << FORCED_LEVEL  # so that time goes on
-            if progress.halving_level >= 0:
-                level = min(level, progress.halving_level)
+            if due >= 0:
+                level = min(level, floor_log2(due) if due > 0 else groping)
             step = (1 << level) * clock.tick
             progress.n_step += 1
             is_good, may_grow = take_step(
@@ -181,13 +199,18 @@ def advance_curved(
                     return CONTACT_UNSOLVED
                 progress.resolved_level = level - 1
                 continue
-            if may_grow and level >= progress.resolved_level and progress.halving_level < 0:
+            if may_grow and level >= progress.resolved_level and due < 0:
                 progress.resolved_level = level + 1
             progress.is_after_event = 0
             if not is_event_free:
                 crossing = closed_crossing(closed, work)
-        if crossing != 0 and level > 0:
+        if crossing != 0 and level > 0 and closed == 0:
             progress.halving_level = level - 1
+            continue
+        if crossing != 0 and level > 0:
+            due = min(int(first_crossing(closed, crossing, work) * (1 << level)), (1 << level) - 1)
+            follow_loads(closed, (1 << level) * clock.tick, 0.0, work)
+            groping = 0
             continue
         if is_sample and closed == 0:
             sample_step(tables, clock, level, z_re, z_im, progress, recorder, samples, accumulator)
@@ -211,6 +234,7 @@ def advance_curved(
             )
             if outcome != UNDER_WAY:
                 return outcome
+            due = NONE
             continue
         if closed != 0:
             step = (1 << level) * clock.tick
@@ -228,6 +252,14 @@ def advance_curved(
                     samples,
                     accumulator,
                 )
+            if due >= 0:
+                groping = groping + 1 if due == 0 else 0
+                due = max(due - (1 << level), 0)
+                ahead = next_crossing(closed, work) * (1 << level)
+                if groping == 0 and ahead <= 2.0 * (1 << level):
+                    due = int(ahead)
+                elif groping > FORCED_LEVEL:  # none came
+                    due = NONE
             go_on(closed, step, work)
         for k in range(z_re.size):
             z_re[k], z_im[k] = next_re[k], next_im[k]
@@ -266,7 +298,7 @@ def enter_curved(
     progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
     progress.resolved_level, progress.halving_level, progress.is_after_event = FORCED_LEVEL, NONE, 1
     progress.contact_age = NONE
-    work.span[BEFORE], work.span[LARGEST], work.span[LEARNT], work.span[PATIENCE] = 0.0, 0.0, 0.0, 0.0
+    work.span[BEFORE], work.span[PAST], work.span[LARGEST], work.span[PATIENCE] = 0.0, 0.0, 0.0, 0.0
     if closed == 0:
         return True
     return evaluate(pairs, curved, reduced.rim_speed, found, closed, 0, z[0], z[1], work)

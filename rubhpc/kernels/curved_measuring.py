@@ -22,8 +22,10 @@ from rubhpc.kernels.accumulators import (
 )
 from rubhpc.kernels.case_progress import Clock, Progress, shaft_angle
 from rubhpc.kernels.contact_modes import (
+    DYING,
     LATERAL_ROW,
     N_ROTOR_ROW,
+    RESOLVED,
     TWIST_ACCELERATION_ROW,
     ModeTables,
     Reduced,
@@ -31,6 +33,7 @@ from rubhpc.kernels.contact_modes import (
     dot,
 )
 from rubhpc.kernels.curved_contact import (
+    LARGEST,
     LOBATTO,
     N_NODE,
     NODES,
@@ -92,6 +95,46 @@ def begin_curved_span(
         transient[0, k], transient[1, k] = z[0, k] + a * re - b * im, z[1, k] + a * im + b * re
     observe_power(pairs, tables, curved, mode, 0, angle, z, work)
     progress.energy_from = progress.tick
+
+
+@jit_lean_sum
+def resolved_transient(tables: ModeTables, mode: int, work: CurvedWork) -> float:
+    """Time, s, over which polynomials follow what force and slip of the closed pairs do by themselves.
+
+    To 1e-4, as `contact_modes.resolved_time`, but of the whole force and slip.
+    """
+    time = np.inf
+    for i in range(work.h.shape[1]):
+        if is_closed(tables.mask[mode], i):
+            force = max(work.span[LARGEST], abs(work.force[0, i]))
+            time = min(
+                time,
+                resolved_part(
+                    tables.switch_re[mode, i], tables.switch_im[mode, i], force, tables.pace[mode], work
+                ),
+            )
+            slip = abs(work.slip[0, i])
+            time = min(
+                time,
+                resolved_part(
+                    tables.slip_re[mode, i], tables.slip_im[mode, i], slip, tables.pace[mode], work
+                ),
+            )
+    return time
+
+
+@jit_lean_sum
+def resolved_part(re: Floats, im: Floats, least: float, pace: Floats, work: CurvedWork) -> float:
+    """The same of one signal, of size `least` at least."""
+    size, bend, transient = 0.0, 0.0, work.transient
+    for k in range(pace.size):
+        if pace[k] > DYING:
+            a, b = transient[0, k], transient[1, k]
+            share = np.sqrt((re[k] * re[k] + im[k] * im[k]) * (a * a + b * b))
+            square = pace[k] * pace[k]
+            size += share
+            bend += share * square * square
+    return float((RESOLVED * max(size, least) / bend) ** 0.25) if bend > 0.0 else np.inf
 
 
 @jit_lean_sum

@@ -14,6 +14,7 @@ from rubhpc.kernels.curved_contact import (
     LAGRANGE,
     N_NODE,
     NODES,
+    PAST,
     CurvedTables,
     CurvedWork,
     is_closed,
@@ -33,30 +34,31 @@ def read_free(
     tables: CurvedTables, mode: int, level: int, z_re: Floats, z_im: Floats, work: CurvedWork
 ) -> None:
     """Read the only pair at the nodes of a step of 2^level ticks, under the loads at its beginning alone."""
-    n_load, ahead_re, ahead_im = work.load.shape[2], work.middle[0], work.middle[1]
-    for node in range(1, N_NODE):
-        p_re, p_im = tables.node_re[mode, level, node - 1], tables.node_im[mode, level, node - 1]
-        propagate(p_re, p_im, z_re, z_im, ahead_re, ahead_im)
-        free = work.free[node - 1]
-        for r in range(free.size):
-            free[r] = 0.0
-        add_rows(tables.lone[mode, 0], ahead_re, free)
-        add_rows(tables.lone[mode, 1], ahead_im, free)
-        add_rows(tables.reach[mode, level, node - 1, :n_load], work.loads[:n_load], free)
+    n_load, free = work.load.shape[2], work.free
+    for r in range(free.size):
+        free[r] = 0.0
+    add_rows(tables.lone[mode, level, 0], z_re, free)
+    add_rows(tables.lone[mode, level, 1], z_im, free)
+    add_rows(tables.reach[mode, level, :n_load], work.loads[:n_load], free)
+
+
+@jit_lean_sum
+def read_loaded(tables: CurvedTables, mode: int, level: int, work: CurvedWork) -> None:
+    """Read the only pair at the nodes of a step of 2^level ticks under the loads at its nodes."""
+    n_load, whole = work.load.shape[2], work.whole
+    for r in range(whole.size):
+        whole[r] = work.free[r]
+    add_rows(tables.reach[mode, level, n_load:], work.loads[n_load:], whole)
 
 
 @jit_inline_sum
-def read_loaded(tables: CurvedTables, mode: int, level: int, node: int, work: CurvedWork) -> None:
-    """Fill the motion of the only pair at a node of a step of 2^level ticks, under the loads at its nodes."""
-    d, n_load = tables.bound.shape[2], work.load.shape[2]
-    free, whole, motion = work.free[node - 1], work.whole, work.motion
-    for r in range(free.size):
-        whole[r] = free[r]
-    add_rows(tables.reach[mode, level, node - 1, n_load:], work.loads[n_load:], whole)
+def take_motion(d: int, node: int, work: CurvedWork) -> None:
+    """Fill the motion of the only pair at a node from what was read."""
+    whole, motion, first = work.whole, work.motion, (node - 1) * (3 * d + 1)
     for j in range(d):
-        motion[0, 0, j], motion[2, 0, j] = whole[j], whole[2 * d + 1 + j]
+        motion[0, 0, j], motion[2, 0, j] = whole[first + j], whole[first + 2 * d + 1 + j]
     for j in range(d + 1):
-        motion[1, 0, j] = whole[d + j]
+        motion[1, 0, j] = whole[first + d + j]
 
 
 @jit_lean_sum
@@ -98,11 +100,13 @@ def move_coordinates(
 
 @jit_lean_sum
 def predict_loads(mask: int, step: float, work: CurvedWork) -> None:
-    """Loads at the nodes of a step (s) after the first: those of the step before, gone on as they went."""
+    """Loads at the nodes of a step (s) after the first: those of a step before, gone on as they went."""
     q, n_load, ahead = work.load.shape[1], work.load.shape[2], work.ahead
-    ratio = step / work.span[BEFORE] if work.span[BEFORE] > 0.0 else 0.0
+    ratio, past = 0.0, 0.0
+    if work.span[BEFORE] > 0.0:
+        ratio, past = step / work.span[BEFORE], work.span[PAST] / work.span[BEFORE]
     for node in range(1, N_NODE):
-        t = 1.0 + NODES[node] * ratio  # in units of the step before
+        t = past + NODES[node] * ratio  # in units of that step
         for k in range(N_NODE):
             total = 0.0
             for power in range(N_NODE - 1, -1, -1):

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.contact_modes import ModeTables, bounded, dot, event_free_interval
 from rubhpc.kernels.curved_contact import (
+    LAGRANGE,
     N_NODE,
     NODES,
     CurvedPairs,
@@ -19,6 +20,10 @@ from rubhpc.kernels.curved_forces import fill_geometry, read_motion
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
 
 Floats = NDArray[np.float64]
+
+N_LOOK = 32  # parts of a step in which a first root is looked for
+N_BISECTION = 24  # passes that narrow one down to less than a tick of the longest step
+N_NEWTON = 4  # passes to a root beyond the step's end
 
 
 @jit_lean_sum
@@ -103,6 +108,86 @@ def closed_crossing(closed: int, work: CurvedWork) -> int:
         if least < 0.0:
             crossing |= 1 << i
     return crossing
+
+
+@jit_lean_sum
+def first_crossing(closed: int, crossing: int, work: CurvedWork) -> float:
+    """Share of a step at which the first of the pairs `crossing` does so, by the polynomials of the step."""
+    first = 1.0
+    for i in range(work.h.shape[1]):
+        if is_closed(crossing, i):
+            fill_course(closed, i, work)
+            first = min(first, first_root(work.course))
+    return first
+
+
+@jit_lean_sum
+def next_crossing(closed: int, work: CurvedWork) -> float:
+    """How far beyond the end of a step, over its length, the first force vanishes; infinite if none falls."""
+    nearest = np.inf
+    for i in range(work.h.shape[1]):
+        if is_closed(closed, i):
+            fill_course(closed, i, work)
+            nearest = min(nearest, next_root(work.course) - 1.0)
+    return nearest
+
+
+@jit_lean_sum
+def fill_course(closed: int, i: int, work: CurvedWork) -> None:
+    """Fill `work.course` with the force of pair i, or its gap if open, by powers of the share of the step."""
+    course = work.course
+    for power in range(N_NODE):
+        course[power] = 0.0
+    for node in range(N_NODE):
+        value = work.force[node, i] if is_closed(closed, i) else work.gap[0, node, i] + GAP_TOLERANCE
+        for power in range(N_NODE):
+            course[power] += value * LAGRANGE[node, power]
+
+
+@jit_inline_sum
+def value_at(course: Floats, share: float) -> float:
+    """Value of a polynomial by powers."""
+    total = 0.0
+    for power in range(course.size - 1, -1, -1):
+        total = total * share + course[power]
+    return total
+
+
+@jit_lean_sum
+def first_root(course: Floats) -> float:
+    """First root between 0 and 1 of a polynomial that begins above zero; without one, where it is least."""
+    share, least, where = 0.0, np.inf, 0.0
+    for part in range(1, N_LOOK + 1):
+        share = part / N_LOOK
+        value = value_at(course, share)
+        if value < least:
+            least, where = value, share
+        if value < 0.0:
+            break
+    if not least < 0.0:
+        return where
+    before = share - 1.0 / N_LOOK
+    for _ in range(N_BISECTION):
+        middle = 0.5 * (before + share)
+        if value_at(course, middle) < 0.0:
+            share = middle
+        else:
+            before = middle
+    return before
+
+
+@jit_lean_sum
+def next_root(course: Floats) -> float:
+    """Root of a polynomial from 1 on, by Newton's method; infinite where it does not fall towards one."""
+    share = 1.0
+    for _ in range(N_NEWTON):
+        slope = 0.0
+        for power in range(course.size - 1, 0, -1):
+            slope = slope * share + power * course[power]
+        if not slope < 0.0:
+            return np.inf
+        share -= value_at(course, share) / slope
+    return share if share >= 1.0 else np.inf
 
 
 @jit_lean_sum

@@ -1,9 +1,9 @@
-"""The loads of a step, found by a secant method: Broyden's, whose matrix goes on from step to step.
+"""The loads of a step, found by a secant method: Broyden's, with a matrix for each length of steps.
 
 The loads x at the nodes after the first answer to themselves: the motion under them has the loads g(x). What
 stiff modes make of a load without delay does not fall with the step, so that sweeps `x = g(x)` converge no
-better in short steps. Here `x + H (g(x) - x)` is tried, H learnt from what the loads did before
-(C. G. Broyden, Math. Comput. 19 (1965) 577-593).
+better in short steps. Here `x + H (g(x) - x)` is tried, H learnt from what the loads did before, in this and
+earlier contacts (C. G. Broyden, Math. Comput. 19 (1965) 577-593).
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.curved_contact import (
     HEIGHT,
     HEIGHT_RATE,
-    LEARNT,
     LOAD_ACROSS,
     LOAD_ALONG,
     LOAD_BENDING,
     N_NODE,
+    PAIRS,
     CurvedPairs,
     CurvedWork,
     is_closed,
@@ -86,36 +86,38 @@ def size_of(change: Floats, n: int, n_load: int, forces: Floats) -> float:
 
 
 @jit_lean_sum
-def forget(n: int, work: CurvedWork) -> None:
-    """Begin with sweeps: H is the unit matrix."""
-    secant = work.secant
-    if n <= secant.shape[1]:
-        for part in range(2):
-            for j in range(n):
-                for k in range(n):
-                    secant[part, j, k] = 1.0 if j == k else 0.0
-    work.span[LEARNT] = 1.0
+def take_secant(mask: int, level: int, n: int, work: CurvedWork) -> None:
+    """See that there is an H for steps of 2^level ticks: that of a length next to it, or the unit matrix."""
+    secant, is_learnt = work.secant, work.is_learnt
+    if work.span[PAIRS] != mask:
+        work.span[PAIRS] = mask
+        forget(work)
+    if is_learnt[level] or n > secant.shape[1]:
+        return
+    source = level
+    if level > 0 and is_learnt[level - 1]:
+        source = level - 1
+    elif level + 1 < is_learnt.size and is_learnt[level + 1]:
+        source = level + 1
+    for j in range(n):
+        for k in range(n):
+            secant[level, j, k] = secant[source, j, k]
+            if source == level:
+                secant[level, j, k] = 1.0 if j == k else 0.0
+    is_learnt[level] = True
 
 
 @jit_lean_sum
-def keep_or_forget(n: int, is_settled: bool, work: CurvedWork) -> None:
-    """Keep H where the loads were found; else go back to the one kept before, and at last to sweeps."""
-    secant = work.secant
-    if n <= secant.shape[1]:
-        source, target = (0, 1) if is_settled else (1, 0)
-        for j in range(n):
-            for k in range(n):
-                secant[target, j, k] = secant[source, j, k]
-    if is_settled:
-        work.span[LEARNT] = 1.0
-    else:
-        work.span[LEARNT] = 2.0 if work.span[LEARNT] == 1.0 else 0.0
+def forget(work: CurvedWork) -> None:
+    """Begin with sweeps again, whatever the length of a step: an H has failed."""
+    for level in range(work.is_learnt.size):
+        work.is_learnt[level] = False
 
 
 @jit_lean_sum
-def move_loads(n: int, work: CurvedWork) -> None:
+def move_loads(level: int, n: int, work: CurvedWork) -> None:
     """Move the loads by H times what they are missed by."""
-    point, secant = work.point, work.secant[0]
+    point, secant = work.point, work.secant[level]
     for j in range(n):
         total = point[MISSED, j]
         if n <= secant.shape[0]:
@@ -129,12 +131,12 @@ def move_loads(n: int, work: CurvedWork) -> None:
 
 
 @jit_lean_sum
-def learn(n: int, work: CurvedWork) -> None:
+def learn(level: int, n: int, work: CurvedWork) -> None:
     """Have H say that the last move was due to the change of what the loads are missed by, `SAID` before it.
 
     Of all such matrices the nearest is taken, loads measured by the forces that they stand for.
     """
-    point, secant = work.point, work.secant[0]
+    point, secant = work.point, work.secant[level]
     if n > secant.shape[0]:
         return
     change, weighed = point[SAID], point[IMAGE]

@@ -11,8 +11,8 @@ from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.curved_contact import (
     BEFORE,
     LARGEST,
-    LEARNT,
     N_NODE,
+    PAST,
     PATIENCE,
     CurvedPairs,
     CurvedTables,
@@ -27,6 +27,7 @@ from rubhpc.kernels.curved_response import (
     read_free,
     read_loaded,
     respond,
+    take_motion,
 )
 from rubhpc.kernels.curved_secant import (
     FORCES,
@@ -38,11 +39,11 @@ from rubhpc.kernels.curved_secant import (
     SAID,
     forget,
     give_loads,
-    keep_or_forget,
     learn,
     move_loads,
     size_of,
     take_loads,
+    take_secant,
     weigh_loads,
 )
 
@@ -109,8 +110,7 @@ def take_step(
     n = take_loads(mask, work, point[LOADS])
     for j in range(n):
         point[GUESS, j] = point[LOADS, j]
-    if work.span[LEARNT] == 0.0:
-        forget(n, work)
+    take_secant(mask, level, n, work)
     moved, first, sweep = np.inf, np.inf, 0
     while True:
         if is_lone:
@@ -118,7 +118,7 @@ def take_step(
         else:
             is_found = sweep_all(pairs, curved, rim_speed, mode, mask, level, z, work)
         if not is_found:
-            keep_or_forget(n, False, work)
+            forget(work)
             return False, False
         take_loads(mask, work, point[IMAGE])
         for j in range(n):
@@ -130,10 +130,10 @@ def take_step(
         if sweep >= HOPELESS and not moved <= FALLEN * first:
             break
         if sweep > 0:
-            learn(n, work)
+            learn(level, n, work)
         for j in range(n):
             point[SAID, j] = point[MISSED, j]
-        move_loads(n, work)
+        move_loads(level, n, work)
         if sweep == 0 and level > 0:
             missed = INTERPOLATED * size_of(point[MOVE], n, n_load, point[FORCES])
             if missed > 4.0 * allowed:
@@ -145,7 +145,8 @@ def take_step(
         point[MOVE, j] = point[LOADS, j] - point[GUESS, j]
     missed = INTERPOLATED * size_of(point[MOVE], n, n_load, point[FORCES])
     is_settled = moved <= SETTLED * allowed
-    keep_or_forget(n, is_settled, work)
+    if not is_settled:
+        forget(work)
     work.span[PATIENCE] = max(work.span[PATIENCE] - 1.0, 0.0) if is_settled else 1.0 * PATIENT
     respond(curved, mode, mask, N_NODE, work)
     move_coordinates(curved, mode, level, N_NODE - 1, z, work, z_next)
@@ -157,10 +158,11 @@ def take_step(
 def sweep_alone(
     pairs: CurvedPairs, curved: CurvedTables, rim_speed: Floats, mode: int, level: int, work: CurvedWork
 ) -> bool:
-    """Loads of the only pair at the nodes, each under those found so far; False without forces."""
+    """Loads of the only pair at the nodes under those found so far; False without forces."""
+    read_loaded(curved, mode, level, work)
     is_found = True
     for node in range(1, N_NODE):
-        read_loaded(curved, mode, level, node, work)
+        take_motion(curved.bound.shape[2], node, work)
         is_found = is_found and find_lone_forces(pairs, curved, rim_speed, mode, node, work)
     return is_found
 
@@ -188,15 +190,24 @@ def sweep_all(
 @jit_lean_sum
 def go_on(mask: int, step: float, work: CurvedWork) -> None:
     """Make the end of a step (s) the beginning of the next."""
+    follow_loads(mask, step, step, work)
     for i in range(work.load.shape[1]):
         if is_closed(mask, i):
             for node in range(N_NODE):
-                for a in range(work.load.shape[2]):
-                    work.before[node, i, a] = work.load[node, i, a]
                 work.span[LARGEST] = max(work.span[LARGEST], work.force[node, i])
             for a in range(work.load.shape[2]):
                 work.load[0, i, a] = work.load[-1, i, a]
         work.h[0, i], work.rate[0, i] = work.h[-1, i], work.rate[-1, i]
         work.force[0, i], work.slip[0, i] = work.force[-1, i], work.slip[-1, i]
         work.gap[0, 0, i], work.gap[1, 0, i] = work.gap[0, -1, i], work.gap[1, -1, i]
-    work.span[BEFORE] = step
+
+
+@jit_lean_sum
+def follow_loads(mask: int, step: float, past: float, work: CurvedWork) -> None:
+    """Continue the next loads from those of a step (s) that began a time `past` (s) before them."""
+    for i in range(work.load.shape[1]):
+        if is_closed(mask, i):
+            for node in range(N_NODE):
+                for a in range(work.load.shape[2]):
+                    work.before[node, i, a] = work.load[node, i, a]
+    work.span[BEFORE], work.span[PAST] = step, past

@@ -72,7 +72,8 @@ class CurvedMarch(EventDrivenMarch):
 
     def _make_work(self) -> None:
         _, n_row, n = self._pairs.row.shape
-        self._work = curved_work(self._clearance.size, n_row, n, self._z.shape[1], self._curved.sign.shape[1])
+        n_loss, n_level = self._curved.sign.shape[1], self._curved.node_re.shape[1]
+        self._work = curved_work(self._clearance.size, n_row, n, self._z.shape[1], n_loss, n_level)
 
     def motion(self) -> Floats:
         """Reduced displacements, then velocities (2 n,), at the sample reached."""

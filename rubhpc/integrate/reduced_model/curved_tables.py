@@ -212,9 +212,14 @@ def tuned_tables(
     growth = np.exp(np.maximum(exponent.real, 0.0) * steps[-1])
     inverse = np.divide(1.0, exponent, out=np.zeros_like(exponent), where=exponent != 0.0)
     node = np.exp(np.multiply.outer(np.multiply.outer(steps, NODES[1:]), exponent))
-    reach = np.zeros((steps.size, N_NODE - 1, N_NODE, d + 2, read.shape[1]))
+    width, n_read = exponent.size, (N_NODE - 1) * read.shape[1] if len(row) == 1 else 0
+    lone = np.zeros((steps.size, 2, width, n_read))
+    reach = np.zeros((steps.size, N_NODE * (d + 2), n_read))
     if still.is_lone:
-        reach = np.einsum("rm,lakm,jm->lakjr", read[0], weight, still.load[0], optimize=True).real
+        seen = np.einsum("lam,rm->lmar", node, read[0]).reshape(steps.size, width, n_read)
+        lone[:, 0], lone[:, 1] = seen.real, -seen.imag
+        met = np.einsum("lakm,rm,jm->lkjar", weight, read[0], still.load[0], optimize=True)
+        reach[:] = met.real.reshape(reach.shape)
     forces = np.concatenate([still.dampers, reduced.force])  # (r + 2, n)
     drain = forces @ motion[n:]
     return CurvedTables(
@@ -231,8 +236,8 @@ def tuned_tables(
         weight_im=weight.imag,
         node_re=node.real,
         node_im=node.imag,
-        lone=np.stack([read[0].real.T, -read[0].imag.T]),
-        reach=reach.reshape(steps.size, N_NODE - 1, -1, read.shape[1]),
+        lone=lone,
+        reach=reach,
         inverse_re=inverse.real,
         inverse_im=inverse.imag,
         drain=np.stack([drain.real.T, -drain.imag.T]),
