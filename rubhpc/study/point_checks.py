@@ -8,6 +8,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.constraints import find_rigid_body_mode
 from rubhpc.fem.response import check_response_node
 from rubhpc.study.initial import KNOCKED
+from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
     from rubhpc.study.operating_points import OperatingPoints
@@ -35,7 +36,8 @@ def check_gap(points: OperatingPoints, least: float) -> None:
     varied = [i for i in points.rig_axes if points.study.axes[i].name.endswith("offset")]
     offset = min(s.clearance_offset for at in points.along(varied) for s in points.rig(at).stator)
     if least + offset <= 0:
-        problem = f"{least:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
+        gap, shift = typed_quantity(least, "m"), typed_quantity(offset, "m")
+        problem = f"{gap} and a stator's clearance_offset of {shift} leave no gap"
         name = "clearance_ratio" if points.is_clearance_ratio else "clearance"
         raise InputError(f"[grid] {name}: {problem}; take a larger one")
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.units import typed_quantity
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -60,7 +62,7 @@ def _sag(points: OperatingPoints) -> str:
         n_bad += overlap > 0.0
         if overlap > worst:
             worst = overlap
-            text = f"by up to {overlap:.3g} m at a clearance of {gap:.3g} m"
+            text = f"by up to {_length(overlap)} at a clearance of {_length(float(gap))}"
     if not n_bad:
         return ""
     share = f"{n_bad} of {len(spread)}"
@@ -68,6 +70,10 @@ def _sag(points: OperatingPoints) -> str:
         f"[grid] clearance_ratio: the sag of the shaft exceeds {share} clearances, {text}: it rests on a "
         "stator, and the ratio says little; give clearance instead"
     )
+
+
+def _length(size: float) -> str:
+    return typed_quantity(float(f"{size:.3g}"), "m")
 
 
 def _span(speeds: NDArray[np.float64]) -> str:

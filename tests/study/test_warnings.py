@@ -98,5 +98,6 @@ def test_a_sag_beyond_the_clearance_is_named(tmp_path, gravity, angle, n):
     assert len(found) == (n > 0)
     if n:
         assert f"the sag of the shaft exceeds {n} of 3 clearances" in found[0]
+        assert " um at a clearance of " in found[0]
     absolute = study_of(tmp_path, 'clearance = "0.1 mm"\nspeed_ratio = 0.75', **keys)
     assert CaseGrid(absolute).warnings() == ()
