@@ -91,7 +91,7 @@ def take_secant(mask: int, level: int, n: int, work: CurvedWork) -> None:
     secant, is_learnt = work.secant, work.is_learnt
     if work.span[PAIRS] != mask:
         work.span[PAIRS] = mask
-        forget(work)
+        forget(0, work)
     if is_learnt[level] or n > secant.shape[1]:
         return
     source = level
@@ -108,10 +108,10 @@ def take_secant(mask: int, level: int, n: int, work: CurvedWork) -> None:
 
 
 @jit_lean_sum
-def forget(work: CurvedWork) -> None:
-    """Begin with sweeps again, whatever the length of a step: an H has failed."""
-    for level in range(work.is_learnt.size):
-        work.is_learnt[level] = False
+def forget(level: int, work: CurvedWork) -> None:
+    """Forget the H of steps of 2^level ticks, and of longer ones."""
+    for one in range(level, work.is_learnt.size):
+        work.is_learnt[one] = False
 
 
 @jit_lean_sum

@@ -118,7 +118,7 @@ def take_step(
         else:
             is_found = sweep_all(pairs, curved, rim_speed, mode, mask, level, z, work)
         if not is_found:
-            forget(work)
+            lose_patience(level, work)
             return False, False
         take_loads(mask, work, point[IMAGE])
         for j in range(n):
@@ -145,13 +145,24 @@ def take_step(
         point[MOVE, j] = point[LOADS, j] - point[GUESS, j]
     missed = INTERPOLATED * size_of(point[MOVE], n, n_load, point[FORCES])
     is_settled = moved <= SETTLED * allowed
-    if not is_settled:
-        forget(work)
-    work.span[PATIENCE] = max(work.span[PATIENCE] - 1.0, 0.0) if is_settled else 1.0 * PATIENT
+    if is_settled:
+        work.span[PATIENCE] = max(work.span[PATIENCE] - 1.0, 0.0)
+    else:
+        lose_patience(level, work)
     respond(curved, mode, mask, N_NODE, work)
     move_coordinates(curved, mode, level, N_NODE - 1, z, work, z_next)
     is_easy = missed <= EASY * allowed and sweep <= QUICK and work.span[PATIENCE] == 0.0
     return level == 0 or (is_settled and missed <= allowed), is_easy
+
+
+@jit_lean_sum
+def lose_patience(level: int, work: CurvedWork) -> None:
+    """Take no longer steps for a while, since loads were not found: they are learnt anew for this length.
+
+    Where the step before it failed too, for all lengths.
+    """
+    forget(0 if work.span[PATIENCE] == PATIENT else level, work)
+    work.span[PATIENCE] = 1.0 * PATIENT
 
 
 @jit_lean_sum

@@ -28,7 +28,7 @@ DIRECT = 3  # transient = "direct"
 CHANGING_SPEED = 4  # run-ups and drives
 COULOMB = 2  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
-CURVED = 3  # method = "modal" with gaps that are curved
+CURVED = 4  # method = "modal" with gaps that are curved
 MANY_STATORS = 1  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 2  # [branch]: grazing beside a fold, and at a sharp corner
 ALONG_SPEED = 1  # branches along a speed
