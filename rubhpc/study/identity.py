@@ -26,10 +26,10 @@ PHYSICS = 15  # version of the physics: raised whenever a study gives other resu
 MODAL = 1  # method = "modal": last digits of multipliers
 DIRECT = 3  # transient = "direct"
 CHANGING_SPEED = 4  # run-ups and drives
-COULOMB = 2  # set-valued friction
+COULOMB = 3  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 4  # method = "modal" with gaps that are curved
-MANY_STATORS = 1  # more than five, whose sets of closed contacts or states may be more than 256
+MANY_STATORS = 2  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 2  # [branch]: grazing beside a fold, and at a sharp corner
 ALONG_SPEED = 1  # branches along a speed
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"

@@ -12,6 +12,7 @@ from scipy.linalg import null_space
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
+from rubhpc.integrate.reduced_model.products import expanded, real_times
 from rubhpc.integrate.reduced_model.repeated_exponents import real_ones, separate
 
 if TYPE_CHECKING:
@@ -86,12 +87,8 @@ def solve_contact_mode(
     exponent, shape, inverse = modes_of(system, known)
     phasor = reduced.force[0] - 1j * reduced.force[1]
     lower = np.concatenate([np.zeros(n_free), project @ phasor])
-    parts = _parts(system) if q > 1 else [np.arange(2 * n_free)]
-    response = np.zeros(2 * n_free, dtype=np.complex128)
-    for rows in parts:
-        if np.any(lower[rows] != 0.0):
-            turned = 1j * reduced.spin * np.eye(rows.size) - system[np.ix_(rows, rows)]
-            response[rows] = np.linalg.solve(turned, lower[rows])
+    parts = parts_of(system, q)
+    response = steady_response(system, reduced.spin, lower, parts)
     constant = np.zeros((q, 2 * n_free))
     if closed.size:
         load = -project @ reduced.stiffness @ offset[closed].T
@@ -102,22 +99,39 @@ def solve_contact_mode(
     expand = np.zeros((2 * n, 2 * n_free))
     expand[:n, :n_free] = expand[n:, n_free:] = tangent
     still = constant @ expand.T + np.hstack([offset, np.zeros((q, n))])  # (q, 2 n)
-    motion = np.hstack([expand @ shape, (expand @ response)[:, None], still.T])
+    motion = np.hstack([expanded(tangent, shape), (expand @ response)[:, None], still.T])
     clear = np.hstack([np.zeros((q, exponent.size + 1)), np.eye(q)])
     switch = gap_jacobian @ motion[:n] + clear
     if closed.size:
         reaction = np.linalg.solve(rate @ force, rate)
-        switch[closed] = reaction @ (np.hstack([reduced.stiffness, reduced.damping]) @ motion)
+        switch[closed] = reaction @ real_times(np.hstack([reduced.stiffness, reduced.damping]), motion)
         switch[closed, exponent.size] -= reaction @ phasor
     entry = constant + np.hstack([offset @ tangent, np.zeros((q, n_free))])
     return ContactMode(
         mask=mask,
         exponent=np.concatenate([exponent, [1j * reduced.spin], np.zeros(q)]),
         motion=motion,
-        enter=inverse @ expand.T,
+        enter=expanded(tangent, inverse.T).T,
         take_off=np.vstack([inverse @ response.real, -inverse @ response.imag, entry @ inverse.T]),
         switch=switch,
     )
+
+
+def parts_of(system: Floats, q: int) -> list[NDArray[np.int64]]:
+    """Rows of each part that nothing couples to the rest; of one pair there is little to take apart."""
+    return _parts(system) if q > 1 else [np.arange(len(system))]
+
+
+def steady_response(
+    system: Floats, spin: float, load: Complexes, parts: list[NDArray[np.int64]]
+) -> Complexes:
+    """Coordinates and rates (2 n_free,) under a load (2 n_free,) that turns with the shaft, part by part."""
+    response = np.zeros(len(system), dtype=np.complex128)
+    for rows in parts:
+        if np.any(load[rows] != 0.0):
+            turned = 1j * spin * np.eye(rows.size) - system[np.ix_(rows, rows)]
+            response[rows] = np.linalg.solve(turned, load[rows])
+    return response
 
 
 def count_coordinates(reduced: ReducedModel, gap_jacobian: Floats, force_direction: Floats, mask: int) -> int:

@@ -7,8 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.reduced_model.contact_mode import ContactMode, confine, modes_of
+from rubhpc.integrate.reduced_model.contact_mode import (
+    ContactMode,
+    confine,
+    modes_of,
+    parts_of,
+    steady_response,
+)
 from rubhpc.integrate.reduced_model.penalty_mode import damped, stored_energy
+from rubhpc.integrate.reduced_model.products import expanded, real_times
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, lifted_place
 
 if TYPE_CHECKING:
@@ -126,7 +133,7 @@ def solve_friction_mode(
     m = exponent.size
     phasor = reduced.force[0] - 1j * reduced.force[1]
     lower = np.concatenate([np.zeros(n_free), project @ phasor])
-    response = np.linalg.solve(1j * reduced.spin * np.eye(2 * n_free) - system, lower)
+    response = steady_response(system, reduced.spin, lower, parts_of(system, q))
     expand = np.zeros((2 * n, 2 * n_free))
     expand[:n, :n_free] = expand[n:, n_free:] = tangent
     end = m + 2 + 2 * q
@@ -134,9 +141,9 @@ def solve_friction_mode(
     growth = np.zeros(end)
     growth[ahead] = pairs.rim_speed[stuck]
     motion = np.zeros((2 * n, end), dtype=np.complex128)
-    motion[:, :m], motion[:, m] = expand @ shape, expand @ response
+    motion[:, :m], motion[:, m] = expanded(tangent, shape), expand @ response
     enter, take_off = np.zeros((end, 2 * n), dtype=np.complex128), np.zeros((3 + q, end), dtype=np.complex128)
-    enter[:m] = inverse @ expand.T
+    enter[:m] = expanded(tangent, inverse.T).T
     take_off[0, :m], take_off[1, :m] = inverse @ response.real, -inverse @ response.imag
     switch = np.zeros((2 * q, end), dtype=np.complex128)
     forces = np.zeros((n_row, end), dtype=np.complex128)
@@ -161,7 +168,7 @@ def solve_friction_mode(
         take_off[2 + closed, :m] = (inverse[:, :n_free] @ yielding).T
     if n_row:
         reaction = np.linalg.solve(rows @ force, rows)
-        forces += reaction @ (np.hstack([reduced.stiffness, reduced.damping]) @ motion)
+        forces += reaction @ real_times(np.hstack([reduced.stiffness, reduced.damping]), motion)
         forces[:, m] -= reaction @ phasor
         if soft.size:
             forces[:, clear] -= reaction @ load
