@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import rubhpc
 from rubhpc.errors import InputError
 from rubhpc.fem.model import Body
 from rubhpc.fem.rotor import assemble_rotor
+from rubhpc.input import reading
 from rubhpc.input.fields import FieldError, check_fields, quantity
 from rubhpc.rig import rig as rig_module
 from rubhpc.rig.forces import RotorForces
@@ -87,6 +89,7 @@ damping = 2.0
 def known(monkeypatch):
     """Have rig files read the new kind: the one line that a source tree would change."""
     monkeypatch.setattr(rig_module, "AnyRotor", AnyRotor | Jeffcott)
+    monkeypatch.setattr(reading, "_hints", get_type_hints)  # which remembers what was read before
 
 
 def written(tmp_path, **values):
