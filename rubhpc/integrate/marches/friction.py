@@ -70,6 +70,7 @@ class FrictionMarch(EventDrivenMarch):
         )
         self._steps: ContactSteppingMarch | None = None
         self._n_short = 0  # ticks to be taken in short steps
+        self._pulled: tuple[Floats, Floats, Floats] | None = None  # stiffness, and what follows from it
         super().__init__(setup, clearance, friction, initial, check)
 
     def begin(self, setup: ModalSetup, place: Place) -> None:
@@ -110,13 +111,14 @@ class FrictionMarch(EventDrivenMarch):
     def _friction_bodies(self) -> FrictionBodies:
         """What friction asks of the bodies at the speed that they turn at."""
         bodies = self.bodies
-        rows = np.vstack([bodies.gap_jacobian, bodies.slip])
-        return FrictionBodies(
-            *self._coefficients,
-            rim_speed=bodies.rim_speed,
-            pull=np.hstack([rows @ bodies.stiffness, rows @ bodies.damping]),
-            turned=np.column_stack([rows @ bodies.force_cosine, rows @ bodies.force_sine]),
-        )
+        if self._pulled is None or self._pulled[0] is not bodies.stiffness:  # pieces of a run-up share it
+            rows = np.vstack([bodies.gap_jacobian, bodies.slip])
+            pull = np.hstack([rows @ bodies.stiffness, rows @ bodies.damping])
+            self._pulled = bodies.stiffness, rows, pull
+        _, rows, pull = self._pulled
+        turned = np.empty((len(rows), 2))
+        turned[:, 0], turned[:, 1] = rows @ bodies.force_cosine, rows @ bodies.force_sine
+        return FrictionBodies(*self._coefficients, rim_speed=bodies.rim_speed, pull=pull, turned=turned)
 
     def _use(self, tables: ModeTables) -> None:
         super()._use(tables)
