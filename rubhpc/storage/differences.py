@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.study.axes import meanings_of
 from rubhpc.study.identity import WHOLE
+from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
     from rubhpc.storage.manifest import Manifest
@@ -18,22 +20,18 @@ def differences(stored: Manifest, asked: Manifest) -> list[str]:
 
     Its axes may have grown, anywhere, and the order of their values may be another.
     """
-    found = [
-        f"{key} was {_short(mine)}, is {_short(yours)}"
-        for key, mine, yours in _leaves(stored.parts, asked.parts)
-        if mine != yours
-    ]
+    found = _grouped([leaf for leaf in _leaves(stored.parts, asked.parts) if leaf[1] != leaf[2]])
     if stored.dims != asked.dims:
         found.append(f"axes were {', '.join(stored.dims)}, are {', '.join(asked.dims)}")
         return found
     for dim in stored.dims:
         lost = sorted(set(stored.points.along(dim)) - set(asked.points.along(dim)))
-        names = [axis.name for axis in stored.axes if axis.dimension == dim]
-        if lost and len(names) == 1:
+        own = [axis for axis in stored.axes if axis.dimension == dim]
+        if lost and len(own) == 1:
             rest = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
-            words = meanings_of(names[0])
-            values = ", ".join(words[int(v)] if words else f"{v:.12g}" for (v,) in lost[:3])
-            found.append(f"axis {names[0]} lacks {values}{rest}, which is stored")
+            words, unit = meanings_of(own[0].name), own[0].unit
+            values = ", ".join(words[int(v)] if words else typed_quantity(v, unit) for (v,) in lost[:3])
+            found.append(f"axis {own[0].name} lacks {values}{rest}, which is stored")
         elif lost and not any(WHOLE in text for text in found):
             n_mine, n_yours = (dict(zip(m.dims, m.shape, strict=True))[dim] for m in (stored, asked))
             why = "n can only grow" if n_yours < n_mine else "this SALib or SciPy draws other points"
@@ -50,6 +48,18 @@ def is_other_version(stored: Manifest, asked: Manifest) -> bool:
     return stored.parts != same and not differences(
         replace(stored, parts=same, identity=asked.identity), asked
     )
+
+
+def _grouped(leaves: list[tuple[str, Any, Any]]) -> list[str]:
+    """A text for each leaf, but one for the same change in many members of a list, as in a ring."""
+    members: dict[tuple[str, str, str], list[str]] = {}
+    for key, mine, yours in leaves:
+        anywhere = re.sub(r"\.\d+(?=\.|$)", ".*", key)
+        members.setdefault((anywhere, _short(mine), _short(yours)), []).append(key)
+    return [
+        f"{keys[0] if len(keys) == 1 else f'{anywhere} ({len(keys)} of them)'} was {mine}, is {yours}"
+        for (anywhere, mine, yours), keys in members.items()
+    ]
 
 
 def _leaves(mine: Any, yours: Any, key: str = "") -> list[tuple[str, Any, Any]]:

@@ -14,6 +14,7 @@ from rubhpc import __version__
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING, STATE, VARIABLES
 from rubhpc.storage import layout
+from rubhpc.storage.differences import differences
 from rubhpc.storage.disk import disk_errors, write_whole
 from rubhpc.storage.journal import Entry
 from rubhpc.storage.manifest import Manifest
@@ -202,6 +203,22 @@ def test_another_study_is_refused_with_the_differences(tmp_path, store, changes,
     assert told in str(refused.value)
     assert "\n" not in str(refused.value)
     assert "--output" in str(refused.value)
+
+
+def test_the_same_change_of_all_stators_of_a_ring_is_one_difference(store):
+    def ring(length):
+        return replace(store.manifest, parts={"rig": {"stator": [{"length": length, "node": 8}] * 8}})
+
+    assert differences(ring(0.03), ring(0.04)) == ["rig.stator.*.length (8 of them) was 0.03, is 0.04"]
+
+
+def test_lost_values_of_an_axis_are_written_as_a_study_file_may_state_them(store):
+    def over(*speeds):
+        axis = replace(store.manifest.axes[0], name="speed", dimension="speed", unit="rad s-1", values=speeds)
+        return replace(store.manifest, axes=(axis,))
+
+    found = differences(over(40 * np.pi, 50 * np.pi), over(40 * np.pi))
+    assert found[0] == "axis speed lacks 1500 rpm, which is stored"
 
 
 def test_what_changes_no_result_is_no_difference(tmp_path, store):
