@@ -201,7 +201,7 @@ def test_store_without_points_is_refused(store):
             figure(empty)
 
 
-def test_case_without_a_motion_is_done_with_a_remark(store, tmp_path, monkeypatch):
+def test_case_without_a_motion_is_done_with_a_remark(tmp_path, monkeypatch):
     """Its arrays hold NaN, those with a value a stator or a section too."""
     monkeypatch.setattr(case, "starts", lambda *_: iter(()))
     (tmp_path / "study.toml").write_text(STUDY)
