@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
 
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
-from rubhpc.integrate.reduced_model.products import real_times
 from rubhpc.kernels import contact_modes as kernel
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 
@@ -221,7 +220,7 @@ def _energies(
     n = reduced.stiffness.shape[0]
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
     shape, rate = motion[:n], motion[n:]
-    resisting = real_times(reduced.damping, rate) + real_times(skew, shape) - friction
+    resisting = reduced.damping @ rate + skew @ shape - friction
     phasor = reduced.force[0] - 1j * reduced.force[1]
     turning = np.full(exponent.shape, 1j * reduced.spin)
     forms = []
