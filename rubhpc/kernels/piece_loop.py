@@ -49,6 +49,7 @@ class Pieces(NamedTuple):
     at: Ints  # (3,), which piece, which part of it, and the stage that it is in
     motion: Floats  # (k + 1, 2 n), at the beginning of each piece; of the first one given
     pressing: Floats  # (k + 1, q), N, contact forces there
+    seen: Floats  # (2, 3 + places), `Recorder.last` at the beginning of the piece under way
     n_step: Ints  # (k,), steps taken
     whole: Floats  # (o, k n_sample), samples
 
@@ -111,6 +112,9 @@ def advance_pieces(
                 )
             for i in range(reduced.radius.size):
                 reduced.rim_speed[i] = reduced.radius[i] * abs(spin)
+            for row in range(2):
+                for j in range(pieces.seen.shape[1]):
+                    pieces.seen[row, j] = recorder.last[row, j]
             for row in range(samples.whole.shape[0]):
                 for j in range(pieces.n_sample):
                     samples.whole[row, j] = 0.0

@@ -79,6 +79,7 @@ def take_stretch(
         at=np.array([first, 0, TO_BEGIN]),
         motion=np.zeros((n_piece + 1, 2 * n)),
         pressing=np.zeros((n_piece + 1, q)),
+        seen=np.empty((2, 3 + setups[first].model.n_place)),
         n_step=np.zeros(n_piece, dtype=np.int64),
         whole=np.empty((n_row, n_piece * n_sample)),
     )

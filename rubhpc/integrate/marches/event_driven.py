@@ -10,7 +10,7 @@ import numpy as np
 from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.measuring.samples import new_accumulator
-from rubhpc.kernels.case_progress import MODE_WANTED
+from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, PAUSED
 from rubhpc.kernels.contact_modes import FORCED_LEVEL
 from rubhpc.kernels.event_loop import advance, event_work
 from rubhpc.kernels.mode_change import change_contacts
@@ -106,8 +106,11 @@ class EventDrivenMarch(ModalMarch):
     def advance_through(
         self, kernel: Callable[..., int], pieces: Any, samples: Samples, sums: Accumulator
     ) -> int:
-        """Advance through several pieces by a kernel that begins them (`kernels.piece_loop`)."""
-        return kernel(
+        """Advance through several pieces by a kernel that begins them (`kernels.piece_loop`).
+
+        What it saw of a piece that it could not take to the end is forgotten.
+        """
+        outcome = kernel(
             self.tables,
             self.bodies,
             self.clock,
@@ -121,6 +124,9 @@ class EventDrivenMarch(ModalMarch):
             samples,
             sums,
         )
+        if outcome not in (FINISHED, MODE_WANTED, PAUSED):
+            self._recorder.last[:] = pieces.seen
+        return outcome
 
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs are closed, (q,)."""
