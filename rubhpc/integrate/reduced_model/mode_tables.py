@@ -53,7 +53,8 @@ class TableStack:
         elif self._n_filled == len(self._room[0]):  # twice the room: most books never need it
             n_room = min(2 * self._n_filled, self.n_most)
             for i, field in enumerate(self._room):  # one after the other: all at once would take it twice
-                self._room[i] = np.resize(field, (n_room, *field.shape[1:]))
+                self._room[i] = np.empty((n_room, *field.shape[1:]), field.dtype)
+                self._room[i][: self._n_filled] = field
         for field, new in zip(self._room, rows, strict=True):
             field[self._n_filled] = new[0]
         self._n_filled += 1
