@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from trial_rig import trial_rig
 
 from rubhpc import LumpedStator, Rig, Unbalance, run_up, simulate
@@ -84,26 +85,50 @@ def stepped(
         return np.concatenate([y[n:], accelerations(t, y) + inverse @ push * pressing(t, y)])
 
     def touches(t, y):
-        return clearance + gap @ y[:n]
+        """Bodies part with a gap of 0, which a hop shorter than a step may leave without a change of sign."""
+        return clearance + gap @ y[:n] + 1e-13
+
+    def closest(t, y):
+        """The stator's frequency is 160 Hz: no step of 1 ms holds a minimum of the gap and a maximum."""
+        return gap @ y[n:]
 
     touches.terminal = pressing.terminal = True
     touches.direction = pressing.direction = -1
+    closest.direction = 1
     times = sample_times(start, stop, time, per_revolution)[:most]
     y = np.zeros(2 * n)
     k = np.zeros((5, 5)) if table is None else np.pad(table.at(start)[0], (0, 3))
     y[:5] = np.linalg.solve(K + k, -rate * M @ SPINNING - gravity * M[:, 0])
     found, t, is_closed = np.zeros((2 * n, times.size)), 0.0, False
     while t < times[-1]:
-        rates, event = (closed_rates, pressing) if is_closed else (open_rates, touches)
         part = solve_ivp(
-            rates, (t, times[-1]), y, method="DOP853", rtol=1e-9, atol=1e-12, events=event, dense_output=True
+            closed_rates if is_closed else open_rates,
+            (t, times[-1]),
+            y,
+            method="DOP853",
+            rtol=1e-9,
+            atol=1e-12,
+            max_step=2e-4 if is_closed else 1e-3,
+            events=pressing if is_closed else (touches, closest),
+            dense_output=True,
         )
-        inside = (times >= t) & (times <= part.t[-1])
+        end, touched = part.t[-1], part.status == 1 and not is_closed
+
+        def open_by(s, part=part):
+            return touches(s, part.sol(s))
+
+        for lowest in () if is_closed else part.t_events[1]:
+            before = part.t[max(np.searchsorted(part.t, lowest) - 1, 0)]
+            if open_by(lowest) < 0.0 < open_by(before):  # it touches and parts within a step
+                end, touched = brentq(open_by, before, lowest, xtol=1e-15), True
+                break
+        inside = (times >= t) & (times <= end)
         if inside.any():
             found[:, inside] = part.sol(times[inside])
-        t, y = part.t[-1], part.y[:, -1].copy()
-        if part.status == 1 and not is_closed:
+        t, y = end, part.sol(end)
+        if touched:
             y[n:] -= inverse @ push * (gap @ y[n:]) / (gap @ inverse @ push)
+        y[n - 1] -= clearance + gap @ y[:n]  # an event leaves 1e-13 m at most
         is_closed = not is_closed and pressing(t, y) > 0.0  # or it parts at once
     return found[[0, 1, 4]]
 
@@ -143,11 +168,11 @@ def test_rub_in_a_passage_meets_full_order_stepping(start, stop, time):
     )
     touched = np.flatnonzero(found.contact_fraction[:, 0])
     assert touched.size > 12
-    end = (touched[0] + 12) * 32  # a touch that all but grazes parts them later
+    end = (touched[0] + 20) * 32
     expected = stepped(*law.values(), 32, clearance=6e-4, friction=0.2, most=end)
     rows = np.array([found.vertical, found.horizontal, found.torsion])[:, :end]
     scale = np.abs(expected).max(axis=1)
-    assert (np.abs(rows - expected).max(axis=1) / scale).max() < 2e-3
+    assert (np.abs(rows - expected).max(axis=1) / scale).max() < 5e-4
 
 
 @pytest.mark.parametrize("time", [1.5, 5.0, 12.0])
