@@ -95,7 +95,7 @@ class Branch:
     def events(self) -> list[tuple[str, float]]:
         """What happens on the branch: name and parameter of each event in order, ends left out."""
         quiet = (Event.NONE.name.lower(), Event.END.name.lower())
-        return [(point.event, point.value) for point in self.points if point.event not in quiet]
+        return [(point.event, float(point.value)) for point in self.points if point.event not in quiet]
 
     def record(self, i_point: int) -> Record:
         """Signals, spectra, sections and measures over a period of the motion at a point."""

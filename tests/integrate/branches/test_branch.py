@@ -45,6 +45,7 @@ def test_branches_end_where_the_contact_free_motion_grazes(found):
     assert [branch.period for branch in found] == [2, 1, 2]
     assert [name for name, _ in twice.events()] == ["grazing", "grazing", "period_doubling"]
     assert once.events()[-1] == ("grazing", pytest.approx(contact_free_amplitude(), rel=3e-8))
+    assert all(type(value) is float for _, value in once.events())  # plain numbers, also in print
     doubled = [value for name, value in once.events() if name == "period_doubling"]
     assert [name for name, _ in other.events()] == ["period_doubling"]
     assert (other.values.max(), twice.values.max()) == pytest.approx(doubled, rel=1e-8)
