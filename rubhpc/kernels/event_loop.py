@@ -67,7 +67,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-MOST_EVENTS = 200_000  # of one call; more is chatter without end
+MOST_EVENTS = 200_000  # in a revolution; more is chatter without end
 
 
 @jit_lean_sum

@@ -186,7 +186,7 @@ def end_mode(
     accumulator: Accumulator,
 ) -> bool:
     """Go on where `leave_mode` has filled the motion; `z` are the coordinates of the span that ends."""
-    progress.n_event += 1
+    count_event(clock, progress)
     if is_beyond(reduced, motion):
         return False
     if is_recorded:
@@ -194,6 +194,14 @@ def end_mode(
         for i in range(impulse.size):
             impulse[i] = accumulator.impulse[i]
     return True
+
+
+@jit_inline_sum
+def count_event(clock: Clock, progress: Progress) -> None:
+    """Count an event among those of a revolution, anew with the first one after it."""
+    if progress.tick - progress.counted_from > clock.samples_per_revolution << clock.sample_level:
+        progress.counted_from, progress.n_event = progress.tick, 0
+    progress.n_event += 1
 
 
 @jit_inline_sum

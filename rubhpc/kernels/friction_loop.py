@@ -38,6 +38,7 @@ from rubhpc.kernels.event_search import approach_change, find_change, free_until
 from rubhpc.kernels.event_steps import (
     choose_step,
     contact_age,
+    count_event,
     end_record,
     longest_step,
     note_resolved,
@@ -64,7 +65,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 WORTH_ASKING = 4  # of an interval free of events: its last share, in which it is bounded anew
-MOST_EVENTS = 4096  # in a revolution; more are left to short steps
+MOST_EVENTS = 65536  # in a revolution; more are left to short steps
 
 
 @jit_lean_sum
@@ -242,11 +243,9 @@ def take_change(
     int
         UNDER_WAY, DIVERGED or CONTACT_UNSOLVED.
     """
-    if progress.tick - progress.counted_from > clock.samples_per_revolution << clock.sample_level:
-        progress.counted_from, progress.n_event = progress.tick, 0
     states = tables.mask[progress.mode]
     leave_states(tables, progress.mode, z, motion)
-    progress.n_event += 1
+    count_event(clock, progress)
     if is_beyond(reduced, motion):
         return DIVERGED
     if is_recorded:

@@ -218,6 +218,8 @@ def advance_by_steps(
                 for a in range(n_degree):
                     rate[a] = (now[a] - before[a]) / step
                 fill_start(pairs.row, now, rate, work.now, work.rate)
+                for a in range(n_degree):
+                    rate[a] = (after[a] - now[a]) / step - rate[a]  # its change over a step without forces
             n_touching = solve_contact(pairs, work, step, clock.spin)
             if n_touching == UNSOLVED:
                 return CONTACT_UNSOLVED
@@ -247,6 +249,19 @@ def advance_by_steps(
             work.force[:] = 0.0
             work.traction[:] = 0.0
             work.is_sticking[:] = False
+        if is_recorded and (is_touching or was_touching):
+            for a in range(n_degree):
+                late = work.delay[a // N_DEGREE] / step if bounces and is_touching else 0.0
+                middle = 0.5 * (after[a] - before[a]) / step
+                rate[a] = middle + late * rate[a] if late > 0.0 else middle
+            observe_contact(pairs, work, clock.spin, t * clock.tick, step, rate, rate, accumulator)
+            for i in range(q):
+                samples.force[i, t >> clock.sample_level] += work.force[i] * step / interval
+        was_touching = is_touching
+        for a in range(n_degree):
+            before[a], now[a] = now[a], after[a]
+        if is_touching and bounces:
+            take_back(impulses, work, step, next_re, next_im, before, now)
         if is_recorded and is_touching:
             if progress.energy_from >= 0:
                 end_span(tables, clock, z, progress, recorder, accumulator)
@@ -260,18 +275,7 @@ def advance_by_steps(
                 x[k] = x_after[k]
         elif is_recorded and progress.energy_from < 0:
             begin_span(tables, z, progress, recorder)
-        if is_recorded and (is_touching or was_touching):
-            for a in range(n_degree):
-                rate[a] = 0.5 * (after[a] - before[a]) / step
-            observe_contact(pairs, work, clock.spin, t * clock.tick, step, rate, rate, accumulator)
-            for i in range(q):
-                samples.force[i, t >> clock.sample_level] += work.force[i] * step / interval
-        was_touching = is_touching
-        is_placed = is_touching and not bounces  # an impact is taken back from where it led
-        for a in range(n_degree):
-            before[a], now[a] = now[a], after[a]
-        if is_touching and bounces:
-            take_back(impulses, work, step, next_re, next_im, before, now)
+        is_placed = is_touching
         if not (is_near and is_followed):
             before[0] = np.nan
         for k in range(z_re.size):

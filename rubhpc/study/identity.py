@@ -26,11 +26,12 @@ PHYSICS = 15  # version of the physics: raised whenever a study gives other resu
 MODAL = 1  # method = "modal": last digits of multipliers
 DIRECT = 3  # transient = "direct"
 CHANGING_SPEED = 4  # run-ups and drives
-COULOMB = 3  # set-valued friction
+COULOMB = 4  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 4  # method = "modal" with gaps that are curved
 MANY_STATORS = 2  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 2  # [branch]: grazing beside a fold, and at a sharp corner
+MANY_EVENTS = 1  # method = "modal" where a case may have 200 000 events, or has impacts in short steps
 ALONG_SPEED = 1  # branches along a speed
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
@@ -52,6 +53,7 @@ def physics_of(study: Study) -> int:
         + CURVED * (study.integrator.method == "modal" and _is_curved(study))
         + MANY_STATORS * (len(study.rig.stator) > 5)
         + BRANCHES * (study.branch is not None)
+        + MANY_EVENTS * _has_many_events(study)
         + ALONG_SPEED * (study.branch is not None and study.branch.along in SPEED_AXES)
     )
 
@@ -61,6 +63,16 @@ def _is_curved(study: Study) -> bool:
     turns = "updated" in _laws(study, "normal")
     slides = "sliding" in _laws(study, "friction_law") and "lagrange" in _laws(study, "law")
     return has_bent_stator(study.rig.stator) or (turns and slides)
+
+
+def _has_many_events(study: Study) -> bool:
+    """Whether impacts have restitution, or more than 1000 revolutions are followed without a pause."""
+    name = contact_axes.PREFIX + "restitution"
+    bounces = bool(study.contact.restitution) or any(axis.name == name for axis in study.axes)
+    recording = study.recording
+    transient = 0 if recording.is_transient_auto else recording.longest_transient
+    is_long = max(transient, recording.revolutions) > 1000
+    return study.integrator.method == "modal" and (bounces or is_long)
 
 
 def _laws(study: Study, key: str) -> set[str]:

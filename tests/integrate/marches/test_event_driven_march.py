@@ -113,6 +113,19 @@ def test_neighbours_do_not_depend_on_what_is_forgotten(monkeypatch):
     assert ratios[0] == ratios[1]
 
 
+@pytest.mark.parametrize(("since", "left"), [(-(2**40), 0), (2**40, 1)])
+def test_endless_events_are_those_of_a_revolution(monkeypatch, since, left):
+    """As many events as are allowed, in all the time before: the case stays in closed form."""
+    taken = event_driven_march.EventDrivenMarch._advance
+
+    def late(march, *args):
+        march.progress.n_event, march.progress.counted_from = 10**6, march.progress.tick + since
+        return taken(march, *args)
+
+    monkeypatch.setattr(event_driven_march.EventDrivenMarch, "_advance", late)
+    assert simulate(trial_rig(3), **CLOSE).left_closed_form == left
+
+
 def test_sets_of_contacts_are_met_as_they_come():
     """With three stators some touch together, and no set but the singles is tabulated at the start."""
     record = simulate(trial_rig(3), **CLOSE)
