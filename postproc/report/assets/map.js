@@ -148,6 +148,7 @@ class CaseMap {
     for (const [axis, bokeh] of [[this.x, figure.xaxis], [this.y, figure.yaxis]]) {
       if (axis && axis.values.length <= 10) bokeh.ticker = new Bokeh.FixedTicker({ ticks: axis.order.map((i) => axis.values[i]) });
       bokeh.formatter = new Bokeh.BasicTickFormatter({ use_scientific: false });
+      bokeh.major_label_policy = new Bokeh.NoOverlap({ min_distance: 3 }); // values close together keep their ticks
       if (axis?.names.length) bokeh.major_label_overrides = new Map(axis.names.map((name, i) => [axis.values[i], name]));
     }
     if (this.y) {
