@@ -66,6 +66,7 @@ SLOW = (
     "integrate/measuring/test_regimes_lyapunov.py",
     "integrate/changing_speed/test_retuned_modes.py",
     "integrate/changing_speed/test_run_up.py",
+    "integrate/changing_speed/test_run_up_machines.py",
     "integrate/test_simulate.py::test_energy_balances[3-",
     "integrate/test_simulate.py::test_run_goes_on_from_its_final_state[3",
     "integrate/test_transient.py::test_laws_without_closed_form_settle_as_with_auto",
