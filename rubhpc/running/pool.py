@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 _NAP = 2e-3  # s between looks at whether the others have come
+_PASSED_ON = 0.3  # s, until the launcher has what a rank wrote: it drops the rest once one aborts
 
 
 class Totals(NamedTuple):
@@ -217,6 +218,7 @@ class Ranks:
         """See Pool."""
         sys.stdout.flush()
         sys.stderr.flush()
+        time.sleep(_PASSED_ON)
         self._comm.Abort(code)
         os._exit(code)
 
