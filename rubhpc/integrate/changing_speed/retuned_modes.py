@@ -213,7 +213,7 @@ class RetunedLibrary(ModeLibrary):
             work=np.stack([self._phasor @ motion[n:], self._phasor.conj() @ motion[n:]]),
             output=np.hstack(self._output),
             row=row,
-            rim=_NO_RIM,
+            rim=_WITHOUT_RIM,
             springs=self._springs_of(mode),
         )
 
@@ -235,7 +235,7 @@ def speeds_of(
 
 
 _NONE = np.zeros(0, dtype=np.complex128)
-_NO_RIM = RimPart(
+_WITHOUT_RIM = RimPart(
     one=NO_RIM,
     motion=_NONE,
     entered=_NONE,

@@ -11,6 +11,7 @@ from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, solve_fri
 from rubhpc.integrate.reduced_model.mode_tables import MOST_MODES, TableStack, tabulate
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
+from rubhpc.kernels.friction_coordinates import LANES
 from rubhpc.kernels.friction_states import FORWARD
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-LANES = 8  # coordinates are padded to whole vectors
 # Coordinates that a set of several contacts may have beyond any single one. The width is settled before the
 # first case: that of the tables decides in which order sums are taken, and so the last bits of every case.
 SPARE = 8
