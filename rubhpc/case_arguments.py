@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
@@ -21,6 +21,7 @@ from rubhpc.recent import recent
 from rubhpc.rig.probes import Probe
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.rig import Rig
+from rubhpc.study.contact_keys import ContactArguments
 from rubhpc.study.initial import Initial, check_initials
 from rubhpc.study.state_of_case import with_state
 from rubhpc.study.study import Contact, Integrator
@@ -38,7 +39,7 @@ T = TypeVar("T")
 FRICTION = 0.3  # coefficient, where none is given
 
 
-class CaseArguments(TypedDict, total=False):
+class CaseArguments(ContactArguments, total=False):
     """What `simulate` takes to describe a case, but for its rig.
 
     Keys of the tables [contact] and [integrator] are read and checked as those tables declare them.
@@ -50,16 +51,6 @@ class CaseArguments(TypedDict, total=False):
     clearance_ratio: float | None
     friction: float
     overrides: dict[str, float | str] | None
-    law: str
-    stiffness: float | str | None
-    damping: float | str | None
-    restitution: float | None
-    friction_law: str
-    static_friction_ratio: float | None
-    stribeck_speed: float | str | None
-    slip_speed: Sequence[float | str] | None
-    friction_ratio: Sequence[float] | None
-    normal: str
     method: str
     step: float | str | None
     accuracy: float

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from rubhpc.input.fields import FieldError
 from rubhpc.input.messages import nearest
-from rubhpc.rig.stators import LumpedStator, Stator
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,18 +35,5 @@ def check_carriers(carriers: Sequence[AnyCarrier], stators: Sequence[AnyStator])
         if stator.carrier not in names:
             fix = nearest(stator.carrier, names) if names else "add [[carrier]] with this name"
             raise FieldError(f"stator.{i}.carrier", f"no carrier is named {stator.carrier}; {fix}")
-        if problem := _why_not(stator):
-            raise FieldError(f"stator.{i}.carrier", problem)
-
-
-def _why_not(stator: AnyStator) -> str:
-    """Why a stator cannot stand on a carrier, and what to do; "" where it can."""
-    if isinstance(stator, Stator):
-        held = "" if stator.lateral else "lateral = false, so its tip would not follow; set lateral = true"
-    elif isinstance(stator, LumpedStator):
-        is_held = stator.rigid or stator.lateral_stiffness is None
-        held = "it is held laterally and would not follow; give it mass, stiffness and lateral_stiffness"
-        held = held if is_held else ""
-    else:
-        held = "matrices hold it to the ground; put it and the carrier into one model, or give it springs"
-    return held
+        if stator.carrier_problem:
+            raise FieldError(f"stator.{i}.carrier", stator.carrier_problem)

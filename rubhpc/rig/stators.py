@@ -62,6 +62,11 @@ class Seat:
     def __post_init__(self) -> None:
         check_fields(self)
 
+    @property
+    def carrier_problem(self) -> str:
+        """Why the stator cannot stand on a carrier, and what to do; "" where it can."""
+        return "a stator of this kind stands on the ground; remove carrier, or take a cantilever or springs"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Stator(Seat):
@@ -103,6 +108,11 @@ class Stator(Seat):
         if self.geometry == SECOND_ORDER and self.carrier is not None:
             problem = "second_order needs a stator on the ground, and this one stands on a carrier"
             raise FieldError("geometry", f'{problem}; take geometry = "linear", or remove carrier')
+
+    @property
+    def carrier_problem(self) -> str:
+        """A tip without lateral motion cannot follow."""
+        return "" if self.lateral else "lateral = false, so its tip would not follow; set lateral = true"
 
     @property
     def euler_load(self) -> float:
@@ -159,6 +169,13 @@ class LumpedStator(Seat):
         if self.rigid and self.damping:
             raise FieldError("damping", "conflicts with rigid = true, which does not move; remove one")
 
+    @property
+    def carrier_problem(self) -> str:
+        """Neither a wall nor a mass without lateral motion can follow."""
+        if not self.rigid and self.lateral_stiffness is not None:
+            return ""
+        return "it is held laterally and would not follow; give it mass, stiffness and lateral_stiffness"
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MatrixStator(Seat):
@@ -190,6 +207,11 @@ class MatrixStator(Seat):
         check_body(self, self.degrees)
         if "axial" not in self.degrees:
             raise FieldError("degrees", 'none is "axial", on which contact acts; name that row axial')
+
+    @property
+    def carrier_problem(self) -> str:
+        """Matrices do not say which springs go to the ground."""
+        return "matrices hold it to the ground; put it and the carrier into one model, or give it springs"
 
 
 AnyStator: TypeAlias = Stator | LumpedStator | MatrixStator

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity, series
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 ClosedForm = Literal["always", "never"]
 CLOSED_FORM: dict[str, ClosedForm] = {  # of friction laws
@@ -111,6 +114,21 @@ class ContactKeys:
         if self.normal == "updated":
             return "never"
         return CLOSED_FORM[self.friction_law]
+
+
+class ContactArguments(TypedDict, total=False):
+    """The same keys as arguments of functions, with units in text."""
+
+    law: str
+    stiffness: float | str | None
+    damping: float | str | None
+    restitution: float | None
+    friction_law: str
+    static_friction_ratio: float | None
+    stribeck_speed: float | str | None
+    slip_speed: Sequence[float | str] | None
+    friction_ratio: Sequence[float] | None
+    normal: str
 
 
 @dataclass(frozen=True, kw_only=True)

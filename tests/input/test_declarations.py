@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import tomllib
 
 import pytest
@@ -11,6 +12,7 @@ from rubhpc.input.fields import check_value, parse_field
 from rubhpc.input.reading import build
 from rubhpc.rig import bearing_table, forces, parts, rig, rotors, stators
 from rubhpc.rig.reading import read_rig
+from rubhpc.simulate import simulate
 from rubhpc.study import axes, axis_reading, branch_keys, contact_keys, initial, refine, run_up_keys, tables
 
 TABLES = {
@@ -43,6 +45,12 @@ def test_a_key_has_a_meaning_and_an_example(cls, field):
         assert build(cls, table, "a.toml")
     else:
         assert check_value(field, parse_field(field, table[field.name], "a.toml")) == ""
+
+
+def test_keys_of_contact_are_arguments_of_functions():
+    declared = {field.name for field in dataclasses.fields(contact_keys.ContactKeys)}
+    assert set(contact_keys.ContactArguments.__annotations__) == declared
+    assert declared <= set(inspect.signature(simulate).parameters)
 
 
 @pytest.mark.parametrize("field", [pytest.param(f, id=f.name) for f in dataclasses.fields(axes.OwnAxes)])
