@@ -47,6 +47,13 @@ class DriveLaw:
         share = min(max((speed - low) / (high - low), 0.0), 1.0)
         return self.torque[i - 1] + share * (self.torque[i] - self.torque[i - 1])
 
+    def slope(self, speed: float) -> float:
+        """Change of the torque with the speed (rad/s), N m s."""
+        if not self.speed or not self.speed[0] <= speed < self.speed[-1]:
+            return 0.0
+        i = bisect_right(self.speed, speed)
+        return (self.torque[i] - self.torque[i - 1]) / (self.speed[i] - self.speed[i - 1])
+
     def fastest(self, inertia: float) -> float:
         """Speed, rad/s, that a rotor of this inertia (kg m^2, drive included) cannot pass by its torque.
 

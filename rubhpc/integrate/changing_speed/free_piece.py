@@ -10,6 +10,7 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.passing import Passed, Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
+from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp
 from rubhpc.integrate.measuring.samples import lift_samples, new_accumulator
 from rubhpc.integrate.start import start_of
 from rubhpc.kernels.accumulators import (
@@ -102,16 +103,26 @@ class Spin:
             if not is_fixed and abs(acceleration) * duration**2 > 12.0 * LAG and length > 1:
                 return None
             torque = self._mean_torque(end_speed)
-            setup = self._setup = self._pieces.setup(mean, acceleration, first, duration, torque)
+            low, high = drive.at(self.speed), drive.at(end_speed)
+            middle = 0.5 * (low + high)
+            slope = drive.slope(mean)
+            setup = self._setup = self._pieces.setup(mean, acceleration, first, duration, middle, slope)
+            twist = setup.held.twist
+            ramp = TwistRamp(0.5 * (high - low) * twist, (high - low) / duration * twist)
             if self._begun is None:
                 start = self._initial
-                self._begun = start_of(start, setup, self._clearance) if isinstance(start, Initial) else start
-            passed = self._passing.take(setup, length, self._begun, self._earlier, is_balanced=True)
+                if isinstance(start, Initial):
+                    self._begun = ramp.of_rotor(start_of(start, setup, self._clearance), setup)
+                else:
+                    self._begun = start
+            begun = ramp.about_middle(self._begun, setup)
+            passed = self._passing.take(setup, length, begun, self._earlier, is_balanced=True)
             lift_samples(passed.whole, setup.model)
+            ramp.lift(passed.whole, setup)
             if passed.reason:
                 return self._taken(passed, acceleration, length, per_revolution, torque, np.zeros(6))
             flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)
-            before = self._momentum(state_at(self._begun, setup), first)
+            before = self._momentum(state_at(begun, setup), first)
             after = self._momentum(state_at(passed.end, setup), last)
             turning = acceleration * 0.5 * duration * (before[1] + after[1])
             given = torque * turned + turning - flows[UNBALANCE_WORK] - flows[DRIVE_WORK]
@@ -145,7 +156,7 @@ class Spin:
             return None
         self.time += duration
         self._brake = torque - inertia * change / duration
-        self._begun = passed.end
+        self._begun = ramp.after(passed.end, setup)
         self._earlier = passed.accumulators[-1], duration
         return found
 

@@ -49,6 +49,7 @@ class HeldMatrices:
         reduced: ReducedModel,
         phasor: Complexes,
         acceleration: float,
+        slope: float,
         reach: tuple[float, float],
         sample_level: int,
     ) -> None:
@@ -59,6 +60,7 @@ class HeldMatrices:
         self.bodies: dict[float, Reduced] = {}  # of each friction, but for what a piece changes
         self.sample_level = sample_level  # of the lowest speed
         self._phasor, self._reach, self._acceleration = phasor, reach, acceleration
+        self._slope = slope  # N m s, of a drive's torque over the speed
         self._libraries: dict[tuple[str, float], RetunedLibrary] = {}
         self._pairs: dict[float, FrictionPairs] = {}
         self.first: tuple[tuple[float, ...], list[PieceSetup]] | None = None  # of a case, by what was asked
@@ -68,10 +70,11 @@ class HeldMatrices:
         """Memory that tables of contact modes hold."""
         return sum(library.n_byte for library in self._libraries.values())
 
-    def serve(self, speed: float, acceleration: float) -> bool:
+    def serve(self, speed: float, acceleration: float, slope: float = 0.0) -> bool:
         """Whether a piece may use them."""
         far, changed = self._reach
-        return abs(speed - self.reduced.spin) <= far and abs(acceleration - self._acceleration) <= changed
+        is_near = abs(speed - self.reduced.spin) <= far and abs(acceleration - self._acceleration) <= changed
+        return is_near and slope == self._slope
 
     def driven(self, torque: float, acceleration: float) -> Model:
         """The model with the sag under a drive's torque, N m, at an acceleration, rad/s^2."""

@@ -34,8 +34,9 @@ LONGEST_FALL = 1.0 / 3.0  # half of the range over the first speed of a coast-do
 MOST_HELD = 4  # matrices at hand, of a spin that swings between them
 MOST_BYTES = 2**28  # of contact modes that are kept, with their matrices, for other cases
 
-# Of each set-up, the matrices by speed and acceleration, the latest last: other cases may have them too.
-_KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[float, float], HeldMatrices]] = WeakKeyDictionary()
+# Of each set-up, the matrices by speed, acceleration and slope of the torque, the latest last, for other
+# cases too.
+_KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[float, float, float], HeldMatrices]] = WeakKeyDictionary()
 
 
 def forget_most() -> None:
@@ -67,17 +68,26 @@ class Pieces:
         momentum = np.zeros((n_all, n_all))
         momentum[:n, :n] = rotor.gyroscopic if fastest.free_spin is None else 0.5 * rotor.gyroscopic
         self._momentum = self._basis.T @ momentum @ self._basis
+        self._turning = np.zeros(self._basis.shape[1])  # of the driven end about the mean
+        if fastest.free_spin is not None:
+            self._turning = fastest.free_spin.share @ self._basis[:n]
         phasor = (model.unbalance_cosine - 1j * model.unbalance_sine) @ self._basis[:n]
         self._phasor = phasor.astype(np.complex128)
 
     def setup(
-        self, speed: float, acceleration: float, angle: float, duration: float, torque: float = 0.0
+        self,
+        speed: float,
+        acceleration: float,
+        angle: float,
+        duration: float,
+        torque: float = 0.0,
+        slope: float = 0.0,
     ) -> PieceSetup:
         """The set-up of a piece: mean speed (rad/s), acceleration (rad/s^2), first angle, duration (s).
 
-        `torque` (N m) is that of the drive of a free spin.
+        `torque` (N m) is that of the drive of a free spin, `slope` (N m s) its change with the speed.
         """
-        held = self._find(speed, acceleration)
+        held = self._find(speed, acceleration, slope)
         model = held.model if self._fastest.free_spin is None else held.driven(torque, acceleration)
         columns = np.array([[speed], [acceleration], [angle], [duration]])
         return self._in_held(held, model, columns, torque)[0]
@@ -142,27 +152,28 @@ class Pieces:
             held.first = asked, found
         return found
 
-    def _find(self, speed: float, acceleration: float) -> HeldMatrices:
+    def _find(self, speed: float, acceleration: float, slope: float = 0.0) -> HeldMatrices:
         """Matrices that may be held at a speed and an acceleration."""
         for i, held in enumerate(self._held):
-            if held.serve(speed, acceleration):
+            if held.serve(speed, acceleration, slope):
                 if i:
                     self._held.insert(0, self._held.pop(i))
                 return held
         known = _KNOWN.setdefault(self._fastest, {})
-        found = known.pop((speed, acceleration), None) or self._hold(speed, acceleration)
-        known[speed, acceleration] = found
+        asked = speed, acceleration, slope
+        found = known.pop(asked, None) or self._hold(*asked)
+        known[asked] = found
         self._held = [found, *self._held[: MOST_HELD - 1]]
         return found
 
-    def _hold(self, speed: float, acceleration: float) -> HeldMatrices:
+    def _hold(self, speed: float, acceleration: float, slope: float) -> HeldMatrices:
         """Matrices for a speed at the near end of the range over which they may be held.
 
         That of a free spin, which may turn back, is in the middle of the range.
         """
         fastest, free = self._fastest, self._fastest.free_spin
-        model, damping, stiffness = self._matrices(speed, acceleration)
-        _, next_damping, next_stiffness = self._matrices(speed * (1.0 + SPEED_STEP), acceleration)
+        model, damping, stiffness = self._matrices(speed, acceleration, slope)
+        _, next_damping, next_stiffness = self._matrices(speed * (1.0 + SPEED_STEP), acceleration, slope)
         step = SPEED_STEP * speed
         drift = (next_stiffness - stiffness) / step, (next_damping - damping) / step
         reach, swing = held_range(
@@ -181,7 +192,7 @@ class Pieces:
             else:
                 reach = min(reach, LONGEST_FALL * speed)
             speed += np.sign(acceleration) * reach
-            model, damping, stiffness = self._matrices(speed, acceleration)
+            model, damping, stiffness = self._matrices(speed, acceleration, slope)
             model = sagging(model, sag_under(model.rotor, model.load - acceleration * self._inertia))
         else:
             model = sagging(model, sag_under(model.rotor, model.load))
@@ -198,7 +209,7 @@ class Pieces:
         near_end = reach * (1.0 + 1e-9)  # rounding apart
         slowest = replace(fastest, spin=abs(speed) - reach)
         ranges = near_end, swing
-        held = HeldMatrices(model, reduced, self._phasor, acceleration, ranges, slowest.sample_level)
+        held = HeldMatrices(model, reduced, self._phasor, acceleration, slope, ranges, slowest.sample_level)
         held.template = PieceSetup(
             scheme=fastest.scheme,
             model=model,
@@ -223,11 +234,15 @@ class Pieces:
             held.lean = sag_under(model.rotor, -0.5 * model.rotor.gyroscopic @ model.sag)
         return held
 
-    def _matrices(self, speed: float, acceleration: float) -> tuple[Model, Floats, Floats]:
-        """The model at a speed, within the tables of its bearings, its damping and its stiffness."""
+    def _matrices(self, speed: float, acceleration: float, slope: float) -> tuple[Model, Floats, Floats]:
+        """The model at a speed, within the tables of its bearings, its damping and its stiffness.
+
+        A torque that falls with the speed damps how the driven end turns about the mean.
+        """
         model = self._fastest.model
         if speeds := model.rotor.tabulated_speeds:
             model = model_at(model, float(np.clip(speed, speeds[0], speeds[-1])))
         _, damping, stiffness, _ = whole_system(model, speed)
+        damping = self._basis.T @ damping @ self._basis - slope * np.outer(self._turning, self._turning)
         stiffness = self._basis.T @ stiffness @ self._basis + acceleration * self._momentum
-        return model, self._basis.T @ damping @ self._basis, stiffness
+        return model, damping, stiffness

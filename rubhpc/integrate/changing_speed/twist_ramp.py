@@ -1,0 +1,65 @@
+"""The twist of the shaft under a drive whose torque changes evenly within a piece."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.integrate.marches.modal import Place
+from rubhpc.integrate.record import State
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+
+Floats = NDArray[np.float64]
+
+
+class TwistRamp(NamedTuple):
+    """How the sag of the rotor moves within a piece: that of its set-up is the one in its middle.
+
+    A piece takes the motion about this sag. An even ramp has no inertia, so that the motion about it follows
+    the same equations but for what damping draws from its rate, which is left out.
+    """
+
+    half: Floats  # (n_rotor_dof,), from the middle of the piece to its end, m and rad
+    rate: Floats  # (n_rotor_dof,), m/s and rad/s
+
+    def about_middle(self, begun: State | Place, setup: PieceSetup) -> State | Place:
+        """The motion with which a piece begins, about the sag of its middle, from that of the rotor."""
+        return _moved(begun, setup, self.half, -self.rate)
+
+    def of_rotor(self, begun: State | Place, setup: PieceSetup) -> State | Place:
+        """The motion of the rotor, from one about the sag at the beginning of the piece."""
+        return _moved(begun, setup, -self.half, self.rate)
+
+    def after(self, end: Place, setup: PieceSetup) -> Place:
+        """The motion of the rotor where a piece ends, from that about the sag of its middle."""
+        reached = _moved(end, setup, self.half, self.rate)
+        assert isinstance(reached, Place)
+        return reached
+
+    def lift(self, whole: Floats, setup: PieceSetup) -> None:
+        """Count the samples of a piece (`Samples.whole`) from the shaft without loads."""
+        model, n_sample = setup.model, whole.shape[1]
+        share = 2.0 * np.arange(n_sample) / n_sample - 1.0  # of the half, at each sample
+        n, first_probe = self.half.size, 4 + 3 * model.n_place
+        whole[:3] += np.outer(replace(model, sag=self.half).output_sag, share)
+        positions, rates, _ = model.probe_rows[:, :, :n]
+        whole[first_probe:] += np.outer(positions @ self.half, share) + (rates @ self.rate)[:, np.newaxis]
+
+
+def _moved(motion: State | Place, setup: PieceSetup, displacement: Floats, velocity: Floats) -> State | Place:
+    """The same with other displacements and velocities of the rotor, (n_rotor_dof,) more."""
+    if isinstance(motion, State):
+        return replace(
+            motion,
+            rotor_displacement=motion.rotor_displacement + displacement,
+            rotor_velocity=motion.rotor_velocity + velocity,
+        )
+    reduced = motion.motion.copy()
+    n = reduced.size // 2
+    reduced[n:] += setup.reduced.project[:, : velocity.size] @ velocity
+    return Place(reduced, motion.sag + displacement, motion.contact_force)
