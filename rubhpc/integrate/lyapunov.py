@@ -86,21 +86,29 @@ class Marches:
         self._start, self._recording = start, recording
         self._model, self._spin = setup.model, setup.spin
         self._state = state
+        self._kept: tuple[March, ...] = ()  # of the last span
         self._other, self._size = self._displaced()
 
     def part(self, n_revolution: int) -> float | None:
         """Start both marches anew and compare where they end."""
-        marches = self._start(self._state), self._start(self._other)
-        for march in marches:
+        if not self._start_again():
+            self._kept = self._start(self._state), self._start(self._other)
+        for march in self._kept:
             if pass_revolutions(march, self._recording, n_revolution) is not None:
                 return None
-        self._state, self._other = (march.final() for march in marches)
+        self._state, self._other = (march.final() for march in self._kept)
         ratio = self._distance(self._state, self._other) / self._size
         if ratio > LOST:
             self._other = _between(self._state, self._other, 1.0 / ratio)
         else:
             self._other, self._size = self._displaced()
         return ratio
+
+    def _start_again(self) -> bool:
+        """Start the marches of the last span at the new states; False where there are none, or that fails."""
+        states = self._state, self._other
+        pairs = zip(self._kept, states, strict=bool(self._kept))
+        return bool(self._kept) and all(march.start_again(state) for march, state in pairs)
 
     def _displaced(self) -> tuple[State, float]:
         """State a little faster than the first, so that closed gaps stay closed, and its distance."""

@@ -9,6 +9,7 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.marches.march import NO_FORCES
+from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.curved_tables import curved_pairs
 from rubhpc.kernels.case_progress import ask_for, begin_in
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.record import State
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.setup import ModalSetup
@@ -61,6 +61,11 @@ class CurvedMarch(EventDrivenMarch):
             self._take_pairs()
         else:
             self._make_work()
+
+    def start_again(self, state: State) -> bool:
+        """Start the same case anew at another state, with what was found of its matrices."""
+        self.begin(self._setup, Place(self.reduced(state), self._setup.model.sag, state.contact_force))
+        return True
 
     def _take_pairs(self) -> None:
         """Find what curved gaps have of the matrices."""

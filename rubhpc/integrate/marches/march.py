@@ -60,6 +60,10 @@ class March(ABC):
     ) -> str | None:
         """Advance from `self.sample` to sample `stop` in one kernel call."""
 
+    def start_again(self, state: State) -> bool:
+        """Start the same case anew at another state; False where that takes a new march."""
+        return False
+
     @abstractmethod
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs are in contact, (q,)."""
