@@ -32,7 +32,7 @@ from rubhpc.integrate.measuring.samples import (
     samples_within,
 )
 from rubhpc.integrate.neighbour_motions import NeighbourMotions
-from rubhpc.integrate.periodic_motions.direct import Passed, pass_directly
+from rubhpc.integrate.periodic_motions.direct import pass_directly
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.proof import Solver
@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.lyapunov import Neighbours
     from rubhpc.integrate.marches.march import March
     from rubhpc.integrate.periodic_motions.shooting import Orbit
+    from rubhpc.integrate.periodic_motions.walk import Passed
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
     from rubhpc.study.study import Recording
@@ -258,7 +259,7 @@ def _pass_directly(
             again = start(initial)
             assert isinstance(again, EventDrivenMarch)
             march = again
-    passed = pass_directly(march, start, begin, recording, known)
+    passed = pass_directly(march, begin, recording, known)
     if known is None or passed.reached is None:
         return passed, None
     at_once = replace(recording, transient=0, transient_limit=None, transient_tolerance=None)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PHYSICS = 15  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
 MODAL = 1  # method = "modal": last digits of multipliers
-DIRECT = 3  # transient = "direct"
+DIRECT = 4  # transient = "direct"
 CHANGING_SPEED = 5  # run-ups and drives
 COULOMB = 4  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction

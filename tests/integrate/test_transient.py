@@ -110,11 +110,11 @@ LIGHT = {
     [(0.9, 0.523, 0.3, 1), (1.3, 0.968, 0.269, 1), (2.0, 0.637, 0.016, 3), (0.9, 1.5, 0.3, 1)],
 )
 def test_direct_way_leads_where_a_long_simulation_does(speed_ratio, clearance_ratio, friction, period):
-    """A rotor damped by 1 %: in less than 100 revolutions what 1000 lead to, a shift by revolutions apart."""
+    """A rotor damped by 1 %: in 128 revolutions what 1000 lead to, a shift by revolutions apart."""
     case = {"speed_ratio": speed_ratio, "clearance_ratio": clearance_ratio, "friction": friction} | LIGHT
     found = simulate("mokhtar2017", transient="direct", **case)
     settled = simulate("mokhtar2017", transient=1000, **case)
-    assert found.transient_revolutions < 100
+    assert found.transient_revolutions <= 2 * direct.FIRST
     assert found.period == settled.period == period
     expected = settled.section_vertical
     away = [np.abs(np.roll(found.section_vertical, k) - expected).max() for k in range(period)]
@@ -174,14 +174,18 @@ class Spiral:
 
     def __init__(self, change, begin=(0.3, 0.0), most=400):
         self.change, self.at, self.most, self.n_revolution = change, np.array(begin), most, 0
+        self.passed = np.array([self.at + ORBIT.motion])
 
-    def repeat(self, period):
-        if self.n_revolution + period > self.most:
-            return None, None
-        self.n_revolution += period
-        for _ in range(period):
+    @property
+    def n_left(self):
+        return self.most - self.n_revolution
+
+    def on(self, n_revolution):
+        assert n_revolution <= self.n_left
+        self.n_revolution += n_revolution
+        for _ in range(n_revolution):
             self.at = self.change(self.at)
-        return self.at + ORBIT.motion, None
+            self.passed = np.vstack([self.passed, self.at + ORBIT.motion])
 
 
 TURN = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
@@ -194,45 +198,47 @@ def size_of(at):
 
 
 @pytest.mark.parametrize(
-    ("change", "after"),
+    ("change", "is_expected", "least"),
     [
-        (lambda at: 0.98 * TURN @ at, 16),
-        (lambda at: (0.98 - size_of(at) ** 2 / 9) * TURN @ at, 16),  # as fast at first, in the end as linear
-        (lambda at: TURN @ at, None),  # a torus
-        (lambda at: (1 + 0.1 * np.cos(np.arctan2(at[1], at[0]) / 2)) * TURN @ at, None),  # one that beats
-        (lambda at: (0.98 + 0.015 * (size_of(at) > 0.1)) * TURN @ at, None),  # too slow
-        (lambda at: 0.98 * TURN.T @ at, None),  # as fast, but it turns the other way: of another motion
-        (lambda at: (0.98 if size_of(at) > 0.25 else 1.06) * TURN @ at, None),  # it passes by
+        (lambda at: 0.98 * TURN @ at, True, 16),
+        # As fast at first, in the end as linear:
+        (lambda at: (0.98 - size_of(at) ** 2 / 9) * TURN @ at, True, 16),
+        (lambda at: TURN @ at, False, 16),  # a torus
+        # One that beats:
+        (lambda at: (1 + 0.1 * np.cos(np.arctan2(at[1], at[0]) / 2)) * TURN @ at, False, 16),
+        (lambda at: (0.98 + 0.015 * (size_of(at) > 0.1)) * TURN @ at, False, 100),  # too slow
+        # As fast, but it turns the other way: of another motion.
+        (lambda at: 0.98 * TURN.T @ at, False, 16),
+        (lambda at: (0.98 if size_of(at) > 0.25 else 1.06) * TURN @ at, False, 16),  # it passes by
     ],
 )
-def test_motion_that_draws_near_loses_its_distance_as_the_linear_theory_says(monkeypatch, change, after):
+def test_motion_that_draws_near_loses_its_distance_as_the_linear_theory_says(
+    monkeypatch, change, is_expected, least
+):
+    """Those that do not are watched until 100 revolutions, or given up where they disobey the theory."""
     monkeypatch.setattr(direct, "Onward", lambda *_: SimpleNamespace(keeps_contacts=lambda *_: True))
     walk = Spiral(change)
-    is_near, reason = draws_near(walk, STILL, ORBIT, [walk.at + ORBIT.motion], 100)
+    is_near, reason = draws_near(walk, STILL, ORBIT, 100)
     assert reason is None
-    assert is_near == (after is not None)
-    if after is not None:
-        assert walk.n_revolution == pytest.approx(after, abs=3)
+    assert is_near == is_expected
+    if is_expected:
+        assert walk.n_revolution == pytest.approx(least, abs=3)
     else:
-        assert walk.n_revolution >= 100
+        assert walk.n_revolution >= least
 
 
 def test_last_revolutions_show_that_a_motion_draws_near(monkeypatch):
     """16 of them: the case is simulated no further."""
     monkeypatch.setattr(direct, "Onward", lambda *_: SimpleNamespace(keeps_contacts=lambda *_: True))
-    for n_passed, further in ((17, 0), (13, 4)):
-        walk = Spiral(lambda at: 0.98 * TURN @ at)
-        passed = [walk.at + ORBIT.motion]
-        for _ in range(n_passed - 1):
-            walk.at = walk.change(walk.at)
-            passed.append(walk.at + ORBIT.motion)
-        assert draws_near(walk, STILL, ORBIT, passed, 100) == (True, None)
-        assert walk.n_revolution == further
+    walk = Spiral(lambda at: 0.98 * TURN @ at)
+    walk.on(16)
+    assert draws_near(walk, STILL, ORBIT, 100) == (True, None)
+    assert walk.n_revolution == 16
 
 
 def test_transient_ends_before_a_motion_has_drawn_near():
     walk = Spiral(lambda at: 0.98 * TURN @ at, most=12)
-    assert draws_near(walk, STILL, ORBIT, [walk.at + ORBIT.motion], 100) == (False, None)
+    assert draws_near(walk, STILL, ORBIT, 100) == (False, None)
     assert walk.n_revolution == 12
 
 
@@ -255,9 +261,9 @@ def test_motion_that_would_meet_another_contact_is_watched_until_it_would_not(mo
 
     monkeypatch.setattr(direct, "Onward", lambda *_: SimpleNamespace(keeps_contacts=keeps_contacts))
     walk = Spiral(lambda at: 0.98 * TURN @ at)
-    assert draws_near(walk, STILL, ORBIT, [walk.at + ORBIT.motion], 100) == (True, None)
+    assert draws_near(walk, STILL, ORBIT, 100) == (True, None)
     assert walk.n_revolution == pytest.approx(56, abs=8)  # 0.3 x 0.98^55 = 0.1
-    assert len(asked) == 5
+    assert len(asked) == 4
     assert all(n_period == pytest.approx(np.log(0.1) / np.log(0.98), abs=1) for _, n_period in asked)
 
 

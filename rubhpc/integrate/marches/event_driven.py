@@ -10,10 +10,16 @@ import numpy as np
 from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.measuring.samples import new_accumulator
-from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, PAUSED
+from rubhpc.kernels.case_progress import (
+    FINISHED,
+    MODE_WANTED,
+    PAUSED,
+    restart_clock,
+)
 from rubhpc.kernels.contact_modes import FORCED_LEVEL
 from rubhpc.kernels.event_loop import advance, event_work
 from rubhpc.kernels.mode_change import change_contacts
+from rubhpc.kernels.sections_loop import advance_sections
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -128,9 +134,44 @@ class EventDrivenMarch(ModalMarch):
             self._recorder.last[:] = pieces.seen
         return outcome
 
+    def pass_sections(
+        self, n_revolution: int, samples: Samples, accumulator: Accumulator
+    ) -> tuple[Floats, str | None]:
+        """Go on by some revolutions without a record, in one kernel call where nothing new is met.
+
+        Returns
+        -------
+        (n_revolution, 2 n)
+            The motion at the end of each.
+        str or None
+            Why the case cannot go on.
+        """
+        sections = np.empty((n_revolution, self._motion.size))
+        level, first = self.clock.sample_level, -n_revolution * self.clock.samples_per_revolution
+        restart_clock(self._bare_progress, first << level, first, is_recorded=False)
+        self.sample, self._ended = first, None
+        while self.sample < 0:
+            outcome = self._advance_sections(samples, accumulator, sections)
+            if outcome == MODE_WANTED:
+                self.find_wanted()
+                continue
+            self.n_step = int(self._bare_progress["n_step"])
+            self.sample = int(self._bare_progress["tick"]) >> level
+            reason = self._why_ended(outcome, accumulator)
+            if reason is not None:
+                return sections, reason
+            if self.check is not None:
+                self.check()
+        return sections, None
+
+    @property
+    def states(self) -> int:
+        """Set of closed pairs, or of the states of all pairs under set-valued friction."""
+        return int(self.tables.mask[self._bare_progress["mode"]])
+
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs are closed, (q,)."""
-        return self.closed(int(self.tables.mask[self._bare_progress["mode"]]))
+        return self.closed(self.states)
 
     def closed(self, mask: int) -> NDArray[np.bool_]:
         """Which pairs are closed in a contact mode, (q,)."""
@@ -252,6 +293,25 @@ class EventDrivenMarch(ModalMarch):
             self._recorder,
             samples,
             accumulator,
+        )
+
+    def _advance_sections(self, samples: Samples, accumulator: Accumulator, sections: Floats) -> int:
+        """Advance as `_advance` does, revolution by revolution, up to sample 0."""
+        return advance_sections(
+            self.tables,
+            self.bodies,
+            self.clock,
+            self._setup.displacement_limit,
+            self._setup.energy_limit,
+            self._bare_progress,
+            self._z,
+            self._z_next,
+            self._motion,
+            self._event_work,
+            self._recorder,
+            samples,
+            accumulator,
+            sections,
         )
 
     def _unsolved(self) -> str:

@@ -164,6 +164,20 @@ class FrictionMarch(EventDrivenMarch):
             )
         )
 
+    def pass_sections(
+        self, n_revolution: int, samples: Samples, accumulator: Accumulator
+    ) -> tuple[Floats, str | None]:
+        """Go on by some revolutions without a record, one by one: the motion at the end of each."""
+        sections = np.empty((n_revolution, self._motion.size))
+        for section in sections:
+            reason = self.advance(
+                -self.clock.samples_per_revolution, 0, samples, accumulator, is_recorded=False
+            )
+            if reason is not None:
+                return sections, reason
+            section[:] = self.motion()
+        return sections, None
+
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
         while True:
             if self._n_short:

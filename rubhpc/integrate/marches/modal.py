@@ -160,15 +160,19 @@ class ModalMarch(March):
             outcome = self._kernel(stop << sample_level, samples, accumulator, is_recorded)
             self.n_step = int(self._bare_progress["n_step"])
             self.sample = int(self._bare_progress["tick"]) >> sample_level
-            if outcome == CONTACT_UNSOLVED:
-                return self._unsolved()
-            reason = self._why_diverged(outcome == DIVERGED, accumulator)
+            reason = self._why_ended(outcome, accumulator)
             if reason is not None:
                 return reason
             if outcome == FINISHED:
                 return None
             if self.check is not None:
                 self.check()
+
+    def _why_ended(self, outcome: int, accumulator: Accumulator) -> str | None:
+        """Why a case cannot go on after a kernel call, if it cannot."""
+        if outcome == CONTACT_UNSOLVED:
+            return self._unsolved()
+        return self._why_diverged(outcome == DIVERGED, accumulator)
 
     def _why_diverged(self, is_at_event: bool, accumulator: Accumulator) -> str | None:
         """What of the motion is beyond its limit; of the output node also what was so at a sample."""

@@ -69,6 +69,11 @@ class Approach:
         """Square of the distance (2 n,)."""
         return float(apart @ self._form @ apart)
 
+    def squares(self, apart: Floats) -> list[float]:
+        """Squares of k distances (k, 2 n)."""
+        found: list[float] = np.einsum("ki,ki->k", apart @ self._form, apart).tolist()
+        return found
+
     def periods_to(self, share: float, apart: Floats) -> int:
         """Periods until the linear theory leaves no more than a share of the square."""
         least, n_period = share * self.square(apart), 0

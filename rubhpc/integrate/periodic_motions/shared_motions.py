@@ -86,7 +86,7 @@ def _add(
     try:
         march = start(state)
         assert isinstance(march, EventDrivenMarch)
-        passed = pass_directly(march, start, solve_from, recording, known)
+        passed = pass_directly(march, solve_from, recording, known)
         if passed.found is not None:
             known.add(*passed.found)
     except NoClosedForm:
