@@ -86,17 +86,18 @@ class Marches:
         self._start, self._recording = start, recording
         self._model, self._spin = setup.model, setup.spin
         self._state = state
-        self._kept: tuple[March, ...] = ()  # of the last span
+        self._kept: list[March] = []  # of the last span
         self._other, self._size = self._displaced()
 
     def part(self, n_revolution: int) -> float | None:
-        """Start both marches anew and compare where they end."""
-        if not self._start_again():
-            self._kept = self._start(self._state), self._start(self._other)
-        for march in self._kept:
+        """Start both marches anew, one after the other, and compare where they end."""
+        ends = []
+        for k, state in enumerate((self._state, self._other)):  # the first may empty the tables of the second
+            march = self._started(k, state)
             if pass_revolutions(march, self._recording, n_revolution) is not None:
                 return None
-        self._state, self._other = (march.final() for march in self._kept)
+            ends.append(march.final())
+        self._state, self._other = ends
         ratio = self._distance(self._state, self._other) / self._size
         if ratio > LOST:
             self._other = _between(self._state, self._other, 1.0 / ratio)
@@ -104,11 +105,13 @@ class Marches:
             self._other, self._size = self._displaced()
         return ratio
 
-    def _start_again(self) -> bool:
-        """Start the marches of the last span at the new states; False where there are none, or that fails."""
-        states = self._state, self._other
-        pairs = zip(self._kept, states, strict=bool(self._kept))
-        return bool(self._kept) and all(march.start_again(state) for march, state in pairs)
+    def _started(self, k: int, state: State) -> March:
+        """The march of the last span, the first or the second, started at a new state, or a new one."""
+        if k == len(self._kept):
+            self._kept.append(self._start(state))
+        elif not self._kept[k].start_again(state):
+            self._kept[k] = self._start(state)
+        return self._kept[k]
 
     def _displaced(self) -> tuple[State, float]:
         """State a little faster than the first, so that closed gaps stay closed, and its distance."""

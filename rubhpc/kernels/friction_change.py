@@ -25,6 +25,8 @@ from rubhpc.kernels.soft_friction_events import press_pairs
 
 Floats = NDArray[np.float64]
 
+LEAVING = 1e-3  # of the cone, within which friction is a tick before it is outside
+
 
 @jit_lean_sum
 def change_states(
@@ -68,7 +70,8 @@ def change_states(
         observe_event(PRESSING, pivots, solver, accumulator)
     for i in range(q):
         if solver.gap[i] < np.inf if is_soft else solver.force[i] > 0.0:
-            remaining |= state_by_forces(solver, i) << (2 * i)
+            leaves = state_of(states, i) == STUCK and (crossing >> (2 * i)) & 3 != 0
+            remaining |= state_by_forces(solver, i, leaves) << (2 * i)
         elif is_recorded and reduced.restitution > 0.0:
             has_bounced = state_of(states, i) == OPEN and (crossing >> (2 * i)) & 1 == 1
             accumulator.n_contact[i] += 1 if has_bounced else 0
@@ -77,10 +80,13 @@ def change_states(
 
 
 @jit_inline
-def state_by_forces(solver: Workspace, i: int) -> int:
-    """State in which closed pair i goes on, by its forces: within its cone it sticks."""
+def state_by_forces(solver: Workspace, i: int, leaves: bool) -> int:
+    """State in which closed pair i goes on, by its forces: within its cone it sticks.
+
+    One that `leaves` its cone within the next tick is within it by a hair yet, and slides.
+    """
     traction, bound = solver.traction[i], solver.cone[i] * solver.force[i] * (1.0 - ROUNDING)
-    if abs(traction) < bound:
+    if abs(traction) < (bound * (1.0 - LEAVING) if leaves else bound):
         return STUCK
     if traction != 0.0:
         return FORWARD if traction > 0.0 else BACKWARD

@@ -45,9 +45,15 @@ def enter_states(
         rows = tables.enter_re[mode] if part == 0 else tables.enter_im[mode]
         target = z[part, :used]
         from_cosine, from_sine = tables.enter_cosine[mode, part], tables.enter_sine[mode, part]
+        n_whole = clearance.size - clearance.size % 2
         for k in range(used):
             target[k] = -from_cosine[k] * cosine - from_sine[k] * sine
-        for i in range(clearance.size):
+        for i in range(0, n_whole, 2):  # two at a time: the target would be read and written for each
+            source, other = tables.enter_constant[mode, i, part], tables.enter_constant[mode, i + 1, part]
+            constant, next_constant = clearance[i], clearance[i + 1]
+            for k in range(used):
+                target[k] -= source[k] * constant + other[k] * next_constant
+        for i in range(n_whole, clearance.size):
             source, constant = tables.enter_constant[mode, i, part], clearance[i]
             for k in range(used):
                 target[k] -= source[k] * constant

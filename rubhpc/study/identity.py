@@ -26,7 +26,7 @@ PHYSICS = 15  # version of the physics: raised whenever a study gives other resu
 MODAL = 1  # method = "modal": last digits of multipliers
 DIRECT = 4  # transient = "direct"
 CHANGING_SPEED = 5  # run-ups and drives
-COULOMB = 4  # set-valued friction
+COULOMB = 5  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 4  # method = "modal" with gaps that are curved
 MANY_STATORS = 2  # more than five, whose sets of closed contacts or states may be more than 256

@@ -82,11 +82,15 @@ class ModalMarch(March):
         """Count time from 0, at the speed of a set-up."""
         if self._model is not setup.model:
             self._model, self._clearance = setup.model, self._at_rest - sag_at_stators(setup.model)[0]
-        self._setup, self._ended = setup, None
-        self.clock = setup.clock
+        self._setup, self.clock = setup, setup.clock
         self.bodies = setup.bodies(self._coefficient, self._clearance)
-        self._bare_records[:] = _BEGUN
+        self._begin_time()
         self._entered_with = self._clearance  # values of the coordinates that do not move
+
+    def _begin_time(self) -> None:
+        """Stand at time 0, with nothing met yet."""
+        self._ended = None
+        self._bare_records[:] = _BEGUN
 
     @abstractmethod
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
