@@ -187,7 +187,6 @@ def test_a_hundred_thousand_cases_take_little_memory(tmp_path: Path) -> None:
     assert told["mean"] == pytest.approx(1.3)
     assert told["worst"] == pytest.approx(1.5)
     assert told["median"] == pytest.approx(0.5)
-    assert "100% Completed" in done.stdout
 
 
 @pytest.fixture

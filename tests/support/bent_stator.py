@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from exponential import expm
 from reference_bodies import set_up
-from scipy.linalg import expm
 
 
 def squared_slope(stator):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.linalg import expm
+from exponential import expm
 from scipy.optimize import brentq
 
 from rubhpc.integrate.packing import degrees_of, whole_system

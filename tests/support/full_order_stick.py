@@ -9,8 +9,8 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
+from exponential import expm
 from full_order_flow import N_STEP, FullOrder, _root
-from scipy.linalg import expm
 
 from rubhpc.integrate.packing import degrees_of
 

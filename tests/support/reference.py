@@ -11,8 +11,8 @@ import itertools
 import math
 
 import numpy as np
+from exponential import expm
 from reference_bodies import PER_PAIR, set_up
-from scipy.linalg import expm
 
 N_AHEAD = 64  # steps looked ahead while nothing touches
 CLOSED = 1e-14  # m
