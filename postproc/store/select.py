@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.study.axes import coordinate_of
+from rubhpc.study.axis_values import place_of, study_unit
 from rubhpc.study.sampling import CASE
 from rubhpc.units import typed_quantity
 
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-# A value is on the grid when it is close to a grid value, relatively, and much closer than the next one is.
-_CLOSE = 5e-3
-_CLOSE_IN_SPACING = 0.1
 _MANY = 8  # values of an axis; of more than these, a message lists only some
 
 
@@ -188,20 +185,13 @@ def _number(store: xr.Dataset, axis: str, wanted: Any) -> float:
             raise InputError(
                 f"{source(store)}: {axis} = {wanted}: not on the grid; choose one of {known}"
             ) from None
-        unit = str(store[axis].attrs.get("units", "1"))
-        # "rad s-2" to "rad * s**-2": a store spells units as netCDF does, a study as pint does.
-        spelt = "" if unit == "1" else re.sub(r"(?<=[A-Za-z])(-?\d+)", r"**\1", unit).replace(" ", " * ")
-        return float(parse_quantity(wanted, spelt, f"{source(store)}: {axis}"))
+        unit = study_unit(str(store[axis].attrs.get("units", "1")))
+        return float(parse_quantity(wanted, unit, f"{source(store)}: {axis}"))
 
 
 def _nearest(store: xr.Dataset, axis: str, wanted: float) -> int:
-    values = store[axis].values.astype(float)
-    i = int(np.argmin(np.abs(values - wanted)))
-    tolerance = _CLOSE * max(abs(wanted), abs(values[i]))
-    others = np.abs(np.delete(values, i) - values[i])
-    if others.size:
-        tolerance = min(tolerance, _CLOSE_IN_SPACING * float(others.min()))
-    if not abs(values[i] - wanted) <= tolerance:
+    place = place_of(wanted, store[axis].values.astype(float))
+    if place is None:
         text, near = _typed(store[axis], wanted), written_values(store[axis], around=wanted)
         raise InputError(f"{source(store)}: {axis} = {text}: not on the grid; choose one of {near}")
-    return i
+    return place

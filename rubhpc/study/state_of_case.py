@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ from rubhpc.input.quantity import parse_quantity
 from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.schema import DONE, FINAL_STATE, STATUS
 from rubhpc.study.axes import coordinate_of, is_of_table
+from rubhpc.study.axis_values import place_of, study_unit
 from rubhpc.study.stored_state import StoredState
 
 if TYPE_CHECKING:
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
     Selection = Sequence[tuple[str, str | float]]
 
-# A value is on an axis when it is close to one of its values, relatively, and much closer than the next is.
-_CLOSE, _CLOSE_IN_SPACING = 5e-3, 0.1
 _MOST_WRITTEN = 6  # values of an axis in a message
 
 
@@ -118,20 +116,15 @@ def _nearest(axis: zarr.Array[Any], values: NDArray[np.float64], dim: str, wante
     meanings = str(axis.attrs.get("flag_meanings", "")).split()
     if wanted in meanings:
         return int(np.flatnonzero(values == meanings.index(str(wanted)))[0])
-    unit = str(axis.attrs.get("units", "1"))
-    spelt = "" if unit == "1" else re.sub(r"(?<=[A-Za-z])(-?\d+)", r"**\1", unit).replace(" ", " * ")
-    number = parse_quantity(wanted, spelt, f"[initial] select.{dim}")
-    i = int(np.argmin(np.abs(values - number)))
-    tolerance = _CLOSE * max(abs(number), abs(float(values[i])))
-    others = np.abs(np.delete(values, i) - values[i])
-    if others.size:
-        tolerance = min(tolerance, _CLOSE_IN_SPACING * float(others.min()))
-    if not abs(values[i] - number) <= tolerance:
+    unit = study_unit(str(axis.attrs.get("units", "1")))
+    number = parse_quantity(wanted, unit, f"[initial] select.{dim}")
+    place = place_of(number, values)
+    if place is None:
         near = values[np.sort(np.argsort(np.abs(values - number), kind="stable")[:_MOST_WRITTEN])]
         listed = ", ".join(_written(axis, value) for value in near)
         problem = f"{brief(wanted)} is not on the grid of the store"
         raise InputError(f"[initial] select.{dim}: {problem}; take one of {listed}")
-    return i
+    return place
 
 
 def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
