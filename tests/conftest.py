@@ -229,7 +229,7 @@ collect_ignore = [] if find_browser() else ["browser"]
 
 
 def pytest_report_header() -> str:
-    """Tell which browser there is."""
+    """State which browser there is."""
     return f"browser: {find_browser() or 'no Chromium with playwright, tests/browser is left out'}"
 
 

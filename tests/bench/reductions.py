@@ -139,8 +139,8 @@ def run(way: str, path: Path, workers: int) -> dict[str, Any]:
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=170)
     if done.returncode:
         raise SystemExit(f"{way}: {done.stderr[-2000:]}")
-    told: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return told
+    reported: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return reported
 
 
 def compare(path: Path, workers: int) -> dict[str, dict[str, Any]]:
@@ -153,11 +153,11 @@ def table(found: dict[str, dict[str, Any]], size: float, workers: int) -> str:
     """Return what was measured as a table of Markdown; `size` is that of the spectra, bytes."""
     disk = found["files read, nothing decoded"]["seconds"][0]
     rows = [HEAD, ("---",) * len(HEAD)]
-    for way, told in found.items():
-        cold, warm = told["seconds"]
+    for way, reported in found.items():
+        cold, warm = reported["seconds"]
         name = f"{way} ({workers})" if way.endswith(("processes", "dask-mpi")) else way
         rates = f"{size / cold / 1e9:.2f}", f"{disk / cold:.0%}", f"{warm:.2f}", f"{size / warm / 1e9:.2f}"
-        rows.append((name, f"{cold:.2f}", *rates, f"{told['memory']:.0f}"))
+        rows.append((name, f"{cold:.2f}", *rates, f"{reported['memory']:.0f}"))
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
 
@@ -172,8 +172,8 @@ def main() -> None:
     parser.add_argument("--store", type=Path, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.way:
-        told = measured(given.way, given.store, given.workers)
-        print(json.dumps(told))
+        reported = measured(given.way, given.store, given.workers)
+        print(json.dumps(reported))
         return
     folder = Path(tempfile.mkdtemp(prefix="reductions", dir=given.folder))
     try:

@@ -24,7 +24,7 @@ class Dense:
     now: np.ndarray  # (n_dof, n_dof)
     before: np.ndarray  # (n_dof, n_dof)
     force: np.ndarray  # (n_dof, 2), m
-    push: np.ndarray  # (n_dof,), the gap's rate with displacement
+    gap_jacobian: np.ndarray  # (n_dof,), the gap's rate with displacement
     kick: np.ndarray  # (n_dof,), displacement for a unit contact force, m/N
     vertical: int
 
@@ -36,9 +36,9 @@ def dense(rig, speed, friction, step):
     mass, stiffness = (block_diag(*(getattr(b, name) for b in bodies)) for name in ("mass", "stiffness"))
     damping = block_diag(*(b.damping + speed * b.gyroscopic for b in bodies))
     v, w, torsion, axial, lateral = degrees_of(model)[0]
-    push, pull = np.zeros((2, len(mass)))  # the stator stands upright: n = y
-    push[[v, axial]] = -1.0, 1.0
-    pull[[v, w, torsion, axial, lateral]] = (
+    gap_jacobian, force_direction = np.zeros((2, len(mass)))  # the stator stands upright: n = y
+    gap_jacobian[[v, axial]] = -1.0, 1.0
+    force_direction[[v, w, torsion, axial, lateral]] = (
         -1.0,
         -friction,
         -friction * model.stators[0].radius,
@@ -52,23 +52,23 @@ def dense(rig, speed, friction, step):
         now=inverse @ (2 * mass / step**2 - stiffness),
         before=inverse @ (damping / (2 * step) - mass / step**2),
         force=inverse @ force,
-        push=push,
-        kick=inverse @ pull,
+        gap_jacobian=gap_jacobian,
+        kick=inverse @ force_direction,
         vertical=v,
     )
 
 
-def march(now, before, force, push, kick, place, clearance, turn, n_step, vertical):
+def march(now, before, force, gap_jacobian, kick, place, clearance, turn, n_step, vertical):
     """Step by step from rest; fills `vertical` (n_step,), m."""
-    compliance = push @ kick
+    compliance = gap_jacobian @ kick
     # From rest: the displacement a step earlier has half the first step's acceleration in it.
-    u, earlier = np.zeros(len(push)), 0.5 * force[:, 0]
+    u, earlier = np.zeros(len(gap_jacobian)), 0.5 * force[:, 0]
     for i in range(n_step):
         vertical[i] = u[place]
         free = (
             now @ u + before @ earlier + force[:, 0] * math.cos(turn * i) + force[:, 1] * math.sin(turn * i)
         )
-        gap = clearance + push @ free
+        gap = clearance + gap_jacobian @ free
         if gap < 0.0:
             free -= kick * (gap / compliance)
         u, earlier = free, u
@@ -80,7 +80,7 @@ compiled = numba.njit(march)
 def run(rig, speed, clearance, friction, n_step, *, step, is_compiled):
     """Wall time a step (s), and the vertical motion at each, m."""
     scheme = dense(rig, speed, friction, step)
-    given = (scheme.now, scheme.before, scheme.force, scheme.push, scheme.kick)
+    given = (scheme.now, scheme.before, scheme.force, scheme.gap_jacobian, scheme.kick)
     vertical = np.empty(n_step)
     function = compiled if is_compiled else march
     if is_compiled:

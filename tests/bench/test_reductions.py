@@ -23,8 +23,8 @@ def test_reductions_take_less_than_a_loop_and_bounded_memory(tmp_path: Path) -> 
     found = compare(path, workers=2)
     print("\n" + table(found, open_in_pieces(path)[many_cases.NAME].nbytes, 2))
     by_hand = found["mean, plain loop over zarr's chunks"]
-    for way, told in found.items():
-        assert told["memory"] < MOST_MEMORY, way
+    for way, reported in found.items():
+        assert reported["memory"] < MOST_MEMORY, way
         if way.startswith("mean"):
-            assert told["result"] == pytest.approx(by_hand["result"], rel=1e-9), way
+            assert reported["result"] == pytest.approx(by_hand["result"], rel=1e-9), way
     assert found["mean, dask threads"]["seconds"][1] < by_hand["seconds"][1]

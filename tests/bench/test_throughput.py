@@ -107,9 +107,9 @@ def test_modal_case_against_what_else_there_is(benchmark, capsys, name):
         f"{'':34} {'s a simulated s':>16} {'cases a core-s':>15} {'ratio':>8} {'error':>9}",
     ]
     for label, (seconds, off) in rows.items():
-        told = "another model" if math.isnan(off) else f"{off:9.1e}"
+        reported = "another model" if math.isnan(off) else f"{off:9.1e}"
         lines.append(
-            f"{label:34} {seconds:16.5f} {1 / (seconds * whole):15.3f} {seconds / modal_cost:8.1f} {told}"
+            f"{label:34} {seconds:16.5f} {1 / (seconds * whole):15.3f} {seconds / modal_cost:8.1f} {reported}"
         )
     dense = rows["dense central difference, numba"][0]
     nominal = DENSE_STEP_TIME / STEP / modal_cost

@@ -61,8 +61,8 @@ def test_the_pointer_is_told_what_it_is_over(visit: Visit, pages: dict[str, str]
     box = page.locator("#map").bounding_box()
     assert box is not None
     page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 60)
-    told = re.compile(r"Speed ratio 1\.25, Clearance 100.µm\s+Regime: quasi-periodic")
-    expect(page.locator("#tip")).to_contain_text(told)
+    reported = re.compile(r"Speed ratio 1\.25, Clearance 100.µm\s+Regime: quasi-periodic")
+    expect(page.locator("#tip")).to_contain_text(reported)
     page.mouse.move(2, 2)
     expect(page.locator("#tip")).to_be_hidden()
 

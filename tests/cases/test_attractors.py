@@ -1,4 +1,4 @@
-"""Motions that starts reach, told apart in synthetic sections of known motions; intervals; entropy."""
+"""Motions that starts reach, distinguished in synthetic sections of known motions; intervals; entropy."""
 
 from __future__ import annotations
 

@@ -179,14 +179,14 @@ def test_a_hundred_thousand_cases_take_little_memory(tmp_path: Path) -> None:
     store = many_cases.write(tmp_path / "many.zarr")
     script = [sys.executable, many_cases.__file__, store]
     done = subprocess.run(script, env=environment(), capture_output=True, text=True, check=True, timeout=300)
-    told = json.loads(done.stdout.splitlines()[-1])
-    assert told["bytes"] > 3e9
+    reported = json.loads(done.stdout.splitlines()[-1])
+    assert reported["bytes"] > 3e9
     # Pieces of 64 MB at most, each four times: 1 GB; two cores took 0.4 GB.
-    assert told["memory"] < 1500
-    assert told["cases"] == told["counted"] == 84_000
-    assert told["mean"] == pytest.approx(1.3)
-    assert told["worst"] == pytest.approx(1.5)
-    assert told["median"] == pytest.approx(0.5)
+    assert reported["memory"] < 1500
+    assert reported["cases"] == reported["counted"] == 84_000
+    assert reported["mean"] == pytest.approx(1.3)
+    assert reported["worst"] == pytest.approx(1.5)
+    assert reported["median"] == pytest.approx(0.5)
 
 
 @pytest.fixture
@@ -239,8 +239,8 @@ def test_command_refuses_bad_input_in_a_line(on_ranks: bool, path: Path) -> None
     arguments = ["reduce", path, "--over", "sped_ratio"]
     done = run(*arguments, "--on", "mpi", ranks=3) if on_ranks else run(*arguments)
     assert done.returncode == 2
-    told = [line for line in done.stderr.splitlines() if line.startswith("rubhpc:")]
-    assert told == [f"rubhpc: {path}: no axis sped_ratio; did you mean speed_ratio?"]
+    reported = [line for line in done.stderr.splitlines() if line.startswith("rubhpc:")]
+    assert reported == [f"rubhpc: {path}: no axis sped_ratio; did you mean speed_ratio?"]
 
 
 def test_command_takes_measures(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -234,5 +234,5 @@ def test_command_tells_draws_and_writes(tmp_path: Path, monkeypatch: pytest.Monk
     assert lines[1] == "of 512 cases 6 missing, 5 failed, 5 diverged"
     assert lines[-2:] == ["study_sensitivity.png", "shares.json"]
     assert (tmp_path / "study_sensitivity.png").read_bytes().startswith(b"\x89PNG")
-    told = json.loads((tmp_path / "shares.json").read_text())["data_vars"]["total"]["data"]
-    assert [f"{share:.3f}" for share in told] == [line.split()[5] for line in lines[4:7]]
+    reported = json.loads((tmp_path / "shares.json").read_text())["data_vars"]["total"]["data"]
+    assert [f"{share:.3f}" for share in reported] == [line.split()[5] for line in lines[4:7]]

@@ -49,14 +49,14 @@ def test_the_short_help_is_that_of_a_command():
 
 
 def loaded_by(code: str) -> set[str]:
-    told = subprocess.run(
+    reported = subprocess.run(
         [sys.executable, "-c", f"{code}\nimport sys; print(*sys.modules)"],
         env=environment(),
         capture_output=True,
         text=True,
         check=True,
     )
-    return set(told.stdout.split())
+    return set(reported.stdout.split())
 
 
 HEAVY = {"numpy", "numba", "mpi4py", "zarr", "xarray", "dask", "scipy", "matplotlib", "pint", "rich"}
@@ -82,7 +82,7 @@ def test_status_loads_neither_mpi_nor_numba_nor_zarr(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "told"),
+    ("arguments", "code", "message"),
     [
         ([], 2, "nothing to do; give a STUDY.toml or a command, see rubhpc --help"),
         (["nowhere.toml"], 2, "nowhere.toml: no such file"),
@@ -98,12 +98,12 @@ def test_status_loads_neither_mpi_nor_numba_nor_zarr(tmp_path):
         (["x.toml", "--max-failures", "-1"], 2, "--max-failures"),
     ],
 )
-def test_errors_are_one_line_with_their_code(arguments, code, told, capsys, tmp_path, monkeypatch):
+def test_errors_are_one_line_with_their_code(arguments, code, message, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     got, out, err = call(capsys, *arguments)
     assert (got, out) == (code, "")
     assert err.startswith("rubhpc: ")
-    assert told in err
+    assert message in err
     assert err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 

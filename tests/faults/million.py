@@ -68,7 +68,7 @@ study = Study(
     recording=Recording(keep=()),
     output=folder / "many.zarr",
 )
-told = {
+reported = {
     "plan": seconds(lambda: plan.make_plan(study)),
     "run": seconds(lambda: driver.run(study, quiet=True)),
     "plan_again": seconds(lambda: plan.make_plan(study)),
@@ -76,4 +76,4 @@ told = {
     "done": read_status(study.output).counts[DONE],
     "memory": peak_memory(),
 }
-print(json.dumps(told))
+print(json.dumps(reported))

@@ -1,4 +1,4 @@
-"""Any byte of a store may be changed, cut off or deleted: verify tells, the next run mends."""
+"""Any byte of a store may be changed, cut off or deleted: `verify` reports it, the next run repairs it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ blows = st.tuples(
 
 
 def check(finished: Path, strikes: list[tuple[int, str, float, int]]) -> None:
-    """Damage a copy of the store here and there; see that it is told, mended, and equal to the original."""
+    """Damage a copy of the store here and there; it is reported, repaired, and equal to the original."""
     with tempfile.TemporaryDirectory() as folder:
         store = Path(shutil.copytree(finished / "tiny.zarr", Path(folder) / "tiny.zarr"))
         files = sorted(path for path in store.rglob("*") if path.is_file() and path.name != "lock.guard")
@@ -53,17 +53,17 @@ def check(finished: Path, strikes: list[tuple[int, str, float, int]]) -> None:
         for path, blow in struck.items():
             damage(path, *blow)
         read = {path for path in store.rglob("*") if path.is_file()}
-        told = verify(store)
+        reported = verify(store)
         seen = stored_bytes(store) != whole
         if seen:
-            assert told, struck  # nothing that a reader sees is damaged in silence
+            assert reported, struck  # nothing that a reader sees is damaged in silence
         assert {path for path in store.rglob("*") if path.is_file()} >= read - {
             store / ".rubhpc" / "packed.json"
         }
-        n_case = len(told.cases)
+        n_case = len(reported.cases)
         summary = run_study(finished / "tiny.toml", output=store, quiet=True)
         assert summary.counts == (0, 12, 0, 0, 0)
-        assert summary.computed == n_case, (told.lines(), struck)
+        assert summary.computed == n_case, (reported.lines(), struck)
         assert not verify(store)
         assert stored_bytes(store) == whole
         assert Store(store).manifest.damaged_copies(store) == []

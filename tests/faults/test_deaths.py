@@ -65,7 +65,7 @@ def test_a_case_with_a_segmentation_fault_fails_after_two_of_them(tmp_path, laun
 @pytest.mark.timeout(3600)
 @each_launcher
 def test_a_case_whose_rank_is_killed_fails_after_five_times(tmp_path, launcher):
-    """Of SIGKILL nothing tells whose fault it was: neither of the memory, nor of the user."""
+    """SIGKILL does not show its cause: neither the memory nor the user is blamed."""
     study, store = write_poisoned(tmp_path, guilty=2), tmp_path / "tiny.zarr"
     n_death = runs_until_the_end("killed", study, store, 10, ranks=2, launcher=launcher)
     check_outcome(store, "its rank died in it 5 times, of unknown cause", guilty=2)
@@ -100,9 +100,9 @@ def store(tmp_path: Path) -> Store:
 
 def die(store: Store, flat: int, run_number: int = 1) -> InProgress:
     """Leave the record of a rank that died in a case."""
-    hand = InProgress(store.in_progress_directory, run_number, "rank00000")
-    hand.take(flat, store.manifest.case_id(flat))
-    return hand
+    progress = InProgress(store.in_progress_directory, run_number, "rank00000")
+    progress.take(flat, store.manifest.case_id(flat))
+    return progress
 
 
 def test_innocent_cases_are_tried_again_and_no_record_of_them_stays(store):
@@ -133,14 +133,14 @@ def test_a_record_of_another_grid_or_of_no_case_says_nothing(store):
 
 
 def test_want_of_memory_is_told_from_other_kills(store, monkeypatch):
-    from rubhpc.storage import in_progress as hand
+    from rubhpc.storage import in_progress
 
     is_missing = store.replay().status == 0
-    monkeypatch.setattr(hand, "_oom_kills", lambda: 7)
+    monkeypatch.setattr(in_progress, "_oom_kills", lambda: 7)
     die(store, 3)
     die(store, 3)
     die(store, 5)
-    monkeypatch.setattr(hand, "_oom_kills", lambda: 8)
+    monkeypatch.setattr(in_progress, "_oom_kills", lambda: 8)
     suspects = read_deaths(store.in_progress_directory, store.manifest, is_missing)
     assert suspects.failed == {3: "its rank died in it 2 times: killed, as the machine had no memory left"}
     assert suspects.suspect == {5: 1}

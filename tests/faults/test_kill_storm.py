@@ -39,7 +39,7 @@ def seconds_until_gone(store: Path) -> float:
 
 
 def wait_until_computing(job: subprocess.Popen[str], store: Path) -> None:
-    """Return once a rank has a case in hand, or all is done."""
+    """Return once a rank has a case in progress, or all is done."""
     before = set((store / ".rubhpc" / "in_progress").glob("*"))
     while job.poll() is None and set((store / ".rubhpc" / "in_progress").glob("*")) <= before:
         time.sleep(0.01)

@@ -1,4 +1,4 @@
-"""What a study costs beside its physics: a million cases are to be planned, run and told of with ease."""
+"""What a study costs beside its physics: a million cases are to be planned, run and reported with ease."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def took(n_case: int, folder: Path) -> dict[str, float]:
     script = Path(__file__).with_name("million.py")
     command = [sys.executable, str(script), str(n_case), str(folder)]
     done = subprocess.run(command, env=environment(), capture_output=True, text=True, check=True)
-    told: dict[str, float] = json.loads(done.stdout)
-    assert told["done"] == n_case
-    return told
+    reported: dict[str, float] = json.loads(done.stdout)
+    assert reported["done"] == n_case
+    return reported
 
 
 @pytest.fixture(scope="module")
@@ -52,14 +52,15 @@ def test_a_million_cases_fit_in_a_gigabyte(times):
 @pytest.mark.timeout(3600)
 def test_a_million_cases_in_earnest(tmp_path):
     """Nothing is extrapolated."""
-    told = took(MILLION, tmp_path)
-    each = told["run"] / MILLION * 1e6
+    reported = took(MILLION, tmp_path)
+    each = reported["run"] / MILLION * 1e6
     print(
-        f"\na million cases: plan {told['plan']:.1f} s, status {told['status']:.1f} s, plan when done "
-        f"{told['plan_again']:.1f} s, {each:.0f} us a case beside its physics, {told['memory']:.0f} MB"
+        f"\na million cases: plan {reported['plan']:.1f} s, status {reported['status']:.1f} s, "
+        f"plan when done {reported['plan_again']:.1f} s, {each:.0f} us a case beside its physics, "
+        f"{reported['memory']:.0f} MB"
     )
-    assert told["plan"] < 10
-    assert told["plan_again"] < 10
-    assert told["status"] < 5
+    assert reported["plan"] < 10
+    assert reported["plan_again"] < 10
+    assert reported["status"] < 5
     assert each < 50
-    assert told["memory"] < 1000
+    assert reported["memory"] < 1000

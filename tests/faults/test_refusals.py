@@ -38,8 +38,8 @@ def test_poisoned_cases_fail_and_the_others_finish(tmp_path, launcher):
     assert done.returncode == 1, done.stderr
     line = complaint(done.stderr)
     assert line.startswith(f"rubhpc: {tmp_path / 'tiny.zarr'}: 6 of 8 cases failed; the first, ")
-    told = run("status", tmp_path / "tiny.zarr").stdout
-    assert "8 cases: 2 done, 6 failed, 0 diverged, 0 missing" in told
+    reported = run("status", tmp_path / "tiny.zarr").stdout
+    assert "8 cases: 2 done, 6 failed, 0 diverged, 0 missing" in reported
     reasons = {
         0.3: "ZeroDivisionError: a poisoned case",
         0.5: "over its time limit of 4 s",
@@ -69,9 +69,9 @@ def test_a_second_run_on_a_store_is_refused_and_status_tells_of_the_first(tmp_pa
     assert second.returncode == 3
     assert f"in use by process {first.pid} on " in second.stderr
     assert second.stderr.count("\n") == 1
-    told = run("status", store)
-    assert told.returncode == 0
-    assert f"running: process {first.pid} on " in told.stdout
+    reported = run("status", store)
+    assert reported.returncode == 0
+    assert f"running: process {first.pid} on " in reported.stdout
     first.send_signal(signal.SIGTERM)
     first.communicate(timeout=20)
     assert first.returncode == 75

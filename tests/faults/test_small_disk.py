@@ -60,23 +60,25 @@ def test_a_disk_that_fills_up_keeps_what_is_there_and_is_gone_on_with(tmp_path, 
         capture_output=True,
     )
 
-    def told(name: str) -> str:
+    def reported(name: str) -> str:
         return (tmp_path / name).read_text().strip()
 
-    assert told("full.rc") == "3", told("full.err")
-    assert told("full.err").startswith("rubhpc: disk/tiny.zarr: the disk is full; free some space")
-    assert told("full.err").count("\n") == 0
+    assert reported("full.rc") == "3", reported("full.err")
+    assert reported("full.err").startswith("rubhpc: disk/tiny.zarr: the disk is full; free some space")
+    assert reported("full.err").count("\n") == 0
     n_before = 0
     if (tmp_path / "full.zarr" / ".rubhpc").exists():
-        assert told("verify.rc") == "0", told("verify.out")  # earlier cases are intact
-        n_before = int(told("verify.out").split()[0])
-        assert f"24 cases: {n_before} done" in told("status.out")
-        assert told("ro-status.rc") == "0"
-    assert told("ro.rc") == "3"
-    assert told("ro.err").startswith("rubhpc: disk/tiny.zarr: the file system is read-only; choose another")
-    assert told("ro.err").count("\n") == 0
-    assert told("again.rc") == "0", told("again.err")
-    assert f"24 done; {24 - n_before} computed" in told("again.out")
+        assert reported("verify.rc") == "0", reported("verify.out")  # earlier cases are intact
+        n_before = int(reported("verify.out").split()[0])
+        assert f"24 cases: {n_before} done" in reported("status.out")
+        assert reported("ro-status.rc") == "0"
+    assert reported("ro.rc") == "3"
+    assert reported("ro.err").startswith(
+        "rubhpc: disk/tiny.zarr: the file system is read-only; choose another"
+    )
+    assert reported("ro.err").count("\n") == 0
+    assert reported("again.rc") == "0", reported("again.err")
+    assert f"24 done; {24 - n_before} computed" in reported("again.out")
     assert not verify(tmp_path / "tiny.zarr")
     assert stored_bytes(tmp_path / "tiny.zarr") == stored_bytes(whole)
     print(f"\na disk of {size}: {n_before} of 24 cases were stored before it was full, none was lost")

@@ -37,7 +37,7 @@ def ended_early(job: subprocess.Popen[str]) -> str:
     assert job.returncode == 75
     line = complaint(err)
     assert "cases missing; run the same command again" in line
-    print(f"\nended {took:.1f} s after it was told")
+    print(f"\nended {took:.1f} s after the signal")
     return line
 
 

@@ -111,7 +111,7 @@ def test_unbalance_at_another_node_changes_what_is_excited():
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "message"),
     [
         ({"speed_range": (300.0, 100.0)}, "range: 300 to 100 rad/s is not a range"),
         ({"speed_range": (-1.0, 100.0)}, "give a lowest speed, at least 0"),
@@ -119,8 +119,8 @@ def test_unbalance_at_another_node_changes_what_is_excited():
         ({"nodes": [9]}, "node: 9 does not move sideways; nodes 1 to 5 do"),
     ],
 )
-def test_what_is_no_request_is_refused(given, told):
-    with pytest.raises(InputError, match=told):
+def test_what_is_no_request_is_refused(given, message):
+    with pytest.raises(InputError, match=message):
         linear_design(rig(), **given)
 
 

@@ -171,7 +171,7 @@ def test_stators_follow_the_axes_of_a_real_study(cases):
     rig = read_rig("mokhtar2017")
     axes = ("speed", [100.0]), ("clearance", [1e-4]), ("friction", [0.3]), ("stator.1.angle", [0.0, 1.2])
     study = Study(
-        title="as a store tells it",
+        title="as a store states it",
         rig=rig,
         axes=tuple(make_axis(name, values, rig) for name, values in axes),
         output=Path("none.zarr"),

@@ -138,8 +138,8 @@ def test_what_is_above_zero_has_no_cell_below():
 
 def test_names_of_facets_stay_within_their_panels():
     name = "rotor_unbalance_radius"
-    told = {"long_name": name.replace("_", " "), "units": "m"}
-    radius = xr.DataArray(0.1 + 0.05 * np.arange(5.0), dims=name, attrs=told)
+    reported = {"long_name": name.replace("_", " "), "units": "m"}
+    radius = xr.DataArray(0.1 + 0.05 * np.arange(5.0), dims=name, attrs=reported)
     data = xr.Dataset(coords={"friction": [0.0, 0.1], name: radius})
     with house_style():
         figure, axes = new_figure(2, 120, 180, 5)

@@ -73,22 +73,22 @@ def test_a_wall_that_moves_in_pushes_as_it_would_slowly(method):
     """The strain energy it adds is what the forces do over the way, and no body is thrown."""
     setup = setup_of(method)
     state = settled(setup, 1e-4)
-    gap, push = gaps(state.displacement, setup, 1e-4)
+    gap, gap_jacobian = gaps(state.displacement, setup, 1e-4)
     clearance = 1e-4 - float(gap.max()) - 2e-5  # every gap would be overlapped by 20 um and more
     start = fit_to_gaps(state, setup, clearance)
     after, _ = gaps(start.displacement, setup, clearance)
     assert np.all(after > -1e-12)
     assert after.min() == pytest.approx(0.0, abs=1e-12)
     assert np.array_equal(start.velocity, state.velocity)
-    # By the laws of statics: K du = push^T F, with forces that push, and none where the gap is open.
+    # By the laws of statics: K du = gap_jacobian^T F, with forces that press, and none where the gap is open.
     moved = start.displacement - state.displacement
     bodies = setup.model.bodies
     stiffness = [0.5 * (body.stiffness + body.stiffness.T) for body in bodies]
     parts = np.split(moved, np.cumsum([body.n_dof for body in bodies])[:-1])
     load = np.concatenate([k @ u for k, u in zip(stiffness, parts, strict=True)])
-    force = np.linalg.lstsq(push.T, load, rcond=None)[0]
+    force = np.linalg.lstsq(gap_jacobian.T, load, rcond=None)[0]
     if method != "updated":  # there the normals turn on the way
-        assert np.linalg.norm(push.T @ force - load) < 1e-6 * np.linalg.norm(load)
+        assert np.linalg.norm(gap_jacobian.T @ force - load) < 1e-6 * np.linalg.norm(load)
         assert np.all(force > -1e-6 * force.max())
     # And what goes on from there is the motion of before, not a shock.
     before = run_case(setup, clearance=1e-4, friction=0.1, recording=SHORT, initial=state)

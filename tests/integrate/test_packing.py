@@ -141,7 +141,7 @@ def test_compliance_is_the_answer_to_a_force_over_a_step(model, packed):
         one, other = positions[i][a], positions[j][b]
         expected = 0.0 if one is None or other is None else answer[one, other]
         assert packed.compliance[i, a, j, b] == pytest.approx(expected, rel=1e-9, abs=1e-25), (i, a, j, b)
-    assert packed.compliance[0, 0, 2, 0] != 0.0  # the disc yields to a force at another node
+    assert packed.compliance[0, 0, 2, 0] != 0.0  # the disc gives way to a force at another node
 
 
 def test_arrays_are_contiguous_whatever_the_bearings(packed):

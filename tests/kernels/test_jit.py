@@ -52,7 +52,7 @@ def probe(tmp_path):
             env=environment(
                 PYTHONPATH="",
                 NUMBA_CACHE_DIR=str(tmp_path / "cache"),
-                PYTHONDONTWRITEBYTECODE="1",  # Python tells sources apart by their second and size
+                PYTHONDONTWRITEBYTECODE="1",  # Python distinguishes sources by their second and size
             ),
             stdout=subprocess.PIPE,
             text=True,

@@ -119,6 +119,6 @@ def test_the_document_lists_the_claims_of_the_code_and_none_that_fails(results):
         return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
 
     fresh, kept = rows(document_of(results)), rows(DOCUMENT.read_text())
-    told = [HEAD.index(column) for column in ("id", "figure", "claim", "expected")]
-    assert [[row[i] for i in told] for row in kept] == [[row[i] for i in told] for row in fresh]
+    reported = [HEAD.index(column) for column in ("id", "figure", "claim", "expected")]
+    assert [[row[i] for i in reported] for row in kept] == [[row[i] for i in reported] for row in fresh]
     assert {row[-1] for row in kept} == {HOLDS, REPORTED}

@@ -59,11 +59,13 @@ def test_the_studies_store_where_the_command_looks():
 
 def test_the_gallery_tells_of_every_study_its_cases_and_every_figure():
     gallery = (ROOT / "docs" / "gallery.md").read_text()
-    told = dict(re.findall(r"^\| \[`jobs/paper/(\w+).toml`\].*?\| [^|]* \| (\d+) \|", gallery, re.MULTILINE))
+    reported = dict(
+        re.findall(r"^\| \[`jobs/paper/(\w+).toml`\].*?\| [^|]* \| (\d+) \|", gallery, re.MULTILINE)
+    )
     cases = {
         name: math.prod(len(axis.values) for axis in read_study(path).axes) for name, path in STUDIES.items()
     }
-    assert {name: int(n) for name, n in told.items()} == cases
+    assert {name: int(n) for name, n in reported.items()} == cases
     assert f"{sum(cases.values())} cases" in (ROOT / "README.md").read_text()
     shown = re.findall(r"^## Fig\. (\d+): .*\n\n!\[.*\]\(gallery/fig(\d\d)\.png\)$", gallery, re.MULTILINE)
     assert [int(a) for a, _ in shown] == [int(b) for _, b in shown] == list(FIGURES)

@@ -35,7 +35,7 @@ def test_two_ranks_carry_as_one_does(tmp_path, alone):
 
 @pytest.mark.parametrize("moments", [(5,), pytest.param((2, 7), marks=pytest.mark.long)])
 def test_chains_that_are_killed_go_on_where_they_were(tmp_path, alone, moments):
-    """Four chains on two ranks, killed once or twice; a kill costs each rank the block in hand, one case."""
+    """Four chains on two ranks, killed once or twice; a kill costs each rank its block, one case."""
     study, store = write_slow_study(tmp_path, **SWEPT), tmp_path / "tiny.zarr"
     for n_case in moments:
         job = start(study, ranks=2)

@@ -14,7 +14,7 @@ import pytest
 SCRIPTS = Path(__file__).parents[2] / "jobs" / "slurm"
 SWEEP = SCRIPTS / "sweep.sh"
 
-# A step: tells that it runs, and ends with CODE at once, or as soon as USR1 or TERM reaches it.
+# A step: says that it runs, and ends with CODE at once, or as soon as USR1 or TERM reaches it.
 SRUN = """#!/usr/bin/env bash
 echo "$@" > step.arguments
 trap 'echo USR1 >> step.signals; exit 75' USR1

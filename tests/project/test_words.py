@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 from running import ROOT
 
-FOLDERS = ("rubhpc", "postproc", "docs", "jobs")
+FOLDERS = ("rubhpc", "postproc", "docs", "jobs", "tests")
 ENDINGS = {".py", ".md", ".toml", ".js", ".html", ".css", ".sh"}
 FILES = [
     path
     for folder in FOLDERS
     for path in sorted((ROOT / folder).rglob("*"))
-    if path.suffix in ENDINGS and "site" not in path.relative_to(ROOT).parts
+    if path.suffix in ENDINGS
+    and "site" not in path.relative_to(ROOT).parts
+    and path.name != Path(__file__).name
 ] + [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "pyproject.toml", "Makefile")]
 
 INSTEAD_OF = {

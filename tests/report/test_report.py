@@ -133,11 +133,11 @@ def test_failures_are_told_with_their_reasons(two_stator_path: Path) -> None:
 def test_validity_counts_what_is_out_of_range(two_stator_path: Path) -> None:
     text = Page(open_store(two_stator_path)).html(values={})
     rows = re.findall(r'scope="row">([^<]+)</th><td>[^<]+</td>\D*?data-label="Cases">(\d+)<', text)
-    told = {name: int(n) for name, n in rows}
+    reported = {name: int(n) for name, n in rows}
     # Of 60 cases those at the speeds 1.5 and 1.7 slip back, and those at 1.7 are over the Euler load.
-    assert told["Lowest slip speed"] == 24
-    assert told["Contact force over Euler load"] == 12
-    assert told["Tip deflection over length"] == 0
+    assert reported["Lowest slip speed"] == 24
+    assert reported["Contact force over Euler load"] == 12
+    assert reported["Tip deflection over length"] == 0
 
 
 def test_slip_may_reverse_under_coulombs_law(two_stator_path: Path) -> None:
@@ -146,7 +146,7 @@ def test_slip_may_reverse_under_coulombs_law(two_stator_path: Path) -> None:
     text = Page(dataset.assign_attrs(study=study)).html(values={})
     assert "Contact force over Euler load" in text
     assert "contradicts steady sliding" not in text
-    assert "no limit of the model; below 0 the rim slips back" in text  # how many cases is still told
+    assert "no limit of the model; below 0 the rim slips back" in text  # how many cases is still stated
     found, sliding = validity(dataset.assign_attrs(study=study)), validity(dataset)
     assert int((found & 1).sum()) == 0
     assert "slip" not in found.attrs["long_name"]
@@ -232,11 +232,11 @@ def test_every_kind_of_stator_is_drawn(kind: str) -> None:
     from rubhpc.rig.stators import LumpedStator
 
     rig = read_rig("mokhtar2017")
-    told = RINGS[kind]
+    settings = RINGS[kind]
     if kind == "several":
-        stator = type(rig.stator[0])(**{**vars(rig.stator[0]), **told})
+        stator = type(rig.stator[0])(**{**vars(rig.stator[0]), **settings})
     else:
-        stator = LumpedStator(node=8, **told)
+        stator = LumpedStator(node=8, **settings)
     rig = Rig(name="ring", rotor=rig.rotor, stator=(stator,))
     n_drawn = end_view(rig).count("rotate(") - 1  # the arrow of the spin is turned too
     assert n_drawn == (5 if kind == "several" else 1)
@@ -287,7 +287,7 @@ def test_the_command_writes_the_page_and_says_what_is_on_it(
 
 
 @pytest.mark.parametrize(
-    ("args", "told"),
+    ("args", "message"),
     [
         (["--output", "page.pdf"], "name it page.html"),
         (["--output", "no/page.html"], "no directory no"),
@@ -296,12 +296,12 @@ def test_the_command_writes_the_page_and_says_what_is_on_it(
     ],
 )
 def test_wrong_input_is_one_line(
-    two_stator_path: Path, tmp_path: Path, monkeypatch, args: list[str], told: str
+    two_stator_path: Path, tmp_path: Path, monkeypatch, args: list[str], message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError) as refusal:
         CliRunner().invoke(report, [str(two_stator_path), *args], catch_exceptions=False)
-    assert told in str(refusal.value)
+    assert message in str(refusal.value)
     assert list(tmp_path.iterdir()) == []
 
 

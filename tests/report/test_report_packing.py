@@ -38,10 +38,10 @@ def test_codes_of_a_flag_are_kept_exactly() -> None:
 
 def test_a_waveform_is_kept_to_a_step_of_its_range() -> None:
     wave = 3.0 + np.sin(np.linspace(0, 20, 700))
-    told, codes = quantised(wave)
-    assert told["low"] + codes * told["step"] == pytest.approx(wave, abs=0.51 * np.ptp(wave) / 65535)
-    told, codes = quantised(np.full(5, 7.0))
-    assert (told["low"] + codes * told["step"] == 7.0).all()
+    reported, codes = quantised(wave)
+    assert reported["low"] + codes * reported["step"] == pytest.approx(wave, abs=0.51 * np.ptp(wave) / 65535)
+    reported, codes = quantised(np.full(5, 7.0))
+    assert (reported["low"] + codes * reported["step"] == 7.0).all()
 
 
 @given(arrays(np.uint16, st.integers(1, 60), elements=st.integers(0, WAVE_STEPS)))
@@ -51,8 +51,8 @@ def test_second_differences_are_undone(codes: np.ndarray) -> None:
 
 def test_a_spectrum_is_kept_within_a_pixel_over_five_decades() -> None:
     amplitude = np.array([0.0, 1e-9, 2e-5, 3.3e-3, 0.5, 1.0]) * 42
-    told, codes = quantised_spectrum(amplitude)
-    back = np.where(codes > 0, told["top"] * 10 ** (5 * (codes / RATIOS - 1)), 0)
+    reported, codes = quantised_spectrum(amplitude)
+    back = np.where(codes > 0, reported["top"] * 10 ** (5 * (codes / RATIOS - 1)), 0)
     assert back[2:] == pytest.approx(amplitude[2:], rel=3e-3)
     assert (back[:2] == 0).all()
 

@@ -116,7 +116,7 @@ def test_standstill_has_the_coefficients_of_the_lowest_speed():
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         ({"speed": [1.0]}, "speed: a table has at least two speeds"),
         ({"speed": [1.0, 3.0, 2.0, 4.0]}, "speed: the speeds do not rise"),
@@ -129,8 +129,8 @@ def test_standstill_has_the_coefficients_of_the_lowest_speed():
         ({"interpolation": "spline"}, 'interpolation: "spline" is not available'),
     ],
 )
-def test_what_is_no_table_is_refused(change, told):
-    with pytest.raises(InputError, match=told):
+def test_what_is_no_table_is_refused(change, message):
+    with pytest.raises(InputError, match=message):
         table(**change)
 
 

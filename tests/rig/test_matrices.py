@@ -1,4 +1,4 @@
-"""Rotors and stators that come as matrices: what is refused, and that stores can tell them again."""
+"""Rotors and stators that come as matrices: what is refused, and that stores keep them."""
 
 import json
 import math
@@ -38,7 +38,7 @@ def rotor(M=ONE, C=None, K=ONE, G=None, degrees=PLANE, **given):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         ({"M": [[1.0, 0.0]]}, r"mass: has the shape \(1, 2\); give a square one"),
         ({"M": [[1.0, 0.0], [0.0]]}, "mass: .* is not a matrix of real numbers"),
@@ -74,14 +74,14 @@ def rotor(M=ONE, C=None, K=ONE, G=None, degrees=PLANE, **given):
         ),
     ],
 )
-def test_what_is_no_body_is_refused_in_one_line(change, told):
-    with pytest.raises(InputError, match=told) as error:
+def test_what_is_no_body_is_refused_in_one_line(change, message):
+    with pytest.raises(InputError, match=message) as error:
         rotor(**change)
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "message"),
     [
         ({"mass": 1.0}, "stiffness: missing; give mass and stiffness, or rigid = true"),
         ({"rigid": True, "mass": 1.0}, "mass: conflicts with rigid = true"),
@@ -90,8 +90,8 @@ def test_what_is_no_body_is_refused_in_one_line(change, told):
         ({"mass": 1.0, "stiffness": 1.0, "lateral_mass": 1.0}, "lateral_mass: has no effect without"),
     ],
 )
-def test_lumped_stator_has_mass_and_spring_or_is_rigid(given, told):
-    with pytest.raises(InputError, match=told):
+def test_lumped_stator_has_mass_and_spring_or_is_rigid(given, message):
+    with pytest.raises(InputError, match=message):
         LumpedStator(node=1, **given)
 
 
@@ -115,9 +115,9 @@ def test_beam_and_its_matrices_are_the_same_stator():
         stiffness=beam.body.stiffness,
         degrees=tuple(names),
     )
-    told = assemble(replace(packaged, stator=(given,))).stators[0]
-    assert (told.axial, told.lateral) == (beam.axial, beam.lateral)
-    for one, other in zip(modes(told.body), modes(beam.body), strict=True):
+    reported = assemble(replace(packaged, stator=(given,))).stators[0]
+    assert (reported.axial, reported.lateral) == (beam.axial, beam.lateral)
+    for one, other in zip(modes(reported.body), modes(beam.body), strict=True):
         assert one.frequency == pytest.approx(other.frequency, rel=1e-9)
 
 
@@ -157,7 +157,7 @@ def test_matrices_are_the_identity_of_a_study_not_what_made_them(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("code", "name", "told"),
+    ("code", "name", "message"),
     [
         ("def build():\n    return 1 / 0\n", "rig.py:build", "line 2: ZeroDivisionError: division by zero"),
         ("def build(:\n", "rig.py:build", "line 1: SyntaxError"),
@@ -172,9 +172,9 @@ def test_matrices_are_the_identity_of_a_study_not_what_made_them(tmp_path):
         ),
     ],
 )
-def test_what_is_wrong_with_a_rig_of_python_is_told_in_one_line(tmp_path, code, name, told):
+def test_what_is_wrong_with_a_rig_of_python_is_told_in_one_line(tmp_path, code, name, message):
     (tmp_path / "rig.py").write_text(code)
-    with pytest.raises(InputError, match=told) as error:
+    with pytest.raises(InputError, match=message) as error:
         read_rig(name, tmp_path, "study.toml: rig", trust_rig=True)
     assert str(error.value).startswith("study.toml: rig")
     assert "\n" not in str(error.value)
@@ -346,14 +346,14 @@ def test_coupling_of_ross_keeps_its_sense():
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         ({"number_dof": 4}, "the rotor has 4 degrees per node, not 6"),
         ({"K": None}, "is not a ross.Rotor; pass one"),
     ],
 )
-def test_what_is_no_rotor_of_ross_is_refused(change, told):
-    with pytest.raises(InputError, match=told):
+def test_what_is_no_rotor_of_ross_is_refused(change, message):
+    with pytest.raises(InputError, match=message):
         Rig.from_ross(ross(**change))
 
 
@@ -415,15 +415,15 @@ def test_bearings_of_ross_are_frozen_where_a_speed_is_given():
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         ({"speed": None, "frequency": [0.0, 100.0]}, "depends on the whirl frequency"),
         ({"n_link": 0}, "connects two nodes"),
         ({"mxx": [1.0, 2.0]}, "mxx depends on the speed"),
     ],
 )
-def test_bearings_of_ross_that_no_table_holds_ask_for_a_speed(change, told):
-    with pytest.raises(InputError, match=told):
+def test_bearings_of_ross_that_no_table_holds_ask_for_a_speed(change, message):
+    with pytest.raises(InputError, match=message):
         Rig.from_ross(ross_on_bearing(**change))
     Rig.from_ross(ross_on_bearing(**change), speed=10.0)
 

@@ -82,7 +82,7 @@ def test_a_number_names_one_of_many(rig):
 
 
 @pytest.mark.parametrize(
-    ("key", "mend"),
+    ("key", "fix"),
     [
         ("stator.youngs_modulis", "stator.youngs_modulus?"),
         ("stator.2.angle", "stator.1.angle?"),
@@ -97,10 +97,10 @@ def test_a_number_names_one_of_many(rig):
         ("stator.__class__", "unknown key"),
     ],
 )
-def test_an_unknown_key_is_refused_with_the_nearest(rig, key, mend):
+def test_an_unknown_key_is_refused_with_the_nearest(rig, key, fix):
     with pytest.raises(InputError) as refused:
         with_key(rig, key, 1.0)
-    assert mend in str(refused.value)
+    assert fix in str(refused.value)
 
 
 def test_setting_one_direction_of_a_bearing_leaves_the_other(rig):

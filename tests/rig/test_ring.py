@@ -63,7 +63,7 @@ def test_stators_of_a_ring_have_keys_of_their_own():
 
 
 @pytest.mark.parametrize(
-    ("count", "told"),
+    ("count", "message"),
     [
         (0, "count: 0 is out of range; it must be at least 1"),
         (-3, "count: -3 is out of range"),
@@ -73,10 +73,10 @@ def test_stators_of_a_ring_have_keys_of_their_own():
         (10**9, "count: 1000000000 is out of range; it must be at most 62"),
     ],
 )
-def test_senseless_counts_are_refused(count, told):
+def test_senseless_counts_are_refused(count, message):
     table = PACKAGED.as_dict()
     table["stator"] = [table["stator"][0] | {"count": count}]
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=message):
         rig_from_dict(table)
 
 

@@ -70,10 +70,10 @@ def as_format_3(store: Path) -> None:
     """Turn a store into one whose manifest does not list its measures."""
     for name in ("manifest.json", "manifest.copy.json"):
         path = store / PRIVATE / name
-        told = json.loads(path.read_bytes().partition(b"\n")[2])
-        assert told.pop("measures")
-        assert not told.pop("added")
-        text = json.dumps(told).encode()
+        reported = json.loads(path.read_bytes().partition(b"\n")[2])
+        assert reported.pop("measures")
+        assert not reported.pop("added")
+        text = json.dumps(reported).encode()
         path.write_bytes(b"rubhpc 3 %08x\n%s" % (crc32(text), text))
 
 
@@ -118,8 +118,8 @@ def test_a_store_without_a_measure_is_resumed_and_grown(study, request, capsys, 
             assert now.load().identical(before[name]), name
     assert not verify(study.output)
     for flat in (0, 1):  # one case with the measure, one without it
-        told = reproduce(longer(study), Store(study.output).manifest.case_id(flat))
-        assert "bit for bit" in told.verdict
+        reported = reproduce(longer(study), Store(study.output).manifest.case_id(flat))
+        assert "bit for bit" in reported.verdict
 
 
 def test_older_cases_are_read_where_no_header_is_left(study, toys):

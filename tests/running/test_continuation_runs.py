@@ -36,8 +36,8 @@ RECORD = {"transient": 2, "revolutions": 3}
 def swept(folder: Path, sweep: str = "both", speeds: tuple[float, ...] = SPEEDS, **changes: object) -> Study:
     """A study of 5 speeds and 2 clearances, in blocks of 2 speeds."""
     axis = f'{{ values = {list(speeds)}, sweep = "{sweep}" }}'
-    told = {"speed_ratio": axis, "friction": [0.2], "block": 2, **RECORD}
-    return read_study(write_study(folder, **(told | changes)))
+    settings = {"speed_ratio": axis, "friction": [0.2], "block": 2, **RECORD}
+    return read_study(write_study(folder, **(settings | changes)))
 
 
 @pytest.fixture(scope="module")
@@ -55,17 +55,17 @@ def copied(study: Study, folder: Path) -> Study:
 @pytest.fixture
 def computed(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
     """Speed (rad/s) and clearance (m) of every case that is computed, in turn."""
-    told: list[tuple[float, float]] = []
+    reported: list[tuple[float, float]] = []
     run_case = worker.run_case
 
     def count(setup: Any, *, clearance: float, **rest: Any) -> Any:
         record = run_case(setup, clearance=clearance, **rest)
-        told.append((setup.spin, clearance))
+        reported.append((setup.spin, clearance))
         return record
 
     monkeypatch.setattr(worker, "run_case", count)
     monkeypatch.setattr(job, "_warm_up", lambda *_: None)
-    return told
+    return reported
 
 
 def test_a_study_is_what_one_would_carry_by_hand(finished):
@@ -235,8 +235,8 @@ def test_a_case_that_fails_breaks_its_chain_and_a_retry_mends_it(finished, tmp_p
     assert summary.counts == (0, 16, 4, 0, 0)
     assert "4 done with a remark, rubhpc status names them" in summary.text()
     ledger = Store(study.output).replay()
-    told = sorted({text for i, text in ledger.reasons.items() if ledger.status[i] == DONE})
-    assert told == ["it starts at rest, as speed_ratio=1.5 before it has failed"]
+    reported = sorted({text for i, text in ledger.reasons.items() if ledger.status[i] == DONE})
+    assert reported == ["it starts at rest, as speed_ratio=1.5 before it has failed"]
     store = xr.open_zarr(study.output).load()
     assert (store.status.values[2] == FAILED).all()
     alone = simulate(
@@ -263,8 +263,8 @@ def test_those_behind_a_case_that_kills_its_rank_wait_for_it(finished, tmp_path,
     store = Store(study.output)
     flat = int(np.ravel_multi_index((1, 0, 0, 0), store.manifest.shape))
     for _ in range(3):
-        hand = InProgress(store.in_progress_directory, 1, "rank00000")
-        hand.take(flat, store.manifest.case_id(flat))
+        progress = InProgress(store.in_progress_directory, 1, "rank00000")
+        progress.take(flat, store.manifest.case_id(flat))
     run(study, quiet=True)
     assert len(computed) == 20
     slowest = [spin for spin, _ in computed[-4:]]
@@ -276,19 +276,19 @@ def test_one_case_is_computed_again_from_the_store_or_from_the_beginning(finishe
     manifest = Store(finished.output).manifest
     flat = int(np.ravel_multi_index((2, 1, 0, 1), manifest.shape))
     name = manifest.case_id(flat)
-    told = reproduce(finished, name)
-    assert "direction=down" in told.case
-    assert "holds the same, bit for bit" in told.verdict
+    reported = reproduce(finished, name)
+    assert "direction=down" in reported.case
+    assert "holds the same, bit for bit" in reported.verdict
     elsewhere = reproduce(replace(finished, output=tmp_path / "none.zarr"), name)
-    assert elsewhere.measures["peak_torsion"] == told.measures["peak_torsion"]
+    assert elsewhere.measures["peak_torsion"] == reported.measures["peak_torsion"]
     grown = swept(tmp_path, speeds=(*SPEEDS, 2.4))
     with pytest.raises(InputError, match="no case has such an id"):  # another comes before it
         reproduce(replace(grown, output=finished.output), name)
 
 
 def test_a_sweep_is_part_of_what_a_study_is(finished, tmp_path):
-    for sweep, told in (("up", "sweep.speed_ratio was"), ("from_rest", "sweep was")):
-        with pytest.raises(StoreError, match=told):
+    for sweep, message in (("up", "sweep.speed_ratio was"), ("from_rest", "sweep was")):
+        with pytest.raises(StoreError, match=message):
             run(replace(swept(tmp_path, sweep), output=finished.output), quiet=True)
 
 
@@ -299,7 +299,7 @@ def test_the_plan_tells_how_many_ranks_have_work(finished):
 
 
 @pytest.mark.parametrize(
-    ("grid", "told"),
+    ("grid", "message"),
     [
         ({"friction": '{ values = [0.1, 0.2], sweep = "up" }'}, "speed_ratio is swept already"),
         (
@@ -309,7 +309,7 @@ def test_the_plan_tells_how_many_ranks_have_work(finished):
         ({"friction": "[0.1]\ndirection = [0, 1]"}, "direction: unknown axis"),
     ],
 )
-def test_what_no_motion_can_be_carried_through_is_refused(tmp_path, grid, told):
-    with pytest.raises(InputError, match=told) as caught:
+def test_what_no_motion_can_be_carried_through_is_refused(tmp_path, grid, message):
+    with pytest.raises(InputError, match=message) as caught:
         make_plan(swept(tmp_path, **grid))
     assert "\n" not in str(caught.value)

@@ -112,7 +112,7 @@ def test_a_poisoned_case_fails_with_its_reason_and_the_others_finish(physics, st
     summary = run(replace(study, run=replace(study.run, case_time_limit=0.05)), quiet=True)
     assert summary.counts == (0, 8, 4, 0, 0)
     assert summary.exit_code == 1
-    assert {told for _, told in summary.reasons} == {reason}
+    assert {reported for _, reported in summary.reasons} == {reason}
     assert summary.reasons[0][0] == "speed_ratio=0.9, clearance_ratio=0.7, friction=0.3"
     assert "\n" not in summary.complaint()
     ds = xr.open_zarr(study.output)
@@ -148,7 +148,7 @@ def test_a_diverged_case_is_a_result(physics, study):
 
 
 def test_a_balance_that_is_off_is_named(physics, study):
-    """The result stands, and both the run's end and `rubhpc status` tell what is wrong with it."""
+    """The result stands, and both the run's end and `rubhpc status` say what is wrong with it."""
 
     def lose_energy(*, recording: Recording, **_: Any) -> Record:
         case = record(recording, 0.3)
@@ -164,7 +164,9 @@ def test_a_balance_that_is_off_is_named(physics, study):
     assert "4 done with a remark" in summary.text()
     failures = read_status(other.output).failures
     assert len(failures) == 4
-    assert {told for _, told in failures} == {"its energy balance is off by 25 %; take a shorter step"}
+    assert {reported for _, reported in failures} == {
+        "its energy balance is off by 25 %; take a shorter step"
+    }
     assert "friction=0.3: done" in failures[0][0]
 
 
@@ -210,13 +212,13 @@ def test_the_file_stop_stops_one_run(physics, study):
 
 
 class Clock:
-    """A time that passes when it is told to."""
+    """A time that passes when the test says so."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 1000.0
-        tell = SimpleNamespace(monotonic=lambda: self.now, perf_counter=lambda: self.now, time=time.time)
+        clock = SimpleNamespace(monotonic=lambda: self.now, perf_counter=lambda: self.now, time=time.time)
         for module in (worker, stopping):
-            monkeypatch.setattr(module, "time", tell)
+            monkeypatch.setattr(module, "time", clock)
 
     def passes(self, seconds: float) -> None:
         self.now += seconds
@@ -324,11 +326,11 @@ def test_an_error_of_the_programs_own_leaves_its_traceback_in_a_log(physics, stu
         raise LookupError("a slip")
 
     monkeypatch.setattr(worker.Worker, "work", burst)
-    with pytest.raises(driver.RubError, match="LookupError: a slip") as told:
+    with pytest.raises(driver.RubError, match="LookupError: a slip") as reported:
         run(study, quiet=True)
-    assert told.value.exit_code == 70
+    assert reported.value.exit_code == 70
     (log,) = (study.output / ".rubhpc" / "logs").iterdir()
-    assert str(log) in str(told.value)
+    assert str(log) in str(reported.value)
     assert "burst" in log.read_text()
 
 

@@ -34,12 +34,12 @@ def test_a_case_comes_out_again_to_the_last_bit_and_the_store_is_not_touched(fin
     before = files(finished.output)
     for flat in (0, 5, 11):
         name = Store(finished.output).manifest.case_id(flat)
-        told = reproduce(finished, name[:10].upper())
-        assert told.id == name
-        assert told.case == Store(finished.output).manifest.name_case(flat)
-        assert told.status == "done"
-        assert "holds the same, bit for bit" in told.verdict
-        assert f"case{' ' * 21}" in told.text()
+        reported = reproduce(finished, name[:10].upper())
+        assert reported.id == name
+        assert reported.case == Store(finished.output).manifest.name_case(flat)
+        assert reported.status == "done"
+        assert "holds the same, bit for bit" in reported.verdict
+        assert f"case{' ' * 21}" in reported.text()
     assert files(finished.output) == before
 
 
@@ -68,9 +68,9 @@ def test_a_case_that_is_not_stored_is_computed_all_the_same(finished, tmp_path):
     assert "bit for bit" in reproduce(grown, CaseGrid(finished).case((1, 1, 2)).id).verdict  # it has moved
 
 
-@pytest.mark.parametrize(("name", "told"), [("12345", "too short"), ("zzzzzz", "no case has such an id")])
-def test_an_id_that_names_no_case_is_refused(finished, name, told):
-    with pytest.raises(InputError, match=told):
+@pytest.mark.parametrize(("name", "message"), [("12345", "too short"), ("zzzzzz", "no case has such an id")])
+def test_an_id_that_names_no_case_is_refused(finished, name, message):
+    with pytest.raises(InputError, match=message):
         reproduce(finished, name)
 
 

@@ -144,8 +144,8 @@ def test_revolutions_are_exported_as_rows(folder, tmp_path, kind):
 def test_a_report_shows_measures_and_pictures(folder, monkeypatch, tmp_path):
     monkeypatch.setattr("postproc.report.run_ups.MOST_DRAWN", 1)
     load = write_report(rubhpc.open(folder / "run_ups.zarr"), tmp_path / "report.html", 20e6)
-    told = "Of cases that change speed the page shows measures and pictures over their revolutions."
-    assert load.notes == [told]
+    reported = "Of cases that change speed the page shows measures and pictures over their revolutions."
+    assert load.notes == [reported]
     page = (tmp_path / "report.html").read_text()
     assert "peak_contact_force" in page
     assert "start 1800 rpm, stop 1500 rpm" in page

@@ -48,7 +48,7 @@ def test_a_later_run_decides(tmp_path):
 
 
 def test_a_doubled_journal_loses_nothing_and_a_foreign_line_is_named(tmp_path):
-    """Of two results the one with the stored arrays cannot be told if these agree: the case is computed."""
+    """Of two results the one with the stored arrays cannot be found if these agree: the case is computed."""
     study = write_study(tmp_path, friction=[0.1], speed_ratio=[0.9])
     assert run_here("run", study, "--quiet").returncode == 0
     store = tmp_path / "tiny.zarr"

@@ -42,7 +42,7 @@ def make_study(folder: Path, grid: dict[str, list[float]], block: int = 4) -> St
 
 
 def numbers(point: list[float], name: str, extent: tuple[int, ...]) -> np.ndarray:
-    """What the stand-in for the physics gives: numbers that tell of their case and array."""
+    """What the stand-in for the physics gives: numbers that show their case and array."""
     return np.full(extent, math.fsum(p * 10**i for i, p in enumerate(point)) + len(name))
 
 
@@ -278,11 +278,11 @@ def test_another_version_of_the_physics_is_refused_unless_it_is_accepted(tmp_pat
     before = known(store)
     old = identity.physics_of(study)
     monkeypatch.setattr(identity, "PHYSICS", identity.PHYSICS + 1)
-    told = f"physics was {old}, is {old + 1}"
-    with pytest.raises(StoreError, match=f"{told}; --accept-version keeps its cases"):
+    reported = f"physics was {old}, is {old + 1}"
+    with pytest.raises(StoreError, match=f"{reported}; --accept-version keeps its cases"):
         grid_for(study)
     changed = make_study(tmp_path, {**grid, "friction": [0.1]})
-    with pytest.raises(StoreError, match=f"{told}; axis friction lacks 0.2, .*choose another"):
+    with pytest.raises(StoreError, match=f"{reported}; axis friction lacks 0.2, .*choose another"):
         grid_for(changed, accept_version=True)
     bring_up_to_date(store, grid_for(study, accept_version=True), accept_version=True)
     assert known(Store(study.output)) == before

@@ -102,13 +102,13 @@ def test_the_heart_beats(path, monkeypatch):
 
 def test_a_run_whose_lock_was_taken_is_told_and_leaves_the_other_alone(path, monkeypatch):
     monkeypatch.setattr(lock_module, "HEARTBEAT", 0.05)
-    told: list[bool] = []
-    with Lock(path, lambda: told.append(True)):
+    reported: list[bool] = []
+    with Lock(path, lambda: reported.append(True)):
         leave(path, token="another")
         deadline = time.monotonic() + 5
-        while not told and time.monotonic() < deadline:
+        while not reported and time.monotonic() < deadline:
             time.sleep(0.02)
-    assert told == [True]
+    assert reported == [True]
     assert read_holder(path).token == "another"
 
 
@@ -133,7 +133,7 @@ def test_an_orphan_is_waited_for(path):
 
 
 def test_an_heir_takes_the_lock_of_a_lost_rank_at_once(path):
-    """On another machine nothing but its heart could tell that the holder is dead."""
+    """On another machine nothing but its heartbeat could show that the holder is dead."""
     leave(path, host="elsewhere", token="of the first rank")
     with pytest.raises(StoreError, match="on elsewhere"):
         Lock(path, heir_of="of another run").__enter__()

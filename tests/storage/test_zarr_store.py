@@ -187,7 +187,7 @@ def test_lengthened_axes_keep_what_is_there(tmp_path, study, store):
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "message"),
     [
         ({"transient": 5}, "record.transient was 1, is 5"),
         ({"speed_ratio": [0.9]}, "axis speed_ratio lacks 2, which is stored"),
@@ -197,10 +197,10 @@ def test_lengthened_axes_keep_what_is_there(tmp_path, study, store):
         ({"run": '[override]\n"rotor.damping.alpha" = 30'}, "rig.rotor.damping.alpha was 31.7, is 30"),
     ],
 )
-def test_another_study_is_refused_with_the_differences(tmp_path, store, changes, told):
+def test_another_study_is_refused_with_the_differences(tmp_path, store, changes, message):
     with pytest.raises(StoreError) as refused:
         grid_for(read_study(write_study(tmp_path, "other.toml", **changes)))
-    assert told in str(refused.value)
+    assert message in str(refused.value)
     assert "\n" not in str(refused.value)
     assert "--output" in str(refused.value)
 
@@ -340,10 +340,10 @@ def test_one_damaged_manifest_costs_nothing(study, store, at):
 def test_a_manifest_that_is_damaged_twice_is_told_in_a_line(store, text):
     for name in ("manifest.json", "manifest.copy.json"):
         (store.private / name).write_text(text)
-    with pytest.raises(StoreError) as told:
+    with pytest.raises(StoreError) as reported:
         Store(store.path)
-    assert "\n" not in str(told.value)
-    assert "--output" in str(told.value)
+    assert "\n" not in str(reported.value)
+    assert "--output" in str(reported.value)
 
 
 @pytest.mark.parametrize(
@@ -370,7 +370,7 @@ def test_cases_are_named_by_their_coordinates(store):
 
 
 @pytest.mark.parametrize(
-    ("number", "mend"),
+    ("number", "fix"),
     [
         (errno.ENOSPC, "free some space"),
         (errno.EROFS, "--output"),
@@ -378,10 +378,10 @@ def test_cases_are_named_by_their_coordinates(store):
         (errno.EDQUOT, "quota"),
     ],
 )
-def test_errors_of_the_disk_name_the_mend(tmp_path, number, mend):
-    with pytest.raises(StoreError, match=mend) as told, disk_errors(tmp_path):
+def test_errors_of_the_disk_name_the_fix(tmp_path, number, fix):
+    with pytest.raises(StoreError, match=fix) as reported, disk_errors(tmp_path):
         raise OSError(number, "whatever")
-    assert told.value.exit_code == 3
+    assert reported.value.exit_code == 3
 
 
 def test_a_file_written_whole_replaces_the_old_one_or_leaves_it(tmp_path, monkeypatch):

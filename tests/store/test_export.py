@@ -49,7 +49,7 @@ def test_chosen_cases_and_variables(synthetic_path, run):
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["--value", "peak_contact_fore"], "did you mean peak_contact_force"),
         (["--output", "a.mat"], "unknown format"),
@@ -59,8 +59,8 @@ def test_chosen_cases_and_variables(synthetic_path, run):
         (["--select", "speed_ratio=77"], "speed_ratio"),
     ],
 )
-def test_mistakes_are_told_and_leave_nothing(synthetic_path, run, tmp_path, words, told):
-    with pytest.raises(InputError, match=told):
+def test_mistakes_are_told_and_leave_nothing(synthetic_path, run, tmp_path, words, message):
+    with pytest.raises(InputError, match=message):
         run(synthetic_path, *words)
     assert not list(tmp_path.iterdir())
 

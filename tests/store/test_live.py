@@ -1,4 +1,4 @@
-"""A store looked at while its run is on, and what is told of the runs."""
+"""A store looked at while its run is on, and what it shows of the runs."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def test_measures_come_from_the_journals_before_they_are_packed(store: Path) -> 
 
 
 def test_what_only_the_journals_know_is_told(store: Path) -> None:
-    told = open_live(store).attrs
-    assert told["reasons"] == {}
-    assert told["running"] == ""
-    (run,) = told["runs"]
+    reported = open_live(store).attrs
+    assert reported["reasons"] == {}
+    assert reported["running"] == ""
+    (run,) = reported["runs"]
     assert run["n_rank"] == 1
     assert run["host"]
     assert run["processor"]
@@ -61,9 +61,9 @@ def test_a_second_run_that_computes_nothing_leaves_no_trace(store: Path, tmp_pat
 
 def test_a_damaged_record_of_a_run_is_passed_over(store: Path) -> None:
     (path,) = (store / ".rubhpc" / "runs").iterdir()
-    told = json.loads(path.read_text())
+    settings = json.loads(path.read_text())
     path.with_name("run000002.json").write_text("{")
-    path.with_name("run000003.json").write_text(json.dumps(told | {"number": 3, "unheard": 1}))
+    path.with_name("run000003.json").write_text(json.dumps(settings | {"number": 3, "unheard": 1}))
     assert [run.number for run in read_runs(store)] == [1]
 
 

@@ -178,5 +178,5 @@ def test_a_study_of_laws_runs_is_selected_by_name_and_recomputed(tmp_path):
                     assert (chosen[name].values == expected[name].values).all(), name
         assert validity(store).dims == store.status.dims
     assert "contact.law=penalty" in Store(study.output).manifest.name_case(1)
-    told = reproduce(study, Store(study.output).manifest.case_id(1))
-    assert "bit for bit" in told.verdict
+    reported = reproduce(study, Store(study.output).manifest.case_id(1))
+    assert "bit for bit" in reported.verdict

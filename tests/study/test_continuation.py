@@ -40,7 +40,7 @@ def test_a_swept_axis_rises_whatever_the_order_it_is_written_in(name, given, val
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "message"),
     [
         ({"values": [0.1], "sweep": "upp"}, 'sweep: "upp" is unknown; did you mean up'),
         ({"values": [0.1], "sweep": "sideways"}, "choose one of from_rest, up, down, both"),
@@ -53,8 +53,8 @@ def test_a_swept_axis_rises_whatever_the_order_it_is_written_in(name, given, val
         ({"values": [0.1, 0.1], "sweep": "up"}, "0.1 is duplicated"),
     ],
 )
-def test_what_cannot_be_swept_is_refused_in_a_line(given, told):
-    with pytest.raises(InputError, match=told) as caught:
+def test_what_cannot_be_swept_is_refused_in_a_line(given, message):
+    with pytest.raises(InputError, match=message) as caught:
         make_axis("friction", given, RIG, "a.toml")
     assert str(caught.value).startswith("a.toml: [grid] friction: ")
     assert "\n" not in str(caught.value)

@@ -38,11 +38,13 @@ def test_the_points_are_those_of_saltelli(tmp_path):
     assert (case_grid.dims, case_grid.shape) == (("case", "clearance_ratio"), (64, 2))
     cases = [case for block in case_grid.blocks() for case in case_grid.cases(block)]
     assert len({case.id for case in cases}) == 128
-    told = {case.index: case for case in cases}
+    reported = {case.index: case for case in cases}
     for i in (0, 17, 63):
-        assert told[i, 1].friction == friction.values[i]
-        assert told[i, 1] == case_grid.case((i, 1))
-        assert case_grid.operating_points()["spin_speed"][1][i] == told[i, 0].speed == told[i, 1].speed
+        assert reported[i, 1].friction == friction.values[i]
+        assert reported[i, 1] == case_grid.case((i, 1))
+        assert (
+            case_grid.operating_points()["spin_speed"][1][i] == reported[i, 0].speed == reported[i, 1].speed
+        )
 
 
 def test_each_case_has_the_speed_and_the_rig_of_its_row(tmp_path):
@@ -127,8 +129,8 @@ def test_a_store_tells_its_sample(tmp_path):
     np.testing.assert_array_equal(cases.coords["friction"].values, study.axes[2].values)
     assert cases.coords["speed_ratio"].dims == ("case",)
     assert cases.attrs["study"]["sample"] == {"method": "sobol", "n": 8, "seed": 1}
-    told = cases.attrs["study"]["grid"]["friction"]
-    assert told == {"unit": "1", "start": 0.05, "stop": 0.5, "scale": "log"}
+    reported = cases.attrs["study"]["grid"]["friction"]
+    assert reported == {"unit": "1", "start": 0.05, "stop": 0.5, "scale": "log"}
     manifest = Store(study.output).manifest
     assert manifest.name_case(5).startswith("case=2, speed_ratio=")
     assert "holds the same, bit for bit" in reproduce(study, manifest.case_id(5)).verdict

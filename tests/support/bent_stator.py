@@ -67,10 +67,10 @@ def solve(rig, spin, clearance, friction, revolutions, samples_per_revolution, l
         normal = line / abs(line) if is_round else axis
         gap = (line * normal.conjugate()).real - radius
         gradients = []
-        for pull in (normal, normal * (1 + 1j * mu)):
-            along = pull * axis.conjugate()
+        for direction in (normal, normal * (1 + 1j * mu)):
+            along = direction * axis.conjugate()
             force = along.real * drawn
-            force[v], force[w] = -pull.real, -pull.imag
+            force[v], force[w] = -direction.real, -direction.imag
             force[axial] += along.real
             force[lateral] += along.imag
             gradients.append(force)
@@ -95,15 +95,15 @@ def solve(rig, spin, clearance, friction, revolutions, samples_per_revolution, l
                 motion[i] = far[:n]
                 continue
         if gap < 0.0:
-            _, gradient, pull = look(free)
+            _, gradient, direction = look(free)
             impulse = 0.0
             for _ in range(20):
-                end = free + kicked @ pull * impulse
+                end = free + kicked @ direction * impulse
                 gap, gradient, _ = look(end)
-                impulse -= gap / (gradient @ (kicked[:n] @ pull))
+                impulse -= gap / (gradient @ (kicked[:n] @ direction))
                 if abs(gap) < 1e-15:
                     break
-            free, force[i] = free + kicked @ pull * impulse, impulse / h
+            free, force[i] = free + kicked @ direction * impulse, impulse / h
         state, i = free, i + 1
         motion[i] = state[:n]
     sampled = motion[:-1:per_sample]

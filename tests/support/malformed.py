@@ -314,7 +314,7 @@ CASES = [
     _rig(
         "disc both ways", 'thickness = "0.03 m"', 'thickness = "0.03 m"\nmass = 3', "[rotor.disc.1] thickness"
     ),
-    _rig("disc half told", 'thickness = "0.03 m"', "", "[rotor.disc.1] thickness: missing"),
+    _rig("disc half reported", 'thickness = "0.03 m"', "", "[rotor.disc.1] thickness: missing"),
     _rig("bearing both ways", "stiffness = 1e6", "stiffness = 1e6\nkyy = 1e6", "[rotor.bearing.1] kyy"),
     _rig("bearing of nothing", "stiffness = 1e6", "kyy = 1e6", "[rotor.bearing.1] kzz: missing"),
     _rig("node zero", "node = 15", "node = 0", "[rotor.bearing.2] node: 0"),

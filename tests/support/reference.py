@@ -69,8 +69,8 @@ def solve(rig, spin, clearance, friction, normal, revolutions, samples_per_revol
             free = ahead[0, :n_degree] @ state
             if not (pairs.gap(free) < 0).any():
                 break
-            force[i], pull = pairs.solve(free)
-            state = propagator @ state + held @ pull
+            force[i], load = pairs.solve(free)
+            state = propagator @ state + held @ load
             i += 1
             motion[i] = reading @ state
     sampled = motion[:-1:per_sample]
@@ -109,7 +109,7 @@ class Pairs:
         self.friction, self.is_updated, self.moved = friction, is_updated, moved
         self.touching = (0,)  # the set that was right last time is tried first
         if not is_updated:
-            self.pull, self.compliance = self.directions(self.axis)
+            self.force_direction, self.compliance = self.directions(self.axis)
 
     def line(self, at):
         """From disc centre to tip, (..., q), with the degrees `at` (..., 5 q)."""
@@ -125,20 +125,20 @@ class Pairs:
         on_disc = -n * (1 + 1j * self.friction)  # the rim moves along i n
         on_tip = -on_disc * self.axis.conj()
         along = n * self.axis.conj()
-        pull, push = np.zeros((2, PER_PAIR * n.size, n.size))
+        force_direction, gap_jacobian = np.zeros((2, PER_PAIR * n.size, n.size))
         for j in range(n.size):
             rows = slice(PER_PAIR * j, PER_PAIR * (j + 1))
             twist = -self.friction * self.radius[j]
-            pull[rows, j] = on_disc[j].real, on_disc[j].imag, twist, on_tip[j].real, on_tip[j].imag
-            push[rows, j] = -n[j].real, -n[j].imag, 0.0, along[j].real, along[j].imag
-        return pull, push.T @ self.moved @ pull
+            force_direction[rows, j] = on_disc[j].real, on_disc[j].imag, twist, on_tip[j].real, on_tip[j].imag
+            gap_jacobian[rows, j] = -n[j].real, -n[j].imag, 0.0, along[j].real, along[j].imag
+        return force_direction, gap_jacobian.T @ self.moved @ force_direction
 
     def solve(self, free):
         """Normal forces (q,) >= 0 that leave no gap negative, and the forces on all degrees (5 q,)."""
         q = self.radius.size
         if self.is_updated:
             line = self.line(free)
-            self.pull, self.compliance = self.directions(line / abs(line))
+            self.force_direction, self.compliance = self.directions(line / abs(line))
         sets = (c for size in range(1, q + 1) for c in itertools.combinations(range(q), size))
         for touching in itertools.chain([self.touching], sets):
             chosen = list(touching)
@@ -147,10 +147,10 @@ class Pairs:
             flexible = self.compliance[np.ix_(chosen, chosen)]
             for _ in range(20):  # the gap of the updated normal is all but linear
                 force[chosen] -= np.linalg.solve(flexible, gap[chosen])
-                gap = self.gap(free + self.moved @ (self.pull @ force))
+                gap = self.gap(free + self.moved @ (self.force_direction @ force))
                 if abs(gap[chosen]).max() < CLOSED:
                     break
             if (force >= 0).all() and (gap > -CLOSED).all():
                 self.touching = touching
-                return force, self.pull @ force
+                return force, self.force_direction @ force
         raise AssertionError("no set of touching pairs closes the gaps")

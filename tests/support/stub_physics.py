@@ -25,7 +25,7 @@ def signals(recording: Recording, value: float) -> dict[str, np.ndarray]:
 
 
 def record(recording: Recording, friction: float, status: int = DONE, reason: str = "") -> Record:
-    """A record whose numbers tell the friction of its case."""
+    """A record whose numbers show the friction of its case."""
     waveforms = signals(recording, friction)
     n_order = recording.revolutions * recording.samples_per_revolution // 2 + 1
     return Record(

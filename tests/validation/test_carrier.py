@@ -34,9 +34,9 @@ CASE = {"speed_ratio": 0.75, "clearance": "90 um", "friction": 0.2, "transient":
 
 def ring(count: int = 8, **changes: float) -> Rig:
     """The packaged rig with a ring of its stators on one carrier."""
-    told = {"mass": MASS, "stiffness": STIFFNESS, "inertia": INERTIA, "torsional_stiffness": TORSIONAL}
+    settings = {"mass": MASS, "stiffness": STIFFNESS, "inertia": INERTIA, "torsional_stiffness": TORSIONAL}
     stator = replace(BASE.stator[0], count=count, carrier="casing")
-    return replace(BASE, stator=(stator,), carrier=(Carrier(name="casing", **(told | changes)),))
+    return replace(BASE, stator=(stator,), carrier=(Carrier(name="casing", **(settings | changes)),))
 
 
 def test_stators_moved_with_their_carrier_are_not_strained_and_have_all_their_mass():

@@ -1,4 +1,4 @@
-"""What a record tells of its contact problems: iterations, residual, and the end where none is solved."""
+"""What a record states of its contact problems: iterations, residual, and the end where none is solved."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A single impact of rotor on stator with a known answer (I6); others are in `test_foreign`."""
+"""A single impact of rotor on stator with a known answer (I6); others are in `test_matrix_bodies`."""
 
 import math
 from dataclasses import replace

@@ -116,14 +116,14 @@ def test_impact_on_a_meshed_stator_reverses_the_pair_and_moves_all_by_one_impuls
     row = case.packed.degree_row[0]
     case.state[1, row[:2]] = 0.1 * np.cos(0.3), 0.1 * np.sin(0.3)  # the rim's node, towards the stator
     for i in range(20_000):
-        (u, before), push = case.state.copy(), case.work.gap_jacobian[0]
+        (u, before), gap_jacobian = case.state.copy(), case.work.gap_jacobian[0]
         assert case.advance(i, i + 1) == FINISHED
         if case.work.force[0] > 0.0:
             break
     after, step, packed = case.state[1], case.step, case.packed
-    arrives = -push @ before[row]
+    arrives = -gap_jacobian @ before[row]
     assert arrives > 0.01
-    assert push @ after[row] == pytest.approx(restitution * arrives, abs=2e-3 * arrives)
+    assert gap_jacobian @ after[row] == pytest.approx(restitution * arrives, abs=2e-3 * arrives)
     given = packed.mass @ (after - before) / step + packed.stiffness @ u
     given += packed.damping @ (after + before) / 2
     expected = np.zeros_like(given)
@@ -131,5 +131,5 @@ def test_impact_on_a_meshed_stator_reverses_the_pair_and_moves_all_by_one_impuls
     assert given == pytest.approx(expected, abs=1e-6 * expected.max())
     unit = np.zeros_like(given)
     unit[row] = case.work.force_direction[0]
-    yields = push @ np.linalg.solve(packed.mass, unit)[row]
+    yields = gap_jacobian @ np.linalg.solve(packed.mass, unit)[row]
     assert case.work.force[0] * step == pytest.approx((1 + restitution) * arrives / yields, rel=5e-3)

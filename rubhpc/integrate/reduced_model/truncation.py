@@ -68,7 +68,7 @@ def modal_error(model: Model, spin: float, are_kept: list[Bools]) -> float:
     large as the normal force, is a second force of that kind. A ring
     counts as long as it lasts, over half a period of `w_c` at most: what is damped at once is followed by the
     static shapes that stand for it. What it drives through dampers and gyroscopic terms rings with it
-    (`carried`). The error is the root of the sum of squares over the modes left out, over
+    (`coupled_ringing`). The error is the root of the sum of squares over the modes left out, over
     that of all modes, times a margin.
 
     Parameters
@@ -103,8 +103,8 @@ def ringing_of(model: Model, spin: float) -> Ringing:
     standstill = at_standstill(model)
     frequency = np.concatenate([part.frequency for part in standstill.parts])
     mode = np.hstack([part.mode for part in standstill.parts])
-    drag = mode.T @ whole_system(model, spin)[1] @ mode
-    decay = np.maximum(0.5 * np.diag(drag), 0.0)  # 1/s, of each mode
+    damping = mode.T @ whole_system(model, spin)[1] @ mode
+    decay = np.maximum(0.5 * np.diag(damping), 0.0)  # 1/s, of each mode
     lasting = 1.0 / (1.0 + np.pi * decay / standstill.contact_frequency)
     signals = [mode[row] for row in output_degrees(model) if row >= 0]
     rungs: list[Floats] = []
@@ -120,24 +120,24 @@ def ringing_of(model: Model, spin: float) -> Ringing:
         along = lateral + ez * v - ey * w - stator.radius * twist
         rungs.append(np.vstack([np.zeros(frequency.size), rung * along]))
     square = np.vstack(rungs) ** 2
-    square += square @ carried(drag, frequency) ** 2
+    square += square @ coupled_ringing(damping, frequency) ** 2
     square = square.reshape(len(model.stators), 2, -1, frequency.size).sum(axis=1).reshape(-1, frequency.size)
     whole = square.sum(axis=1)
     seen = whole > 0.0
     return Ringing((square * lasting**2)[seen] / whole[seen, np.newaxis], impact)
 
 
-def carried(drag: Floats, frequency: Floats) -> Floats:
+def coupled_ringing(damping: Floats, frequency: Floats) -> Floats:
     """How far a ring of each mode (row) moves the other modes (column), (n, n), relative to itself.
 
     A mode of frequency w that moves at v forces another, of frequency w', by `-c v`, where c is their entry
-    of `drag` (n, n), 1/s. The other moves by `c w / |w'^2 - w^2|` of it, and in resonance as far. Above all
-    these are modes of the two planes, which gyroscopic terms couple.
+    of `damping` (n, n), 1/s. The other moves by `c w / |w'^2 - w^2|` of it, and in resonance as far. Above
+    all these are modes of the two planes, which gyroscopic terms couple.
     """
-    pull = np.abs(drag.T) * frequency[:, np.newaxis]
+    driven = np.abs(damping.T) * frequency[:, np.newaxis]
     apart = np.abs(frequency[:, np.newaxis] ** 2 - frequency**2)
-    np.fill_diagonal(pull, 0.0)
-    return np.divide(pull, apart + pull, out=np.zeros_like(pull), where=pull > 0.0)
+    np.fill_diagonal(driven, 0.0)
+    return np.divide(driven, apart + driven, out=np.zeros_like(driven), where=driven > 0.0)
 
 
 def pulse_spectrum(across: Floats, axial: Floats, frequency: Floats, contact_frequency: float) -> Floats:

@@ -60,7 +60,7 @@ def stepped(
     damping[5, 5], stiffness[5, 5] = STOP.damping, STOP.stiffness
     inverse = np.linalg.inv(mass)
     gap = np.array([-1.0, 0, 0, 0, 0, 1.0])
-    push = np.array([-1.0, -friction, 0, 0, -friction * STOP.radius, 1.0])
+    force_direction = np.array([-1.0, -friction, 0, 0, -friction * STOP.radius, 1.0])
 
     def accelerations(t, y):
         spin, angle = start + rate * t, start * t + rate * t**2 / 2
@@ -76,13 +76,13 @@ def stepped(
         return inverse @ force
 
     def pressing(t, y):
-        return -(gap @ accelerations(t, y)) / (gap @ inverse @ push)
+        return -(gap @ accelerations(t, y)) / (gap @ inverse @ force_direction)
 
     def open_rates(t, y):
         return np.concatenate([y[n:], accelerations(t, y)])
 
     def closed_rates(t, y):
-        return np.concatenate([y[n:], accelerations(t, y) + inverse @ push * pressing(t, y)])
+        return np.concatenate([y[n:], accelerations(t, y) + inverse @ force_direction * pressing(t, y)])
 
     def touches(t, y):
         """Bodies part with a gap of 0, which a hop shorter than a step may leave without a change of sign."""
@@ -127,7 +127,7 @@ def stepped(
             found[:, inside] = part.sol(times[inside])
         t, y = end, part.sol(end)
         if touched:
-            y[n:] -= inverse @ push * (gap @ y[n:]) / (gap @ inverse @ push)
+            y[n:] -= inverse @ force_direction * (gap @ y[n:]) / (gap @ inverse @ force_direction)
         y[n - 1] -= clearance + gap @ y[:n]  # an event leaves 1e-13 m at most
         is_closed = not is_closed and pressing(t, y) > 0.0  # or it parts at once
     return found[[0, 1, 4]]

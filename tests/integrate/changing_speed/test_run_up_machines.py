@@ -36,18 +36,18 @@ def stepped(rig):
     phasor[: rotor.n_dof] = model.unbalance_cosine - 1j * model.unbalance_sine
     spinning[: rotor.n_dof] = [name == "thx" for _, name in rotor.degrees]
     v, w, twist = (rotor.index(6, name) for name in ("v", "w", "thx"))
-    gap, push = np.zeros((2, 8, n))
+    gap, force_direction = np.zeros((2, 8, n))
     for i, tip in enumerate(TIPS):
         c, s = math.cos(tip.angle), math.sin(tip.angle)
         gap[i, [v, w, model.stator_start[i]]] = -c, -s, 1.0
         friction = CONTACT["friction"]
-        push[i, [v, w, model.stator_start[i]]] = -c + friction * s, -s - friction * c, 1.0
-        push[i, twist] = -friction * model.stators[i].radius
+        force_direction[i, [v, w, model.stator_start[i]]] = -c + friction * s, -s - friction * c, 1.0
+        force_direction[i, twist] = -friction * model.stators[i].radius
     opened = CONTACT["clearance"] + gap[:, : rotor.n_dof] @ model.sag
     linear = inverse @ np.hstack([stiffness + rate * gyroscopic, damping])
     turning, pushed, turned, torque = (
         inverse @ gyroscopic,
-        inverse @ push.T,
+        inverse @ force_direction.T,
         inverse @ phasor,
         rate * spinning,
     )

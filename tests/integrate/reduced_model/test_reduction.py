@@ -174,20 +174,20 @@ def test_directions_of_gap_force_and_slip(spin):
     friction = 0.35
     model = assemble(trial_rig(3))
     reduced = reduce_model(model, spin, 1e-3)
-    push, pull, slip = directions(reduced, model, friction)
+    gap_jacobian, force_direction, friction_direction = directions(reduced, model, friction)
     rng = np.random.default_rng(1)
-    x = rng.normal(size=push.shape[1])
+    x = rng.normal(size=gap_jacobian.shape[1])
     sense = np.sign(spin)
     for i, stator in enumerate(model.stators):
         v, w, twist, axial, lateral = reduced.degree[i] @ x
         axis = np.exp(1j * stator.angle)
         apart = (axial + 1j * lateral) * axis - (v + 1j * w)  # the tip's motion less the disc's
-        assert push[i] @ x == pytest.approx((apart / axis).real)
+        assert gap_jacobian[i] @ x == pytest.approx((apart / axis).real)
         sliding = sense * (stator.radius * twist - (apart / (1j * axis)).real)
-        assert slip[i] @ x == pytest.approx(sliding)
+        assert friction_direction[i] @ x == pytest.approx(sliding)
         on_disc = -axis * (1 + 1j * sense * friction)
         work = (on_disc.conj() * -apart).real - sense * friction * stator.radius * twist
-        assert pull[i] @ x == pytest.approx(work)
+        assert force_direction[i] @ x == pytest.approx(work)
 
 
 def test_stator_without_lateral_freedom_has_no_lateral_row():

@@ -12,7 +12,7 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.reduced_model import truncation
 from rubhpc.integrate.reduced_model.standstill import at_standstill, cutoff_frequency, modes_below
 from rubhpc.integrate.reduced_model.truncation import (
-    carried,
+    coupled_ringing,
     impact_share,
     kept_modes,
     modal_error,
@@ -177,8 +177,8 @@ def test_bar_answers_an_impact_with_its_wave():
 
 
 def test_ring_is_carried_in_full_in_resonance_and_little_far_from_it():
-    drag = np.array([[0.0, 3.0, 0.02], [-3.0, 0.0, 0.0], [0.02, 0.0, 0.0]])
-    share = carried(drag, np.array([100.0, 100.0, 300.0]))
+    damping = np.array([[0.0, 3.0, 0.02], [-3.0, 0.0, 0.0], [0.02, 0.0, 0.0]])
+    share = coupled_ringing(damping, np.array([100.0, 100.0, 300.0]))
     assert share[0, 1] == share[1, 0] == pytest.approx(1.0)
     assert share[0, 2] == pytest.approx(0.02 * 100.0 / (300.0**2 - 100.0**2), rel=1e-4)
     assert share[1, 2] == 0.0
