@@ -44,7 +44,7 @@ html_theme_options = {
     "secondary_sidebar_items": ["page-toc"],
     "show_prev_next": True,
 }
-html_sidebars = {"index": [], "changelog": [], "glossary": [], "claims": []}
+html_sidebars = {"index": [], "gallery": [], "changelog": [], "glossary": [], "claims": []}
 
 myst_enable_extensions = ["dollarmath", "deflist", "attrs_inline"]
 myst_dmath_double_inline = True
@@ -57,7 +57,6 @@ napoleon_google_docstring = False
 napoleon_use_rtype = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
-autodoc_preserve_defaults = True
 # Words of types, such as "name", are attributes of several classes: none of them is meant.
 suppress_warnings = ["ref.python"]
 copybutton_exclude = ".linenos, .gp, .go"

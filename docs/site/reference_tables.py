@@ -22,7 +22,7 @@ from rubhpc.input.fields import key_of
 from rubhpc.rig.probes import Probe
 from rubhpc.rig.rig import Rig
 from rubhpc.schema import VARIABLES
-from rubhpc.study.axes import OwnAxes
+from rubhpc.study.axes import CLEARANCE_AXES, SPEED_AXES, OwnAxes
 from rubhpc.study.branch_keys import BranchKeys
 from rubhpc.study.contact_keys import Contact
 from rubhpc.study.drive_keys import DriveKeys
@@ -102,7 +102,9 @@ def key_tables(tables: dict[str, type]) -> str:
 
 def axis_table() -> str:
     """Return the table of the axes that are no keys of the rig."""
-    return _table(_KEY_HEAD, [_key_row(field) for field in dataclasses.fields(OwnAxes)])
+    rows = [_key_row(field) for field in dataclasses.fields(OwnAxes)]
+    either = {f"`{name}`" for name in (*SPEED_AXES, *CLEARANCE_AXES)}
+    return _table(_KEY_HEAD, [(*r[:3], "**one of the two**", *r[4:]) if r[0] in either else r for r in rows])
 
 
 _KEY_HEAD = ("key", "type", "unit", "default", "meaning", "example")

@@ -133,7 +133,7 @@ class ContactArguments(TypedDict, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(ContactKeys):
-    """Laws of contact and friction, and the direction of the normal: keys that agree."""
+    """Laws of contact and friction, and the direction of the contact normal."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
