@@ -46,9 +46,9 @@ def open_live(path: Path) -> xr.Dataset:
         running = "; ".join(map(str, holders))
         runs = [asdict(run) for run in read_runs(path)]
     if not is_packed and not is_of_points(dataset):  # points have no values of cases
-        packed = store.packed_values(ledger)
-        dataset = dataset.assign(
-            {name: (dataset[name].dims, values, dataset[name].attrs) for name, values in packed.items()}
+        packed = {name: (dataset[name], values) for name, values in store.packed_values(ledger).items()}
+        dataset = dataset.assign(  # a run-up is opened without its axis of one speed
+            {name: (was.dims, values.reshape(was.shape), was.attrs) for name, (was, values) in packed.items()}
         )
         dataset = fill_inferred(dataset, path)
     about_runs = {"reasons": dict(ledger.reasons), "runs": runs, "running": running}

@@ -1,11 +1,13 @@
 """Studies with [run_up]: what is stored and opened, resumption, one case again, and what is refused."""
 
+import shutil
 from functools import partial
 
 import numpy as np
 import pandas as pd
 import pytest
 import running
+import xarray as xr
 from running import check_a_lost_chunk
 
 import rubhpc
@@ -16,6 +18,7 @@ from postproc.report.budget import write_report
 from postproc.signals.sections import section_of
 from postproc.signals.waveforms import waveform_data
 from postproc.store.case_table import write_table
+from postproc.store.live import open_live
 from postproc.store.revolution_table import revolution_table
 from rubhpc.errors import InputError
 from rubhpc.running.plan import make_plan
@@ -50,6 +53,13 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run_ups")
     rubhpc.run(study_of(folder, STUDY), quiet=True)
     return folder
+
+
+def test_a_store_is_opened_before_its_measures_are_packed(folder, tmp_path):
+    shutil.copytree(folder / "run_ups.zarr", tmp_path / "run_ups.zarr")
+    whole = open_live(tmp_path / "run_ups.zarr").load()
+    (tmp_path / "run_ups.zarr/.rubhpc/packed.json").unlink()
+    xr.testing.assert_equal(open_live(tmp_path / "run_ups.zarr").load(), whole)
 
 
 def test_cases_are_those_of_the_function(folder):
