@@ -101,6 +101,8 @@ MOST_RESIDUAL = 0.01  # of the energy balance: a larger one is reported
 class Record(RecordVariables):
     """One simulated case; every stored variable is an attribute (`record.vertical`, `record.period`).
 
+    Type checkers do not know the names of probes and Lyapunov spectra: take `signals` and `measures` there.
+
     Attributes
     ----------
     status : int
@@ -157,13 +159,15 @@ class Record(RecordVariables):
         """Return all attributes, the variables that this record holds among them."""
         return sorted({*super().__dir__(), *(name for group in self._groups() for name in group)})
 
-    def __getattr__(self, name: str) -> Any:
-        """Return a variable by its name in the schema."""
-        if not name.startswith("_"):
-            for group in self._groups():
-                if name in group:
-                    return group[name]
-        raise AttributeError(f"this record holds no {name}")
+    if not TYPE_CHECKING:  # type checkers know the names from `RecordVariables`
+
+        def __getattr__(self, name: str) -> Any:
+            """Return a variable by its name in the schema."""
+            if not name.startswith("_"):
+                for group in self._groups():
+                    if name in group:
+                        return group[name]
+            raise AttributeError(f"this record holds no {name}")
 
     @property
     def remark(self) -> str:
