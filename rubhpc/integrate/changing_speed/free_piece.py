@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.passing import Passed, Passing, state_at
+from rubhpc.integrate.changing_speed.passing import Passed, Passing, energy_of, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp
+from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import lift_samples, new_accumulator
 from rubhpc.integrate.start import start_of
 from rubhpc.kernels.accumulators import (
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.changing_speed.carried_modes import Standing
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
-    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.study.drive_law import DriveLaw
@@ -74,6 +75,8 @@ class Spin:
         self._brake = 0.0  # N m, mean of the last piece
         self._begun: State | Place | None = None
         self._setup: PieceSetup | None = None  # of the last piece
+        self._standing: Standing | None = None  # where it has ended
+        self._held_from = 0.0  # s, since when its matrices are held
         # The contact forces of the piece before, and how long it took, s.
         self._earlier = new_accumulator(len(model.stators), model.n_place), 0.0
 
@@ -115,17 +118,21 @@ class Spin:
                     self._begun = ramp.of_rotor(start_of(start, setup, self._clearance), setup)
                 else:
                     self._begun = start
-            begun = ramp.about_middle(self._begun, setup)
+            reached = ramp.about_middle(self._begun, setup)
+            begun = self._passing.continued(setup, reached, self._standing, self.time - self._held_from)
+            carried = 0.0  # J
+            if isinstance(begun, Place) and isinstance(reached, Place) and begun is not reached:
+                carried = energy_of(begun, setup) - energy_of(reached, setup)
             passed = self._passing.take(setup, length, begun, self._earlier, is_balanced=True)
             lift_samples(passed.whole, setup.model)
             ramp.lift(passed.whole, setup)
             if passed.reason:
                 return self._taken(passed, acceleration, length, per_revolution, torque, np.zeros(6))
             flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)
-            before = self._momentum(state_at(begun, setup), first)
+            before = self._momentum(state_at(reached, setup), first)
             after = self._momentum(state_at(passed.end, setup), last)
             turning = acceleration * 0.5 * duration * (before[1] + after[1])
-            given = torque * turned + turning - flows[UNBALANCE_WORK] - flows[DRIVE_WORK]
+            given = torque * turned + turning - flows[UNBALANCE_WORK] - flows[DRIVE_WORK] - carried
             change = self._change(given, sum(before), sum(after))
             if not math.isfinite(change):
                 return None
@@ -143,7 +150,7 @@ class Spin:
         energies = np.array(
             [
                 held[1] - held[0],
-                passed.gained,
+                passed.gained + carried,
                 torque * turned + turning,
                 flows[FRICTION_LOSS],
                 flows[DAMPING_LOSS],
@@ -154,6 +161,9 @@ class Spin:
         self.speed += change
         if not self.speed > 0.0:
             return None
+        if self._standing is None or self._standing.setup.held is not setup.held:
+            self._held_from = self.time
+        self._standing = self._passing.standing(setup, passed.end, length)
         self.time += duration
         self._brake = torque - inertia * change / duration
         self._begun = ramp.after(passed.end, setup)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.case import march_of
+from rubhpc.integrate.changing_speed.carried_modes import Standing, carried, standing
 from rubhpc.integrate.changing_speed.stretch import Stretch, take_stretch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
@@ -67,6 +68,22 @@ class Passing:
             self._march = None
             steps = ContactSteppingMarch(setup, *self._case, state_at(begun, setup), self._check)
             return self._pass(steps, setup, n_sample, earlier, is_balanced)
+
+    def continued(
+        self, setup: PieceSetup, begun: State | Place, before: Standing | None, lasted: float
+    ) -> State | Place:
+        """Where a piece begins after another in other matrices, which were held for a time, s."""
+        is_other = before is not None and before.setup.held is not setup.held
+        if self._march is None or before is None or not is_other or not isinstance(begun, Place):
+            return begun
+        return carried(before, lasted, self._march, setup, begun)
+
+    def standing(self, setup: PieceSetup, end: State | Place, n_sample: int) -> Standing | None:
+        """Where the piece that was taken last has ended, in its own modes, if it has some."""
+        if self._march is None or not isinstance(end, Place):
+            return None
+        angle = setup.spin * setup.interval * n_sample
+        return standing(self._march, setup, end, angle)
 
     def take_several(
         self,
@@ -134,3 +151,10 @@ def state_at(begun: State | Place, setup: PieceSetup) -> State:
     displacement, velocity = (setup.reduced.basis @ begun.motion.reshape(2, -1).T).T.copy()
     displacement[: begun.sag.size] += begun.sag
     return State.of_bodies(setup.model, displacement, velocity, begun.contact_force)
+
+
+def energy_of(begun: Place, setup: PieceSetup) -> float:
+    """Mechanical energy, J, of the motion where a piece begins, about its sag."""
+    (displacement, velocity), moved = begun.motion.reshape(2, -1), begun.sag - setup.model.sag
+    displacement = displacement + setup.reduced.project[:, : moved.size] @ moved
+    return float(0.5 * (velocity @ velocity + displacement @ setup.reduced.stiffness @ displacement))

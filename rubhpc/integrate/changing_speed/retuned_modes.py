@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray  # noqa: TC002 - of a NamedTuple
 
+from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
 from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
 from rubhpc.integrate.reduced_model.mode_tables import TableStack
@@ -122,6 +123,30 @@ class RetunedLibrary(ModeLibrary):
             self._tuned[first] = end
         self.masks[place] = self.tables().mask[place] = mask
         return True
+
+    def eigenmodes(self, mask: int) -> Eigenmodes | None:
+        """Those of a set of closed pairs; None where a speed changes what enters them, or it has no room."""
+        if mask not in self._place:
+            if self.is_full:
+                self.forget()
+            mode = self._solved(mask)
+            if mode.exponent.size > self.width:
+                return None
+            self._take_in(mode)
+        place, tables = self._place[mask], self.tables()
+        held, m = self._held[place], self._held[place].is_pair.size
+        if held.rim.one >= 0:
+            return None
+        constant = tables.enter_constant[place, :, :, :m]
+        return Eigenmodes(
+            exponent=held.exponent[:m],
+            is_pair=held.is_pair,
+            motion=held.motion.T,
+            enter=(tables.enter_re[place, :, :m] + 1j * tables.enter_im[place, :, :m]).T,
+            constant=constant[:, 0] + 1j * constant[:, 1],
+            drive=held.drive,
+            mirrored_drive=held.mirrored_drive,
+        )
 
     def tuned(self, met: set[int]) -> Ints:
         """Sets of closed pairs of the tables that are tuned to this piece or to later ones, of those met."""

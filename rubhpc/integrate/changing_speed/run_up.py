@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
     from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator
@@ -112,12 +113,17 @@ def integrate_run_up(
     durations, sizes = np.diff(times), np.diff(cuts)
     before = np.concatenate([[0.0], durations[:-1]])
     speeds: Floats = np.diff(angles) / durations
-    piece = 0
+    piece, held_from = 0, times[0]  # since when the matrices are held
+    last: tuple[PieceSetup, int] | None = None  # piece of the matrices before, and its samples
     for setups in pieces.blocks(speeds, accelerations, angles[:-1], durations, sizes):
         setup, size, block = setups[0], int(sizes[piece]), piece
         if setup.model is not sagging:
             lift_samples(whole[:, begun : cuts[piece]], sagging)
             sagging, begun = setup.model, cuts[piece]
+        if last is not None and reached is not None and last[0].held is not setup.held:
+            ended = passing.standing(last[0], reached, last[1])
+            reached = passing.continued(setup, reached, ended, times[piece] - held_from)
+            held_from = times[piece]
         while not reason and (place := piece - block) < len(setups):
             first = int(cuts[piece])
             if reached is None:
@@ -144,6 +150,7 @@ def integrate_run_up(
             piece += 1
         if reason:
             break
+        last = setups[-1], size
     lift_samples(whole[:, begun : n_done * per_revolution], sagging)
     gathered.sum_up()
     assert reached is not None  # a law has a whole revolution at least

@@ -100,6 +100,21 @@ class EventDrivenMarch(ModalMarch):
         return self._library
 
     @property
+    def library(self) -> ModeLibrary:
+        """Contact modes of the case."""
+        return self._library
+
+    @property
+    def mask(self) -> int:
+        """Set of closed contacts in which the case stands."""
+        return int(self.tables.mask[self._bare_progress["mode"]])
+
+    @property
+    def constants(self) -> Floats:
+        """Values of the coordinates that do not move."""
+        return self._entered_with
+
+    @property
     def begun_motion(self) -> Floats:
         """Reduced displacements, then velocities (2 n,), with which a piece begins."""
         return self._motion

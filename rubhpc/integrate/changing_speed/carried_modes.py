@@ -1,0 +1,85 @@
+"""Higher modes carried over a change of the matrices, which else would make them ring.
+
+With the speed a mode's shape and its static part change evenly; matrices that are held change at once,
+and a motion that goes on unchanged then holds each mode by another amount. Over an even change that takes
+the time T the amplitude of a mode of frequency w, under a force that turns with the spin W, keeps its value
+but for `sin(a) / a` of that jump, with `a = (w - W) T / 2`. The rest is taken off here.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.marches.modal import Place
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+
+Floats = NDArray[np.float64]
+
+LOWEST = 3.0  # frequency of a mode over the spin; lower ones take part in contact
+SAME = 0.9  # share of a mode in the one before that it is taken for
+
+
+class Standing(NamedTuple):
+    """Where a piece has ended, in its own matrices."""
+
+    setup: PieceSetup
+    library: RetunedLibrary
+    end: Place
+    constants: Floats  # values of the coordinates that do not move
+    angle: float  # rad, since the piece began
+
+
+def standing(march: EventDrivenMarch, setup: PieceSetup, end: Place, angle: float) -> Standing | None:
+    """Where a march has ended a piece; None where modes are not carried over."""
+    library = march.library
+    if not isinstance(library, RetunedLibrary):
+        return None
+    return Standing(setup, library, end, march.constants, angle)
+
+
+def carried(
+    before: Standing, lasted: float, march: EventDrivenMarch, setup: PieceSetup, begun: Place
+) -> Place:
+    """The place from which a piece begins, with what its matrices would make ring taken off.
+
+    Parameters
+    ----------
+    before : Standing
+        At the same instant.
+    lasted : float, s
+        Since when the matrices before were held.
+    march : EventDrivenMarch
+        Which stands nowhere afterwards, until it begins anew.
+    begun : Place
+        From which the piece would begin.
+    """
+    march.begin(setup, begun)
+    library, mask = march.library, march.mask
+    assert isinstance(library, RetunedLibrary)
+    was, now = before.library.eigenmodes(mask), library.eigenmodes(mask)
+    if was is None or now is None or was.exponent.size != now.exponent.size:
+        return begun
+    old, new = before.setup, setup
+    z_before = was.entered(before.end.motion, before.constants, *_turning(old), before.angle)
+    z = now.entered(march.begun_motion, march.constants, *_turning(new), 0.0)
+    pairs = np.flatnonzero(now.is_pair & (np.abs(now.exponent.imag) > LOWEST * abs(new.spin)))
+    share = 0.5 * now.enter[pairs] @ was.motion
+    match = np.abs(share).argmax(axis=1)
+    found = np.take_along_axis(share, match[:, np.newaxis], axis=1)[:, 0]
+    is_same = (np.abs(found) > SAME) & was.is_pair[match]
+    off = 0.5 * (np.abs(now.exponent.imag[pairs]) - abs(new.spin)) * lasted
+    jump = np.where(is_same, z[pairs] - found * z_before[match], 0.0) * (1.0 - np.sinc(off / np.pi))
+    motion = march.begun_motion - (now.motion[:, pairs] @ jump).real
+    return Place(motion, setup.model.sag, begun.contact_force)
+
+
+def _turning(setup: PieceSetup) -> tuple[float, complex]:
+    """Spin of a piece (rad/s) and the factor of its unbalance (1/s^2)."""
+    return setup.spin, complex(setup.speeds.factor[setup.place])

@@ -1,0 +1,34 @@
+"""What enters the eigenmodes of a contact mode, at any speed of the shaft."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+class Eigenmodes(NamedTuple):
+    """Eigenmodes of a set of closed pairs, m of them, which no speed changes."""
+
+    exponent: Complexes  # (m,), 1/s
+    is_pair: NDArray[np.bool_]  # (m,)
+    motion: Complexes  # (2 n, m)
+    enter: Complexes  # (m, 2 n)
+    constant: Complexes  # (c, m), for a unit of each coordinate that does not move
+    drive: Complexes  # (m,), by the unbalance at unit speed
+    mirrored_drive: Complexes  # (m,)
+
+    def entered(
+        self, motion: Floats, constants: Floats, spin: float, factor: complex, angle: float
+    ) -> Complexes:
+        """Coordinates (m,) of a motion (2 n,) at an angle of the shaft (rad); the rest as in `Speeds`."""
+        direct = self.drive * factor / (1j * spin - self.exponent)
+        mirrored = self.mirrored_drive * factor / (1j * spin - self.exponent.conj())
+        other = np.where(self.is_pair, mirrored, direct).conj()
+        response = 0.5 * (direct * np.exp(1j * angle) + other * np.exp(-1j * angle))
+        coordinates: Complexes = self.enter @ motion - constants @ self.constant - response
+        return coordinates
