@@ -11,10 +11,12 @@ from itertools import product
 import numpy as np
 from exponential import expm
 from full_order_flow import N_STEP, FullOrder, _root
+from scipy.optimize import brentq
 
 from rubhpc.integrate.packing import degrees_of
 
 OPEN, AHEAD, BACK, STUCK = 0, 1, -1, 2
+NOTHING = 1e-13  # m, N: a smaller gap or force is rounding
 SLOW = 1e-9  # m/s: a pair that slips less may stick
 
 
@@ -79,11 +81,15 @@ class FullOrderStick(FullOrder):
             rate, whole, *_ = self.system(states)
             span = min(step, self.turn - time)
             ahead = whole @ state if span == step else expm(rate * span) @ state
-            crossing = [one for one in self.watched(states) if one[0] @ ahead < 0 and one[0] @ state > 1e-13]
+            crossing = [
+                one
+                for one in self.watched(states)
+                if one[0] @ ahead < 0 and (one[0] @ state > NOTHING or self.has_parted(one[1], states, state))
+            ]
             if not crossing:
                 state, time = ahead, time + span
                 continue
-            roots = [_root(row, rate, state, span) for row, *_ in crossing]
+            roots = [_next_root(row, rate, state, span) for row, *_ in crossing]
             _, first, follows = crossing[int(np.argmin(roots))]
             state, time = expm(rate * min(roots)) @ state, time + min(roots)
             was_open = states[first] == OPEN
@@ -96,6 +102,10 @@ class FullOrderStick(FullOrder):
             passed.append(states)
         n = self.n
         return state[:n], state[n : 2 * n], passed
+
+    def has_parted(self, i, states, state):
+        """Whether a pair is open whose gap, nothing as yet, opens: it may close again within the step."""
+        return states[i] == OPEN and self.gap[i, : self.n] @ state[self.n : 2 * self.n] > SLOW
 
     def hit(self, state, pairs):
         """Inelastic impact with Coulomb's law for the impulses, in place."""
@@ -149,3 +159,12 @@ class FullOrderStick(FullOrder):
         if abs(friction[i] @ state) <= self.friction * (normal[i] @ state):
             return states
         return (*states[:i], int(np.sign(friction[i] @ state)), *states[i + 1 :])
+
+
+def _next_root(row, rate, state, span):
+    """Time within a span at which a row vanishes, or vanishes again where it begins at nothing."""
+    if row @ state > NOTHING:
+        return _root(row, rate, state, span)
+    turn = brentq(lambda time: row @ rate @ expm(rate * time) @ state, 0.0, span, xtol=1e-16)
+    ahead = expm(rate * turn) @ state
+    return turn + (_root(row, rate, ahead, span - turn) if row @ ahead > NOTHING else turn)

@@ -152,8 +152,9 @@ def shoot(
             if not is_fresh:
                 derivative = None
                 continue
+            usual = abs(piecewise.setup.spin * piecewise.bodies.clearance)
             raise NotConverged(
-                f"Newton's method stalls at a residual of {trial.residual:.2g}{_grazing(trial)}"
+                f"Newton's method stalls at a residual of {trial.residual:.2g}{_grazing(trial, usual)}"
             )
         if better.residual > FAST * trial.residual:
             derivative = None
@@ -189,20 +190,23 @@ def _shortened(
     return None
 
 
-NEAR_GRAZING = 1e-4  # of the largest speed of approach: a slower one grazes
+NEAR_GRAZING = 1e-2  # of spin times clearance: a touch that is slower grazes
 
 
-def _grazing(trial: _Trial) -> str:
-    """What a failure has to do with grazing; "" where nothing."""
-    approach = [
+def _grazing(trial: _Trial, usual: Floats) -> str:
+    """What a failure has to do with grazing; "" where nothing.
+
+    `usual` (q,), m/s, are spin times clearance of each pair. A gap that opens where it is found closed, since
+    the trial begins beyond a wall, grazes nothing.
+    """
+    slow = [
         float(speed)
         for revolution in trial.revolutions
         for piece in revolution.pieces
-        for speed in piece.approach
+        for pair, speed in zip(piece.touching, piece.approach, strict=True)
+        if 0.0 <= speed < NEAR_GRAZING * usual[pair]
     ]
-    if approach and min(approach) < NEAR_GRAZING * max(approach):
-        return f": a contact grazes, its speed of approach is {min(approach):.2g} m/s"
-    return ""
+    return f": a contact grazes, its speed of approach is {min(slow):.2g} m/s" if slow else ""
 
 
 def _settled(piecewise: PiecewiseMotion, trial: _Trial, derivative: Floats | None, iterations: int) -> Orbit:

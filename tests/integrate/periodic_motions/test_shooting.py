@@ -1,5 +1,7 @@
 """Why a search for a periodic motion ends without one."""
 
+import math
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
@@ -30,13 +32,49 @@ def test_limit_that_is_reached_is_named(monkeypatch, limit, text):
 
 
 def test_contact_that_grazes_is_named():
-    """A touch far slower than the others."""
+    """A touch that is slow beside spin times clearance, not one from beyond a wall."""
 
     def trial(*speeds):
-        pieces = [SimpleNamespace(approach=np.array([speed])) for speed in speeds]
+        pieces = [SimpleNamespace(touching=np.array([0]), approach=np.array([speed])) for speed in speeds]
         return SimpleNamespace(revolutions=[SimpleNamespace(pieces=pieces)])
 
-    assert _grazing(trial(0.4, 0.3 * NEAR_GRAZING)) == (
+    usual = np.array([0.01])
+    assert _grazing(trial(0.4, 0.3 * NEAR_GRAZING * 0.01), usual) == (
         ": a contact grazes, its speed of approach is 3e-05 m/s"
     )
-    assert _grazing(trial(0.4, 0.3)) == _grazing(trial()) == ""
+    assert _grazing(trial(0.4, 0.3), usual) == _grazing(trial(-1e-5), usual) == _grazing(trial(), usual) == ""
+
+
+@pytest.mark.parametrize(
+    ("speed_ratio", "clearance_ratio", "restitution", "friction", "period"),
+    [
+        (4.694606442943905, 0.9999964348254972, 0.7830807406309803, 0.04981067997975758, 2),
+        (4.338454117692162, 0.9999933916382433, 0.9457844555672066, 0.02148910548131534, 1),
+    ],
+)
+def test_motion_that_has_just_touched_grazes(speed_ratio, clearance_ratio, restitution, friction, period):
+    """Rebounds from millionths of the clearance: no motion of such a period is left there."""
+    with pytest.raises(
+        NoPeriodicMotion, match=r"a contact grazes, its speed of approach is .*e-0[56] m/s; give"
+    ):
+        rubhpc.periodic(
+            "mokhtar2017", speed_ratio=speed_ratio, clearance_ratio=clearance_ratio, friction=friction,
+            restitution=restitution, period=period, transient=1, initial={"from": "contact_free"}, keep=(),
+            samples_per_revolution=32,
+        )  # fmt: skip
+
+
+def test_whip_of_more_than_a_thousand_events_in_a_slow_revolution(monkeypatch):
+    """Three stators are rolled around 105 times, each with a touch, a stick, a slip and a release."""
+    rig = rubhpc.read_rig("mokhtar2017")
+    ring = tuple(replace(rig.stator[0], angle=2.0 * math.pi * i / 3) for i in range(3))
+    rig = replace(rig, stator=ring)
+    case = {
+        "speed_ratio": 0.03, "clearance": "3 um", "friction": 0.5, "friction_law": "coulomb", "keep": (),
+        "samples_per_revolution": 256,
+    }  # fmt: skip
+    whip = rubhpc.simulate(rig, transient=2, revolutions=1, initial={"vertical_velocity": 0.5}, **case)
+    assert whip.contacts_per_revolution.sum() > 250
+    monkeypatch.setattr(periodic_motion, "SPANS", ())  # seconds later it is the same
+    with pytest.raises(NoPeriodicMotion, match="more than 1000 events in a revolution; give another period"):
+        rubhpc.periodic(rig, initial=whip.final, **case)
