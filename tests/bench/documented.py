@@ -1,0 +1,153 @@
+"""Numbers that the documents state of the accuracy and the energy balance of cases, computed anew.
+
+    python tests/bench/documented.py [NAME ...]
+
+with the names of the functions below, or none for all of them: a minute or two.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections import Counter
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rubhpc import LumpedStator, read_rig, simulate
+from rubhpc.rig.reading import with_keys
+
+if TYPE_CHECKING:
+    from rubhpc import Rig
+
+PACKAGED = read_rig("mokhtar2017")
+STIFF = with_keys(PACKAGED, {"stator.youngs_modulus": "30 GPa"})
+COULOMB = {"friction_law": "coulomb"}
+BARE: dict[str, Any] = {"samples_per_revolution": 64, "keep": ()}
+
+
+def ring(stator: Any, count: int) -> Rig:
+    """Return the packaged rotor in a ring of equal stators."""
+    turned = (replace(stator, angle=2.0 * math.pi * i / count) for i in range(count))
+    return replace(STIFF, stator=tuple(turned))
+
+
+def closed_form() -> None:
+    """Largest energy residual of 72 cases from event to event (theory, records: energy balance)."""
+    laws = [law | {"restitution": e} for law in ({}, COULOMB) for e in (None, 0.3, 0.8)]
+    cases = product((1, 3, 8), laws, (0.75, 1.5, 2.25, 3.0))
+    worst = max(
+        simulate(
+            ring(STIFF.stator[0], n), speed_ratio=r, clearance_ratio=0.7, friction=0.2, transient=10,
+            revolutions=6, **law, **BARE,
+        ).energy_residual
+        for n, law, r in cases
+    )  # fmt: skip
+    print(f"72 cases: energy residual at most {worst:.1e}")
+
+
+def bounces() -> None:
+    """Energy residuals of stators that bounce (theory, records: energy balance)."""
+    light = LumpedStator(node=8, mass=0.01, stiffness=1e6, radius=0.06)
+    for restitution in (0.8, None):
+        case = {"speed_ratio": 2.0, "clearance": "40 um", "friction": 0.0, "restitution": restitution}
+        record = simulate(ring(light, 16), **case, transient=4, revolutions=8, **BARE)
+        print(f"16 springs, restitution {restitution}: {record.energy_residual:.1e}")
+    heavy = LumpedStator(node=8, mass=0.1, stiffness=1e5, damping=5.0, radius=0.06)
+    case = {"speed_ratio": 1.2, "clearance": "10 um", "restitution": 0.8}
+    for count, law in ((16, {"friction": 0.0}), (8, COULOMB | {"friction": 0.1})):
+        record = simulate(ring(heavy, count), **case, **law, transient=4, revolutions=8, **BARE)
+        print(f"ring of {count}, from event to event: {record.energy_residual:.1e}")
+    case["friction"] = 0.1
+    for micron in (1.0, 0.5, 0.25):
+        step = {"step": micron * 1e-6, "transient": 0, "revolutions": 2}
+        normal = simulate(ring(heavy, 3), **case, normal="updated", **COULOMB, **step, **BARE)
+        central = simulate(ring(heavy, 3), **case, method="central-difference", **step, **BARE)
+        print(
+            f"three stators, {micron} us: short steps {normal.energy_residual:.1e}, "
+            f"central difference {central.energy_residual:.1e}"
+        )
+    del case["restitution"]
+    central = simulate(ring(heavy, 3), **case, method="central-difference", **step, **BARE)
+    print(f"central difference without restitution: {central.energy_residual:.1e}")
+
+
+def peaks() -> None:
+    """Largest mean of the contact force over windows, by elements (theory, records: peak of the force)."""
+    shaft = replace(STIFF.stator[0], node=5, radius=0.01)
+    rows = [("on the shaft", shaft, 1.1, 100), ("packaged", STIFF.stator[0], 3.5, 74)]
+    rows += [
+        (f"on the shaft, beta {beta}", replace(shaft, damping=replace(shaft.damping, beta=beta)), 1.1, 100)
+        for beta in (2e-4, 0.0)
+    ]
+    first = 2.0 * math.pi * 31.5596
+    for name, stator, ratio, micron in rows:
+        samples = 2 * round(math.pi / (ratio * first * 1e-6))  # some 1 us apart
+        for n in (3, 6, 12, 24, 48):
+            record = simulate(
+                replace(STIFF, stator=(replace(stator, elements=n),)),
+                speed_ratio=ratio, clearance=micron * 1e-6, transient=2, revolutions=4, accuracy=1e-9,
+                samples_per_revolution=samples, keep=("waveform",),
+            )  # fmt: skip
+            impulse = np.concatenate([[0.0], np.cumsum(np.asarray(record.contact_force[0], float))])
+            means = [f"{(impulse[w:] - impulse[:-w]).max() / w:.2f}" for w in (1, 10, 20, 50)]
+            print(
+                f"{name}, {n} elements: {', '.join(means)} N over 1, 10, 20, 50 us; "
+                f"measure {record.peak_contact_force[0]:.2f} N"
+            )
+
+
+def rigid() -> None:
+    """Peaks of a rigid mass and of the same with a penalty (theory, records: rigid masses and walls)."""
+    mass = LumpedStator(node=8, mass=0.92, stiffness=3.9e5, radius=0.06)
+    rig = replace(STIFF, stator=(mass,))
+    case: dict[str, Any] = {"speed_ratio": 1.9, "clearance": "70 um", "friction": 0.3}
+    case |= {"transient": 0, "revolutions": 4} | BARE
+    found = simulate(rig, **case)
+    print(f"rigid: {found.peak_contact_force[0]:.0f} N, {found.contact_impulse[0]:.3f} N s a revolution")
+    for stiffness in (1e6, 1e7, 1e8, 1e9, 1e10):
+        text = []
+        for damping in (0.0, 2.0 * math.sqrt(0.05 * stiffness)):
+            soft = {"law": "penalty", "stiffness": stiffness, "damping": damping}
+            record = simulate(rig, **case, **soft)
+            text.append(
+                f"{record.peak_contact_force[0]:.0f} N, {1e6 * record.contact_duration[0]:.0f} us, "
+                f"{record.contact_impulse[0]:.3f} N s"
+            )
+        print(f"k = {stiffness:.0e}: without damper {text[0]}; with {text[1]}")
+
+
+def rounding() -> None:
+    """Where twenty simulations end whose friction differs by 1e-9 (theory, records: direct)."""
+    rig = with_keys(PACKAGED, {"stator.youngs_modulus": "28 GPa", "rotor.damping.alpha": 2.0})
+    ends: Counter[str] = Counter()
+    for i in range(20):
+        record = simulate(
+            rig, speed_ratio=0.624, clearance_ratio=0.545, friction=0.3 + i * 1e-9, transient=10_000, **BARE
+        )
+        ends[f"P{record.period} with the multiplier {record.largest_multiplier:.3f}"] += 1
+    print("after 10 000 revolutions:", "; ".join(f"{n} at {end}" for end, n in ends.items()))
+
+
+def short_records() -> None:
+    """Regimes by the last 24 and 16 revolutions of 64 (guide, regimes: short records)."""
+    same, without = Counter[int](), 0
+    for ratio, clearance in product(np.linspace(0.85, 6.0, 104), (0.6, 0.7, 0.8, 0.9)):
+        case = {"speed_ratio": ratio, "clearance_ratio": clearance, "friction": 0.3}
+        whole = simulate(STIFF, **case, transient=120, revolutions=64, **BARE)
+        if whole.regime == 1 and whole.period:
+            continue
+        without += whole.regime > 0
+        for n in (24, 16):
+            part = simulate(STIFF, **case, transient=184 - n, revolutions=n, **BARE)
+            same[n] += whole.regime > 0 and part.regime == whole.regime
+    print(f"{without} of 416 without a period; alike with 24 revolutions {same[24]}, with 16 {same[16]}")
+
+
+if __name__ == "__main__":
+    known = [closed_form, bounces, peaks, rigid, rounding, short_records]
+    for function in known:
+        if len(sys.argv) == 1 or function.__name__ in sys.argv[1:]:
+            function()
