@@ -30,7 +30,7 @@ COULOMB = 5  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 4  # method = "modal" with gaps that are curved
 MANY_STATORS = 2  # more than five, whose sets of closed contacts or states may be more than 256
-BRANCHES = 2  # [branch]: grazing beside a fold, and at a sharp corner
+BRANCHES = 3  # [branch]: how near to grazing a motion is under Coulomb's law
 MANY_EVENTS = 1  # method = "modal" where a case may have 200 000 events, or has impacts in short steps
 ALONG_SPEED = 1  # branches along a speed
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"

@@ -77,7 +77,7 @@ def distances(point: Point) -> Floats:
     gap = np.min([revolution.least_gap for revolution in point.revolutions], axis=0)
     force = np.min([revolution.least_force for revolution in point.revolutions], axis=0)
     approach = [speed for r in point.revolutions for piece in r.pieces for speed in piece.approach.tolist()]
-    clearance = np.maximum(point.case.bodies.clearance, np.finfo(float).tiny)
+    clearance = np.maximum(point.case.bodies.clearance[: gap.size], np.finfo(float).tiny)
     whirl = abs(point.case.setup.spin) * float(clearance.max())
     return np.concatenate([gap / clearance, force, np.array(approach) / whirl])
 

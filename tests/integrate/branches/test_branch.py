@@ -1,5 +1,7 @@
 """Branches on the packaged rig: derivatives, events, points that are motions, and refusals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -131,6 +133,24 @@ def test_cases_along_a_speed_share_a_basis_and_are_followed_as_they_are_recorded
     ends = [flow(case, *begun, 1, 0.0)[-1] for case in (here, recorded)]
     assert len(ends[0].pieces) > 1
     assert np.array_equal(ends[0].end, ends[1].end)
+
+
+def test_several_pairs_that_slide_under_coulombs_law_branch_as_pairs_that_slide():
+    """Both branches go on beyond the grazing of the contact-free motion, with a contact of each stator."""
+    springs = rubhpc.LumpedStator(node=8, radius=0.06, count=3, mass=1e-3, damping=2.0, stiffness=1e5)
+    ring = replace(rubhpc.read_rig("mokhtar2017"), stator=(springs,))
+    (sliding,), (coulomb,) = (
+        rubhpc.branch(
+            ring, along="clearance_ratio", start=1.05, stop=0.98, speed_ratio=0.8, friction=0.1, doublings=0,
+            keep=(), friction_law=law,
+        )
+        for law in ("sliding", "coulomb")
+    )  # fmt: skip
+    assert [name for name, _ in coulomb.events()][:2] == ["grazing", "grazing"]
+    assert coulomb.points[-1].touches >= 3
+    values = [[value for _, value in found.events()] for found in (coulomb, sliding)]
+    assert values[0] == pytest.approx(values[1], rel=1e-8)
+    assert coulomb.values[-1] == sliding.values[-1]
 
 
 @pytest.mark.parametrize(
