@@ -99,15 +99,15 @@ class Page:
             drawing = {"side": side_view(rig), "end": end_view(rig), "text": description(rig)}
         except RubError as error:  # a copy of a store may lack its rig
             drawing["text"] = str(error)
-        told_counts = counts(self.cases.status)
+        counted = counts(self.cases.status)
         return {
             "title": str(store.attrs.get("title") or Path(source(store)).stem),
             "store": source(store),
             "made": time.strftime("%Y-%m-%d %H:%M"),
             "version": __version__,
             "running": store.attrs.get("running", ""),
-            "counts": told_counts,
-            "n_case": sum(c["n"] for c in told_counts),
+            "counts": counted,
+            "n_case": sum(c["n"] for c in counted),
             "rig_name": (store.attrs.get("rig") or {}).get("name", ""),
             "drawing": drawing,
             "rig_axes": list(rig_axes(store).values()),

@@ -55,7 +55,7 @@ def test_a_click_shows_the_case_of_that_cell(visit: Visit, pages: dict[str, str]
     assert "out of the model's range: slip, Euler load" in said(page)
 
 
-def test_the_pointer_is_told_what_it_is_over(visit: Visit, pages: dict[str, str]) -> None:
+def test_the_pointer_is_reported_what_it_is_over(visit: Visit, pages: dict[str, str]) -> None:
     page = visit(pages["whole"])
     click_map(page, 0.97, 0.5)
     box = page.locator("#map").bounding_box()
@@ -227,7 +227,7 @@ def test_the_colours_follow_the_scheme(visit: Visit, pages: dict[str, str]) -> N
     assert page.evaluate(ground) == "rgb(251, 250, 248)"
 
 
-def test_changes_are_told_to_those_who_listen(visit: Visit, pages: dict[str, str]) -> None:
+def test_changes_are_reported_to_those_who_listen(visit: Visit, pages: dict[str, str]) -> None:
     page = visit(pages["whole"])
     assert page.locator("#case-text[role=status]").get_attribute("aria-live") == "polite"
     unnamed = page.evaluate("""() => [...document.querySelectorAll("button, input, select")]

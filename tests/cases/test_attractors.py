@@ -14,7 +14,7 @@ from rubhpc.errors import InputError
 from rubhpc.schema import INFERRED
 
 
-def test_motions_are_told_apart_whatever_revolution_they_are_seen_in():
+def test_motions_are_distinguished_whatever_revolution_they_are_seen_in():
     kinds = ["P2", "free", "P2", "P1", "torus", "other P1", "P2", "long period", "P1"]
     found = attractors(store_of(kinds)).values
     groups = {"free": [1], "P1": [3, 8], "other P1": [5], "P2": [0, 2, 6], "torus": [4, 7]}

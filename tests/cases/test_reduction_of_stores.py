@@ -165,7 +165,7 @@ def test_bad_input_is_one_line(path: Path, call: Any, said: str) -> None:
     assert "\n" not in str(refusal.value)
 
 
-def test_no_store_is_told(tmp_path: Path) -> None:
+def test_no_store_is_reported(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="no such store"):
         open_in_pieces(tmp_path / "none.zarr")
 

@@ -104,7 +104,7 @@ def test_draws_are_repeatable_also_with_the_seed_0() -> None:
     assert not np.array_equal(one["total_high"], other["total_high"])
 
 
-def test_a_point_with_a_case_missing_is_left_out_whole_and_told() -> None:
+def test_a_point_with_a_case_missing_is_left_out_whole_and_reported() -> None:
     store = sample_of_sines(1024)
     whole = shares(sensitivity(store, "peak_torsion", n_draw=2))
     store["status"][0, [7, 8, 501]] = [DIVERGED, MISSING, DIVERGED]
@@ -158,7 +158,7 @@ def test_bars_reach_beyond_the_shares() -> None:
     assert ax.get_xlim()[1] > high
 
 
-def test_command_tells_ranges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_command_shows_ranges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     sample_of_sines(64).to_zarr("sines.zarr")
     done = CliRunner().invoke(

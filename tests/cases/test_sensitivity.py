@@ -154,7 +154,7 @@ def without(store: xr.Dataset, share: float) -> xr.Dataset:
     return store
 
 
-def test_cases_without_a_value_are_filled_and_told() -> None:
+def test_cases_without_a_value_are_filled_and_reported() -> None:
     store = without(sines(20), share=0.05)
     whole = grid_indices(ishigami(*(middles(20),) * 3))
     found = sensitivity(store, "peak_torsion", n_draw=2)
@@ -174,7 +174,7 @@ def test_fill_is_exact_where_axes_do_not_act_together() -> None:
     np.testing.assert_allclose(shares(found), grid_indices(values), atol=1e-7)
 
 
-def test_level_without_cases_is_left_out_and_told() -> None:
+def test_level_without_cases_is_left_out_and_reported() -> None:
     store = sines(6)
     store["status"][{"friction": 2}] = FAILED
     found = sensitivity(store, "peak_torsion", n_draw=2)
@@ -224,7 +224,7 @@ def test_bars_are_as_long_as_the_shares() -> None:
     assert ax.get_yticklabels()[0].get_text() == "Speed ratio $r$"
 
 
-def test_command_tells_draws_and_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_command_shows_draws_and_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     without(sines(8), share=0.05).to_zarr("study.zarr", zarr_format=3, consolidated=False)
     words = ["study.zarr", "--measure", "peak_contact_force", "--select", "stator=2", "--draws", "20"]

@@ -108,7 +108,7 @@ def test_errors_are_one_line_with_their_code(arguments, code, message, capsys, t
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_directory_that_is_no_store_is_told_so(capsys, tmp_path):
+def test_a_directory_that_is_no_store_is_reported_so(capsys, tmp_path):
     code, _, err = call(capsys, "status", tmp_path)
     assert code == 3
     assert "is not a rubhpc store" in err
@@ -308,7 +308,7 @@ def test_only_missing_cases_are_timed(tmp_path, monkeypatch):
     assert sorted(picked) == [tuple(index) for index in np.argwhere(missing).tolist()]
 
 
-def test_plan_tells_why_its_pilots_failed(tmp_path, monkeypatch, capsys):
+def test_plan_shows_why_its_pilots_failed(tmp_path, monkeypatch, capsys):
     from rubhpc.running import pilot_cases
 
     def burst(*_: object) -> None:
@@ -323,7 +323,7 @@ def test_plan_tells_why_its_pilots_failed(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("arguments", [("nosuch",), ("nosuch", "--help"), ("verfy", "x.zarr")])
-def test_a_word_that_is_no_command_is_told(capsys, arguments):
+def test_a_word_that_is_no_command_is_reported(capsys, arguments):
     code, out, err = call(capsys, *arguments)
     assert (code, out) == (2, "")
     assert f"{arguments[0]}: no such command or study; " in err

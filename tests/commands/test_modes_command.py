@@ -44,7 +44,7 @@ def test_plain_number_is_a_speed_in_radians_a_second():
     assert len(document["speeds"][0]["rotor"]) == len(document["speeds"][0]["stators"][0]) == 1
 
 
-def test_table_stands_still_unless_told():
+def test_table_stands_still_by_default():
     lines = run("mokhtar2017", "--count", "3").splitlines()
     assert "Rotor at 0 rpm (0 rad/s)" in lines
     assert "Stator 1" in lines

@@ -71,7 +71,7 @@ def check(finished: Path, strikes: list[tuple[int, str, float, int]]) -> None:
 
 @settings(max_examples=4, phases=[Phase.generate])  # a failure says all; to shrink it takes minutes
 @given(strikes=st.lists(blows, min_size=1, max_size=3))
-def test_any_damage_is_told_and_mended(finished, strikes):
+def test_any_damage_is_reported_and_repaired(finished, strikes):
     check(finished, strikes)
 
 
@@ -79,5 +79,5 @@ def test_any_damage_is_told_and_mended(finished, strikes):
 @pytest.mark.timeout(3600)
 @settings(max_examples=100, phases=[Phase.generate])
 @given(strikes=st.lists(blows, min_size=1, max_size=6))
-def test_any_damage_is_told_and_mended_many_times(finished, strikes):
+def test_any_damage_is_reported_and_repaired_many_times(finished, strikes):
     check(finished, strikes)

@@ -28,7 +28,7 @@ def named_by_verify(store: Path) -> set[tuple[int, ...]]:
     return {tuple(int(i) for i in np.unravel_index(flat, (2, 2, 3))) for flat in damage.cases}
 
 
-def mended_by_run(store: Path, finished: Path) -> int:
+def repaired_by_run(store: Path, finished: Path) -> int:
     """Run the study again; how many cases that took to make all as it was."""
     summary = run_study(finished / "tiny.toml", output=store, quiet=True)
     assert summary.counts == (0, 12, 0, 0, 0)
@@ -50,20 +50,20 @@ def test_a_byte_of_a_chunk_is_changed(store, finished, name, at):
     named = named_by_verify(store)
     assert named
     assert named <= {(0, 1, 0), (0, 1, 1)}
-    assert mended_by_run(store, finished) == len(named)
+    assert repaired_by_run(store, finished) == len(named)
 
 
 def test_one_case_of_a_chunk_is_changed(store, finished):
     """Only its own numbers: the other case of the chunk is carried over."""
     array_of(store, "torsion")[1, 0, 0, 7] += 1e-9
     assert named_by_verify(store) == {(1, 0, 0)}
-    assert mended_by_run(store, finished) == 1
+    assert repaired_by_run(store, finished) == 1
 
 
 def test_a_chunk_is_deleted(store, finished):
     Store(store).chunk_files((1, 0, 0))[4].unlink()
     assert named_by_verify(store) == {(1, 0, 0), (1, 0, 1)}
-    assert mended_by_run(store, finished) == 2
+    assert repaired_by_run(store, finished) == 2
 
 
 def test_links_that_lead_back_to_themselves(store, finished):
@@ -74,12 +74,12 @@ def test_links_that_lead_back_to_themselves(store, finished):
         shutil.rmtree(path) if path.is_dir() else path.unlink()
         path.symlink_to(path)
         assert len(named_by_verify(store)) == n_case
-        assert mended_by_run(store, finished) == n_case
+        assert repaired_by_run(store, finished) == n_case
 
 
 def test_a_run_sees_a_deleted_chunk_by_itself(store, finished):
     Store(store).chunk_files((1, 0, 0))[4].unlink()
-    assert mended_by_run(store, finished) == 2
+    assert repaired_by_run(store, finished) == 2
 
 
 def test_the_journal_is_cut_short(store, finished):
@@ -91,7 +91,7 @@ def test_the_journal_is_cut_short(store, finished):
         tuple(int(i) for i in np.unravel_index(flat, (2, 2, 3))) for flat in lost
     }
     # The line cut short stays in its file; two new ones come.
-    assert mended_by_run(store, finished) == 2
+    assert repaired_by_run(store, finished) == 2
 
 
 def test_a_line_of_the_journal_is_changed(store, finished):
@@ -100,7 +100,7 @@ def test_a_line_of_the_journal_is_changed(store, finished):
     flat = int(lines[4].split()[1])
     change_byte(path, len(b"".join(lines[:4])) + 60)
     assert named_by_verify(store) == {tuple(int(i) for i in np.unravel_index(flat, (2, 2, 3)))}
-    assert mended_by_run(store, finished) == 1
+    assert repaired_by_run(store, finished) == 1
 
 
 @pytest.mark.parametrize("name", ["period", "status", "speed_ratio", "clearance", "revolution"])
@@ -110,7 +110,7 @@ def test_what_is_no_case_is_written_anew_without_computing(store, finished, name
     damage = verify(store)
     assert damage.arrays == (name,)
     assert damage.cases == {}
-    assert mended_by_run(store, finished) == 0
+    assert repaired_by_run(store, finished) == 0
 
 
 def test_a_chunk_of_missing_values_is_deleted(store, finished):
@@ -119,7 +119,7 @@ def test_a_chunk_of_missing_values_is_deleted(store, finished):
     assert np.isnan(array_of(store, "lyapunov_exponent")[...]).all()
     chunk.unlink()
     assert verify(store).arrays == ("lyapunov_exponent",)
-    assert mended_by_run(store, finished) == 0
+    assert repaired_by_run(store, finished) == 0
 
 
 def test_axes_that_no_journal_has(store):
@@ -134,7 +134,7 @@ def test_a_partial_file_is_no_damage(store, finished):
     stray = store / "vertical" / "c" / "0" / "0" / "0" / "0.5f.partial"
     stray.write_bytes(b"half a chunk")
     assert not verify(store)
-    assert mended_by_run(store, finished) == 0
+    assert repaired_by_run(store, finished) == 0
     assert not stray.exists()
 
 

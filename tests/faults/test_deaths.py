@@ -132,7 +132,7 @@ def test_a_record_of_another_grid_or_of_no_case_says_nothing(store):
     assert list(store.in_progress_directory.iterdir()) == []
 
 
-def test_want_of_memory_is_told_from_other_kills(store, monkeypatch):
+def test_want_of_memory_is_distinguished_from_other_kills(store, monkeypatch):
     from rubhpc.storage import in_progress
 
     is_missing = store.replay().status == 0

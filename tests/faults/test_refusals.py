@@ -58,7 +58,7 @@ def test_poisoned_cases_fail_and_the_others_finish(tmp_path, launcher):
     assert "8 done; 6 computed" in healthy.stdout
 
 
-def test_a_second_run_on_a_store_is_refused_and_status_tells_of_the_first(tmp_path):
+def test_a_second_run_on_a_store_is_refused_and_status_shows_of_the_first(tmp_path):
     study, store = write_slow_study(tmp_path, transient=2000), tmp_path / "tiny.zarr"
     first = start(study)
     lock = store / ".rubhpc" / "lock"
@@ -108,7 +108,7 @@ def bound_by_permissions(*arguments: object) -> subprocess.CompletedProcess[str]
     )
 
 
-def test_a_store_that_cannot_be_written_is_told_in_a_line(tmp_path):
+def test_a_store_that_cannot_be_written_is_reported_in_a_line(tmp_path):
     study, store = write_study(tmp_path), tmp_path / "tiny.zarr"
     part = write_study(tmp_path, "part.toml", speed_ratio=[0.9])
     assert run(part).returncode == 0
@@ -131,7 +131,7 @@ def test_a_store_that_cannot_be_written_is_told_in_a_line(tmp_path):
     assert run(study).returncode == 0
 
 
-def test_a_full_disk_is_told_in_a_line_and_the_run_goes_on_once_there_is_space(tmp_path):
+def test_a_full_disk_is_reported_in_a_line_and_the_run_goes_on_once_there_is_space(tmp_path):
     """A limit on the size of files stands for the disk: a journal may not grow beyond a few lines."""
     study, store = write_study(tmp_path, block=1), tmp_path / "tiny.zarr"
     assert run(write_study(tmp_path, "empty.toml", block=1), "--time-limit", "1 ms").returncode == 75

@@ -68,13 +68,13 @@ def test_each_command_leaves_its_figure_and_says_where(run, synthetic_path, name
     assert Path(said[-1]).read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_map_tells_what_it_took_for_the_other_axes(run, synthetic_path):
+def test_a_map_shows_what_it_took_for_the_other_axes(run, synthetic_path):
     said = run("map", synthetic_path)
     assert "friction = 0.1: the first of 2" in said
     assert "stator_youngs_modulus = 3 GPa: the first of 2" in said
 
 
-def test_a_spectrum_tells_its_lines(run, synthetic_path):
+def test_a_spectrum_shows_its_lines(run, synthetic_path):
     said = run("spectrum", synthetic_path, *ONE, "--signal", "vertical").splitlines()
     assert said[0].split() == ["1X", "47.339", "Hz", "1.0000e-04", "m"]
 

@@ -148,7 +148,7 @@ def test_record_holds_what_the_schema_names():
 
 
 @pytest.mark.parametrize("keep", [(), ("section",), ("spectrum", "waveform")])
-def test_record_keeps_what_it_is_told(keep):
+def test_record_keeps_what_it_is_reported(keep):
     record = simulate(RIG, **RUB, keep=keep)
     held = {"waveform": record.signals, "spectrum": record.spectra, "section": record.sections}
     assert {name for name, group in held.items() if group} == set(keep)

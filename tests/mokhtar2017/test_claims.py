@@ -45,7 +45,7 @@ def test_a_claim_fails_on_what_it_does_not_describe(name, i, sound):
     assert result.verdict == FAILS, result.finding.found
 
 
-def test_findings_tell_the_known_content(results):
+def test_findings_show_the_known_content(results):
     found = {r.claim.id: r.finding.found for r in results}
     assert found["C14"] == "11/2X (130.18 Hz)"
     assert found["C12"] == "1/2X, 1X, 3/2X: 1.4, 122, 4.3 µm"
@@ -103,7 +103,7 @@ def test_claims_are_found_by_their_figures():
         on_figure(2)
 
 
-def test_results_as_text_and_as_json_tell_the_same(results):
+def test_results_as_text_and_as_json_show_the_same(results):
     listed = json.loads(as_json(results))
     assert [entry["id"] for entry in listed] == [c.id for c in CLAIMS]
     assert all(set(entry) == set(HEAD) for entry in listed)

@@ -33,7 +33,7 @@ def test_figures_have_the_panels_of_the_paper(number, sound):
     assert all(ax.lines or ax.collections for ax in panels)
 
 
-def test_cases_over_one_another_are_told_apart(sound):
+def test_cases_over_one_another_are_distinguished(sound):
     torsion = drawn(10, sound).axes[0]
     assert [text.get_text() for text in torsion.get_legend().get_texts()] == [
         f"$\\mu$ = {friction}" for friction in (0.1, 0.3, 0.5)
@@ -67,7 +67,7 @@ def test_the_cascade_marks_what_it_found(sound):
     assert "pseudo-critical 53.65 Hz" in texts
 
 
-def test_a_folder_that_cannot_be_made_is_told(sound, tmp_path):
+def test_a_folder_that_cannot_be_made_is_reported(sound, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="choose another --draw"):
         list(draw_figures([9], sound, tmp_path / "file" / "figures"))

@@ -37,7 +37,7 @@ def test_other_ranks_of_the_wrong_launcher_are_silent(tmp_path):
     assert (done.returncode, done.stdout, done.stderr) == (2, "", "")
 
 
-def test_a_launcher_without_mpi4py_names_the_mend(tmp_path):
+def test_a_launcher_without_mpi4py_names_the_fix(tmp_path):
     (tmp_path / "mpi4py.py").write_text("raise ImportError('none here')")
     path = f"{tmp_path}{os.pathsep}{environment()['PYTHONPATH']}"
     done = run(write_study(tmp_path), PMI_RANK="0", PMI_SIZE="2", PYTHONPATH=path)
@@ -62,7 +62,7 @@ def test_mpi_is_loaded_under_a_launcher_only(tmp_path):
         ({"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_RANK": "1"}, (1, 2)),
     ],
 )
-def test_launchers_are_told_apart(monkeypatch, variables, expected):
+def test_launchers_are_distinguished(monkeypatch, variables, expected):
     for name in list(os.environ):
         if name.startswith(("PMI", "OMPI_", "SLURM_")):
             monkeypatch.delenv(name)

@@ -112,7 +112,7 @@ def test_no_rank_outlives_the_daemon_that_started_it(tmp_path):
         time.sleep(0.05)
 
 
-def test_an_input_error_is_told_once(tmp_path):
+def test_an_input_error_is_reported_once(tmp_path):
     done = run(tmp_path / "nowhere.toml", ranks=3)
     assert done.returncode == 2
     assert done.stderr.count("nowhere.toml: no such file") == 1

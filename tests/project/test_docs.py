@@ -153,13 +153,13 @@ def test_study_of_the_readme_is_one(tmp_path: Path) -> None:
     assert read_study(tmp_path / "study.toml").rig.name == "mokhtar2017"
 
 
-def test_readme_tells_of_targets_that_exist() -> None:
+def test_readme_shows_of_targets_that_exist() -> None:
     targets = re.findall(r"^([a-z]+):.*## ", (ROOT / "Makefile").read_text(), re.MULTILINE)
     reported = set(re.findall(r"(?:^|`)make ([a-z]+)", README + CONTRIBUTING, re.MULTILINE))
     assert reported <= set(targets)
 
 
-def test_readme_tells_of_every_study_and_its_cases() -> None:
+def test_readme_shows_of_every_study_and_its_cases() -> None:
     reported = {re.search(r"\((.*)\)", row[0]).group(1): int(row[2]) for row in rows(README, STUDIES)}  # type: ignore[union-attr]
     axes = {path: read_study(path).axes for path in (ROOT / "jobs").glob("*.toml")}
     cases = {f"jobs/{path.name}": Points(axes[path]).n_case for path in axes}

@@ -120,7 +120,7 @@ def test_every_control_and_drawing_has_a_name(written: Elements) -> None:
     assert named <= set(ids)
 
 
-def test_failures_are_told_with_their_reasons(two_stator_path: Path) -> None:
+def test_failures_are_reported_with_their_reasons(two_stator_path: Path) -> None:
     dataset = open_store(two_stator_path).assign_attrs(reasons={0: "ran away <b>", 12: "worker died"})
     text = Page(dataset).html(values={})
     assert "1 case diverged" in text
@@ -262,7 +262,7 @@ def test_a_carrier_is_drawn_on_its_springs(count: int, kind: str) -> None:
     assert side_view(rig).count('class="spring"') == (2 if count == 8 else 1)
 
 
-def test_a_rotor_of_matrices_is_told_in_words() -> None:
+def test_a_rotor_of_matrices_is_reported_in_words() -> None:
     from postproc.report.end_view import end_view
     from postproc.report.side_view import description, side_view
     from rubhpc.rig.stators import LumpedStator

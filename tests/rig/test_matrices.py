@@ -121,7 +121,7 @@ def test_beam_and_its_matrices_are_the_same_stator():
         assert one.frequency == pytest.approx(other.frequency, rel=1e-9)
 
 
-def test_a_store_can_tell_the_matrices_again_to_the_last_bit():
+def test_a_store_can_show_the_matrices_again_to_the_last_bit():
     random = np.random.default_rng(1)
     half = random.normal(size=(3, 2, 2))
     skew = half[2] - half[2].T
@@ -172,7 +172,7 @@ def test_matrices_are_the_identity_of_a_study_not_what_made_them(tmp_path):
         ),
     ],
 )
-def test_what_is_wrong_with_a_rig_of_python_is_told_in_one_line(tmp_path, code, name, message):
+def test_what_is_wrong_with_a_rig_of_python_is_reported_in_one_line(tmp_path, code, name, message):
     (tmp_path / "rig.py").write_text(code)
     with pytest.raises(InputError, match=message) as error:
         read_rig(name, tmp_path, "study.toml: rig", trust_rig=True)
@@ -246,7 +246,7 @@ def test_rig_file_takes_lumped_stators_and_matrices(tmp_path):
     assert first_lateral_frequency(assemble(rig)) == pytest.approx(2.0)
 
 
-def test_kinds_of_motion_that_a_body_couples_are_told_by_their_energy():
+def test_kinds_of_motion_that_a_body_couples_are_reported_by_their_energy():
     """A sideways mass that turns a wheel by a lever: two modes of both kinds, and their exact roots."""
     lever, m, J, k, t = 0.1, 2.0, 1e-3, 2e4, 90.0
     M, K = np.diag([m, J]), np.array([[k, k * lever], [k * lever, t + k * lever**2]])
@@ -291,7 +291,7 @@ def test_free_motion_is_found_where_contact_or_outputs_see_it():
     )
 
 
-def test_rotor_free_in_torsion_is_refused_with_the_mend_and_a_soft_drive_twists_alike():
+def test_rotor_free_in_torsion_is_refused_with_the_fix_and_a_soft_drive_twists_alike():
     """Four revolutions: 0.01 N m/rad holds next to nothing of what friction turns back by then."""
     packaged = read_rig("mokhtar2017")
     free = with_key(packaged, "rotor.torsion.free", True)

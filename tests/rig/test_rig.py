@@ -124,7 +124,7 @@ def test_ways_of_holding_torsion_replace_each_other(rig):
     assert with_key(spring, "rotor.torsion.free", True).rotor.torsion == Torsion(free=True)
 
 
-def test_damping_that_is_told_in_ratios_is_not_told_twice(rig):
+def test_damping_stated_in_ratios_is_not_stated_twice(rig):
     table = rig.as_dict()
     table["rotor"]["damping"] = {"ratios": {"31.56": 0.08}}
     with pytest.raises(InputError, match=r"rotor\.damping\.ratios: conflicts with alpha and beta"):

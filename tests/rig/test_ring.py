@@ -127,7 +127,7 @@ def test_forces_of_a_ring_are_one_problem_solved_in_few_pivots(count, friction):
     assert worst < 1e-12
 
 
-def test_a_store_tells_where_the_stators_stand_and_which_cases_diverged(tmp_path):
+def test_a_store_shows_where_the_stators_stand_and_which_cases_diverged(tmp_path):
     """Dry friction drives the whirl of a ring without bound: a result of its own, which stops nothing."""
     (tmp_path / "study.toml").write_text(
         'rig = "ring.toml"\n[grid]\nspeed_ratio = 1.5\nclearance_ratio = 0.8\nfriction = [0.3, 0.02]\n'

@@ -226,7 +226,9 @@ def poisoned(monkeypatch: pytest.MonkeyPatch, speed: float) -> Callable[[], None
     return lambda: monkeypatch.setattr(worker, "run_case", run_case)
 
 
-def test_a_case_that_fails_breaks_its_chain_and_a_retry_mends_it(finished, tmp_path, monkeypatch, computed):
+def test_a_case_that_fails_breaks_its_chain_and_a_retry_completes_it(
+    finished, tmp_path, monkeypatch, computed
+):
     study = swept(tmp_path)
     speed = float(xr.open_zarr(finished.output).spin_speed[2])
     undo = poisoned(monkeypatch, speed)
@@ -292,7 +294,7 @@ def test_a_sweep_is_part_of_what_a_study_is(finished, tmp_path):
             run(replace(swept(tmp_path, sweep), output=finished.output), quiet=True)
 
 
-def test_the_plan_tells_how_many_ranks_have_work(finished):
+def test_the_plan_shows_how_many_ranks_have_work(finished):
     plan = make_plan(finished)
     assert "12, at most 2 cases each; in 4 sequential sweeps: more ranks than that would idle" in plan.text()
     assert plan.counts[DONE] == 20

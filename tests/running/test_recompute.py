@@ -74,7 +74,7 @@ def test_an_id_that_names_no_case_is_refused(finished, name, message):
         reproduce(finished, name)
 
 
-def test_a_case_that_fails_tells_why(finished, monkeypatch):
+def test_a_case_that_fails_shows_why(finished, monkeypatch):
     def burst(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by\nzero")
 

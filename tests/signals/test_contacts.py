@@ -139,7 +139,7 @@ def test_events_are_found_in_the_signal_alone():
     assert events_in_signal(smooth).sizes["event"] == 0
 
 
-def test_a_jump_in_noise_is_told_by_its_ratio():
+def test_a_jump_in_noise_is_reported_by_its_ratio():
     rng = np.random.default_rng(1)
     noisy = case(
         {"torsion_acceleration": lambda t: pushed(t) + 0.1 * rng.normal(size=t.size)}, [bump(0.25, 0.375, 1)]
@@ -164,7 +164,7 @@ def test_a_decaying_sine_has_its_frequency_and_damping(frequency, ratio, per_cyc
     assert found["residual"] < 1e-8
 
 
-def test_the_strongest_of_two_decaying_sines_is_told():
+def test_the_strongest_of_two_decaying_sines_is_reported():
     t = np.arange(2000) * 2e-5
     weak = 0.3 * np.exp(-3000 * t) * np.cos(2 * math.pi * 4500 * t)
     found = decaying_sine(np.exp(-250 * t) * np.sin(2 * math.pi * 802 * t) + weak, 2e-5)

@@ -81,7 +81,7 @@ def test_a_chirp_has_its_frequency_at_every_instant():
     assert middle(amplitude) == pytest.approx(1.0, rel=0.02)
 
 
-def test_amplitude_and_frequency_modulation_are_told_apart():
+def test_amplitude_and_frequency_modulation_are_distinguished():
     t = np.arange(8192) * DT
     envelope = 1 + 0.3 * np.cos(2 * math.pi * 20 * t)
     swing = 300 + 40 * np.cos(2 * math.pi * 15 * t)
@@ -101,7 +101,7 @@ def test_a_decaying_tone_keeps_its_frequency_whatever_its_phase(phase):
     assert amplitude[late] == pytest.approx(np.exp(-250 * t[late]), rel=0.15)
 
 
-def test_without_zeros_nothing_is_told():
+def test_without_zeros_nothing_is_reported():
     amplitude, frequency = analytic(np.linspace(1, 2, 50), DT)
     assert np.isnan(amplitude).all()
     assert np.isnan(frequency).all()
@@ -270,7 +270,7 @@ def run(store, tmp_path, monkeypatch):
     return invoke
 
 
-def test_the_command_tells_the_frequency_and_writes_what_it_draws(run):
+def test_the_command_shows_the_frequency_and_writes_what_it_draws(run):
     said = run("--data", "hht.nc").splitlines()
     assert said[-2:] == ["study_hht.png", "hht.nc"]
     median = float(said[0].split()[5])

@@ -138,7 +138,7 @@ def test_noise_added_to_lines_is_that_added_in_time():
         assert a.std() == pytest.approx(b.std(), rel=0.2), name
 
 
-def test_benign_harmonics_are_as_strong_as_told():
+def test_benign_harmonics_are_as_strong_as_stated():
     waves = {n: np.array([tone(7, math.sqrt(2)), tone(0, 0.0)]) for n in CHANNELS}
     fast = store(waves, np.array([True, False])).assign(
         spin_speed=2 * math.pi * 64.0
@@ -269,7 +269,7 @@ def test_all_together_beat_equal_ones_alone_and_err_as_rarely():
     assert float(verdict.where(found["rub"]).mean()) == pytest.approx(float(together["detection_rate"]))
 
 
-def test_indicators_that_tell_nothing_have_the_rate_of_false_alarms():
+def test_indicators_that_show_nothing_have_the_rate_of_false_alarms():
     found = judge(made_scores((0.0, 0.0, 0.0, 0.0)), false_alarm=0.2).squeeze("level")
     assert found["detection_rate"].values == pytest.approx(0.2, abs=0.04)
     assert found["area_under_curve"].values == pytest.approx(0.5, abs=0.03)

@@ -291,7 +291,7 @@ def test_another_version_of_the_physics_is_refused_unless_it_is_accepted(tmp_pat
     assert grid_for(study).identity == Store(study.output).manifest.identity
 
 
-def test_origins_tell_where_each_case_was(tmp_path):
+def test_origins_show_where_each_case_was(tmp_path):
     grid = {"speed_ratio": [0.9, 2.0], "clearance_ratio": [0.7], "friction": [0.1, 0.3]}
     before, after = (
         manifest_of(grid_for(make_study(tmp_path, g)))

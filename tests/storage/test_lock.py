@@ -37,7 +37,7 @@ def leave(path: Path, **changes: object) -> None:
     path.write_text(json.dumps(asdict(replace(Holder.myself(), **changes))))
 
 
-def test_a_second_run_is_refused_and_told_by_whom(path):
+def test_a_second_run_is_refused_and_reported_by_whom(path):
     with Lock(path), pytest.raises(StoreError, match=f"process {os.getpid()} on {socket.gethostname()}"):
         Lock(path).__enter__()
     assert not path.exists()
@@ -100,7 +100,7 @@ def test_the_heart_beats(path, monkeypatch):
         assert path.stat().st_mtime > time.time() - 60
 
 
-def test_a_run_whose_lock_was_taken_is_told_and_leaves_the_other_alone(path, monkeypatch):
+def test_a_run_whose_lock_was_taken_is_reported_and_leaves_the_other_alone(path, monkeypatch):
     monkeypatch.setattr(lock_module, "HEARTBEAT", 0.05)
     reported: list[bool] = []
     with Lock(path, lambda: reported.append(True)):

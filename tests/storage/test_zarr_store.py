@@ -337,7 +337,7 @@ def test_one_damaged_manifest_costs_nothing(study, store, at):
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"format": 99}', "rubhpc 99 00000000\n{}"])
-def test_a_manifest_that_is_damaged_twice_is_told_in_a_line(store, text):
+def test_a_manifest_that_is_damaged_twice_is_reported_in_a_line(store, text):
     for name in ("manifest.json", "manifest.copy.json"):
         (store.private / name).write_text(text)
     with pytest.raises(StoreError) as reported:
@@ -407,7 +407,7 @@ def test_a_diverged_case_keeps_its_metrics(store):
     assert packed["steps"].ravel()[:2].tolist() == [1234, -1]
 
 
-def test_a_file_on_the_way_to_a_store_is_told_with_the_mend(tmp_path):
+def test_a_file_on_the_way_to_a_store_is_reported_with_the_fix(tmp_path):
     (tmp_path / "taken").write_text("mine")
     store = tmp_path / "taken" / "study.zarr"
     with pytest.raises(StoreError, match="--output"), disk_errors(store):

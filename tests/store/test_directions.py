@@ -57,7 +57,7 @@ def test_both_directions_may_be_listed_and_others_are_refused(store):
     assert notes == ["direction = up: the first of 2; change with --select direction=VALUE"]
 
 
-def test_a_diagram_tells_the_directions_apart_unless_one_is_chosen(store):
+def test_a_diagram_distinguishes_the_directions_unless_one_is_chosen(store):
     assert default_coloring(store) == "direction"
     one = select(store, {"direction": "up", "clearance_ratio": 0.7})
     assert default_coloring(one) == "regime"

@@ -59,7 +59,7 @@ def test_chosen_cases_and_variables(synthetic_path, run):
         (["--select", "speed_ratio=77"], "speed_ratio"),
     ],
 )
-def test_mistakes_are_told_and_leave_nothing(synthetic_path, run, tmp_path, words, message):
+def test_mistakes_are_reported_and_leave_nothing(synthetic_path, run, tmp_path, words, message):
     with pytest.raises(InputError, match=message):
         run(synthetic_path, *words)
     assert not list(tmp_path.iterdir())

@@ -43,7 +43,7 @@ def test_measures_come_from_the_journals_before_they_are_packed(store: Path) -> 
     assert now.encoding["source"] == str(store)
 
 
-def test_what_only_the_journals_know_is_told(store: Path) -> None:
+def test_what_only_the_journals_know_is_reported(store: Path) -> None:
     reported = open_live(store).attrs
     assert reported["reasons"] == {}
     assert reported["running"] == ""

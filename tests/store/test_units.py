@@ -50,7 +50,7 @@ def test_speeds_are_read_in_revolutions_per_minute():
     assert label == "Spin speed (rpm)"
 
 
-def test_a_caption_tells_what_was_selected():
+def test_a_caption_shows_what_was_selected():
     data = xr.Dataset(
         coords={
             "clearance": ((), 84e-6, {"units": "m"}),

@@ -116,7 +116,7 @@ def test_ids_and_growth_agree_on_which_cases_are_the_same(continuation, after):
             )
 
 
-def test_without_a_chain_an_id_tells_of_the_case_alone():
+def test_without_a_chain_an_id_shows_of_the_case_alone():
     assert CaseIds("s", [(1.0, 2.0)], None)([2.0]) == CaseIds("s", [(2.0,)], None)([2.0])
     assert CaseIds("s", [(1.0, 2.0)], Continuation(axis=0))([2.0]) != CaseIds(
         "s", [(2.0,)], Continuation(axis=0)

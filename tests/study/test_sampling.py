@@ -91,7 +91,7 @@ def test_a_larger_sample_keeps_every_case(tmp_path):
     )
 
 
-def test_another_sample_is_refused_and_told(tmp_path):
+def test_another_sample_is_refused_and_reported(tmp_path):
     def differs(**changes: object) -> str:
         with pytest.raises(StoreError) as refused:
             run_here(read_study(write_sample(tmp_path, "other.toml", **changes)), quiet=True)
@@ -117,7 +117,7 @@ def test_points_that_a_library_draws_otherwise_are_no_growth(tmp_path):
         run_here(replace(study, axes=(moved, *study.axes[1:])), quiet=True)
 
 
-def test_a_store_tells_its_sample(tmp_path):
+def test_a_store_shows_its_sample(tmp_path):
     path = write_sample(tmp_path)
     study = read_study(path)
     plan = make_plan(study).text()

@@ -22,7 +22,7 @@ CASE = {"speed": 300.0, "clearance": 5e-5, "friction": 0.05, "transient": 0, "re
 
 @pytest.mark.parametrize("method", ["modal", "central-difference"])
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: "-".join(map(str, law.values())) or "plain")
-def test_every_law_tells_iterations_and_residual(method, law):
+def test_every_law_shows_iterations_and_residual(method, law):
     step = {"step": "1 us"} if method == "central-difference" or "law" in law or "normal" in law else {}
     record = simulate(trial_rig(3), **CASE, **law, **step, method=method)
     assert record.status == 1

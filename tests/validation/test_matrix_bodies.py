@@ -209,11 +209,11 @@ class RossRotor:
     number_dof, L, bearing_elements = 6, 0.8, ()
 
     def __init__(self, folder):
-        self._told = np.load(folder / "ross_2.3.0_mokhtar2017.npz")
+        self._entries = np.load(folder / "ross_2.3.0_mokhtar2017.npz")
 
     def _matrix(self, name):
         entries = np.zeros((90, 90))
-        entries[tuple(self._told[f"{name}_at"])] = self._told[name]
+        entries[tuple(self._entries[f"{name}_at"])] = self._entries[name]
         return entries
 
     def M(self, frequency):  # noqa: N802

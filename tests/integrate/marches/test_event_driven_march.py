@@ -350,7 +350,7 @@ def test_energy_limit_is_that_of_the_rotor_at_its_displacement_limit():
     assert disc_alone < gained < 1.6 * disc_alone  # and the shaft of 1.96 kg, of which half moves less
 
 
-def test_free_twist_is_refused_with_the_mend():
+def test_free_twist_is_refused_with_the_fix():
     rig = trial_rig(1)
     free = replace(rig, rotor=replace(rig.rotor, torsion=Torsion(free=True)))
     with pytest.raises(InputError, match='method = "central-difference"'):

@@ -62,7 +62,7 @@ def test_periods_beyond_sixteen_are_not_sought():
 
 
 @pytest.mark.parametrize(("amount", "expected"), [(0.004, 1), (0.02, 2)])
-def test_difference_of_a_hundredth_of_the_orbit_tells_two_revolutions_apart(amount, expected):
+def test_difference_of_a_hundredth_of_the_orbit_distinguishes_two_revolutions(amount, expected):
     """Revolutions of a half-order part a differ by 2 a everywhere: 0.008 and 0.04 of the orbit's size."""
     assert period(*orbit(2, amount=amount), SAMPLES) == expected
 

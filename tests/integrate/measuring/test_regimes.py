@@ -139,7 +139,7 @@ def test_growth_that_chance_may_have_made_is_none():
     ("rate", "expected", "n_read"),
     [(0.3, "chaotic", 16), (-0.3, "periodic", 16), (0.0, "quasi_periodic", 64), (0.03, "chaotic", 64)],
 )
-def test_of_a_record_that_tells_no_torus_the_growth_decides(revolutions, rate, expected, n_read):
+def test_of_a_record_that_shows_no_torus_the_growth_decides(revolutions, rate, expected, n_read):
     growth = iter([rate] * 100)
     whirl = torus(GOLDEN)[: revolutions * SAMPLES]
     assert of(whirl, growth) == (expected, pytest.approx(rate))

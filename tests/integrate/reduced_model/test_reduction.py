@@ -199,7 +199,7 @@ def test_stator_without_lateral_freedom_has_no_lateral_row():
 
 @pytest.mark.parametrize("alpha", [0.0, 25.0])
 @pytest.mark.parametrize("accuracy", [1e-3, FULL])
-def test_body_that_nothing_holds_is_refused_with_the_mend(alpha, accuracy):
+def test_body_that_nothing_holds_is_refused_with_the_fix(alpha, accuracy):
     rig = trial_rig(1)
     rotor = replace(rig.rotor, torsion=Torsion(free=True), damping=Damping(alpha=alpha))
     with pytest.raises(InputError, match=r'free to move or to turn; take method = "central-difference"'):
