@@ -2,7 +2,7 @@
 
     python tests/bench/documented.py [NAME ...]
 
-with the names of the functions below, or none for all of them: a minute or two.
+with the names of the functions below, or none for all of them: some minutes.
 """
 
 from __future__ import annotations
@@ -146,8 +146,31 @@ def short_records() -> None:
     print(f"{without} of 416 without a period; alike with 24 revolutions {same[24]}, with 16 {same[16]}")
 
 
+def default_accuracy() -> None:
+    """Distance of the modal scheme from the central difference (guide, performance: accuracy)."""
+    soft = PACKAGED
+    rows = [
+        ("r 0.75, 3 GPa, 84 um", soft, 0.75, {"clearance": "84 um"}),
+        ("r 0.75, 3 GPa, 100 um", soft, 0.75, {"clearance": "100 um"}),
+        ("r 3, 3 GPa, 76 um", soft, 3.0, {"clearance": "76 um"}),
+        ("r 2, 30 GPa, 90 um", STIFF, 2.0, {"clearance": "90 um"}),
+        ("r 1.7, 30 GPa, cg 0.70", STIFF, 1.7, {"clearance_ratio": 0.7}),
+        ("r 5.3, 30 GPa, cg 0.70", STIFF, 5.3, {"clearance_ratio": 0.7}),
+    ]
+    for name, rig, ratio, clearance in rows:
+        case: dict[str, Any] = {"speed_ratio": ratio, "friction": 0.3, "transient": 60, "revolutions": 6}
+        own = simulate(rig, **case, **clearance)
+        other = simulate(rig, **case, **clearance, method="central-difference", step=0.25e-6)
+        off = []
+        for signal in ("vertical", "torsion", "stator_axial", "stator_lateral"):
+            a, b = (np.asarray(getattr(record, signal), float) for record in (own, other))
+            off.append(np.sqrt(np.mean((a - b) ** 2)) / b.std())
+        off.append(abs(own.peak_contact_force[0] / other.peak_contact_force[0] - 1.0))
+        print(f"| {name} (P{own.period}) | {' | '.join(f'{x:.0e}' for x in off)} |")
+
+
 if __name__ == "__main__":
-    known = [closed_form, bounces, peaks, rigid, rounding, short_records]
+    known = [closed_form, bounces, peaks, rigid, rounding, short_records, default_accuracy]
     for function in known:
         if len(sys.argv) == 1 or function.__name__ in sys.argv[1:]:
             function()
