@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 PHYSICS = 15  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
-MODAL = 1  # method = "modal": last digits of multipliers
+MODAL = 2  # method = "modal": modes kept for torsional accelerations, and `modal_error` of these
 DIRECT = 4  # transient = "direct"
 CHANGING_SPEED = 6  # run-ups and drives
 COULOMB = 5  # set-valued friction

@@ -10,7 +10,15 @@ from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.stators import LumpedStator
 
-SIGNALS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral", "contact_force")
+SIGNALS = (
+    "vertical",
+    "horizontal",
+    "torsion",
+    "torsion_acceleration",
+    "stator_axial",
+    "stator_lateral",
+    "contact_force",
+)
 PACKAGED = read_rig("mokhtar2017")
 
 

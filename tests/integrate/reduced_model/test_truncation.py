@@ -95,7 +95,7 @@ def test_packaged_rig_is_as_accurate_as_asked_with_the_modes_below_the_cutoff(mo
         assert number(kept_modes(model, spin, 1e-3)) == number(below(model, spin))
 
 
-@pytest.mark.parametrize("seed", [0, 11, 21, 25, 37])
+@pytest.mark.parametrize("seed", [0, 4, 11, 21, 25, 37])
 def test_random_rigs_are_as_accurate_as_asked(seed):
     """Beams and masses on and off the disc; tests/validation/test_modal_accuracy.py has many more."""
     rig, case = random_rig(seed)
