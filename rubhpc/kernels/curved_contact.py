@@ -36,8 +36,8 @@ PARTS = np.ascontiguousarray(
 )
 # Of `CurvedWork.span`: length of the step that loads are continued from (0: none), largest force of the
 # contact, time that resolves force and slip, set of the pairs that `secant` is of, steps before one may be
-# longer, time since the step that loads are continued from began.
-BEFORE, LARGEST, RESOLVED, PAIRS, PATIENCE, PAST = range(6)
+# longer, time since the step that loads are continued from began, how often the last step moved its loads.
+BEFORE, LARGEST, RESOLVED, PAIRS, PATIENCE, PAST, SWEEPS = range(7)
 MOST_UNKNOWNS = 64  # loads of a step that are found by a secant method; more are found by sweeps
 
 
@@ -77,6 +77,7 @@ class CurvedTables(NamedTuple):
     # What is read of an only pair at those nodes, without columns where there are more pairs.
     lone: Floats  # (p, n_level, 2, m, 4 (3 d + 1)), of real and imaginary parts at the beginning
     reach: Floats  # (p, n_level, 5 (4 + b), 4 (3 d + 1)), of the loads
+    reached: Floats  # (p, n_level, 4 (3 d + 1), 4 (4 + b)), the same the other way round, those to be found
     inverse_re: Floats  # (p, m), s, inverse of each exponent; 0 where that is 0
     inverse_im: Floats
     drain: Floats  # (p, 2, m, r + 2), of real and imaginary parts: what squares to the loss by damping, and
@@ -96,7 +97,7 @@ class CurvedWork(NamedTuple):
     loads: Floats  # the same in one row
     before: Floats  # (5, q, 4 + b), loads of the step that they are continued from
     gap: Floats  # (2, 5, q), of open pairs at the nodes, m, and their rates
-    span: Floats  # (6,), see above
+    span: Floats  # (7,), see above
     motion: Floats  # (3, q, 3 + b), displacements, rates and free accelerations at a node
     free: Floats  # (4 (3 d + 1),), what is read of one pair at the nodes, without the loads to be found
     normal: Floats  # (2, q), along and across
@@ -120,6 +121,14 @@ class CurvedWork(NamedTuple):
     response: Floats  # (5, 2, m), rates of the coordinates under the loads at the nodes
     middle: Floats  # (2, m), coordinates at a node
     shape: Floats  # (2, q, n), Jacobian and directions of an event
+    # Of `curved_newton`, for the only pair at the nodes after the first, three states (h, rate, force) each:
+    part: Floats  # (6, 3 + b), derivatives at a node
+    slope: Floats  # (4, 3, 3 d + 1), of the states in what is read
+    lever: Floats  # (4, 2 + b), loads of a unit of force
+    answer: Floats  # (12, 4 (4 + b)), of the states in the loads
+    system: Floats  # (12, 12)
+    order: Ints  # (12,), its rows as they were exchanged
+    unknown: Floats  # (12,)
 
 
 def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int, n_level: int) -> CurvedWork:
@@ -137,7 +146,7 @@ def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int, n_level: int) -
         loads=load.reshape(-1),
         before=np.zeros((N_NODE, q, n_row + 1)),
         gap=np.zeros((2, N_NODE, q)),
-        span=np.zeros(6),
+        span=np.zeros(7),
         motion=np.zeros((3, q, n_row)),
         free=np.zeros((N_NODE - 1) * (3 * n_row - 2)),
         normal=np.zeros((2, q)),
@@ -161,6 +170,13 @@ def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int, n_level: int) -
         response=np.zeros((N_NODE, 2, m)),
         middle=np.zeros((2, m)),
         shape=np.zeros((2, q, n)),
+        part=np.zeros((6, n_row)),
+        slope=np.zeros((N_NODE - 1, 3, 3 * n_row - 2)),
+        lever=np.zeros((N_NODE - 1, n_row - 1)),
+        answer=np.zeros((3 * (N_NODE - 1), (N_NODE - 1) * (n_row + 1))),
+        system=np.zeros((3 * (N_NODE - 1), 3 * (N_NODE - 1))),
+        order=np.zeros(3 * (N_NODE - 1), dtype=np.int64),
+        unknown=np.zeros(3 * (N_NODE - 1)),
     )
 
 

@@ -73,6 +73,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+GROWTH = 2  # steps are no longer than 2^this times what the contact has lasted
 OBSERVED = 1e-4  # of the tolerance of loads, while recording, so that energies balance
 
 
@@ -175,8 +176,8 @@ def advance_curved(
             if not is_event_free:
                 crossing = open_crossing(tables, curved, pairs, mode, next_re, next_im, work)
         else:
-            # What an event sets off is fast at first: no step is longer than the contact has lasted.
-            age = contact_age(progress)
+            # What an event sets off is fast at first: steps grow with the age of the contact.
+            age = contact_age(progress) + GROWTH
             level = min(longest, age if is_recorded else max(age, FORCED_LEVEL), progress.resolved_level)
             level = min(level, curved.weight_re.shape[1] - 1)
             if is_recorded:
@@ -191,7 +192,7 @@ def advance_curved(
                 level = min(level, floor_log2(due) if due > 0 else groping)
             step = (1 << level) * clock.tick
             progress.n_step += 1
-            is_good, may_grow = take_step(
+            is_good, growth = take_step(
                 pairs, curved, tables, reduced.rim_speed, mode, level, step, tolerance, z, z_next, work
             )
             if not is_good:
@@ -199,8 +200,8 @@ def advance_curved(
                     return CONTACT_UNSOLVED
                 progress.resolved_level = level - 1
                 continue
-            if may_grow and level >= progress.resolved_level and due < 0:
-                progress.resolved_level = level + 1
+            if level >= progress.resolved_level and due < 0:
+                progress.resolved_level = level + growth
             progress.is_after_event = 0
             if not is_event_free:
                 crossing = closed_crossing(closed, work)

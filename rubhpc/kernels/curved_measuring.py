@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     DRIVE_WORK,
@@ -137,7 +137,7 @@ def resolved_part(re: Floats, im: Floats, least: float, pace: Floats, work: Curv
     return float((RESOLVED * max(size, least) / bend) ** 0.25) if bend > 0.0 else np.inf
 
 
-@jit_lean_sum
+@jit_inline_sum
 def observe_power(
     pairs: CurvedPairs,
     tables: ModeTables,
@@ -169,7 +169,7 @@ def observe_power(
     work.power[node, 0], work.power[node, 1] = loss, gain
 
 
-@jit_lean_sum
+@jit_inline_sum
 def observe_energies(
     pairs: CurvedPairs,
     tables: ModeTables,
@@ -206,7 +206,7 @@ def observe_energies(
         transient[0, k], transient[1, k] = p_re[k] * re - p_im[k] * im, p_re[k] * im + p_im[k] * re
 
 
-@jit_lean_sum
+@jit_inline_sum
 def observe_curved_step(
     reduced: Reduced,
     mask: int,
@@ -246,7 +246,7 @@ def observe_curved_step(
         accumulator.energy[DRIVE_WORK] += reduced.friction[i] * reduced.rim_speed[i] * impulse
 
 
-@jit_lean_sum
+@jit_inline_sum
 def take_curved_sample(
     tables: ModeTables,
     curved: CurvedTables,

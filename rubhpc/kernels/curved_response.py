@@ -29,7 +29,7 @@ def lone_pair(mask: int, q: int) -> int:
     return 0 if q == 1 and mask == 1 else -1
 
 
-@jit_lean_sum
+@jit_inline_sum
 def read_free(
     tables: CurvedTables, mode: int, level: int, z_re: Floats, z_im: Floats, work: CurvedWork
 ) -> None:
@@ -42,7 +42,7 @@ def read_free(
     add_rows(tables.reach[mode, level, :n_load], work.loads[:n_load], free)
 
 
-@jit_lean_sum
+@jit_inline_sum
 def read_loaded(tables: CurvedTables, mode: int, level: int, work: CurvedWork) -> None:
     """Read the only pair at the nodes of a step of 2^level ticks under the loads at its nodes."""
     n_load, whole = work.load.shape[2], work.whole
@@ -61,7 +61,7 @@ def take_motion(d: int, node: int, work: CurvedWork) -> None:
         motion[1, 0, j] = whole[first + d + j]
 
 
-@jit_lean_sum
+@jit_inline_sum
 def respond(tables: CurvedTables, mode: int, mask: int, n_node: int, work: CurvedWork) -> None:
     """Rates of the coordinates under the loads at the first `n_node` nodes, into `work.response`."""
     for node in range(n_node):
@@ -75,30 +75,27 @@ def respond(tables: CurvedTables, mode: int, mask: int, n_node: int, work: Curve
 
 
 @jit_lean_sum
-def add_responses(
-    tables: CurvedTables, mode: int, level: int, node: int, response: Floats, re: Floats, im: Floats
-) -> None:
-    """Add the responses at a node of a step of 2^level ticks to the loads at all nodes."""
+def add_responses(weight_re: Floats, weight_im: Floats, response: Floats, re: Floats, im: Floats) -> None:
+    """Add the responses at a node to the loads at all nodes, with their weights there (5, m)."""
     for a in range(N_NODE):
-        w_re = tables.weight_re[mode, level, node - 1, a]
-        w_im = tables.weight_im[mode, level, node - 1, a]
-        r_re, r_im = response[a, 0], response[a, 1]
+        w_re, w_im, r_re, r_im = weight_re[a], weight_im[a], response[a, 0], response[a, 1]
         for k in range(re.size):
             re[k] += w_re[k] * r_re[k] - w_im[k] * r_im[k]
             im[k] += w_re[k] * r_im[k] + w_im[k] * r_re[k]
 
 
-@jit_lean_sum
+@jit_inline_sum
 def move_coordinates(
     tables: CurvedTables, mode: int, level: int, node: int, z: Floats, work: CurvedWork, target: Floats
 ) -> None:
     """Coordinates (2, m) at a node of a step of 2^level ticks from `z`, under the responses of `work`."""
     p_re, p_im = tables.node_re[mode, level, node - 1], tables.node_im[mode, level, node - 1]
     propagate(p_re, p_im, z[0], z[1], target[0], target[1])
-    add_responses(tables, mode, level, node, work.response, target[0], target[1])
+    w_re, w_im = tables.weight_re[mode, level, node - 1], tables.weight_im[mode, level, node - 1]
+    add_responses(w_re, w_im, work.response, target[0], target[1])
 
 
-@jit_lean_sum
+@jit_inline_sum
 def predict_loads(mask: int, step: float, work: CurvedWork) -> None:
     """Loads at the nodes of a step (s) after the first: those of a step before, gone on as they went."""
     q, n_load, ahead = work.load.shape[1], work.load.shape[2], work.ahead

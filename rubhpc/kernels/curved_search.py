@@ -26,7 +26,7 @@ N_BISECTION = 24  # passes that narrow one down to less than a tick of the longe
 N_NEWTON = 4  # passes to a root beyond the step's end
 
 
-@jit_lean_sum
+@jit_inline_sum
 def curved_free_interval(
     tables: ModeTables,
     curved: CurvedTables,
@@ -91,7 +91,7 @@ def open_crossing(
     return crossing
 
 
-@jit_lean_sum
+@jit_inline_sum
 def closed_crossing(closed: int, work: CurvedWork) -> int:
     """Set of the pairs whose force or, of those open, gap is negative at or between the nodes of a step."""
     crossing = int(np.int64(0))
@@ -110,7 +110,7 @@ def closed_crossing(closed: int, work: CurvedWork) -> int:
     return crossing
 
 
-@jit_lean_sum
+@jit_inline_sum
 def first_crossing(closed: int, crossing: int, work: CurvedWork) -> float:
     """Share of a step at which the first of the pairs `crossing` does so, by the polynomials of the step."""
     first = 1.0
@@ -121,7 +121,7 @@ def first_crossing(closed: int, crossing: int, work: CurvedWork) -> float:
     return first
 
 
-@jit_lean_sum
+@jit_inline_sum
 def next_crossing(closed: int, work: CurvedWork) -> float:
     """How far beyond the end of a step, over its length, the first force vanishes; infinite if none falls."""
     nearest = np.inf

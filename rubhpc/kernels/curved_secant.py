@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.curved_contact import (
     HEIGHT,
     HEIGHT_RATE,
@@ -33,7 +33,7 @@ LOADS, IMAGE, GUESS, MISSED, MOVE, SAID, FORCES = range(7)
 LEAST_SHARE = 0.1  # of a move's square; below it, what was learnt of the move is noise
 
 
-@jit_lean_sum
+@jit_inline_sum
 def take_loads(mask: int, work: CurvedWork, target: Floats) -> int:
     """Fill `target` with the loads of the closed pairs at the nodes after the first; returns their number."""
     n = 0
@@ -46,7 +46,7 @@ def take_loads(mask: int, work: CurvedWork, target: Floats) -> int:
     return n
 
 
-@jit_lean_sum
+@jit_inline_sum
 def give_loads(mask: int, work: CurvedWork) -> None:
     """Set the loads of the closed pairs to `LOADS`."""
     n = 0
@@ -58,7 +58,7 @@ def give_loads(mask: int, work: CurvedWork) -> None:
                     n += 1
 
 
-@jit_lean_sum
+@jit_inline_sum
 def weigh_loads(pairs: CurvedPairs, mask: int, step: float, work: CurvedWork) -> None:
     """Fill `FORCES` for a step (s)."""
     forces, n_load, n = work.point[FORCES], work.load.shape[2], 0
@@ -85,7 +85,7 @@ def size_of(change: Floats, n: int, n_load: int, forces: Floats) -> float:
     return largest
 
 
-@jit_lean_sum
+@jit_inline_sum
 def take_secant(mask: int, level: int, n: int, work: CurvedWork) -> None:
     """See that there is an H for steps of 2^level ticks: that of a length next to it, or the unit matrix."""
     secant, is_learnt = work.secant, work.is_learnt
@@ -107,14 +107,14 @@ def take_secant(mask: int, level: int, n: int, work: CurvedWork) -> None:
     is_learnt[level] = True
 
 
-@jit_lean_sum
+@jit_inline_sum
 def forget(level: int, work: CurvedWork) -> None:
     """Forget the H of steps of 2^level ticks, and of longer ones."""
     for one in range(level, work.is_learnt.size):
         work.is_learnt[one] = False
 
 
-@jit_lean_sum
+@jit_inline_sum
 def move_loads(level: int, n: int, work: CurvedWork) -> None:
     """Move the loads by H times what they are missed by."""
     point, secant = work.point, work.secant[level]
@@ -130,7 +130,7 @@ def move_loads(level: int, n: int, work: CurvedWork) -> None:
         point[LOADS, j] += point[MOVE, j]
 
 
-@jit_lean_sum
+@jit_inline_sum
 def learn(level: int, n: int, work: CurvedWork) -> None:
     """Have H say that the last move was due to the change of what the loads are missed by, `SAID` before it.
 

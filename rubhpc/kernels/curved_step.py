@@ -7,19 +7,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum
 from rubhpc.kernels.curved_contact import (
     BEFORE,
     LARGEST,
     N_NODE,
     PAST,
     PATIENCE,
+    SWEEPS,
     CurvedPairs,
     CurvedTables,
     CurvedWork,
     is_closed,
 )
 from rubhpc.kernels.curved_forces import evaluate, find_lone_forces
+from rubhpc.kernels.curved_newton import fill_slopes, find_system, move_by_newton
 from rubhpc.kernels.curved_response import (
     lone_pair,
     move_coordinates,
@@ -57,7 +59,7 @@ MOST_SWEEPS = 12  # over the nodes
 # went on: |t (t - 1/2) (t - 1) (t^2 - t + 1/7)| is at most 0.0029 within a step, 6.4 a step further.
 INTERPOLATED = 5e-4
 SETTLED = 0.1  # share of the loads' tolerance to which the iteration goes
-EASY = 0.02  # share of the tolerance below which the next step may be twice as long
+EASY, VERY_EASY = 0.02, 5e-4  # shares of the tolerance below which steps may be twice, four times as long
 HOPELESS = 6  # sweeps after which loads are to be missed by less than `FALLEN` of what they first were
 FALLEN = 0.1
 PATIENT = 16  # steps, after one whose loads were not found, before a longer one is tried
@@ -65,7 +67,7 @@ QUICK = 5  # sweeps that a step took which may do for one twice as long
 LEAST_TRAVEL = 0.01  # of the clearance: errors are relative to a force that moves the tip so far, or more
 
 
-@jit_lean_sum
+@jit_inline_sum
 def take_step(
     pairs: CurvedPairs,
     curved: CurvedTables,
@@ -78,7 +80,7 @@ def take_step(
     z: Floats,
     z_next: Floats,
     work: CurvedWork,
-) -> tuple[bool, bool]:
+) -> tuple[bool, int]:
     """Take a step of 2^level ticks (s) from coordinates `z` to `z_next`, by collocation.
 
     `work` holds forces and loads at the beginning, and is left with those at the other nodes.
@@ -92,8 +94,8 @@ def take_step(
     -------
     bool
         Whether the loads are found, and a polynomial follows them; a step of one tick has no error.
-    bool
-        Whether the next step may be twice as long.
+    int
+        Binary logarithm of how many times as long the next step may be.
     """
     mask = int(tables.mask[mode])
     scale = work.span[LARGEST]
@@ -110,16 +112,19 @@ def take_step(
     n = take_loads(mask, work, point[LOADS])
     for j in range(n):
         point[GUESS, j] = point[LOADS, j]
-    take_secant(mask, level, n, work)
+    if not is_lone:
+        take_secant(mask, level, n, work)
+    is_newton, takes_slopes = False, False
     moved, first, sweep = np.inf, np.inf, 0
     while True:
         if is_lone:
-            is_found = sweep_alone(pairs, curved, rim_speed, mode, level, work)
+            takes_slopes = (sweep > 0 and not is_newton) or (sweep == 0 and work.span[SWEEPS] > 0.0)
+            is_found = sweep_alone(pairs, curved, rim_speed, mode, level, takes_slopes, work)
         else:
             is_found = sweep_all(pairs, curved, rim_speed, mode, mask, level, z, work)
         if not is_found:
             lose_patience(level, work)
-            return False, False
+            return False, 0
         take_loads(mask, work, point[IMAGE])
         for j in range(n):
             point[MISSED, j] = point[IMAGE, j] - point[LOADS, j]
@@ -129,33 +134,45 @@ def take_step(
         first = moved if sweep == 0 else first
         if sweep >= HOPELESS and not moved <= FALLEN * first:
             break
-        if sweep > 0:
-            learn(level, n, work)
-        for j in range(n):
-            point[SAID, j] = point[MISSED, j]
-        move_loads(level, n, work)
+        if is_lone:
+            if takes_slopes:
+                is_newton = find_system(curved, mode, level, work)
+            if is_newton:
+                move_by_newton(work)
+            else:
+                for j in range(n):
+                    point[MOVE, j] = point[MISSED, j]
+                    point[LOADS, j] = point[IMAGE, j]
+        else:
+            if sweep > 0:
+                learn(level, n, work)
+            for j in range(n):
+                point[SAID, j] = point[MISSED, j]
+            move_loads(level, n, work)
         if sweep == 0 and level > 0:
             missed = INTERPOLATED * size_of(point[MOVE], n, n_load, point[FORCES])
             if missed > 4.0 * allowed:
-                return False, False
+                return False, 0
         give_loads(mask, work)
         sweep += 1
     take_loads(mask, work, point[LOADS])
     for j in range(n):
         point[MOVE, j] = point[LOADS, j] - point[GUESS, j]
     missed = INTERPOLATED * size_of(point[MOVE], n, n_load, point[FORCES])
-    is_settled = moved <= SETTLED * allowed
+    is_settled, work.span[SWEEPS] = moved <= SETTLED * allowed, 1.0 * sweep
     if is_settled:
         work.span[PATIENCE] = max(work.span[PATIENCE] - 1.0, 0.0)
     else:
         lose_patience(level, work)
     respond(curved, mode, mask, N_NODE, work)
     move_coordinates(curved, mode, level, N_NODE - 1, z, work, z_next)
-    is_easy = missed <= EASY * allowed and sweep <= QUICK and work.span[PATIENCE] == 0.0
-    return level == 0 or (is_settled and missed <= allowed), is_easy
+    growth = 0
+    if missed <= EASY * allowed and sweep <= QUICK and work.span[PATIENCE] == 0.0:
+        growth = 2 if missed <= VERY_EASY * allowed else 1
+    return level == 0 or (is_settled and missed <= allowed), growth
 
 
-@jit_lean_sum
+@jit_inline_sum
 def lose_patience(level: int, work: CurvedWork) -> None:
     """Take no longer steps for a while, since loads were not found: they are learnt anew for this length.
 
@@ -165,20 +182,31 @@ def lose_patience(level: int, work: CurvedWork) -> None:
     work.span[PATIENCE] = 1.0 * PATIENT
 
 
-@jit_lean_sum
+@jit_inline_sum
 def sweep_alone(
-    pairs: CurvedPairs, curved: CurvedTables, rim_speed: Floats, mode: int, level: int, work: CurvedWork
+    pairs: CurvedPairs,
+    curved: CurvedTables,
+    rim_speed: Floats,
+    mode: int,
+    level: int,
+    takes_slopes: bool,
+    work: CurvedWork,
 ) -> bool:
-    """Loads of the only pair at the nodes under those found so far; False without forces."""
+    """Loads of the only pair at the nodes under those found so far, and slopes if asked for.
+
+    False without forces.
+    """
     read_loaded(curved, mode, level, work)
     is_found = True
     for node in range(1, N_NODE):
         take_motion(curved.bound.shape[2], node, work)
         is_found = is_found and find_lone_forces(pairs, curved, rim_speed, mode, node, work)
+        if takes_slopes:
+            fill_slopes(pairs, curved, mode, node, work)
     return is_found
 
 
-@jit_lean_sum
+@jit_inline_sum
 def sweep_all(
     pairs: CurvedPairs,
     curved: CurvedTables,
@@ -198,7 +226,7 @@ def sweep_all(
     return True
 
 
-@jit_lean_sum
+@jit_inline_sum
 def go_on(mask: int, step: float, work: CurvedWork) -> None:
     """Make the end of a step (s) the beginning of the next."""
     follow_loads(mask, step, step, work)
@@ -213,7 +241,7 @@ def go_on(mask: int, step: float, work: CurvedWork) -> None:
         work.gap[0, 0, i], work.gap[1, 0, i] = work.gap[0, -1, i], work.gap[1, -1, i]
 
 
-@jit_lean_sum
+@jit_inline_sum
 def follow_loads(mask: int, step: float, past: float, work: CurvedWork) -> None:
     """Continue the next loads from those of a step (s) that began a time `past` (s) before them."""
     for i in range(work.load.shape[1]):

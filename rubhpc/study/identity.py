@@ -28,7 +28,7 @@ DIRECT = 4  # transient = "direct"
 CHANGING_SPEED = 6  # run-ups and drives
 COULOMB = 5  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
-CURVED = 4  # method = "modal" with gaps that are curved
+CURVED = 5  # method = "modal" with gaps that are curved
 MANY_STATORS = 2  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 3  # [branch]: how near to grazing a motion is under Coulomb's law
 MANY_EVENTS = 1  # method = "modal" where a case may have 200 000 events, or has impacts in short steps

@@ -34,6 +34,7 @@ UNBENT = 1e-8  # bending displacement over the largest of a stator, below which 
 LONGEST_STEP = 1e-3  # s, of closed contacts
 SERIES, N_TERM = 3.0, 26  # |x| below which the phi functions are series, which cancel less there; their terms
 _SERIES = [1.0 / math.factorial(N_NODE + j) for j in range(N_TERM)]  # of the last phi function
+SKEWED = 1e-14  # skew part of the stiffness over its largest entry, below which it is rounding
 UNDAMPED = 1e-14  # eigenvalue of the damping over the largest, below which it is none
 
 
@@ -49,7 +50,7 @@ def curved_pairs(
         row=row,
         gram=(flat @ flat.T).reshape(*row.shape[:2], *row.shape[:2]),
         output=_outputs(reduced),
-        skew=skew if np.any(skew) else skew[:0],
+        skew=skew if np.abs(skew).max() > SKEWED * np.abs(reduced.stiffness).max() else skew[:0],
         radius=np.array([stator.radius for stator in model.stators]),
         clearance=clearance,
         aside=sag_at_stators(model)[1],
@@ -238,6 +239,7 @@ def tuned_tables(
         node_im=node.imag,
         lone=lone,
         reach=reach,
+        reached=reach[:, d + 2 :].swapaxes(1, 2),
         inverse_re=inverse.real,
         inverse_im=inverse.imag,
         drain=np.stack([drain.real.T, -drain.imag.T]),
