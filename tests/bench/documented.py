@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.signals import contacts
+from postproc.signals.hilbert_huang import hilbert_huang, median_frequency
 from rubhpc import LumpedStator, read_rig, simulate
 from rubhpc.rig.reading import with_keys
 
@@ -169,8 +171,35 @@ def default_accuracy() -> None:
         print(f"| {name} (P{own.period}) | {' | '.join(f'{x:.0e}' for x in off)} |")
 
 
+def signals() -> None:
+    """Contacts, jumps, decays and frequencies of signals (guide, signal analysis)."""
+    for ratio, modulus, micron in ((0.75, 3, 100), (0.75, 3, 84), (0.75, 30, 84), (2, 30, 70), (3, 3, 76)):
+        case = simulate(
+            with_keys(PACKAGED, {"stator.youngs_modulus": modulus * 1e9}),
+            speed_ratio=ratio, clearance=micron * 1e-6, friction=0.3, transient=240, revolutions=64,
+            samples_per_revolution=2048, keep=("waveform",),
+        ).to_dataset()  # fmt: skip
+        spans = contacts.contact_spans(case).to_dataframe()
+        lasting = ", ".join(f"{1e3 * x:.2f}" for x in spans["duration"][:2])
+        apart = ", ".join(f"{1e3 * x:.1f}" for x in np.diff(spans["start"][:3]))
+        jumps = contacts.event_jumps(case)
+        found = contacts.events_in_signal(case).sizes["event"]
+        print(f"r {ratio}, {modulus} GPa, {micron} um: contacts of {lasting} ms, begun {apart} ms apart")
+        print(f"  {jumps.sizes['event']} touches and releases, {found} found without the force")
+        for kind in ("touch", "release"):
+            jump = jumps["ratio"].values[jumps["kind"].values == kind]
+            print(f"  departure at {kind}: {jump.min():.0f} to {jump.max():.0f}")
+        for signal in ("stator_lateral", "torsion"):
+            decay = contacts.free_decay(case, signal).median("span")
+            first = float(median_frequency(hilbert_huang(case, signal)))
+            print(
+                f"  {signal}: decays at {float(decay['frequency']):.6g} Hz, "
+                f"{100 * float(decay['damping_ratio']):.4g} %; first mode at {first:.2f} Hz"
+            )
+
+
 if __name__ == "__main__":
-    known = [closed_form, bounces, peaks, rigid, rounding, short_records, default_accuracy]
+    known = [closed_form, bounces, peaks, rigid, rounding, short_records, default_accuracy, signals]
     for function in known:
         if len(sys.argv) == 1 or function.__name__ in sys.argv[1:]:
             function()
