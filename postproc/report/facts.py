@@ -14,6 +14,7 @@ from postproc.report.grid import plain
 from postproc.report.settings import setting_rows
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.units import short_name
+from rubhpc.integrate.record import MOST_RESIDUAL
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS, VARIABLES
 from rubhpc.units import Scale, scale_for
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from postproc.report.grid import Measures
 
 _MOST_FAILURES = 200  # listed, of each kind
-_NOTABLE_RESIDUAL = 0.01  # of the energy that goes through a case
 _LIMITS = {
     "minimum_slip_speed": "below 0: the rim slips backwards, which contradicts steady sliding",
     "force_over_euler_load": "above 1: the stator would buckle",
@@ -103,7 +103,7 @@ def validity_rows(
         limit = _LIMITS.get(name, f"{text} out of range") if name in watched else _FOLLOWED[name]
         rows.append(_row(measures, axes, name, bad, worst, n_done, limit))
     if "energy_residual" in measures.names:
-        bad = measures.values("energy_residual") > _NOTABLE_RESIDUAL
+        bad = measures.values("energy_residual") > MOST_RESIDUAL
         limit = "no limit of the model; above 1 %, check the step and the sampling"
         rows.append(_row(measures, axes, "energy_residual", bad, np.nanargmax, n_done, limit))
     return rows

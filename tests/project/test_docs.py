@@ -173,3 +173,11 @@ def test_figure_of_the_readme_is_small() -> None:
 def test_first_study_shows_the_quick_start() -> None:
     (shown,) = code((ROOT / "docs" / "guide" / "first_study.md").read_text(), "toml")
     assert tomllib.loads(shown) == tomllib.loads((ROOT / "jobs" / "quickstart.toml").read_text())
+
+
+def test_equations_have_their_own_numbers_and_names_without_backslashes() -> None:
+    theory = "".join(path.read_text() for path in sorted((ROOT / "docs" / "theory").glob("*.md")))
+    tags = re.findall(r"\\tag\{(\w+)\}", theory)
+    assert len(tags) > 50
+    assert len(tags) == len(set(tags))
+    assert not re.findall(r"\\texttt\{[^}]*\\_", theory)  # MathJax shows the backslash
