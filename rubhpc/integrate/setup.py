@@ -17,7 +17,13 @@ from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.central_difference_setup import CentralDifferenceSetup, prepare_steps
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.packing import law_of
-from rubhpc.integrate.reduced_model.contact_mode import ContactMode, confine, solve_contact_mode, solve_parts
+from rubhpc.integrate.reduced_model.contact_mode import (
+    ContactMode,
+    KeptParts,
+    confine,
+    solve_contact_mode,
+    solve_parts,
+)
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_library import (
@@ -182,9 +188,10 @@ class ModalSetup:
 
     @cached_property
     def _known(self) -> Solved:
-        """The parts of the system with every pair open."""
+        """The parts of the system with every pair open; those of several stators' contact modes join them."""
         n = self.reduced.stiffness.shape[0]
-        return solve_parts(confine(self.reduced, np.zeros((0, n)), np.zeros((n, 0)))[2])
+        opened = solve_parts(confine(self.reduced, np.zeros((0, n)), np.zeros((n, 0)))[2])
+        return KeptParts(opened) if len(self.model.stators) > 1 else opened
 
     @property
     def _known_of_ring(self) -> Solved:

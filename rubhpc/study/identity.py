@@ -29,7 +29,7 @@ CHANGING_SPEED = 6  # run-ups and drives
 COULOMB = 5  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 5  # method = "modal" with gaps that are curved
-MANY_STATORS = 2  # more than five, whose sets of closed contacts or states may be more than 256
+MANY_STATORS = 3  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 3  # [branch]: how near to grazing a motion is under Coulomb's law
 MANY_EVENTS = 1  # method = "modal" where a case may have 200 000 events, or has impacts in short steps
 ALONG_SPEED = 1  # branches along a speed

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 FORESEEN, MOST_FORESEEN = 8, 4  # pieces for which a set of contacts is found again at their beginning; sets
-MOST_REFILLS = 8  # of tables that one case may meet; where it meets more, short steps cost less
+MOST_REFILLS = 4  # of tables that one case may meet; where it meets more, short steps cost less
 
 
 class NoClosedForm(Exception):  # noqa: N818 - a state of the motion, never seen by users
@@ -83,7 +83,8 @@ class EventDrivenMarch(ModalMarch):
 
     def _enter_first(self, contact_force: Floats) -> None:
         """Enter the contact mode with which the case begins; forces (q,), N."""
-        self._library = self._find_library(self._setup, self._coefficient)
+        self._measured = self._find_library(self._setup, self._coefficient)
+        self._library = self._measured.followed
         self._met = set(self._library.first_masks)  # sets of closed contacts
         if self.is_foreseeing:
             for foreseen in list(self._asked)[-MOST_FORESEEN:]:
@@ -265,11 +266,11 @@ class EventDrivenMarch(ModalMarch):
         other cases have left in the library.
         """
         self._met.add(mask)
-        if len(self._met) > MOST_REFILLS * self._library.n_most:
+        if len(self._met) > MOST_REFILLS * self._measured.followed.n_most:
             raise NoClosedForm
         if mask not in self._library.masks:
             if self._library.is_full:
-                self._library.forget()
+                self._library.make_room()
             if not self._library.add(mask):
                 raise NoClosedForm
         tables = self._library.tables()
@@ -287,7 +288,17 @@ class EventDrivenMarch(ModalMarch):
         self._asked[mask] = self._n_piece  # the last one asked for comes last
         self.find(mask)
 
+    def _take_library(self, library: ModeLibrary) -> None:
+        """Go on with the tables of another library, in the same coordinates."""
+        if library is not self._library:
+            mask, z = int(self.tables.mask[self._bare_progress["mode"]]), self._z
+            self._library = library
+            self.find(mask)
+            self._z[:] = z
+            self._bare_progress["mode"] = library.masks.index(mask)
+
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        self._take_library(self._measured if is_recorded else self._measured.followed)
         while (outcome := self._advance(last_tick, samples, accumulator, is_recorded)) == MODE_WANTED:
             self.find_wanted()
         return outcome

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from hashlib import blake2b
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,14 +23,33 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
-    Solved = dict[bytes, tuple[Complexes, Complexes, Complexes]]  # parts, by the bytes of their matrices
+    Solved = dict[bytes, tuple[Complexes, Complexes, Complexes]]  # parts, by their names (`_name_of`)
 
 WORST_CONDITION = 1e11  # of the eigenvectors; beyond it their sum loses its digits, and they are set apart
 SMALL = 64  # states of a part that is kept
+MOST_BYTES = 2**28  # of parts that are kept
 
 
 class KeptParts(dict[bytes, "tuple[Complexes, Complexes, Complexes]"]):
-    """Parts as they are known to `modes_of`, to which it adds those that it solves."""
+    """Parts as they are known to `modes_of`, to which it adds those that it solves; the oldest make room."""
+
+    def __init__(self, parts: Solved | None = None) -> None:
+        super().__init__()
+        self.n_byte = 0
+        for part, solved in (parts or {}).items():
+            self.keep(part, solved)
+
+    def keep(self, part: bytes, solved: tuple[Complexes, Complexes, Complexes]) -> None:
+        """Add a part that is new."""
+        self[part] = solved
+        self.n_byte += _size(part, solved)
+        while self.n_byte > MOST_BYTES and len(self) > 1:
+            oldest = next(iter(self))
+            self.n_byte -= _size(oldest, self.pop(oldest))
+
+
+def _size(part: bytes, solved: tuple[Complexes, Complexes, Complexes]) -> int:
+    return len(part) + sum(values.nbytes for values in solved)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -207,10 +227,13 @@ def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Co
     inverses: list[Complexes] = [np.zeros((0, n_state), dtype=np.complex128)]
     for rows in _parts(system):
         part = system[np.ix_(rows, rows)]
-        solved = known.get(part.tobytes()) if known else None
-        exponent, shape, inverse = solved = solved or solve_part(part)
-        if isinstance(known, KeptParts):
-            known[part.tobytes()] = solved
+        name = _name_of(part) if known else b""
+        solved = known.get(name) if known else None
+        if solved is None:
+            solved = solve_part(part)
+            if isinstance(known, KeptParts):
+                known.keep(name or _name_of(part), solved)
+        exponent, shape, inverse = solved
         wide, tall = np.zeros((2, n_state, exponent.size), dtype=np.complex128)
         wide[rows], tall[rows] = shape, inverse.T
         exponents.append(exponent)
@@ -265,9 +288,15 @@ def _inverse(shape: Complexes, worst: float) -> Complexes | None:
 
 
 def solve_parts(system: Floats) -> Solved:
-    """All parts of a system, solved: what `modes_of` looks up, by the bytes of their matrices."""
+    """All parts of a system, solved: what `modes_of` looks up."""
     parts = (system[np.ix_(rows, rows)] for rows in _parts(system))
-    return {key: solve_part(part) for key, part in {part.tobytes(): part for part in parts}.items()}
+    return {name: solve_part(part) for name, part in {_name_of(part): part for part in parts}.items()}
+
+
+def _name_of(part: Floats) -> bytes:
+    """What a part is known by: its bytes, or of a large one a digest of them."""
+    values = part.tobytes()
+    return values if len(part) <= SMALL else blake2b(values, digest_size=32).digest()
 
 
 def _parts(system: Floats) -> list[NDArray[np.int64]]:

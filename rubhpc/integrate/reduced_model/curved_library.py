@@ -27,6 +27,11 @@ class CurvedLibrary(ModeLibrary):
         return super().n_most if self._curved is None else min(super().n_most, self._curved.n_most)
 
     @property
+    def followed(self) -> ModeLibrary:
+        """Itself: curved gaps are the same whether they are recorded or not."""
+        return self
+
+    @property
     def n_byte(self) -> int:
         """Memory that its tables hold."""
         return super().n_byte + (0 if self._curved is None else self._curved.n_byte)
@@ -36,6 +41,10 @@ class CurvedLibrary(ModeLibrary):
         if self._curved is not None:
             self._curved.clear()
         super().forget()
+
+    def make_room(self) -> None:
+        """Forget all: of curved gaps there is more than one table a mode."""
+        self.forget()
 
     def curved_tables(self) -> CurvedTables:
         """What curved gaps need of all contact modes."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
 from rubhpc.integrate.reduced_model.contact_mode import ContactMode, count_coordinates, solve_contact_mode
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, solve_friction_mode
-from rubhpc.integrate.reduced_model.mode_tables import MOST_MODES, TableStack, tabulate
+from rubhpc.integrate.reduced_model.mode_tables import MOST_BYTES, MOST_MODES, TableStack, tabulate
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.kernels.friction_coordinates import LANES
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 # Coordinates that a set of several contacts may have beyond any single one. The width is settled before the
 # first case: that of the tables decides in which order sums are taken, and so the last bits of every case.
 SPARE = 8
+VACANT = -3  # in place of a set of closed contacts: one that has been given up
 MOST_FRICTION_MODES = 1024  # sets of states of one speed and friction: up to four for each of closed pairs
 
 
@@ -82,12 +84,30 @@ class ModeLibrary:
         self.first_masks = [0] if q > 1 else [0, self._closed]
         modes = [self._solved(mask) for mask in self.first_masks]
         self.width = self._width([mode.exponent.size for mode in modes])
-        self._tables = TableStack(1 + q, self._most_modes)
+        self._tables = TableStack(1 + q, self._most_modes, MOST_BYTES)
         self.masks = [mode.mask for mode in modes]
         self._exponents: dict[int, tuple[Floats, Floats]] = {}
         self.derived: dict[int, Any] = {}  # what others make of the modes, by mask
+        self._chance = np.random.default_rng(0)
         for mode in modes:
             self._tabulate(mode)
+
+    @property
+    def followed(self) -> ModeLibrary:
+        """Contact modes with which a motion is followed where nothing is recorded.
+
+        Of large ones memory holds few: without outputs and energies it holds two to three times as many.
+        """
+        if not (self._is_measured and self._tables.is_short_of_memory):
+            return self
+        if self._followed is None:
+            self._followed = made = copy(self)
+            made._is_measured = False
+            made._tables = TableStack(1 + len(self.gap_jacobian), self._most_modes, MOST_BYTES)
+            made.masks, made._exponents, made.derived, made._chance = [], {}, {}, np.random.default_rng(0)
+            for mask in self.first_masks:
+                made.add(mask)
+        return self._followed
 
     @property
     def n_most(self) -> int:
@@ -97,7 +117,7 @@ class ModeLibrary:
     @property
     def n_byte(self) -> int:
         """Memory that its tables hold."""
-        return self._tables.n_byte
+        return self._tables.n_byte + (self._followed.n_byte if self._followed else 0)
 
     @property
     def is_full(self) -> bool:
@@ -109,9 +129,30 @@ class ModeLibrary:
         mode = self._solved(mask)
         if mode.exponent.size > self.width:
             return False
-        self.masks.append(mask)
+        if VACANT in self.masks:
+            self.masks[self.masks.index(VACANT)] = mask
+        else:
+            self.masks.append(mask)
         self._tabulate(mode)
         return True
+
+    def make_room(self) -> None:
+        """Give up any contact mode but those to begin with.
+
+        By chance: a rotor that runs round in a ring comes back to that which has been kept longest. A library
+        that does not hold its modes one by one forgets them all.
+        """
+        if self._chance is None:
+            self.forget()
+            return
+        if VACANT in self.masks:
+            return
+        n_first = len(self.first_masks)
+        place = int(self._chance.integers(n_first, len(self.masks)))
+        self._exponents.pop(self.masks[place])
+        self.derived.pop(self.masks[place], None)
+        self.masks[place] = VACANT
+        self._tables.vacate(place)
 
     def forget(self) -> None:
         """Make room: keep no mode but that with every pair open."""
@@ -134,6 +175,8 @@ class ModeLibrary:
         """Of the coordinates of a mode, 1/s: (2, m), real and imaginary, and the drift (m,) of those of 0."""
         return self._exponents[mask]
 
+    _followed: ModeLibrary | None = None
+    _chance: np.random.Generator | None = None
     _most_modes = MOST_MODES
     _closed = 1  # set of one pair that is closed
     _is_measured = True

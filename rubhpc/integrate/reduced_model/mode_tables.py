@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 MOST_MODES = 1024  # sets of closed contacts of one speed and friction
 FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
+WIDENING = 8  # times the room when it is full: what is there has to be copied
 MOST_BYTES = 2**30  # of their tables
 GONE = -40.0  # exponent of what has died away
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
@@ -32,33 +33,46 @@ class TableStack:
     ----------
     n_most : int
         ModeTables that there is room for: those of every pair closed by itself, and of as many more sets as
-        `n_most` and `MOST_BYTES` allow.
+        `n_most` and `most_bytes` allow.
     """
 
-    def __init__(self, n_least: int, n_most: int = MOST_MODES) -> None:
-        self.n_most = max(n_least, n_most)
-        self._n_least, self._n_filled = n_least, 0
+    def __init__(self, n_least: int, n_most: int = MOST_MODES, most_bytes: int = MOST_BYTES) -> None:
+        self._most_bytes = most_bytes
+        self._n_asked = self.n_most = max(n_least, n_most)
+        self._n_least, self._n_filled, self._n_written = n_least, 0, 0
+        self._vacant: int | None = None  # place for the next one
         self._room: list[Any] = []
         self._view: Any = None
 
     def add(self, row: Any) -> None:
         """Take in the tables of a mode, a named tuple of (1, ...) each."""
         rows: list[Any] = list(row)
+        if self._vacant is not None:
+            for field, new in zip(self._room, rows, strict=True):
+                field[self._vacant] = new[0]
+            self._vacant = self._view = None
+            return
         if not self._room:
             n_bytes = sum(field.nbytes for field in rows)
-            self.n_most = max(self._n_least, min(self.n_most, MOST_BYTES // n_bytes))
+            self.n_most = max(self._n_least, min(self.n_most, self._most_bytes // n_bytes))
             n_room = min(self._n_least, FIRST_ROOM)
             self._room = [np.empty((n_room, *field.shape[1:]), field.dtype) for field in rows]
             self._kind = type(row)
-        elif self._n_filled == len(self._room[0]):  # twice the room: most books never need it
-            n_room = min(2 * self._n_filled, self.n_most)
+        elif self._n_filled == len(self._room[0]):  # memory that is not written yet is not taken
+            n_room = min(WIDENING * self._n_filled, self.n_most)
             for i, field in enumerate(self._room):  # one after the other: all at once would take it twice
                 self._room[i] = np.empty((n_room, *field.shape[1:]), field.dtype)
                 self._room[i][: self._n_filled] = field
         for field, new in zip(self._room, rows, strict=True):
             field[self._n_filled] = new[0]
         self._n_filled += 1
+        self._n_written = max(self._n_written, self._n_filled)
         self._view = None
+
+    @property
+    def is_short_of_memory(self) -> bool:
+        """Whether there is room for fewer than were asked for."""
+        return self.n_most < self._n_asked
 
     def repeat(self, count: int) -> None:
         """Take in the tables of the last mode `count` times more."""
@@ -69,12 +83,16 @@ class TableStack:
 
     def clear(self) -> None:
         """Give all room back to contact modes to come."""
-        self._n_filled, self._view = 0, None
+        self._n_filled, self._view, self._vacant = 0, None, None
+
+    def vacate(self, place: int) -> None:
+        """Give the place of a mode to the next one."""
+        self._vacant = place
 
     @property
     def n_byte(self) -> int:
         """Memory that is held."""
-        return sum(field.nbytes for field in self._room)
+        return self.n_byte_of_one * self._n_written
 
     @property
     def n_byte_of_one(self) -> int:
