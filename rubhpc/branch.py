@@ -11,7 +11,7 @@ from rubhpc.case_arguments import CaseArguments, case_of
 from rubhpc.errors import InputError, NoPeriodicMotion
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.integrate.branches.branch import branch_of
-from rubhpc.integrate.branches.point import Branching
+from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.search import search
 from rubhpc.integrate.branches.start import shot, simulated, starts
 from rubhpc.integrate.initial_state import fit_to_gaps

@@ -9,18 +9,15 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from rubhpc.integrate.branches.case import record_branches
 from rubhpc.integrate.case import compile_kernels, run_case
 from rubhpc.integrate.changing_speed.case import RunUpRecord
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.setup import ModalSetup
 from rubhpc.running.case_setup import operation_of, set_up
+from rubhpc.running.shorter_cases import parts, shortened
 from rubhpc.running.worker import integrate
 from rubhpc.schema import FINAL_STATE
-from rubhpc.study.drive_law import DriveLaw
-from rubhpc.study.speed_law import SpeedLaw
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,13 +28,15 @@ if TYPE_CHECKING:
     from rubhpc.integrate.setup import Setup
     from rubhpc.study.cases import Case, CaseGrid
     from rubhpc.study.contact_keys import Contact
+    from rubhpc.study.drive_law import DriveLaw
+    from rubhpc.study.speed_law import SpeedLaw
     from rubhpc.study.study import Recording
 
 _LONG = 0.25  # s: cases that take longer are shortened where there is no time for the whole of them
 _PATIENCE = 4.0  # times as long as foreseen: a case is cut off
 _FIRST_STEPS = 50_000  # predicted, of the first run of a case that is shortened
 _LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
-_FIRST_TURNS, _WINDOWS = 64, 4  # revolutions of a changing speed that are tried first, and in how many parts
+_FIRST_TURNS = 64  # revolutions of a changing speed that are tried first
 _WHOLE_TURNS = 3.0  # s: such cases are run whole if that takes no longer
 _LATE = 0.25  # least pace of what is left of a shortened case, over that of what was timed
 
@@ -179,7 +178,7 @@ class Pilots:
         modes = 0.0
         runs: list[tuple[float, float]] = []
         while True:
-            recording = _shortened(whole, share)
+            recording = shortened(whole, share)
             taken = self._run(case, setup, recording)
             done = (recording.longest_transient + recording.revolutions) / (
                 whole.longest_transient + whole.revolutions
@@ -306,37 +305,3 @@ def _limited(seconds: float) -> Callable[[], None]:
             raise _Enough
 
     return check
-
-
-def parts(law: SpeedLaw | DriveLaw, turns: int) -> list[SpeedLaw | DriveLaw]:
-    """So many revolutions of a changing speed: the first ones of a drive, else parts spread over the law."""
-    if isinstance(law, DriveLaw):
-        return [replace(law, n_revolution=turns)]
-    n = law.n_revolution
-    if turns >= n:
-        return [law]
-    each = max(turns // _WINDOWS, 1)
-    firsts = [round((k + 0.5) / _WINDOWS * (n - each)) for k in range(_WINDOWS)]
-    return [_between(law, first, first + each) for first in firsts]
-
-
-def _between(law: SpeedLaw, first: int, last: int) -> SpeedLaw:
-    """A law from one revolution to another."""
-    (begin, end), speeds, _ = law.at_angle(2.0 * np.pi * np.array([first, last * (1.0 + 1e-9)]))
-    inner = [(t, v) for t, v in zip(law.time, law.speed, strict=True) if begin < t < end]
-    points = [(begin, speeds[0]), *inner, (end, speeds[1])]
-    times, values = zip(*points, strict=True)
-    return SpeedLaw(time=tuple(map(float, times)), speed=tuple(map(float, values)))
-
-
-def _shortened(whole: Recording, share: float) -> Recording:
-    """A recording, or a share of it: what is recorded costs more than what is not."""
-    if share == 1.0:
-        return whole
-    return replace(
-        whole,
-        transient=round(share * whole.longest_transient),
-        transient_limit=None,
-        transient_tolerance=None,
-        revolutions=round(share * whole.revolutions) or 1,
-    )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rubhpc.running import pilots
-from rubhpc.running.pilot_cases import parts
+from rubhpc.running.shorter_cases import parts
 from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.speed_law import SpeedLaw
 

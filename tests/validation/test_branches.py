@@ -18,8 +18,8 @@ from lone_bodies import body, set_up_modal, tip
 import rubhpc
 from rubhpc import LumpedStator, Rig, Unbalance, read_rig
 from rubhpc.integrate.branches.arclength import follow
+from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.events import Event
-from rubhpc.integrate.branches.point import Branching
 from rubhpc.integrate.branches.search import search
 from rubhpc.integrate.periodic_motion import find_periodic_motion
 from rubhpc.integrate.periodic_motions.family import Family

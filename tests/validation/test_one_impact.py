@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 
 from rubhpc import State
 from rubhpc.integrate.branches.arclength import follow
+from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.events import Event
-from rubhpc.integrate.branches.point import Branching
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.periodic_motion import find_periodic_motion
 from rubhpc.integrate.periodic_motions.family import Family

@@ -17,7 +17,8 @@ from rubhpc.integrate.periodic_motions.shooting import SAME, NotConverged
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.branches.point import Branching, Point
+    from rubhpc.integrate.branches.branching import Branching
+    from rubhpc.integrate.branches.point import Point
 
     Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.integrate.branches.branch import branch_of
-from rubhpc.integrate.branches.point import Branching
+from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.search import search
 from rubhpc.integrate.branches.start import starts
 from rubhpc.integrate.compilation import seconds_compiling

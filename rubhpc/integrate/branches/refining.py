@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.branches.arclength import Track
-    from rubhpc.integrate.branches.point import Branching, Point
+    from rubhpc.integrate.branches.branching import Branching
+    from rubhpc.integrate.branches.point import Point
 
     Floats = NDArray[np.float64]
 

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.branches.point import Branching, Point
+    from rubhpc.integrate.branches.branching import Branching
+    from rubhpc.integrate.branches.point import Point
     from rubhpc.integrate.record import State
     from rubhpc.study.tables import Recording
 

@@ -7,7 +7,7 @@ import pytest
 
 import rubhpc
 from rubhpc.errors import InputError
-from rubhpc.integrate.branches.point import Branching
+from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.initial_state import fit_to_gaps
 from rubhpc.integrate.periodic_motions.family import Family, Operation, flow
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion

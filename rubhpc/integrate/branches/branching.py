@@ -1,0 +1,230 @@
+"""Newton's method for points of branches, each in a plane across its branch."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.errors import InputError
+from rubhpc.integrate.branches.point import SAME_MOTION, Point, away_from_events
+from rubhpc.integrate.periodic_motions.family import flow
+from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
+from rubhpc.integrate.periodic_motions.saltation import monodromy
+from rubhpc.integrate.periodic_motions.shooting import CONVERGED, NotConverged, shoot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.periodic_motions.family import Family
+
+    Floats = NDArray[np.float64]
+
+MOST_ITERATIONS = 7
+SOON = 1e-4  # residual from which an iteration that is late may go on
+FAST = 0.02  # ratio of two residuals below which a derivative serves once more
+STEEP = 0.4  # share of the parameter in a step below which it is an unknown
+
+
+class Branching:
+    """Finds points of one family of cases.
+
+    Parameters
+    ----------
+    step : float
+        Change of the parameter that counts as one step.
+    check : callable, optional
+        Called before every search for a motion; what it raises ends the search for branches.
+    say : callable, optional
+        Called then with how many motions have been found, and where the next is sought.
+    """
+
+    def __init__(
+        self,
+        family: Family,
+        step: float,
+        check: Callable[[], None] | None = None,
+        say: Callable[[str], None] | None = None,
+    ) -> None:
+        """Take the cases."""
+        self.family, self.step, self._check, self._say = family, step, check, say
+        self._n_found = 0
+
+    def begin(self, value: float, motion: Floats, states: int, period: int) -> Point:
+        """Shoot at a value of the parameter from a motion at the angle 0; the section is then moved.
+
+        Raises
+        ------
+        NotConverged
+            No motion was found.
+        """
+        case = self.family.at(value)
+        orbit = shoot(case, motion, states, period)
+        point = Point(
+            value=value,
+            phase=0.0,
+            motion=orbit.motion,
+            states=orbit.states,
+            revolutions=list(orbit.revolutions),
+            case=case,
+        )
+        return self.moved(point, away_from_events(point))
+
+    def moved(self, point: Point, ahead: float) -> Point:
+        """The same motion from a section some revolutions ahead, a number from 0 to its period."""
+        if ahead == 0.0:
+            return point
+        motion, states, phase = point.after(ahead)
+        return Point(
+            value=point.value,
+            phase=phase,
+            motion=motion,
+            states=states,
+            revolutions=flow(point.case, motion, states, point.period, phase),
+            case=point.case,
+        )
+
+    def repeated(self, point: Point, times: int) -> Point:
+        """The same motion over several of its periods."""
+        if times == 1:
+            return point
+        n = times * point.period
+        revolutions = flow(point.case, point.motion, point.states, n, point.phase)
+        return replace(point, revolutions=revolutions)
+
+    def direction(self, point: Point, change: Floats) -> Floats:
+        """A change (2 n,) of the motion alone, in steps, of length 1 (2 n + 1,)."""
+        scaled = np.append(point.scale * change, 0.0)
+        return np.asarray(scaled / np.linalg.norm(scaled))
+
+    def length_of(self, point: Point, change: Floats) -> float:
+        """Length, in steps, of a change (2 n,) of a motion."""
+        return float(np.linalg.norm(point.scale * change))
+
+    def difference(self, a: Point, b: Point) -> Floats:
+        """From one point to another in steps: (2 n + 1,), the parameter last."""
+        motion = self.family.carry(a.motion, a.case, b.case)
+        return np.append(b.scale * (b.motion - motion), (b.value - a.value) / self.step)
+
+    def is_same(self, a: Point, b: Point) -> bool:
+        """Whether two motions of a case are one, but for a shift by revolutions."""
+        if a.motion.size != b.motion.size or a.period != b.period:
+            return False
+        limit = SAME_MOTION * a.case.size(a.motion)
+        for k in range(b.period):
+            moved = self.moved(b, (a.phase - b.phase) % 1.0 + k)
+            if a.case.size(moved.motion - a.motion) <= limit:
+                return True
+        return False
+
+    def tangent(self, point: Point, toward: Floats) -> Floats:
+        """Direction of the branch at a point, in steps, of length 1 (2 n + 1,), along another."""
+        rate = self.family.derivative(
+            point.value, point.motion, point.states, point.revolutions, point.phase
+        )  # fmt: skip
+        moving = (point.monodromy - np.eye(point.motion.size)) / point.scale
+        matrix = np.column_stack([moving, rate * self.step])
+        along: Floats = np.linalg.svd(matrix / np.abs(matrix).max(axis=1, keepdims=True))[2][-1]
+        return along if along @ toward >= 0.0 else -along
+
+    def correct(
+        self,
+        base: Point,
+        guess: Floats,
+        along: Floats,
+        *,
+        period: int = 0,
+        most: int = MOST_ITERATIONS,
+        is_free: bool = False,
+    ) -> Point:
+        """Find the motion in the plane through a guess across a direction.
+
+        Parameters
+        ----------
+        base : Point
+            In whose scale and section guess and direction are.
+        guess, along : (2 n + 1,)
+            From the base, in steps; the direction of length 1. Where it runs along the parameter mainly,
+            that is held, which costs less; not near a fold, where a motion may not be found so, or badly.
+        period : int
+            Revolutions; by default that of the base.
+        most : int
+            Iterations; up to twice as many where the end is near.
+        is_free : bool
+            The parameter is never held: between two points around a fold several motions have one parameter.
+
+        Raises
+        ------
+        NotConverged
+            Newton's method finds none.
+        """
+        period = period or base.period
+        is_asked = not np.any(along[:-1])
+        if is_asked or (abs(along[-1]) > STEEP and not is_free and not base.is_near_fold):
+            try:
+                found = self._corrected(base, guess, along, period, most, is_held=True)
+                if is_asked or not found.is_near_fold:
+                    return found
+            except NotConverged:
+                if is_asked:
+                    raise
+        return self._corrected(base, guess, along, period, most, is_held=False)
+
+    def _corrected(
+        self, base: Point, guess: Floats, along: Floats, period: int, most: int, *, is_held: bool
+    ) -> Point:
+        """Newton's method, with the parameter held or an unknown."""
+        family, phase, states = self.family, base.phase, base.states
+        if self._say is not None:
+            self._say(f"{self._n_found} motions of branches found, now at {family.along} {base.value:.4g}")
+        if self._check is not None:
+            self._check()
+        scale = base.scale
+        value = base.value + guess[-1] * self.step
+        before = base.motion + guess[:-1] / scale
+        origin, rate, derivative, last = base.case, None, None, math.inf
+        try:
+            case = family.at(value)
+            motion = family.carry(before, origin, case)
+            for iteration in range(2 * most):
+                revolutions = flow(case, motion, states, period, phase)
+                defect = revolutions[-1].end - motion
+                residual = case.size(defect) / max(case.size(motion), np.finfo(float).tiny)
+                if residual <= CONVERGED and revolutions[-1].states == states:
+                    self._n_found += 1
+                    return Point(
+                        value=value, phase=phase, motion=motion, states=states, revolutions=revolutions,
+                        case=case,
+                    )  # fmt: skip
+                states = revolutions[-1].states
+                is_late = iteration >= most and residual > SOON
+                if residual > 2.0 * last or is_late or not math.isfinite(residual):
+                    break
+                if derivative is None or residual > FAST * last:
+                    derivative = monodromy(case, revolutions) - np.eye(motion.size)
+                last = residual
+                if is_held:
+                    motion = motion - np.linalg.solve(derivative, defect)
+                    continue
+                if rate is None or rate.size != motion.size:
+                    rate = family.derivative(value, motion, states, revolutions, phase) * self.step
+                if scale.size != motion.size:
+                    break
+                ahead = np.append(
+                    scale * (motion - family.carry(base.motion, base.case, case)),
+                    (value - base.value) / self.step,
+                )
+                row = np.append(along[:-1] * scale, along[-1])
+                matrix = np.block([[derivative, rate[:, None]], [row[None, :]]])
+                change = np.linalg.solve(matrix, np.append(-defect, along @ (guess - ahead)))
+                value += float(change[-1]) * self.step
+                moved = motion + change[:-1]
+                case, origin = family.at(value), case
+                motion = family.carry(moved, origin, case)
+        except (Unfollowed, InputError, np.linalg.LinAlgError) as problem:
+            raise NotConverged(str(problem)) from None
+        raise NotConverged(f"no convergence, residual {last:.2g}")
