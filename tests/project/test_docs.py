@@ -181,3 +181,10 @@ def test_equations_have_their_own_numbers_and_names_without_backslashes() -> Non
     assert len(tags) > 50
     assert len(tags) == len(set(tags))
     assert not re.findall(r"\\texttt\{[^}]*\\_", theory)  # MathJax shows the backslash
+
+
+def test_numbers_of_documents_have_their_functions() -> None:
+    pages = "".join(path.read_text() for path in (ROOT / "docs").rglob("*.md"))
+    named = set(re.findall(r"`python tests/bench/documented\.py (\w+)`", pages))
+    script = (ROOT / "tests" / "bench" / "documented.py").read_text()
+    assert named == set(re.findall(r"^def (\w+)\(\) -> None:", script, re.MULTILINE))
