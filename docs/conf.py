@@ -27,7 +27,6 @@ extensions = [
 ]
 exclude_patterns = ["site"]
 default_role = "code"
-smartquotes_action = "qe"  # no dashes: options begin with two hyphens
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"rubhpc {release}"

@@ -187,16 +187,21 @@ def command_sections() -> str:
                 "`" + ", ".join([*p.opts, *p.secondary_opts]) + "`",
                 "" if p.is_flag else f"`{p.make_metavar(own)}`",
                 _option_default(p),
-                (p.help or "")
+                _as_code(p.help or "")
                 + (" May be repeated." if p.multiple and "repeat" not in (p.help or "") else ""),
             )
             for p in options
         ]
         sections.append(
-            f"## `rubhpc {name}`\n\n```text\n{usage}\n```\n\n{_prose(command.help or '')}\n\n"
+            f"## `rubhpc {name}`\n\n```text\n{usage}\n```\n\n{_as_code(_prose(command.help or ''))}\n\n"
             + (_table(("option", "value", "default", "meaning"), rows) if rows else "")
         )
     return "\n\n".join(sections)
+
+
+def _as_code(text: str) -> str:
+    """Return help with its options, `--part`, as code."""
+    return re.sub(r"(?<![`\w-])--[a-z][\w-]*", r"`\g<0>`", text)
 
 
 def _option_default(option: click.Option) -> str:
