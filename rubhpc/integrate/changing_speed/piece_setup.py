@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
-from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.changing_speed.retuned_modes import Desk, RetunedLibrary
 from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
 from rubhpc.integrate.reduced_model.contact_mode import KeptParts
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
@@ -52,7 +52,9 @@ class HeldMatrices:
         slope: float,
         reach: tuple[float, float],
         sample_level: int,
+        desks: dict[tuple[object, ...], Desk],
     ) -> None:
+        self._desks = desks
         self.model, self.reduced = model, reduced
         self.at_hand = reduced  # at the speed of the piece under way
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
@@ -98,6 +100,7 @@ class HeldMatrices:
                 tick=piece.tick,
                 sample_level=piece.sample_level,
                 n_level=piece.n_level,
+                desks=self._desks,
                 **make(),
             )
         library = self._libraries[key]

@@ -14,7 +14,7 @@ from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.statics import sag_under
 from rubhpc.integrate.changing_speed.held_matrices import WIDEST, WIDEST_TABULATED, held_range
 from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, sagging, with_values
-from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE, speeds_of
+from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE, Desk, speeds_of
 from rubhpc.integrate.packing import whole_system
 from rubhpc.kernels.case_progress import Clock
 
@@ -32,11 +32,13 @@ if TYPE_CHECKING:
 SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the speed is taken
 LONGEST_FALL = 1.0 / 3.0  # half of the range over the first speed of a coast-down, which stays above 0
 MOST_HELD = 4  # matrices at hand, of a spin that swings between them
-MOST_BYTES = 2**28  # of contact modes that are kept, with their matrices, for other cases
+MOST_BYTES = 2**29  # of contact modes that are kept, with their matrices, for other cases
 
 # Of each set-up, the matrices by speed, acceleration and slope of the torque, the latest last, for other
 # cases too.
 _KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[float, float, float], HeldMatrices]] = WeakKeyDictionary()
+
+_DESKS: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], Desk]] = WeakKeyDictionary()
 
 
 def forget_most() -> None:
@@ -209,7 +211,9 @@ class Pieces:
         near_end = reach * (1.0 + 1e-9)  # rounding apart
         slowest = replace(fastest, spin=abs(speed) - reach)
         ranges = near_end, swing
-        held = HeldMatrices(model, reduced, self._phasor, acceleration, slope, ranges, slowest.sample_level)
+        desks = _DESKS.setdefault(fastest, {})
+        at = acceleration, slope, ranges
+        held = HeldMatrices(model, reduced, self._phasor, *at, slowest.sample_level, desks)
         held.template = PieceSetup(
             scheme=fastest.scheme,
             model=model,

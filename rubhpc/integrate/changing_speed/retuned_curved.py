@@ -6,15 +6,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.retuned_modes import Linear, RetunedLibrary
+from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
-from rubhpc.integrate.reduced_model.curved_tables import StillParts, motion_rows, still_parts, tuned_tables
+from rubhpc.integrate.reduced_model.curved_tables import (
+    StillParts,
+    motion_rows,
+    steps_of,
+    still_parts,
+    tuned_tables,
+)
+from rubhpc.integrate.reduced_model.mode_tables import TableStack
+from rubhpc.kernels.curved_contact import CurvedTables
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rubhpc.integrate.changing_speed.mode_parts import Linear
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.retuning import HeldMode
 
 
@@ -30,38 +40,50 @@ class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
         """Start with every pair open."""
         self._row, self._curved = motion_rows(args[0], args[1]), None
         self._at_piece = at_piece
-        self._still: dict[int, StillParts] = {}  # by place
-        super().__init__(*args, **keys)
+        self._still: dict[int, StillParts] = {}  # by set of closed pairs
+        self._n_curved, self._n_step = 0, steps_of(keys["tick"], keys["n_level"]).size
+        super().__init__(
+            *args, **keys | {"desks": None}
+        )  # its own: tables of curved gaps stay where they are
 
     def add(self, mask: int) -> bool:
         """Tune the mode with these pairs closed; returns whether the tables are wide enough for it."""
-        is_tuned = self._tuned.get(self._place.get(mask, -1), 0) > self._at
+        is_tuned = self._tuned.get(mask, 0) > self._at
         if not super().add(mask):
             return False
         if not is_tuned:
-            self._tune_curved(self._place[mask])
+            self._tune_curved(mask)
         return True
 
     def forget(self) -> None:
         """Make room: keep no mode but that with every pair open."""
         if self._curved is not None:
             self._curved.clear()
+        self._n_curved = 0
+        self._still.clear()
         super().forget()
 
-    def _hold(self, mode: ContactMode, place: int) -> HeldMode:
+    def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
         directions = self.gap_jacobian, self.force_direction
-        self._still[place] = still_parts(mode, self.reduced, self._row, directions, self.width)
-        return super()._hold(mode, place)
+        self._still[mode.mask] = still_parts(mode, self.reduced, self._row, directions, self.width)
+        return super()._hold(mode, row)
 
     def _linear(self, mode: ContactMode) -> Linear:
         linear = super()._linear(mode)  # friction follows the momentary normal, and is not counted
         return linear._replace(across=np.zeros_like(linear.across))
 
-    def _tune_curved(self, place: int) -> None:
-        tables, curved = self.tables(), self.curved_tables()
+    def _tune_curved(self, mask: int) -> None:
+        place, tables = self._place[mask], self.tables()
         motion = tables.motion_re[place] + 1j * tables.motion_im[place]
-        steps = np.ldexp(self._speeds.tick[self._at], np.arange(curved.weight_re.shape[1]))
-        exponent = self._held[place].exponent
-        tuned = tuned_tables(self._still[place], self._at_piece(), exponent, motion, steps)
-        for field, now in zip(curved, tuned, strict=True):
+        steps = np.ldexp(self._speeds.tick[self._at], np.arange(self._n_step))
+        exponent = self._held[mask][1].exponent
+        tuned = tuned_tables(self._still[mask], self._at_piece(), exponent, motion, steps)
+        if self._curved is None:
+            self._curved = TableStack(1 + len(self.gap_jacobian), self._most_modes)
+        if place == self._n_curved:
+            fields: list[Any] = [np.array(field[np.newaxis], order="C") for field in tuned]
+            self._curved.add(CurvedTables(*fields))
+            self._n_curved += 1
+            return
+        for field, now in zip(self.curved_tables(), tuned, strict=True):
             field[place] = now

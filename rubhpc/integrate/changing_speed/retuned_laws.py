@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.retuned_modes import Linear, RetunedLibrary
+from rubhpc.integrate.changing_speed.mode_parts import Linear
+from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
 from rubhpc.integrate.reduced_model.contact_mode import confine
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, solve_friction_mode, states_of
 from rubhpc.integrate.reduced_model.mode_library import MOST_FRICTION_MODES, SPARE
@@ -136,9 +137,9 @@ class RetunedFrictionLibrary(RetunedLibrary):
         damping = pairs.damped(reduced, mode.mask).damping
         return Linear(tangent @ (project @ self._phasor), switch, reaction, across, damping)
 
-    def _hold(self, mode: ContactMode, place: int) -> HeldMode:
+    def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
         assert isinstance(mode, FrictionMode)
-        held, tables = super()._hold(mode, place), self.tables()
+        held = super()._hold(mode, row)
         q = len(self.slip)
         one = mode.n_eigenmode + 1 + q
         switch = mode.switch[:, one].copy()
@@ -152,11 +153,11 @@ class RetunedFrictionLibrary(RetunedLibrary):
         rim = RimPart(
             one=one,
             motion=mode.motion[:, one].copy(),
-            entered=tables.enter_constant[place, q, 0] + 1j * tables.enter_constant[place, q, 1],
+            entered=row.enter_constant[0, q, 0] + 1j * row.enter_constant[0, q, 1],
             switch=switch,
             fixed=fixed,
             rate=mode.switch[:, growing] @ mode.growth[growing].astype(np.complex128),
-            loss=tables.loss[place][[one, self.width + one]].copy(),
+            loss=row.loss[0][[one, self.width + one]].copy(),
             power=float((held.rate[one] @ held.resisting[one]).real),
             velocity=held.rate[one].copy(),
             resisting=held.resisting[one].copy(),

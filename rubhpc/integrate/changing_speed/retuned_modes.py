@@ -6,19 +6,19 @@ A library holds the contact modes of a set of matrices, and tunes them to the sp
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray  # noqa: TC002 - of a NamedTuple
 
 from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
+from rubhpc.integrate.changing_speed.mode_parts import WITHOUT_RIM, Linear, output_operators
 from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
 from rubhpc.integrate.reduced_model.mode_tables import TableStack
-from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
-from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
+from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.kernels.retuning import HeldMode, Speeds, retune
-from rubhpc.kernels.retuning_laws import NO_RIM, RimPart, Springs
+from rubhpc.kernels.retuning_laws import Springs
 
 NOT_TUNED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
 AT_ONCE = 8  # pieces to whose speeds a contact mode is tuned at once
@@ -27,10 +27,20 @@ MOST_BYTES = 2**22  # of its tables for so many pieces; where they are more, pie
 if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode, Solved
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.kernels.contact_modes import ModeTables
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
     Ints = NDArray[np.int64]
+
+
+class Desk:
+    """Tables that are tuned to pieces under way, of one library after the other."""
+
+    def __init__(self, tables: TableStack) -> None:
+        self.tables = tables
+        self.user: RetunedLibrary | None = None
 
 
 class RetunedLibrary(ModeLibrary):
@@ -45,6 +55,8 @@ class RetunedLibrary(ModeLibrary):
     tick : float, s
     sample_level, n_level : int
         As in `ModeLibrary`; levels stay, the tick changes with the speed.
+    desks : dict
+        Of the libraries that take turns, by what they have in common.
     """
 
     at_once = AT_ONCE
@@ -60,27 +72,46 @@ class RetunedLibrary(ModeLibrary):
         tick: float,
         sample_level: int,
         n_level: int,
+        desks: dict[tuple[object, ...], Desk] | None = None,
     ) -> None:
         """Start with every pair open."""
         self.reduced, self._known = reduced, known
         self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
-        self._phasor, self._output = phasor, _output_operators(reduced)
+        self._phasor, self._output = phasor, np.hstack(output_operators(reduced))
         self._opened = self._solve(0)
         self.first_masks = [0]
         self.width = self._width_of(model, friction)
-        self._tables = TableStack(1 + len(self.gap_jacobian), self._most_modes)
+        q = len(self.gap_jacobian)
+        kind: tuple[object, ...] = type(self), self.width, n_level
+        desk = Desk(TableStack(1 + q, self._most_modes))
+        self._desk = desk if desks is None else desks.setdefault(kind, desk)
+        self._tables = self._desk.tables
         self._exponents = {}
         self.n_room = 0  # tables that each mode has, for as many pieces
-        self._place: dict[int, int] = {}  # of each set of closed pairs: the first of its tables
-        self._held: dict[int, HeldMode] = {}  # by place
-        self._tuned: dict[int, int] = {}  # by place: up to which piece of those at hand
+        # By the set of closed pairs: what is kept of a mode; of those on the desk, the first of its tables,
+        # and up to which piece of those at hand it is tuned.
+        self._held: dict[int, tuple[ModeTables, HeldMode]] = {}
+        self._place: dict[int, int] = {}
+        self._tuned: dict[int, int] = {}
         self._speeds = speeds_of(
             [reduced.spin], [complex(reduced.spin**2)], [tick], reduced.spin, sample_level
         )
         self._at = 0  # piece among those at hand
         self.masks: list[int] = []
+        self._take_desk()
         self.add(0)
+
+    @property
+    def followed(self) -> RetunedLibrary:
+        """Itself: all of a run-up is recorded."""
+        return self
+
+    @property
+    def n_byte(self) -> int:
+        """Memory that its contact modes hold."""
+        fields = (field for kept in self._held.values() for part in kept for field in part)
+        return sum(field.nbytes for field in fields if isinstance(field, np.ndarray) and any(field.strides))
 
     @property
     def n_most(self) -> int:
@@ -98,6 +129,7 @@ class RetunedLibrary(ModeLibrary):
 
     def tune(self, speeds: Speeds, piece: int) -> None:
         """Begin a piece, given by its place among the speeds: with no mode."""
+        self._take_desk()
         if speeds is not self._speeds or piece <= self._at:
             self._speeds, self._tuned = speeds, {}
         self.reach(piece)
@@ -110,39 +142,34 @@ class RetunedLibrary(ModeLibrary):
 
     def add(self, mask: int) -> bool:
         """Tune the mode with these pairs closed; returns whether the tables are wide enough for it."""
+        if not self._has(mask):
+            return False
         if mask not in self._place:
-            mode = self._solved(mask)
-            if mode.exponent.size > self.width:
-                return False
-            self._take_in(mode)
+            self._put(mask)
         first, at, speeds = self._place[mask], self._at, self._speeds
         place = first + (at if self.n_room > 1 else 0)
-        if self._tuned.get(first, 0) <= at:
+        if self._tuned.get(mask, 0) <= at:
             end = min(speeds.spin.size, self.n_room) if self.n_room > 1 else at + 1
-            retune(self.tables(), place - at, self._held[first], speeds, at, end)
-            self._tuned[first] = end
+            retune(self.tables(), place - at, self._held[mask][1], speeds, at, end)
+            self._tuned[mask] = end
         self.masks[place] = self.tables().mask[place] = mask
         return True
 
     def eigenmodes(self, mask: int) -> Eigenmodes | None:
         """Those of a set of closed pairs; None where a speed changes what enters them, or it has no room."""
-        if mask not in self._place:
-            if self.is_full:
-                self.forget()
-            mode = self._solved(mask)
-            if mode.exponent.size > self.width:
-                return None
-            self._take_in(mode)
-        place, tables = self._place[mask], self.tables()
-        held, m = self._held[place], self._held[place].is_pair.size
+        if mask not in self._held and self.is_full:
+            self.forget()
+        if not self._has(mask):
+            return None
+        (row, held), m = self._held[mask], self._held[mask][1].is_pair.size
         if held.rim.one >= 0:
             return None
-        constant = tables.enter_constant[place, :, :, :m]
+        constant = row.enter_constant[0, :, :, :m]
         return Eigenmodes(
             exponent=held.exponent[:m],
             is_pair=held.is_pair,
             motion=held.motion.T,
-            enter=(tables.enter_re[place, :, :m] + 1j * tables.enter_im[place, :, :m]).T,
+            enter=(row.enter_re[0, :, :m] + 1j * row.enter_im[0, :, :m]).T,
             constant=constant[:, 0] + 1j * constant[:, 1],
             drive=held.drive,
             mirrored_drive=held.mirrored_drive,
@@ -153,29 +180,51 @@ class RetunedLibrary(ModeLibrary):
         found = np.full(len(self.masks), NOT_TUNED)
         for mask, first in self._place.items():
             if mask in met:
-                found[first + self._at : first + self._tuned.get(first, 0)] = mask
+                found[first + self._at : first + self._tuned.get(mask, 0)] = mask
         return found
 
-    def _take_in(self, mode: ContactMode) -> None:
-        """Make room for a mode that is met for the first time."""
-        place = len(self.masks)
-        self._tabulate(mode)
-        is_small = self.at_once * self._tables.n_byte_of_one <= MOST_BYTES
+    def _take_desk(self) -> None:
+        """Clear the desk of what another library has left on it."""
+        if self._desk.user is not self:
+            self._desk.user = self
+            self._tables.clear()
+            self._place.clear()
+            self._tuned.clear()
+            self.masks = []
+
+    def _has(self, mask: int) -> bool:
+        """Whether it has the mode with these pairs closed; one met for the first time is solved."""
+        if mask not in self._held:
+            mode = self._solved(mask)
+            if mode.exponent.size > self.width:
+                return False
+            self._tabulate(mode)
+        return True
+
+    def _tabulate(self, mode: ContactMode) -> None:
+        self._note_exponents(mode)
+        row = self._tables_of(mode, self.reduced)
+        row = row._replace(output=np.broadcast_to(0.0, row.output.shape))  # is filled in for each speed
+        self._held[mode.mask] = row, self._hold(mode, row)
+
+    def _put(self, mask: int) -> None:
+        """Put a mode on the desk."""
+        row, place = self._held[mask][0], len(self.masks)
+        is_small = self.at_once * sum(field.nbytes for field in row) <= MOST_BYTES
         self.n_room = self.n_room or (self.at_once if is_small else 1)
-        self._place[mode.mask] = place
-        self._held[place] = self._hold(mode, place)
-        self._tables.repeat(self.n_room - 1)
+        self._place[mask] = place
+        self._tables.add(row, self.n_room)
         self.masks += [NOT_TUNED] * self.n_room
         self.tables().mask[place:] = NOT_TUNED
 
     def forget(self) -> None:
         """Make room: keep no mode but that with every pair open."""
-        self._tables.clear()
         self._exponents.clear()
-        for known in (self._place, self._held, self._tuned):
-            known.clear()
-        self.masks = []
-        self.add(0)
+        self._held.clear()
+        if self._desk.user is self:
+            self._desk.user = None
+            self._take_desk()
+            self.add(0)
 
     def _solve(self, mask: int) -> ContactMode:
         """The mode of a set of states."""
@@ -203,8 +252,8 @@ class RetunedLibrary(ModeLibrary):
         across[:, closed] = (self.force_direction - self.gap_jacobian)[closed].T
         return Linear(tangent @ (project @ self._phasor), switch, reaction, across, reduced.damping)
 
-    def _hold(self, mode: ContactMode, place: int) -> HeldMode:
-        """What the spin speed leaves alone of a mode, whose tables are at `place`."""
+    def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
+        """What the spin speed leaves alone of a mode and its tables, (1, ...) each."""
         reduced, m, width = self.reduced, mode.n_eigenmode, self.width
         linear, slip = self._linear(mode), self._slip_rows()
         n = slip.shape[1]
@@ -212,9 +261,9 @@ class RetunedLibrary(ModeLibrary):
         resistance = np.hstack([skew, linear.damping]) - linear.across @ linear.switch
         motion = np.pad(mode.motion, ((0, 0), (0, width - mode.exponent.size)))
         exponent = np.pad(mode.exponent, (0, width - mode.exponent.size))
-        position, velocity, acceleration = self._output
-        row = position @ motion[:n] + velocity @ motion[n:]
-        row += (acceleration @ motion[n:]) * exponent
+        position, velocity, acceleration = np.hsplit(self._output, 3)
+        seen = position @ motion[:n] + velocity @ motion[n:]
+        seen += (acceleration @ motion[n:]) * exponent
         # An inverse shape times its shape is 2 where a mode stands for a conjugate pair, and is doubled.
         enter = mode.enter[:m]
         doubled = np.einsum("ka,ak->k", enter, mode.motion[:, :m]).real
@@ -236,9 +285,9 @@ class RetunedLibrary(ModeLibrary):
             resisting=np.ascontiguousarray(resisting.T),
             phasor=self._phasor,
             work=np.stack([self._phasor @ motion[n:], self._phasor.conj() @ motion[n:]]),
-            output=np.hstack(self._output),
-            row=row,
-            rim=_WITHOUT_RIM,
+            output=self._output,
+            row=seen,
+            rim=WITHOUT_RIM,
             springs=self._springs_of(mode),
         )
 
@@ -257,48 +306,3 @@ def speeds_of(
     spins, ticks = np.asarray(spin, dtype=np.float64), np.asarray(tick, dtype=np.float64)
     factors = np.asarray(factor, dtype=np.complex128)
     return Speeds(spins, np.abs(spins / held_spin), factors, ticks, ticks * 2.0**sample_level)
-
-
-_NONE = np.zeros(0, dtype=np.complex128)
-_WITHOUT_RIM = RimPart(
-    one=NO_RIM,
-    motion=_NONE,
-    entered=_NONE,
-    switch=_NONE,
-    fixed=_NONE,
-    rate=_NONE,
-    loss=np.zeros((0, 0)),
-    power=0.0,
-    velocity=_NONE,
-    resisting=_NONE,
-    row=_NONE,
-    work=_NONE,
-    growing=np.zeros(0, dtype=np.int64),
-    speed=np.zeros(0),
-)
-
-
-class Linear(NamedTuple):
-    """What a set of states makes of the motion: n reduced degrees, r switch functions."""
-
-    seen: Complexes  # (n,), what the constraints leave of the unbalance at unit speed
-    switch: Floats  # (r, 2 n), switch functions of the motion
-    reaction: Complexes  # (r,), what they lose by the unbalance at unit speed
-    across: Floats  # (n, r), friction forces by switch functions
-    damping: Floats  # (n, n)
-
-
-def _output_operators(reduced: ReducedModel) -> tuple[Floats, Floats, Floats]:
-    """Rows of tables (`kernels.contact_modes`): of displacements, rates and accelerations, (o, n) each."""
-    none = np.zeros_like(reduced.output)
-    position, rate = [reduced.output, none, none[2:]], [none, reduced.output, none[2:]]
-    acceleration = [none, none, reduced.output[2:]]
-    for place in (*(degree[[AXIAL, LATERAL]] for degree in reduced.degree), *reduced.carrier):
-        position += [place, 0.0 * place[1:]]
-        rate += [0.0 * place, place[1:]]
-        acceleration += [0.0 * place, 0.0 * place[1:]]
-    of_probes = reduced.probe
-    position.append(of_probes[0])
-    rate.append(of_probes[1])
-    acceleration.append(of_probes[2])
-    return np.concatenate(position), np.concatenate(rate), np.concatenate(acceleration)

@@ -28,11 +28,11 @@ class RetunedSoftFrictionLibrary(RetunedFrictionLibrary):
         rows = overlap_rows(self.gap_jacobian, closed, mode, self.width)
         return Springs(0.5 * self._pairs.stiffness, np.ascontiguousarray(self.gap_jacobian[closed]), rows)
 
-    def _hold(self, mode: ContactMode, place: int) -> HeldMode:
-        held = super()._hold(mode, place)
+    def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
+        held = super()._hold(mode, row)
         m, one = held.is_pair.size, held.rim.one
         moving = [m, self.width + m] if one == NO_RIM else [m, one, self.width + m, self.width + one]
         still = held.springs.overlap.copy()
         still[:, moving] = 0.0  # these are added piece by piece
-        self.tables().loss[place] += held.springs.half * still.T @ still
+        row.loss[0] += held.springs.half * still.T @ still
         return held

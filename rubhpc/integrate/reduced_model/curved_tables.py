@@ -136,11 +136,15 @@ def tabulate_curved(
     exponent[:end] = mode.exponent
     motion = np.zeros((2 * n, width), dtype=complex)
     motion[:, :end] = mode.motion
-    n_level = min(n_level, max(1, int(np.log2(LONGEST_STEP / tick))))
     still = still_parts(mode, reduced, row, directions, width)
-    table = tuned_tables(still, reduced, exponent, motion, np.ldexp(tick, np.arange(n_level)))
+    table = tuned_tables(still, reduced, exponent, motion, steps_of(tick, n_level))
     fields: list[Any] = [np.array(field[None], order="C") for field in table]
     return CurvedTables(*fields)
+
+
+def steps_of(tick: float, n_level: int) -> Floats:
+    """Lengths of the steps that are tabulated, of those of a library, s."""
+    return np.ldexp(tick, np.arange(min(n_level, max(1, int(np.log2(LONGEST_STEP / tick))))))
 
 
 class StillParts(NamedTuple):

@@ -201,10 +201,13 @@ class ModeLibrary:
         return friction
 
     def _tabulate(self, mode: ContactMode) -> None:
+        self._note_exponents(mode)
+        self._tables.add(self._tables_of(mode, self.reduced))
+
+    def _note_exponents(self, mode: ContactMode) -> None:
         exponent, drift, m = np.zeros((2, self.width)), np.zeros(self.width), mode.exponent.size
         exponent[0, :m], exponent[1, :m], drift[:m] = mode.exponent.real, mode.exponent.imag, mode.drift
         self._exponents[mode.mask] = exponent, drift
-        self._tables.add(self._tables_of(mode, self.reduced))
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
         """Tables of one mode."""

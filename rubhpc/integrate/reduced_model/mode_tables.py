@@ -44,42 +44,35 @@ class TableStack:
         self._room: list[Any] = []
         self._view: Any = None
 
-    def add(self, row: Any) -> None:
-        """Take in the tables of a mode, a named tuple of (1, ...) each."""
+    def add(self, row: Any, count: int = 1) -> None:
+        """Take in the tables of a mode, a named tuple of (1, ...) each, `count` times."""
         rows: list[Any] = list(row)
         if self._vacant is not None:
             for field, new in zip(self._room, rows, strict=True):
                 field[self._vacant] = new[0]
             self._vacant = self._view = None
             return
+        first, end = self._n_filled, self._n_filled + count
         if not self._room:
             n_bytes = sum(field.nbytes for field in rows)
             self.n_most = max(self._n_least, min(self.n_most, self._most_bytes // n_bytes))
-            n_room = min(self._n_least, FIRST_ROOM)
+            n_room = max(count, min(self._n_least, FIRST_ROOM))
             self._room = [np.empty((n_room, *field.shape[1:]), field.dtype) for field in rows]
             self._kind = type(row)
-        elif self._n_filled == len(self._room[0]):  # memory that is not written yet is not taken
-            n_room = min(WIDENING * self._n_filled, self.n_most)
+        elif end > len(self._room[0]):  # memory that is not written yet is not taken
+            n_room = max(end, min(WIDENING * first, self.n_most))
             for i, field in enumerate(self._room):  # one after the other: all at once would take it twice
                 self._room[i] = np.empty((n_room, *field.shape[1:]), field.dtype)
-                self._room[i][: self._n_filled] = field
+                self._room[i][:first] = field[:first]
         for field, new in zip(self._room, rows, strict=True):
-            field[self._n_filled] = new[0]
-        self._n_filled += 1
-        self._n_written = max(self._n_written, self._n_filled)
+            field[first:end] = new
+        self._n_filled, self._n_written = end, max(self._n_written, end)
         self._view = None
 
     @property
     def is_short_of_memory(self) -> bool:
         """Whether there is room for fewer than were asked for."""
         return self.n_most < self._n_asked
-
-    def repeat(self, count: int) -> None:
-        """Take in the tables of the last mode `count` times more."""
-        last = self._n_filled - 1
-        row = self._kind(*(field[last : last + 1].copy() for field in self._room)) if count else None
-        for _ in range(count):
-            self.add(row)
 
     def clear(self) -> None:
         """Give all room back to contact modes to come."""
