@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit, jit_inline
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
+    FRICTION_LOSS,
+    IMPACT_LOSS,
     STEP,
     TWIST_ACCELERATION,
     UNBALANCE_WORK,
@@ -186,6 +188,9 @@ def advance(
                         reached[0] = i_sample
                         return CONTACT_UNSOLVED
                     is_touching = n_touching > 0
+                if bounces:
+                    for k in range(n_dof):
+                        residual[k] = velocity_next[k] - velocity[k]  # over a step without its forces
                 if is_recorded:
                     observe_solution(STEP, int(solution[0]), solution[1], solution[2], accumulator)
                 apply_contact(
@@ -200,6 +205,8 @@ def advance(
                     observe_contact(pairs, work, spin, begin, step, velocity, velocity_next, accumulator)
                     for i in range(q):
                         samples.force[i, i_sample] += contact_force[i] / steps_per_sample
+                    if is_touching and bounces:
+                        observe_delays(row, work, residual, accumulator)
                 loss = circulatory_power(linear, displacement, velocity)
                 for k in range(n_dof):
                     loss += velocity[k] * damping_force[k]
@@ -215,9 +222,20 @@ def advance(
                     read_probes(probe, step, displacement, velocity, velocity_next, i_sample, samples.probe)
             if is_touching and bounces:  # what a force has moved before its impact was due
                 late[:] = -delay
+                for k in range(n_dof):
+                    residual[k] = -displacement[k]
                 apply_contact(
                     start, inverse, row, block, force_direction, contact_force, step, late, displacement
                 )
+                if is_recorded:  # the loads have moved by it too
+                    for k in range(n_dof):
+                        residual[k] += displacement[k]
+                        energy[DAMPING_LOSS] += residual[k] * damping_force[k]
+                    energy[DAMPING_LOSS] += circulatory_power(linear, displacement, residual)
+                    for k in range(force_row.size):
+                        force = force_cosine[k] * cosine + force_sine[k] * sine
+                        if force_row[k] >= 0:
+                            energy[UNBALANCE_WORK] += force * residual[force_row[k]]
             for k in range(n_dof):
                 displacement[k] += step * velocity_next[k]
                 velocity[k] = velocity_next[k]
@@ -231,6 +249,24 @@ def advance(
             reached[0] = i_sample
             return DIVERGED
     return FINISHED
+
+
+@jit_inline
+def observe_delays(row: Ints, work: Workspace, change: Floats, accumulator: Accumulator) -> None:
+    """Have the impulses of a step work at the velocities of their own instants, a delay after its beginning.
+
+    `change` (n_dof,) is that of the velocities over a step without its forces, by which they go on meanwhile.
+    """
+    for i in range(row.shape[0]):
+        opened, slipped = 0.0, 0.0
+        for a in range(N_DEGREE):
+            if row[i, a] >= 0:
+                moved = work.delay[i] * work.force[i] * change[row[i, a]]
+                opened += work.gap_jacobian[i, a] * moved
+                slipped -= (work.force_direction[i, a] - work.gap_jacobian[i, a]) * moved
+        accumulator.friction_work[i] += slipped
+        accumulator.energy[FRICTION_LOSS] += slipped
+        accumulator.energy[IMPACT_LOSS] -= opened
 
 
 @jit_inline

@@ -194,6 +194,8 @@ def advance_by_steps(
         progress.n_step += 1
         propagate(power_re[0, level], power_im[0, level], z_re, z_im, next_re, next_im)
         is_near, is_touching = level <= impulses.level, False
+        # The force that holds a gap closed is half of what it is in the step that a case begins with.
+        share = 2.0 if progress.n_step == 1 and was_touching and not may_press_open else 1.0
         if is_near:
             for a in range(n_degree):
                 after[a] = dot(degree_re[a], degree_im[a], next_re, next_im)
@@ -233,11 +235,11 @@ def advance_by_steps(
                     if impulse != 0.0:
                         if is_sample:
                             samples.rotor[TWIST_ACCELERATION, t >> clock.sample_level] += (
-                                impulses.twist_response[b] * impulse / step
+                                impulses.twist_response[b] * share * impulse / step
                             )
                             for p in range(samples.probe.shape[0]):
                                 samples.probe[p, t >> clock.sample_level] += (
-                                    impulses.probe_response[p, b] * impulse / step
+                                    impulses.probe_response[p, b] * share * impulse / step
                                 )
                         for k in range(z_re.size):
                             next_re[k] += impulses.drifted_re[b, k] * impulse

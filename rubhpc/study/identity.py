@@ -31,7 +31,7 @@ SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 5  # method = "modal" with gaps that are curved
 MANY_STATORS = 3  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 3  # [branch]: how near to grazing a motion is under Coulomb's law
-MANY_EVENTS = 1  # method = "modal" where a case may have 200 000 events, or has impacts in short steps
+MANY_EVENTS = 1  # restitution, or method = "modal" where a case may have 200 000 events
 ALONG_SPEED = 1  # branches along a speed
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
@@ -72,7 +72,7 @@ def _has_many_events(study: Study) -> bool:
     recording = study.recording
     transient = 0 if recording.is_transient_auto else recording.longest_transient
     is_long = max(transient, recording.revolutions) > 1000
-    return study.integrator.method == "modal" and (bounces or is_long)
+    return bounces or (study.integrator.method == "modal" and is_long)
 
 
 def _laws(study: Study, key: str) -> set[str]:

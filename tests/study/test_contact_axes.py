@@ -89,6 +89,14 @@ def test_a_version_of_some_laws_is_that_of_the_studies_that_take_them(tmp_path, 
     assert identity.physics_of(study_of(tmp_path, axes, contact)) == sum(parts)
 
 
+def test_restitution_has_a_version_by_the_central_difference_too(tmp_path):
+    rest = '[integrator]\nmethod = "central-difference"\nstep = "1 us"'
+    versions = [
+        identity.physics_of(study_of(tmp_path, "", contact, rest)) for contact in ("", "restitution = 0.5")
+    ]
+    assert versions == [identity.PHYSICS, identity.PHYSICS + identity.MANY_EVENTS]
+
+
 @pytest.mark.parametrize(
     ("along", "further"), [("speed_ratio", ("BRANCHES", "ALONG_SPEED")), ("friction", ("BRANCHES",))]
 )

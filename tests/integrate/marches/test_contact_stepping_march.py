@@ -22,6 +22,13 @@ def in_steps(monkeypatch):
 
 RUB = {"speed": 170.0, "clearance": "80 um", "friction": 0.2, "transient": 0, "revolutions": 2}
 CLOSE = RUB | {"clearance": "40 um"}
+BOUNCING = RUB | {"clearance": "10 um", "restitution": 0.8}
+
+
+def bouncing_rig():
+    """Three stators of 0.1 kg, around half of the rotor."""
+    bouncing = LumpedStator(node=3, mass=0.1, stiffness=1e5, damping=5.0)
+    return replace(trial_rig(1), stator=tuple(replace(bouncing, angle=angle) for angle in (0.3, 1.1, -0.9)))
 
 
 def distance(found, known, names=MOTIONS):
@@ -76,10 +83,29 @@ def test_energy_residual_falls_with_the_square_of_the_step():
 @pytest.mark.parametrize("friction_law", ["sliding", "coulomb"])
 def test_energy_balances_where_steps_hold_impacts_with_restitution(monkeypatch, friction_law):
     """An impulse works at the instant of its impact; at its beginning 5e-4 would be left."""
-    bouncing = LumpedStator(node=3, mass=0.1, stiffness=1e5, damping=5.0)
-    rig = replace(trial_rig(1), stator=tuple(replace(bouncing, angle=angle) for angle in (0.3, 1.1, -0.9)))
     monkeypatch.setitem(case.MARCHES, Scheme.EVENT_DRIVEN, ContactSteppingMarch)
-    given = CLOSE | {"clearance": "10 um", "restitution": 0.8, "friction_law": friction_law}
-    record = simulate(rig, **given, step="1 us")
+    record = simulate(bouncing_rig(), **BOUNCING, friction_law=friction_law, step="1 us")
     assert record.contacts_per_revolution.sum() > 100
     assert record.energy_residual < 1e-4
+
+
+@pytest.mark.parametrize("friction_law", ["sliding", "coulomb"])
+def test_energy_of_the_central_difference_balances_with_restitution(friction_law):
+    """Likewise: at the beginning of its step an impulse would leave 6e-4."""
+    given = BOUNCING | {"friction_law": friction_law, "method": "central-difference"}
+    record = simulate(bouncing_rig(), **given, step="0.5 us")
+    assert record.contacts_per_revolution.sum() > 100
+    assert record.energy_residual < 1e-4
+
+
+@pytest.mark.parametrize("friction_law", ["sliding", "coulomb"])
+def test_record_that_begins_in_contact_begins_with_its_acceleration(monkeypatch, friction_law):
+    """The force of the first step is half of what holds the gap closed, since it acts at its beginning."""
+    given = CLOSE | {"friction_law": friction_law}
+    before = simulate(trial_rig(2), **given)
+    assert before.final.contact_force.max() > 5.0
+    exact = simulate(trial_rig(2), **given, initial=before.final)
+    monkeypatch.setitem(case.MARCHES, Scheme.EVENT_DRIVEN, ContactSteppingMarch)
+    found = simulate(trial_rig(2), **given, initial=before.final, step="0.25 us")
+    size = np.sqrt(np.mean(exact.torsion_acceleration**2))
+    assert found.torsion_acceleration[:3] == pytest.approx(exact.torsion_acceleration[:3], abs=1e-2 * size)
