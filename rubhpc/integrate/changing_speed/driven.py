@@ -22,12 +22,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.integrate.changing_speed.free_piece import Spin
+from rubhpc.integrate.changing_speed.free_piece import DRIVEN_LAG, Spin
 from rubhpc.integrate.changing_speed.run_up import RunUp
 from rubhpc.integrate.changing_speed.turns import Turns
 from rubhpc.integrate.measuring.measures import LEAST_EXCHANGE
 from rubhpc.integrate.measuring.samples import empty_samples
-from rubhpc.study.speed_law import LAG, LONGEST_PIECE
+from rubhpc.study.speed_law import LONGEST_PIECE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -141,7 +141,7 @@ def integrate_driven(
         if not drive.lowest < spin.speed < fastest.spin:
             end = TOO_SLOW if spin.speed <= drive.lowest else TOO_FAST
             break
-        if pieces_per_revolution is None and 4.0 * taken.lag <= LAG:
+        if pieces_per_revolution is None and 4.0 * taken.lag <= DRIVEN_LAG:
             length *= 2
     gathered.sum_up()
     if n_done == 0 and not reason:

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+DRIVEN_LAG = 0.25 * LAG  # rad, by which the shaft may depart from its angle: the twist feels its speed too
 GUESSED = 0.02 * LAG  # rad, by which the shaft's angle may depart from that of the acceleration guessed
 MOST_TRIES = 4  # of a piece, after which it is halved
 
@@ -103,7 +104,7 @@ class Spin:
                 return None
             mean = 0.5 * (self.speed + end_speed)
             duration = turned / mean
-            if not is_fixed and abs(acceleration) * duration**2 > 12.0 * LAG and length > 1:
+            if not is_fixed and abs(acceleration) * duration**2 > 12.0 * DRIVEN_LAG and length > 1:
                 return None
             torque = self._mean_torque(end_speed)
             low, high = drive.at(self.speed), drive.at(end_speed)
