@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.branches.events import Event, half_change, halving
 from rubhpc.integrate.branches.grazing import grazing, grazing_beside, passed, touches
 from rubhpc.integrate.branches.point import away_from_events
+from rubhpc.integrate.branches.weak_impact import weakly_impacting
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.shooting import SAME, NotConverged
 
@@ -116,8 +118,8 @@ def follow(
             if found is None:
                 point, follower = grazing(branching, history, predict), None
                 if point is not None:
-                    follower = _beyond(branching, history[-2], base, point)
-                elif len(history) > 1 and (other := _beyond(branching, history[-2], base, base)):
+                    follower = _beyond(branching, history[-2:], base, point)
+                elif len(history) > 1 and (other := _beyond(branching, history[-2:], base, base)):
                     corner_there = grazing_beside(branching, base, other)  # behind a corner that is too sharp
                     if corner_there and _is_close(branching, base, corner_there.point):
                         point, follower = corner_there.point, other
@@ -192,23 +194,25 @@ def _is_near(branching: Branching, history: list[Point], guess: Floats, found: P
     return bool(moved > 0.0 and change @ guess > STRAIGHT * moved * length and moved < 2.0 * length)
 
 
-def _beyond(branching: Branching, before: Point, base: Point, grazing_point: Point) -> Point | None:
-    """A motion of other contacts next to a grazing: further along the parameter, or back."""
-    sense = np.sign(grazing_point.value - before.value)
-    n = 2 * grazing_point.case.n
+def _beyond(branching: Branching, history: list[Point], base: Point, grazing_point: Point) -> Point | None:
+    """A motion of other contacts next to a grazing: with a weak impact, or along the parameter or back."""
+
+    def follows(found: Point) -> bool:
+        is_near = np.linalg.norm(branching.difference(grazing_point, found)) < 1.0
+        return bool(touches(found) != touches(base) and is_near)
+
+    with suppress(NotConverged):
+        if follows(found := weakly_impacting(branching, history)):
+            return found
+    sense = np.sign(grazing_point.value - history[0].value)
+    along = np.zeros(2 * grazing_point.case.n + 1)
+    along[-1] = 1.0
     for steps in BEYOND:
         for direction in (sense, -sense):
-            guess = np.zeros(n + 1)
-            guess[-1] = direction * steps
-            along = np.zeros(n + 1)
-            along[-1] = 1.0
-            try:
-                found = branching.correct(grazing_point, guess, along, most=12)
-            except NotConverged:
-                continue
-            is_other = touches(found) != touches(base)
-            if is_other and np.linalg.norm(branching.difference(grazing_point, found)) < 1.0:
-                return found
+            with suppress(NotConverged):
+                found = branching.correct(grazing_point, direction * steps * along, along, most=12)
+                if follows(found):
+                    return found
     return None
 
 

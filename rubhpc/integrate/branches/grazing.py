@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rubhpc.integrate.branches.events import LOCATED, Event, crossings, tolerance_of
+from rubhpc.integrate.branches.weak_impact import weakly_impacting
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 
 if TYPE_CHECKING:
@@ -153,6 +155,11 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
     def impacting(at: float) -> Point:
         """The motion with more contacts that is nearest to the grazing."""
         end, other = (1.0, b) if is_first_free else (0.0, a)
+        with suppress(NotConverged):
+            found = weakly_impacting(branching, [a if is_first_free else b, *(point for _, point in free)])
+            length = np.linalg.norm(branching.difference(free[-1][1], found))
+            if touches(found) == touches(other) and length <= MEETING * np.linalg.norm(change):
+                return found
         for part in BESIDE:
             for base, share in ((a, at + part * (end - at)), (free[-1][1], part * (end - at))):
                 try:
