@@ -36,8 +36,9 @@ PARTS = np.ascontiguousarray(
 )
 # Of `CurvedWork.span`: length of the step that loads are continued from (0: none), largest force of the
 # contact, time that resolves force and slip, set of the pairs that `secant` is of, steps before one may be
-# longer, time since the step that loads are continued from began, how often the last step moved its loads.
-BEFORE, LARGEST, RESOLVED, PAIRS, PATIENCE, PAST, SWEEPS = range(7)
+# longer, time since the step that loads are continued from began, how often the last step moved its loads,
+# level of the steps that `system` is of.
+BEFORE, LARGEST, RESOLVED, PAIRS, PATIENCE, PAST, SWEEPS, SOLVED = range(8)
 MOST_UNKNOWNS = 64  # loads of a step that are found by a secant method; more are found by sweeps
 
 
@@ -61,6 +62,7 @@ class CurvedPairs(NamedTuple):
 class CurvedTables(NamedTuple):
     """What the tables of p contact modes lack for curved gaps; m coordinates, d = 2 + b motions and twist."""
 
+    used: Ints  # (p,), coordinates that are anything
     read_re: Floats  # (p, q, 3 d + 1, m), motions, their rates, the rate of twist, their accelerations free
     read_im: Floats
     bound: Floats  # (p, q, d, m), bound on the second time derivative of a motion for a unit coordinate
@@ -97,7 +99,7 @@ class CurvedWork(NamedTuple):
     loads: Floats  # the same in one row
     before: Floats  # (5, q, 4 + b), loads of the step that they are continued from
     gap: Floats  # (2, 5, q), of open pairs at the nodes, m, and their rates
-    span: Floats  # (7,), see above
+    span: Floats  # (8,), see above
     motion: Floats  # (3, q, 3 + b), displacements, rates and free accelerations at a node
     free: Floats  # (4 (3 d + 1),), what is read of one pair at the nodes, without the loads to be found
     normal: Floats  # (2, q), along and across
@@ -146,7 +148,7 @@ def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int, n_level: int) -
         loads=load.reshape(-1),
         before=np.zeros((N_NODE, q, n_row + 1)),
         gap=np.zeros((2, N_NODE, q)),
-        span=np.zeros(7),
+        span=np.zeros(8),
         motion=np.zeros((3, q, n_row)),
         free=np.zeros((N_NODE - 1) * (3 * n_row - 2)),
         normal=np.zeros((2, q)),

@@ -41,6 +41,7 @@ from rubhpc.kernels.curved_contact import (
     PAST,
     PATIENCE,
     RESOLVED,
+    SOLVED,
     CurvedPairs,
     CurvedTables,
     CurvedWork,
@@ -74,7 +75,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 GROWTH = 2  # steps are no longer than 2^this times what the contact has lasted
-OBSERVED = 1e-4  # of the tolerance of loads, while recording, so that energies balance
+OBSERVED = 3e-4  # of the tolerance of loads, while recording, so that energies balance
 
 
 @jit_lean_sum
@@ -193,7 +194,18 @@ def advance_curved(
             step = (1 << level) * clock.tick
             progress.n_step += 1
             is_good, growth = take_step(
-                pairs, curved, tables, reduced.rim_speed, mode, level, step, tolerance, z, z_next, work
+                pairs,
+                curved,
+                tables,
+                reduced.rim_speed,
+                mode,
+                level,
+                step,
+                tolerance,
+                is_recorded,
+                z,
+                z_next,
+                work,
             )
             if not is_good:
                 if level == 0:
@@ -300,6 +312,7 @@ def enter_curved(
     progress.resolved_level, progress.halving_level, progress.is_after_event = FORCED_LEVEL, NONE, 1
     progress.contact_age = NONE
     work.span[BEFORE], work.span[PAST], work.span[LARGEST], work.span[PATIENCE] = 0.0, 0.0, 0.0, 0.0
+    work.span[SOLVED] = 1.0 * NONE
     if closed == 0:
         return True
     return evaluate(pairs, curved, reduced.rim_speed, found, closed, 0, z[0], z[1], work)

@@ -152,8 +152,9 @@ def observe_power(
     seen, n_loss = work.seen, curved.sign.shape[1]
     for r in range(n_loss + 2):
         seen[r] = 0.0
-    add_rows(curved.drain[mode, 0], z[0], seen)
-    add_rows(curved.drain[mode, 1], z[1], seen)
+    used = curved.used[mode]
+    add_rows(curved.drain[mode, 0, :used], z[0, :used], seen)
+    add_rows(curved.drain[mode, 1, :used], z[1, :used], seen)
     for i in range(work.h.shape[1]):
         rate = work.rate[node, i]
         for r in range(n_loss + 2):

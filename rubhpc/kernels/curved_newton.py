@@ -231,3 +231,11 @@ def move_by_newton(work: CurvedWork) -> None:
             point[MOVE, first + a] += work.lever[node, a - LOAD_ALONG] * state[own + STATE_FORCE]
     for j in range(n):
         point[LOADS, j] += point[MOVE, j]
+
+
+@jit_inline_sum
+def take_states(work: CurvedWork) -> None:
+    """Take h, its rate and the force of the lone pair at the nodes as the last move has them."""
+    for node in range(1, N_NODE):
+        work.h[node, 0], work.rate[node, 0] = work.load[node, 0, HEIGHT], work.load[node, 0, HEIGHT_RATE]
+        work.force[node, 0] += work.unknown[N_STATE * (node - 1) + STATE_FORCE]

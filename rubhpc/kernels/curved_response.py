@@ -37,8 +37,9 @@ def read_free(
     n_load, free = work.load.shape[2], work.free
     for r in range(free.size):
         free[r] = 0.0
-    add_rows(tables.lone[mode, level, 0], z_re, free)
-    add_rows(tables.lone[mode, level, 1], z_im, free)
+    used = tables.used[mode]
+    add_rows(tables.lone[mode, level, 0, :used], z_re[:used], free)
+    add_rows(tables.lone[mode, level, 1, :used], z_im[:used], free)
     add_rows(tables.reach[mode, level, :n_load], work.loads[:n_load], free)
 
 

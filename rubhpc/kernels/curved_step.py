@@ -14,6 +14,7 @@ from rubhpc.kernels.curved_contact import (
     N_NODE,
     PAST,
     PATIENCE,
+    SOLVED,
     SWEEPS,
     CurvedPairs,
     CurvedTables,
@@ -21,7 +22,7 @@ from rubhpc.kernels.curved_contact import (
     is_closed,
 )
 from rubhpc.kernels.curved_forces import evaluate, find_lone_forces
-from rubhpc.kernels.curved_newton import fill_slopes, find_system, move_by_newton
+from rubhpc.kernels.curved_newton import fill_slopes, find_system, move_by_newton, take_states
 from rubhpc.kernels.curved_response import (
     lone_pair,
     move_coordinates,
@@ -60,6 +61,8 @@ MOST_SWEEPS = 12  # over the nodes
 INTERPOLATED = 5e-4
 SETTLED = 0.1  # share of the loads' tolerance to which the iteration goes
 EASY, VERY_EASY = 0.02, 5e-4  # shares of the tolerance below which steps may be twice, four times as long
+STALE = 2  # sweeps after which slopes are taken anew
+ANSWERED = 0.5  # share of the tolerance below which one more move errs by less than `SETTLED`
 HOPELESS = 6  # sweeps after which loads are to be missed by less than `FALLEN` of what they first were
 FALLEN = 0.1
 PATIENT = 16  # steps, after one whose loads were not found, before a longer one is tried
@@ -77,6 +80,7 @@ def take_step(
     level: int,
     step: float,
     tolerance: float,
+    is_recorded: bool,
     z: Floats,
     z_next: Floats,
     work: CurvedWork,
@@ -89,6 +93,8 @@ def take_step(
     ----------
     tolerance : float
         Of the loads, relative to the largest force of the contact.
+    is_recorded : bool
+        Whether slips at the nodes must be those under the last loads.
 
     Returns
     -------
@@ -114,11 +120,11 @@ def take_step(
         point[GUESS, j] = point[LOADS, j]
     if not is_lone:
         take_secant(mask, level, n, work)
-    is_newton, takes_slopes = False, False
-    moved, first, sweep = np.inf, np.inf, 0
+    is_newton, takes_slopes = is_lone and work.span[SOLVED] == 1.0 * level, False
+    moved, first, sweep, is_last = np.inf, np.inf, 0, False
     while True:
         if is_lone:
-            takes_slopes = (sweep > 0 and not is_newton) or (sweep == 0 and work.span[SWEEPS] > 0.0)
+            takes_slopes = sweep == STALE or (not is_newton and (sweep > 0 or work.span[SWEEPS] > 0.0))
             is_found = sweep_alone(pairs, curved, rim_speed, mode, level, takes_slopes, work)
         else:
             is_found = sweep_all(pairs, curved, rim_speed, mode, mask, level, z, work)
@@ -137,8 +143,10 @@ def take_step(
         if is_lone:
             if takes_slopes:
                 is_newton = find_system(curved, mode, level, work)
+                work.span[SOLVED] = 1.0 * level if is_newton else -1.0
             if is_newton:
                 move_by_newton(work)
+                is_last = not is_recorded and moved <= ANSWERED * allowed
             else:
                 for j in range(n):
                     point[MOVE, j] = point[MISSED, j]
@@ -155,11 +163,14 @@ def take_step(
                 return False, 0
         give_loads(mask, work)
         sweep += 1
+        if is_last:
+            take_states(work)
+            break
     take_loads(mask, work, point[LOADS])
     for j in range(n):
         point[MOVE, j] = point[LOADS, j] - point[GUESS, j]
     missed = INTERPOLATED * size_of(point[MOVE], n, n_load, point[FORCES])
-    is_settled, work.span[SWEEPS] = moved <= SETTLED * allowed, 1.0 * sweep
+    is_settled, work.span[SWEEPS] = is_last or moved <= SETTLED * allowed, 1.0 * sweep
     if is_settled:
         work.span[PATIENCE] = max(work.span[PATIENCE] - 1.0, 0.0)
     else:

@@ -9,7 +9,6 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
 from rubhpc.integrate.marches.march import NO_FORCES
-from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.curved_tables import curved_pairs
 from rubhpc.kernels.case_progress import ask_for, begin_in
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.record import State
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.setup import ModalSetup
@@ -63,8 +63,9 @@ class CurvedMarch(EventDrivenMarch):
             self._make_work()
 
     def start_again(self, state: State) -> bool:
-        """Start the same case anew at another state, with what was found of its matrices."""
-        self.begin(self._setup, Place(self.reduced(state), self._setup.model.sag, state.contact_force))
+        """Start the same case anew at another state, with what was found of its matrices and contacts."""
+        self._force = state.contact_force.copy()
+        self._start_at(state)
         return True
 
     def _take_pairs(self) -> None:

@@ -81,6 +81,15 @@ class EventDrivenMarch(ModalMarch):
         self._asked = {mask: n for mask, n in self._asked.items() if self._n_piece - n <= FORESEEN}
         self._enter_first(place.contact_force)
 
+    def _start_at(self, state: State) -> None:
+        """Start the same case anew at another state, with the contact modes that it has met."""
+        self._stride = ALL_SAMPLES
+        self._begin_time()
+        self._motion[:] = self.reduced(state)
+        mask = self._first_mask(state.contact_force)
+        self.find(mask)
+        self._start(self._library.masks.index(mask))
+
     def _enter_first(self, contact_force: Floats) -> None:
         """Enter the contact mode with which the case begins; forces (q,), N."""
         self._measured = self._find_library(self._setup, self._coefficient)

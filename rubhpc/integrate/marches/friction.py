@@ -9,7 +9,7 @@ import numpy as np
 
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
-from rubhpc.integrate.marches.march import ALL_SAMPLES, NO_FORCES
+from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.marches.workspace import empty_workspace
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, states_of
@@ -80,12 +80,8 @@ class FrictionMarch(EventDrivenMarch):
 
     def start_again(self, state: State) -> bool:
         """Start the same case anew at another state, with the contact modes that it has met."""
-        self._n_short, self._stride = 0, ALL_SAMPLES
-        self._begin_time()
-        self._motion[:] = self.reduced(state)
-        mask = self._first_mask(state.contact_force)
-        self.find(mask)
-        self._start(self._library.masks.index(mask))
+        self._n_short = 0
+        self._start_at(state)
         return True
 
     def closed(self, mask: int) -> NDArray[np.bool_]:

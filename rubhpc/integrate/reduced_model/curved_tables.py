@@ -227,7 +227,9 @@ def tuned_tables(
         reach[:] = met.real.reshape(reach.shape)
     forces = np.concatenate([still.dampers, reduced.force])  # (r + 2, n)
     drain = forces @ motion[n:]
+    used = np.flatnonzero(np.any(motion != 0.0, axis=0))[-1] + 1
     return CurvedTables(
+        used=np.array(used),
         read_re=read.real,
         read_im=read.imag,
         bound=np.abs(flat @ motion[:n]) * np.abs(exponent) ** 2 * growth,
