@@ -15,7 +15,7 @@ from rubhpc.running.launch import end_with_launcher, launch
 _OUTPUT = click.option(
     "--output", type=click.Path(path_type=Path), metavar="STORE", help="The store, instead of the study's."
 )
-_WHOLE_START = 1.2  # the store made and ended
+_WHOLE_START = 1.5  # the store made and ended
 _TRUST = click.option(
     "--trust-rig", is_flag=True, help='Run the Python code of a study whose rig is "FILE.py:FUNCTION".'
 )

@@ -11,6 +11,8 @@ from rubhpc.schema import PROBE_QUANTITIES
 TWISTS = ("twist", "twist_rate", "twist_acceleration")
 MOTIONS = ("displacement", "velocity", "acceleration")
 
+LONGEST_NAME = 64  # of a probe: its signals are files of the store
+
 
 @dataclass(frozen=True, kw_only=True)
 class Probe:
@@ -51,9 +53,10 @@ class Probe:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if not re.fullmatch(r"[A-Za-z]\w*", self.name, re.ASCII):
-            fix = "write letters, digits and _, beginning with a letter"
-            raise FieldError("name", f'"{self.name}" makes no name of a variable; {fix}')
+        if not re.fullmatch(rf"[A-Za-z]\w{{,{LONGEST_NAME - 1}}}", self.name, re.ASCII):
+            fix = f"write up to {LONGEST_NAME} letters, digits and _, beginning with a letter"
+            shown = self.name if len(self.name) <= LONGEST_NAME else f"{self.name[:LONGEST_NAME]}..."
+            raise FieldError("name", f'"{shown}" makes no name of a variable; {fix}')
         if (self.node is None) == (self.stator is None):
             raise FieldError("node", "give either node = 1 or stator = 1, one of the two")
         if self.stator is not None and self.quantity not in (*MOTIONS, "foundation_force"):

@@ -137,7 +137,8 @@ def test_a_tip_that_moves_along_its_axis_alone_is_not_seen_across_it():
     ("keys", "says"),
     [
         ({"name": "1st"}, 'name: "1st" makes no name of a variable'),
-        ({"name": "a b", "node": 1}, "write letters, digits and _"),
+        ({"name": "x" * 65}, "up to 64 letters"),
+        ({"name": "a b", "node": 1}, "letters, digits and _"),
         ({"name": "a", "node": 1, "stator": 1}, "node: give either node = 1 or stator = 1"),
         ({"name": "a"}, "node: give either"),
         ({"name": "a", "stator": 1, "quantity": "twist"}, "twist is not measured at a stator"),
