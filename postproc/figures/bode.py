@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from postproc.figures.options import Axis, Positive
 
+FIRST_LAG = 120.0  # degrees, to which that of the first curve lies near where it begins: from -60 to 300
+
 
 def bode(
     cases: xr.Dataset, signal: str | Sequence[str] = (), *, order: Positive = 1.0, over: Axis | None = None
@@ -82,13 +84,18 @@ def draw_bode(
     for name in signals:
         amplitude, phase = data[f"amplitude_{name}"], data[f"phase_{name}"]
         curves = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
+        first_lag = FIRST_LAG
         for i_case, ((case, height), (_, lead)) in enumerate(curves):
             own_speeds = speeds.isel({over: i_case}) if over in speeds.dims else speeds
             rpm = own_speeds.values * RPM
             own = name.removeprefix("probe_").replace("_", " ") if len(signals) > 1 else None
             label = ", ".join(text for text in (own, case) if text) or None
             top.plot(rpm, height.values * scale.factor, label=label, **style)
-            bottom.plot(rpm, -np.degrees(lead.values), **style)
+            lag = -np.degrees(lead.values)
+            if np.isfinite(lag).any():  # whole turns apart a lag is the same
+                lag -= 360.0 * np.round((lag[np.isfinite(lag)][0] - first_lag) / 360.0)
+                first_lag = lag[np.isfinite(lag)][0]
+            bottom.plot(rpm, lag, **style)
             n_curve += 1
     shown = [signal_name(data[f"amplitude_{signals[0]}"])] if len(signals) == 1 else []
     top.set_title(", ".join([*shown, written_order(order)]), fontsize=8)

@@ -14,12 +14,12 @@ from rubhpc.errors import InputError
 N = 32  # samples a revolution
 
 
-def study(turns=6):
+def study(turns=6, lag=0.0):
     """Two frictions, three speeds: amplitude 1 um per rad/s and friction, lagging by 0.01 rad per rad/s."""
     angle = 2 * math.pi * np.arange(N * turns) / N
     speed, friction = np.array([300.0, 100.0, 200.0]), np.array([1.0, 2.0])
     size = 1e-6 * speed[:, None, None] * friction[:, None]
-    signal = size * np.cos(angle - 0.01 * speed[:, None, None]) + 1e-4 * np.cos(0.5 * angle + 0.7)
+    signal = size * np.cos(angle - lag - 0.01 * speed[:, None, None]) + 1e-4 * np.cos(0.5 * angle + 0.7)
     return xr.Dataset(
         {
             "vertical": (("speed", "friction", "sample"), signal, {"units": "m"}),
@@ -54,6 +54,12 @@ def test_cases_lie_over_one_another():
     assert axes[0].get_title(loc="left") == "Vertical displacement, 1X"
     assert axes[0].get_ylabel() == "Amplitude (µm)"
     assert axes[1].get_xlabel() == "Spin speed (rpm)"
+
+
+def test_a_lag_begins_in_the_first_turn():
+    """At 5 rad, where its mean is nearer to a whole turn."""
+    lines = bode(study(lag=4.0), over="friction").show()[1].lines
+    assert [line.get_ydata() for line in lines] == [pytest.approx(np.degrees([5.0, 6.0, 7.0]))] * 2
 
 
 def run_ups():
