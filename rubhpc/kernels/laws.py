@@ -1,6 +1,6 @@
 """Laws of contact and friction: what ties the forces of a pair to its gap and its slip.
 
-To add one, give it a place here and a name in `study.tables`; CONTRIBUTING.md has the steps.
+To add one, give it a place here and a name in `study.contact_keys`; CONTRIBUTING.md has the steps.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from rubhpc.kernels._jit import jit_inline
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-FRICTION_LAWS = ("sliding", "coulomb", "stribeck", "table")  # in a study; their places are the numbers below
+# In a study; their places are the numbers below.
+FRICTION_LAWS = ("sliding", "coulomb", "stribeck", "table")
 SLIDING, COULOMB, STRIBECK, TABLE = range(4)
 
 
