@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import os
 import sys
+import time
 from importlib import import_module
 
 import click
@@ -15,7 +16,7 @@ import click
 from postproc.catalogue import figures
 from rubhpc import __version__
 from rubhpc.errors import RubError, printable
-from rubhpc.running.launch import launch
+from rubhpc.running.launch import FIRST_SPEAKS, launch, leave
 from rubhpc.threads import VARIABLES
 
 _STOPPED = 75
@@ -120,13 +121,15 @@ def main(args: list[str] | None = None) -> None:
 
         crashed = crash(error)
         code = _report(str(crashed), crashed.exit_code)
-    sys.exit(code)
+    leave(code)
 
 
 def _report(text: str, code: int) -> int:
-    """Print an error in one line, on the first rank only."""
+    """Print an error in one line, on the first rank only; the others wait for it."""
     if launch().rank == 0:
         print(f"rubhpc: {printable(' '.join(text.split()))}", file=sys.stderr)
+    else:
+        time.sleep(FIRST_SPEAKS)
     return code
 
 

@@ -9,7 +9,7 @@ import threading
 import time
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,6 +33,7 @@ class Launch(NamedTuple):
 _PARENT = os.getppid()
 _moved: list[Launch] = []
 _watching: list[bool] = []
+FIRST_SPEAKS = 1.0  # s, for which the other ranks leave the word to the first: a launcher ends all with one
 _LOOK = 0.5  # s between looks at whether the launcher still lives
 _FEW = 32
 _PR_SET_PDEATHSIG = 1  # from Linux's prctl.h
@@ -52,6 +53,17 @@ def launch() -> Launch:
 def move_to(rank: int, size: int) -> None:
     """Have `launch` return this place from now on: ranks were lost, and another rank may be the first."""
     _moved.append(launch()._replace(rank=rank, size=size))
+
+
+def leave(code: int) -> NoReturn:
+    """Exit with a code; after ranks were lost without MPI's own end, in which Open MPI may wait for them."""
+    if _moved:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        if launch().rank > 0:
+            time.sleep(FIRST_SPEAKS)
+        os._exit(code)
+    sys.exit(code)
 
 
 @contextmanager

@@ -245,9 +245,16 @@ class Ranks:
             yield
         except self._mpi.Exception as error:
             lost = (getattr(self._mpi, name, None) for name in ("ERR_PROC_FAILED", "ERR_REVOKED"))
-            if error.Get_error_class() in lost:
+            if error.Get_error_class() in lost or self._misses_ranks():
                 raise RankLost("a rank was lost; run the same command again") from None
             raise
+
+    def _misses_ranks(self) -> bool:
+        """Whether another rank has said so, or MPI knows of one that died: Open MPI has other errors too."""
+        try:
+            return bool(self._comm.Is_revoked()) or self._comm.Get_failed().size > 0
+        except (AttributeError, NotImplementedError, self._mpi.Exception):  # it does not outlive a rank
+            return False
 
 
 def together(pool: Pool, work: Callable[[], T]) -> list[T]:
