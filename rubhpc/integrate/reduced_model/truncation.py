@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 MARGIN = 5.0  # estimates without it were up to 5.5 times too small: a case has many contacts, not one
 REBOUNDS = 3.0  # where modes are added, how much closer: a body that rebounds many times multiplies an error
-# Likewise for torsional accelerations: half the cases of a stiff stator were below 1.5, nine tenths below 4.
-ACCELERATION_MARGIN = 1.5
 MOST_MODES = 400  # kept for the sake of the estimate; `cutoff_frequency` may ask for more
 
 
@@ -140,8 +138,7 @@ def ringing_of(model: Model, spin: float) -> Ringing:
     ratio = frequency / standstill.contact_frequency
     is_fast = ratio > CUTOFF_RATIO
     late = float((accelerating[:, is_fast] @ ratio[is_fast] ** 2).max(initial=1.0))
-    weight = (ACCELERATION_MARGIN / MARGIN) ** 2
-    return Ringing(np.vstack([share * late, accelerating * weight]), impact)
+    return Ringing(np.vstack([share * late, accelerating]), impact)
 
 
 def shares(rung: Floats, n_stator: int, coupled: Floats, lasting: Floats) -> Floats:

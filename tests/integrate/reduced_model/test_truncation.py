@@ -77,14 +77,15 @@ def test_forces_of_a_heavy_stator_are_those_of_all_modes():
 
 
 @pytest.mark.parametrize(
-    ("modulus", "case"),
+    ("modulus", "case", "n_more"),
     [
-        (3e9, {"speed_ratio": 1.1, "clearance": "100 um"}),
-        (3e10, {"speed_ratio": 3.5, "clearance": "74 um"}),
-        (3e9, {"speed_ratio": 6.0, "clearance": "60 um"}),
+        (3e9, {"speed_ratio": 1.1, "clearance": "100 um"}, 0),
+        (3e10, {"speed_ratio": 3.5, "clearance": "74 um"}, 3),
+        (3e9, {"speed_ratio": 6.0, "clearance": "60 um"}, 0),
     ],
 )
-def test_packaged_rig_is_as_accurate_as_asked_with_the_modes_below_the_cutoff(modulus, case):
+def test_packaged_rig_is_as_accurate_as_asked_with_few_modes_above_the_cutoff(modulus, case, n_more):
+    """None at 3 GPa; three torsional ones on a stiff stator, for the torsional acceleration."""
     rig = with_keys(PACKAGED, {"stator.youngs_modulus": modulus})
     record = simulate(rig, **case, transient=0, revolutions=10)
     exact = simulate(rig, **case, transient=0, revolutions=10, accuracy=ALL_MODES)
@@ -92,7 +93,7 @@ def test_packaged_rig_is_as_accurate_as_asked_with_the_modes_below_the_cutoff(mo
     assert record.remark == ""
     model = assemble(rig)
     for spin in (120.0, 400.0, 1200.0):
-        assert number(kept_modes(model, spin, 1e-3)) == number(below(model, spin))
+        assert number(kept_modes(model, spin, 1e-3)) == number(below(model, spin)) + n_more
 
 
 @pytest.mark.parametrize("seed", [0, 4, 11, 21, 25, 37])
