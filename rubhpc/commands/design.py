@@ -24,10 +24,11 @@ def print_design(design: xr.Dataset) -> None:
     for i in range(design.sizes["critical"]):
         one = design.isel(critical=i)
         ratio = float(one["critical_damping_ratio"])
+        shown = round(ratio, 5) + 0.0  # no -0.00000
         excited = "excites" if bool(one["is_excited"]) else "does not excite"
         speed = float(one["critical_speed"])
         click.echo(
-            f"{_RPM * speed:12.2f} {speed / (2 * math.pi):12.4f} {int(one['critical_mode']):5d} {ratio:9.5f} "
+            f"{_RPM * speed:12.2f} {speed / (2 * math.pi):12.4f} {int(one['critical_mode']):5d} {shown:9.5f} "
             f"{_decrement(ratio):9.4f}  {one['critical_whirl'].item():<9} {excited}"
         )
     if not design.sizes["critical"]:

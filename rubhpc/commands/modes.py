@@ -11,7 +11,6 @@ from rubhpc.commands.quantity import quantity
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
     from rubhpc.fem.model import CarrierModel, Model
@@ -82,6 +81,7 @@ def modes(
     from postproc.store.export import check_data_path, write_data
     from rubhpc.commands.design import plain_design, print_design
     from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.lasting import undamped_message
     from rubhpc.fem.linear_design import linear_design
     from rubhpc.fem.modes import modes as find_modes
     from rubhpc.fem.stability import instability_message
@@ -103,6 +103,9 @@ def modes(
     found = [(spin, find_modes(model.rotor, spin)[:count]) for spin in spins]
     for spin in spins:
         if message := instability_message(model, spin):
+            click.echo(f"warning: {message}", err=True)
+    for message in dict.fromkeys(undamped_message(model, spin) for spin in spins):
+        if message:
             click.echo(f"warning: {message}", err=True)
     design = None
     if speed_range or operating or nodes or shapes or data:
@@ -164,16 +167,18 @@ def _print_tables(
 ) -> None:
     import math
 
+    from rubhpc.fem.lasting import stator_names
+
     tables = [(f"Rotor at {spin * 30 / math.pi:g} rpm ({spin:.6g} rad/s)", rotor) for spin, rotor in found]
     for carrier, listed in carriers:
-        tables.append((f"Carrier {carrier.name} with {_named(carrier.stators)}", listed))
+        tables.append((f"Carrier {carrier.name} with {stator_names(carrier.stators)}", listed))
     on = {number: carrier.name for carrier, _ in carriers for number in carrier.stators}
     alike: dict[tuple[object, ...], list[int]] = {}  # a ring has one table
     for number, stator in enumerate(stators, start=1):
         values = ((mode.frequency, mode.damping_ratio, mode.kind) for mode in stator)
         alike.setdefault((on.get(number), *values), []).append(number)
     for (carrier_name, *_), among in alike.items():
-        title = _named(among).capitalize() + (", each" if len(among) > 1 else "")
+        title = stator_names(among).capitalize() + (", each" if len(among) > 1 else "")
         held = f", while carrier {carrier_name} is held" if carrier_name else ""
         tables.append((title + held, stators[among[0] - 1]))
     click.echo("Natural and damped frequency in Hz, damping as a fraction of critical.")
@@ -183,22 +188,11 @@ def _print_tables(
             continue
         click.echo(f"\n{title}\n{'natural':>12} {'damped':>12} {'damping':>9}  {'kind':<10} whirl")
         for mode in listed[:count]:
-            numbers = f"{mode.frequency:12.4f} {mode.damped_frequency:12.4f} {mode.damping_ratio:9.5f}"
+            damping = round(mode.damping_ratio, 5) + 0.0  # no -0.00000
+            numbers = f"{mode.frequency:12.4f} {mode.damped_frequency:12.4f} {damping:9.5f}"
             click.echo(f"{numbers}  {mode.kind:<10} {mode.whirl}")
         if len(listed) > count:
             click.echo(f"({len(listed) - count} more; --count {len(listed)} shows all)")
-
-
-def _named(stators: Sequence[int]) -> str:
-    """Stators by their numbers, runs of them by their ends: "stators 1 to 8, 11"."""
-    runs: list[list[int]] = []
-    for number in stators:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    listed = [f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs]
-    return f"stator{'s' * (len(stators) > 1)} {', '.join(listed)}"
 
 
 def _draw(model: Model, top_speed: float, count: int | None, path: Path) -> None:

@@ -60,10 +60,15 @@ def is_passive(body: Body) -> bool:
     return all(values[0] >= -_SYMMETRY * np.abs(values).max() for values in spectra)
 
 
+def is_rounding(mode: Mode, greatest: float) -> bool:
+    """Whether growth or decay of a mode is rounding; `greatest` is the largest eigenvalue's size, rad/s."""
+    return abs(mode.eigenvalue.real) <= _ROUNDING_OF_GREATEST * greatest + _ROUNDING * abs(mode.eigenvalue)
+
+
 def growing_modes(found: Sequence[Mode]) -> list[Mode]:
     """Return those of all modes of a body that grow, the fastest to grow first."""
-    limit = _ROUNDING_OF_GREATEST * max((abs(mode.eigenvalue) for mode in found), default=0.0)
-    growing = [m for m in found if m.eigenvalue.real > limit + _ROUNDING * abs(m.eigenvalue)]
+    greatest = max((abs(mode.eigenvalue) for mode in found), default=0.0)
+    growing = [m for m in found if m.eigenvalue.real > 0.0 and not is_rounding(m, greatest)]
     return sorted(growing, key=lambda mode: -mode.eigenvalue.real)
 
 

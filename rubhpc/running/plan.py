@@ -63,7 +63,7 @@ class Plan:
     timing : Timing
         What the pilot cases have shown.
     warnings : tuple of str
-        Unstable speeds, and a sag beyond the clearance.
+        Unstable speeds, a sag beyond the clearance, modes without damping.
     n_expected : int or None
         Cases that a refined map computes in all, about; `steps` and `core_hours` are for the rest of them.
     most_core_hours : float

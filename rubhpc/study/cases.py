@@ -215,7 +215,7 @@ class CaseGrid:
         return {name: (tuple(self.dims[i] for i in dims), values) for name, (dims, values) in found.items()}
 
     def warnings(self) -> tuple[str, ...]:
-        """Return what the study is to be warned of: unstable speeds, sag beyond the clearance."""
+        """Return what the study is to be warned of: unstable speeds, sag beyond the clearance, no damping."""
         return warnings_of(self._operating_points)
 
     @property

@@ -1,4 +1,4 @@
-"""What a study is warned of before it runs: unstable rotors, and shafts that sag beyond their clearance."""
+"""What a study is warned of before it runs: unstable rotors, sag beyond the clearance, undamped modes."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.lasting import undamped_message
 from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
@@ -18,11 +20,12 @@ _RPM = 30 / math.pi
 _MOST_SAGS = (
     4096  # pairs of rotor and speed whose sag is compared with the clearance; of more, an even spread
 )
+_MOST_RIGS = 8  # whose undamped modes are looked for; of more, an even spread
 
 
 def warnings_of(points: OperatingPoints) -> tuple[str, ...]:
     """Return a line for each thing that is likely to be a mistake; none as a rule."""
-    found = (_instability(points), _sag(points))
+    found = (_instability(points), _sag(points), _undamped(points))
     return tuple(line for line in found if line)
 
 
@@ -70,6 +73,24 @@ def _sag(points: OperatingPoints) -> str:
         f"[grid] clearance_ratio: the sag of the shaft exceeds {share} clearances, {text}: it rests on a "
         "stator, and the ratio says little; give clearance instead"
     )
+
+
+def _undamped(points: OperatingPoints) -> str:
+    """Modes that nothing damps, of the first rig that has such, and how many rigs do."""
+    dims = points.dims(*points.rig_axes)
+    sizes = [points.points.shape[dim] for dim in dims]
+    n_rig = math.prod(sizes)
+    found = []
+    for number in np.unique(np.linspace(0, n_rig - 1, min(n_rig, _MOST_RIGS)).round().astype(int)):
+        at = [0] * len(points.points.dims)
+        for dim, i in zip(dims, np.unravel_index(number, sizes), strict=True):
+            at[dim] = int(i)
+        found.append(undamped_message(assemble(points.rig(tuple(at))), points.response(tuple(at))[0]))
+    named = [text for text in found if text]
+    if not named:
+        return ""
+    share = "" if len(named) == len(found) else f"at {len(named)} of {len(found)} rigs: "
+    return share + named[0]
 
 
 def _length(size: float) -> str:

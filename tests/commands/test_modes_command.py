@@ -77,6 +77,16 @@ def test_a_wall_has_no_table(tmp_path):
     assert lines[-1] == "Stator 2: a wall, which does not move"
 
 
+def test_no_damping_is_printed_as_zero_and_warned_of(tmp_path):
+    rig = (PACKAGED / "mokhtar2017.toml").read_text().replace("beta = 1.98e-5", "beta = 0.0")
+    (tmp_path / "undamped.toml").write_text(rig)
+    result = CliRunner().invoke(modes, [str(tmp_path / "undamped.toml"), "--speed", "100", "--speed", "200"])
+    table = result.stdout.split("Stator 1")[1]
+    assert table.count(" 0.00000 ") == 12
+    assert "-0.00000" not in result.stdout
+    assert result.stderr.count("warning: nothing damps 18 modes") == 1
+
+
 @pytest.mark.parametrize("extension", ["png", "svg"])
 def test_figure_is_written_in_the_format_of_its_name(tmp_path, extension):
     path = tmp_path / f"campbell.{extension}"

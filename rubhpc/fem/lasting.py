@@ -1,0 +1,82 @@
+"""Modes that nothing damps: what excites them lasts, and a motion that has settled does not look it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.fem.modes import modes
+from rubhpc.fem.stability import is_rounding
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rubhpc.fem.model import Body, Model
+    from rubhpc.fem.modes import Mode
+
+
+def undamped(body: Body, spin: float = 0.0) -> list[Mode]:
+    """Return the modes of a body that neither decay nor grow at a spin (rad/s), by rising frequency.
+
+    Rigid-body modes are not among them: nothing makes them oscillate.
+    """
+    body = body.at(spin)
+    if _takes_energy_from_all(body):
+        return []
+    found = modes(body, spin)
+    greatest = max((abs(mode.eigenvalue) for mode in found), default=0.0)
+    return [mode for mode in found if mode.frequency > 0.0 and is_rounding(mode, greatest)]
+
+
+def undamped_message(model: Model, spin: float) -> str:
+    """Return one line that names the undamped modes at a spin (rad/s); "" where there are none.
+
+    Of the rotor axial modes do not count: neither unbalance nor contact excites them. A stator on a carrier
+    counts with it.
+    """
+    found = [("the rotor", [mode for mode in undamped(model.rotor, spin) if mode.kind != "axial"])]
+    found += [
+        (f"carrier {carrier.name} with {stator_names(carrier.stators)}", undamped(carrier.body))
+        for carrier in model.carriers
+    ]
+    carried = {number for carrier in model.carriers for number in carrier.stators}
+    alike: dict[tuple[tuple[str, str], ...], tuple[list[int], list[Mode]]] = {}  # a ring is named once
+    for number, stator in enumerate(model.stators, start=1):
+        if number not in carried and (lasting := undamped(stator.body)):
+            key = tuple((f"{mode.frequency:.4g}", mode.kind) for mode in lasting)
+            alike.setdefault(key, ([], lasting))[0].append(number)
+    found += [(stator_names(numbers), lasting) for numbers, lasting in alike.values()]
+    named = [f"{_named(lasting)} of {name}" for name, lasting in found if lasting]
+    if not named:
+        return ""
+    return (
+        f"nothing damps {', and '.join(named)}: once excited it does not die out, and a motion that has "
+        "settled otherwise looks quasi-periodic; give it damping"
+    )
+
+
+def stator_names(stators: Sequence[int]) -> str:
+    """Stators by their numbers, runs of them by their ends: "stators 1 to 8, 11"."""
+    runs: list[list[int]] = []
+    for number in stators:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    listed = [f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs]
+    return f"stator{'s' * (len(stators) > 1)} {', '.join(listed)}"
+
+
+def _named(lasting: list[Mode]) -> str:
+    first = f"{lasting[0].kind} mode of {lasting[0].frequency:.4g} Hz"
+    return f"the {first}" if len(lasting) == 1 else f"{len(lasting)} modes, first the {first},"
+
+
+def _takes_energy_from_all(body: Body) -> bool:
+    """Whether damping takes energy from every velocity, so that no mode lasts."""
+    try:
+        np.linalg.cholesky((body.damping + body.damping.T) / 2)
+    except np.linalg.LinAlgError:
+        return False
+    return True
