@@ -28,6 +28,7 @@ class Launch(NamedTuple):
     rank: int
     size: int
     is_open_mpi: bool = False  # its own launcher, which no other library can be started by
+    has_lost: bool = False  # other processes, since it began
 
 
 _PARENT = os.getppid()
@@ -50,19 +51,19 @@ def launch() -> Launch:
     return Launch(0, 1)
 
 
-def move_to(rank: int, size: int) -> None:
-    """Have `launch` return this place from now on: ranks were lost, and another rank may be the first."""
-    _moved.append(launch()._replace(rank=rank, size=size))
+def move_to(rank: int, size: int, *, has_lost: bool = False) -> None:
+    """Have `launch` return this place from now on; where ranks were lost, another may be the first."""
+    _moved.append(launch()._replace(rank=rank, size=size, has_lost=has_lost))
 
 
-def leave(code: int) -> NoReturn:
+def leave(code: int | None) -> NoReturn:
     """Exit with a code; after ranks were lost without MPI's own end, in which Open MPI may wait for them."""
-    if _moved:
+    if launch().has_lost:
         sys.stdout.flush()
         sys.stderr.flush()
         if launch().rank > 0:
             time.sleep(FIRST_SPEAKS)
-        os._exit(code)
+        os._exit(code or 0)
     sys.exit(code)
 
 

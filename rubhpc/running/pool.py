@@ -203,7 +203,7 @@ class Ranks:
         with self._losses():
             self._comm = self._comm.Shrink()
         self._open()  # the old window stays: to free it takes all ranks
-        move_to(self.rank, self.size)
+        move_to(self.rank, self.size, has_lost=True)
 
     def close(self) -> None:
         """See Pool."""
