@@ -13,6 +13,8 @@ from rubhpc.integrate.branches.case import record_branches
 from rubhpc.integrate.case import compile_kernels, run_case
 from rubhpc.integrate.changing_speed.case import RunUpRecord
 from rubhpc.integrate.compilation import seconds_compiling
+from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN
+from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS, N_FIRST
 from rubhpc.integrate.setup import ModalSetup
 from rubhpc.running.case_setup import operation_of, set_up
 from rubhpc.running.shorter_cases import parts, shortened
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.record import Record
+    from rubhpc.integrate.record import Record, State
     from rubhpc.integrate.setup import Setup
     from rubhpc.study.cases import Case, CaseGrid
     from rubhpc.study.contact_keys import Contact
@@ -38,6 +40,8 @@ _FIRST_STEPS = 50_000  # predicted, of the first run of a case that is shortened
 _LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
 _FIRST_TURNS = 64  # revolutions of a changing speed that are tried first
 _WHOLE_TURNS = 3.0  # s: such cases are run whole if that takes no longer
+_NEIGHBOURS = 2 * SPAN * (N_ALIGNING + N_FIRST)  # revolutions of two neighbours of an irregular motion
+_GROWING = 0.1  # new contact modes over those of as many revolutions before: beyond, a motion is irregular
 _LATE = 0.25  # least pace of what is left of a shortened case, over that of what was timed
 
 
@@ -72,6 +76,8 @@ class Pilots:
         Processor seconds in which kernels were loaded, and in which such were compiled that no cache held.
     shortened : set of tuple of int
         Cases that were not run whole.
+    irregular : set of tuple of int
+        Those of them that still met new contact modes where they ended.
     arrays : dict
         Signals and the like of the latest case that was run, by name.
     """
@@ -83,6 +89,8 @@ class Pilots:
         self.was_cut = False
         self.loading = self.compiling = 0.0
         self.shortened: set[tuple[int, ...]] = set()
+        self.irregular: set[tuple[int, ...]] = set()
+        self._final: State | None = None  # of the latest case that was run
         self.arrays: dict[str, NDArray[Any]] = {}
 
     def pace(self, index: tuple[int, ...], steps: float, limit: float) -> Pace:
@@ -117,8 +125,12 @@ class Pilots:
             return modes, whole, done == 1.0
         a_mode = modes / max(_n_mode(setup, case), 1)
         whole += modes
+        if done < 1.0:
+            n_later, longer = self._to_come(case, setup, done)
+            whole += n_later * a_mode + longer * (whole - modes)
         try:
             if done < 1.0 and whole <= limit:
+                self.irregular.discard(case.index)
                 setup, done = set_up(self._study, case, setup.model), 1.0
                 whole = self._run(case, setup, self._study.recording, _PATIENCE * limit)
             if done == 1.0 and (other := self._alike(case)) is not None:
@@ -129,6 +141,27 @@ class Pilots:
         except _Enough:
             return 0.0, max(whole, _PATIENCE * limit), False
         return 0.0, whole, done == 1.0
+
+    def _to_come(self, case: Case, setup: Setup, done: float) -> tuple[float, float]:
+        """Contact modes that the rest of a case meets, and revolutions of neighbours over those of the case.
+
+        It is followed further, as far as it has been. Where it meets hardly any mode that is new, it is taken
+        to come back to them for ever. Elsewhere it is irregular; modes grow by a power of the revolutions,
+        those of neighbouring motions included.
+        """
+        recording = self._study.recording
+        met = _n_mode(setup, case)
+        if self._final is None or not met:
+            return 0.0, 0.0
+        self._run(case, setup, shortened(recording, done), initial=self._final)
+        n_later = _n_mode(setup, case) - met
+        if n_later <= _GROWING * met:
+            return float(n_later), 0.0
+        self.irregular.add(case.index)
+        n_turn = recording.longest_transient + recording.revolutions
+        longer = _NEIGHBOURS / n_turn if recording.revolutions >= LEAST_REVOLUTIONS else 0.0
+        power = min(1.0, math.log2(1.0 + n_later / met))
+        return met * (((1.0 + longer) / done) ** power - 1.0), longer
 
     def _alike(self, case: Case) -> Case | None:
         """Another case, far along one axis, that shares the contact modes of this one."""
@@ -207,6 +240,7 @@ class Pilots:
                 break
             self.compiling += taken
             self.was_cut = False
+        self.irregular.discard(index)
         if self.was_cut:
             taken = max(taken, guessed.step * steps + guessed.friction)
         return guessed._replace(step=max(taken - guessed.friction, 0.0) / steps)
@@ -251,15 +285,22 @@ class Pilots:
                 return taken
             self.compiling += taken
 
-    def _run(self, case: Case, setup: Setup, recording: Recording, most: float = math.inf) -> float:
-        """Processor time of a case, s; `_Enough` where it takes longer than `most`."""
+    def _run(
+        self,
+        case: Case,
+        setup: Setup,
+        recording: Recording,
+        most: float = math.inf,
+        initial: State | None = None,
+    ) -> float:
+        """Processor time of a case, s, from elsewhere if asked for; `_Enough` beyond `most`."""
         return self._timed(
             lambda: run_case(
                 setup,
                 clearance=case.clearance,
                 friction=case.friction,
                 recording=recording,
-                initial=case.initial,
+                initial=initial or case.initial,
                 check=_limited(most),
             )
         )
@@ -275,7 +316,7 @@ class Pilots:
             if seconds_compiling() == compiled:
                 if record is None:
                     raise _Enough
-                self.arrays = arrays_of(record)
+                self.arrays, self._final = arrays_of(record), getattr(record, "final", None)
                 return max(taken, 1e-6)
             self.compiling += taken
 

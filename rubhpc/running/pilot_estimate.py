@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _WITHIN = 0.95  # by Student's distribution: few cases rarely hold the dearest, so that it is 0.8 to 0.95
 _OFF = 0.25  # standard deviation of a time foreseen from part of a case, as a share of it (18 cases, 4 laws)
+_OFF_IRREGULAR = 0.4  # the same where its motion still met contact modes: it may settle, or meet yet more
 
 
 @dataclass
@@ -29,6 +30,8 @@ class Sample:
         Of each case: predicted steps, probability that a draw picks it, and the time it takes.
     is_whole : list of bool
         Whether it was run to its end; the time of others is foreseen from a part.
+    is_irregular : list of bool
+        Whether its motion still met contact modes where that part ended.
     checked : list of (float, float)
         Times foreseen from a part of a case, and what the whole took, s.
     """
@@ -39,14 +42,24 @@ class Sample:
     probability: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     is_whole: list[bool] = field(default_factory=list)
+    is_irregular: list[bool] = field(default_factory=list)
     checked: list[tuple[float, float]] = field(default_factory=list)
 
-    def add(self, steps: float, probability: float, seconds: float, *, is_whole: bool) -> None:
+    def add(
+        self,
+        steps: float,
+        probability: float,
+        seconds: float,
+        *,
+        is_whole: bool,
+        is_irregular: bool = False,
+    ) -> None:
         """Take in a case."""
         self.steps.append(steps)
         self.probability.append(probability)
         self.seconds.append(seconds)
         self.is_whole.append(is_whole)
+        self.is_irregular.append(is_irregular)
 
     @property
     def correction(self) -> float:
@@ -85,10 +98,9 @@ class Sample:
         else:
             residual = weight * (seconds - base - slope * steps)
             error = math.sqrt(share * n / n_free * float(residual @ residual))
-        partly = (
-            float(seconds[~np.array(self.is_whole)].sum() / seconds.sum()) if seconds.sum() > 0.0 else 0.0
-        )
-        of_parts = _OFF * partly * whole / math.sqrt(1 + len(self.checked))
+        off = np.where(self.is_whole, 0.0, np.where(self.is_irregular, _OFF_IRREGULAR, _OFF))
+        mean_off = float(off @ seconds / seconds.sum()) if seconds.sum() > 0.0 else 0.0
+        of_parts = mean_off * whole / math.sqrt(1 + len(self.checked))
         return base * scale, slope * scale, math.hypot(error, of_parts)
 
 

@@ -106,8 +106,13 @@ def time_pilots(
             pace = pilots.pace(index, steps, allowed() / max(few - k, _FEWEST))
             paces.append(pace)
             picked.append((index, steps))
-            is_whole = index not in pilots.shortened
-            sample.add(steps, probability, pace.step * steps, is_whole=is_whole)
+            sample.add(
+                steps,
+                probability,
+                pace.step * steps,
+                is_whole=index not in pilots.shortened,
+                is_irregular=index in pilots.irregular,
+            )
         except Exception as error:  # whatever is wrong with the case: the others are timed all the same
             where = manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))
             failures.append(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}")

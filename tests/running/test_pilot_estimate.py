@@ -71,3 +71,17 @@ def test_times_foreseen_from_parts_are_corrected_by_whole_cases():
 )
 def test_span_of_time_has_one_unit(least, most, text):
     assert span(least, most) == text
+
+
+def test_a_motion_that_still_meets_contact_modes_widens_the_range():
+    """Until it is run whole."""
+
+    def error(**second):
+        sample = Sample(4, 4.0)
+        sample.add(1.0, 0.25, 1.0, is_whole=True)
+        sample.add(1.0, 0.25, 1.0, **second)
+        return sample.estimate()[2]
+
+    regular, irregular = (error(is_whole=False, is_irregular=given) for given in (False, True))
+    assert irregular == pytest.approx(0.4 / 0.25 * regular)
+    assert error(is_whole=True, is_irregular=True) == 0.0

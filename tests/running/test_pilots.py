@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rubhpc.running import pilots
+from rubhpc.running import pilot_cases, pilots
 from rubhpc.running.shorter_cases import parts
 from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.speed_law import SpeedLaw
+from rubhpc.study.study import Recording
 
 
 @pytest.mark.parametrize(
@@ -26,6 +27,7 @@ def test_more_cases_are_timed_where_they_differ(costs, n_pilot, monkeypatch):
     class Pilots:
         loading = compiling = 0.0
         was_cut, arrays, shortened = False, {}, frozenset()
+        irregular = frozenset()
 
         def __init__(self, grid):
             pass
@@ -75,6 +77,7 @@ def test_dearest_case_is_run_whole(monkeypatch, n_case, left):
     class Pilots:
         loading = compiling = 0.0
         was_cut, arrays, shortened = False, {}, {(0,), (1,), (2,)}
+        irregular = frozenset()
 
         def __init__(self, grid):
             pass
@@ -101,3 +104,30 @@ def test_dearest_case_is_run_whole(monkeypatch, n_case, left):
     known = 3 * 3.0 + 3 * 0.1 + 3 * 0.1
     other = 0.2 * (known - 0.3 + 3.1 / 2) / (3.1 + 3.1 / 2)  # ratio of the two, and one of 1
     assert timing.pace.step * 6e3 == pytest.approx(known + other)
+
+
+@pytest.mark.parametrize(
+    ("revolutions", "met", "expected"),
+    [
+        (16, (75, 150), (75 * (56 / 3 * (1 + 160 / 56) - 1), 160 / 56)),  # each part meets as many
+        (16, (75, 106), (75 * ((56 / 3 * (1 + 160 / 56)) ** np.log2(106 / 75) - 1), 160 / 56)),
+        (16, (75, 80), (5.0, 0.0)),  # it comes back to what it has met
+        (8, (75, 150), (75 * (48 / 3 - 1), 0.0)),  # too short for neighbours
+    ],
+    ids=["irregular", "less and less", "regular", "short"],
+)
+def test_contact_modes_of_an_irregular_motion_grow_by_a_power(revolutions, met, expected, monkeypatch):
+    """With those of its neighbours; of all, three revolutions are run, and three that follow."""
+    recording = Recording(transient=40, revolutions=revolutions, samples_per_revolution=16)
+    found = pilot_cases.Pilots(SimpleNamespace(study=SimpleNamespace(recording=recording)))
+    found._final = SimpleNamespace()
+    counts = iter(met)
+    monkeypatch.setattr(pilot_cases, "_n_mode", lambda *_: next(counts))
+    ran = []
+    monkeypatch.setattr(
+        found, "_run", lambda _case, _setup, part, initial: ran.append((part.longest_transient, initial))
+    )
+    share = 3 / (40 + revolutions)
+    assert found._to_come(SimpleNamespace(index=(3,)), None, share) == pytest.approx(expected)
+    assert found.irregular == ({(3,)} if met[1] > 1.1 * met[0] else set())
+    assert ran == [(round(40 * share), found._final)]
