@@ -128,7 +128,8 @@ class Spin:
             lift_samples(passed.whole, setup.model)
             ramp.lift(passed.whole, setup)
             if passed.reason:
-                return self._taken(passed, acceleration, length, per_revolution, torque, np.zeros(6))
+                guessed = end_speed - self.speed
+                return self._taken(passed, acceleration, guessed, length, per_revolution, torque, np.zeros(6))
             flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)
             before = self._momentum(state_at(reached, setup), first)
             after = self._momentum(state_at(passed.end, setup), last)
@@ -158,7 +159,7 @@ class Spin:
                 flows[IMPACT_LOSS],
             ]
         )
-        found = self._taken(passed, acceleration, length, per_revolution, torque, energies)
+        found = self._taken(passed, acceleration, change, length, per_revolution, torque, energies)
         self.speed += change
         if not self.speed > 0.0:
             return None
@@ -175,22 +176,28 @@ class Spin:
         self,
         passed: Passed,
         acceleration: float,
+        change: float,
         length: int,
         per_revolution: int,
         torque: float,
         energies: Floats,
     ) -> Taken:
-        """What a piece has yielded, revolution by revolution."""
+        """What a piece has yielded, revolution by revolution.
+
+        Its times follow from the acceleration (rad/s^2) that was guessed, braking from the change of
+        the speed (rad/s) that its energy has brought.
+        """
         n = max(length // per_revolution, 1)
         turned = 2.0 * math.pi * length / (n * per_revolution)
         speeds = [self._after(acceleration, i * turned) for i in range(n + 1)]
         lasts = [2.0 * turned / (a + b) for a, b in itertools.pairwise(speeds)]
         times = (self.time + np.cumsum([0.0, *lasts])).tolist()
+        missed = change - (speeds[-1] - speeds[0])
         work, braking = [], []
         for low, high, duration in zip(speeds[:-1], speeds[1:], lasts, strict=True):
             mean = torque if n == 1 else self._drive.at(0.5 * (low + high))
             work.append(mean * turned)
-            braking.append(mean * duration - self._free.inertia * (high - low))
+            braking.append(mean * duration - self._free.inertia * (high - low + missed / n))
         duration = sum(lasts)
         lag = abs(acceleration) * duration**2 / 12.0
         return Taken(passed, lag, times, work, braking, energies)

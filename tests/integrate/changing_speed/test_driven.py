@@ -118,6 +118,15 @@ def test_a_rotor_at_rest_on_a_stator_coasts_down_evenly(law):
     assert found.braking_torque.values[8:] == pytest.approx(mu * force * radius, rel=1e-4)
 
 
+def test_braking_takes_what_the_spin_lacks():
+    """Less friction's work over the angle it is that of whirl, without jumps between revolutions."""
+    drive = {"torque": 1.0, "start": "1500 rpm", "revolutions": 45, "inertia": 0.02}
+    found = run_up("mokhtar2017", drive=drive, clearance=1e-4, friction=0.2, samples_per_revolution=64)
+    lasts, speed = 2.0 * math.pi / found.speed.values, found.speed.values
+    whirl = found.braking_torque.values - found.friction_work.values.reshape(-1) / (speed * lasts)
+    assert np.abs(np.diff(whirl)[5:]).max() < 0.01
+
+
 def jeffcott(inertia):
     """One disc on an even shaft, 100 rad/s, damped by 1 %."""
     return Rig.from_matrices(
