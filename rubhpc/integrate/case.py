@@ -220,6 +220,7 @@ def _integrate(
                 samples_per_revolution=per_revolution,
                 growth=growth(lambda: _neighbours(march, solver, start, final, setup, recording)),
                 solve=solver,
+                further=solver.further if solver is not None else None,
             )
             | {"carrier_displacement": carrier_displacement(samples, setup.model)}
             | probe_extents(signals),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import StatorModel
-    from rubhpc.integrate.measuring.regimes import Solution
+    from rubhpc.integrate.measuring.regimes import Further, Solution
 
     Floats = NDArray[np.float64]
 
@@ -48,6 +49,7 @@ def measures_of(
     samples_per_revolution: int,
     growth: Iterable[float],
     solve: Callable[[int], Solution | None] | None,
+    further: Further | None,
 ) -> dict[str, Any]:
     """Measures of a finished case; those of a contact that never happened are zero, or NaN where undefined.
 
@@ -64,6 +66,8 @@ def measures_of(
         How a small displacement grows after the record (`lyapunov.growth`); read where it decides the regime.
     solve : callable, optional
         Finds periodic motions (`proof.Solver`).
+    further : callable, optional
+        Finds them where that does not (`proof.Solver.further`).
     """
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution
@@ -72,7 +76,10 @@ def measures_of(
     is_contact = bool(has_touched.any())
     n_contact = np.maximum(accumulator.n_contact, 1)  # one that lasts throughout never begins in the record
     orbit = signals["vertical"], signals["horizontal"], samples_per_revolution
-    verdict = regime(*orbit, period=period(*orbit), is_contact=is_contact, growth=growth, solve=solve)
+    verdict = regime(
+        *orbit, period=period(*orbit), is_contact=is_contact, growth=growth, solve=solve, further=further
+    )
+    multiplier = verdict.multiplier
     rim = stators[0].radius * signals["torsion"]  # m, as the orbit
     force = signals["contact_force"].reshape(len(stators), n_revolution, samples_per_revolution)
     # Drive and friction exchange a hundred times what the vibration feels of them: only their difference
@@ -89,8 +96,9 @@ def measures_of(
         "period": verdict.period,
         "regime": verdict.flag,
         "lyapunov_exponent": verdict.exponent,
-        "largest_multiplier": abs(verdict.multiplier),
-        "multiplier_angle": cmath.phase(verdict.multiplier),
+        # Python's abs() of a complex NaN may raise an error left over from arithmetic before it.
+        "largest_multiplier": math.nan if cmath.isnan(multiplier) else abs(multiplier),
+        "multiplier_angle": cmath.phase(multiplier),
         "whirl_ratio": whirl_ratio(*orbit, spin),
         "contact_fraction": accumulator.contact_time / duration,
         "stick_fraction": np.divide(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,6 +16,9 @@ from rubhpc.schema import REGIME
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    Solve = Callable[[int], "Solution | None"]
+    Further = Callable[[int], Iterable[tuple[int, Solve]]]
+
 Floats = NDArray[np.float64]
 
 MOST_DOUBLED = 2 * LONGEST_PERIOD  # revolutions, to which period doublings are followed
@@ -24,6 +28,8 @@ TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may show a torus, or 
 N_FIRST, N_ALL, N_MOST = 16, 64, 256  # spans whose growth is measured, each where the last left it open
 CLEAR = 0.05  # per revolution: an exponent beyond that over 16 spans keeps its sign
 ZERO = 0.01  # per revolution: an exponent within that is none
+EQUAL = 1e-5  # of the orbit's size: cycles as near as that are the same where no motion can be solved for
+NOISE, ALIKE = 1e-9, 2.0  # of the orbit's size, and times the nearest return: a return as near as any
 SURE = 2.0  # standard errors: an exponent within that is none, too
 # A torus: the nearest return is that near, of the distance between cycles; that of twice as many revolutions
 # is twice as far, by 8 %; and neither half of the record has the farther ones.
@@ -38,6 +44,7 @@ class Solution(NamedTuple):
     section: (
         Floats  # (period, 2), m, vertical and horizontal at the shaft's angle 0, the end of a record first
     )
+    is_led_to: bool = False  # what follows the record has come to it
 
 
 class Verdict(NamedTuple):
@@ -58,12 +65,15 @@ def regime(
     period: int,
     is_contact: bool,
     growth: Iterable[float],
-    solve: Callable[[int], Solution | None] | None = None,
+    solve: Solve | None = None,
+    further: Further | None = None,
 ) -> Verdict:
     """Judge a record.
 
     A record that looks periodic is so if a stable periodic motion is found next to its end, which the record
-    agrees with or draws near to. Where motions cannot be solved for, it is taken for what it looks like.
+    agrees with or draws near to: of the period that it looks like, of that at which it returns nearest, or
+    further on. If none is found, its cycles must be the same within 1e-5. Where motions cannot be solved for
+    at all, it is taken for what it looks like.
     A record shorter than 16 revolutions without a period leaves the motion undecided: it is too short for
     some periods. From 16 to 31 the growth alone decides, for it is measured beyond the record; a longer
     record may show a torus, or a period beyond 16, by itself.
@@ -77,36 +87,36 @@ def regime(
         Growth of a small displacement per revolution, span by span; read only where it is needed.
     solve : callable, optional
         Finds the motion of a period next to the end of the record (`proof.Solver`).
+    further : callable, optional
+        What else to try for a period, in turn (`proof.Solver.further`).
     """
     if not is_contact:
         return Verdict(REGIME.index("no_contact"), period)
     orbit = _Orbit(vertical, horizontal, samples_per_revolution)
     periodic = REGIME.index("periodic")
-    is_open = False  # looks periodic, but no solution is found that would decide
-    if period > 0:
-        verdict = _proved(orbit, period, solve)
-        is_open = verdict is not None and solve is not None and math.isnan(abs(verdict.multiplier))
-        if verdict is not None and (not is_open or orbit.n_revolution < LEAST_REVOLUTIONS):
-            return verdict
-    if orbit.n_revolution < LEAST_REVOLUTIONS:
-        return Verdict(REGIME.index("undecided"), 0)
-    distances, nearest = None, 0
+    distances, nearest, looks_like = None, 0, period
     if orbit.n_revolution >= TORUS_REVOLUTIONS:
         distances = cycle_distances(vertical, horizontal, samples_per_revolution)
         square = returns(distances)
         nearest = int(square.argmin()) + 1
         if period == 0 and square.min() <= PERIOD_TOLERANCE**2 * orbit.size**2:
-            verdict = _proved(orbit, nearest, solve)
-            if verdict is not None:
-                is_solved = not math.isnan(abs(verdict.multiplier))
-                return verdict if is_solved else Verdict(periodic, 0)
-    flag, exponent = by_growth(growth, None if is_open else distances)
-    if is_open and flag != REGIME.index("chaotic"):
-        return Verdict(periodic, period, exponent)
+            looks_like = nearest
+    if solve is None and (period > 0 or (looks_like > 0 and orbit.has_equal_ends(looks_like))):
+        return Verdict(periodic, period)
+    search = _Search(orbit)
+    if solve and looks_like > 0 and (verdict := search.proves(looks_like, solve, further)):
+        return verdict
+    is_open = looks_like > 0 and search.finds_nothing
+    repeats = is_open and orbit.repeats(orbit.closest_return)
+    if orbit.n_revolution < LEAST_REVOLUTIONS:
+        return Verdict(periodic, orbit.closest_return) if repeats else Verdict(REGIME.index("undecided"), 0)
+    flag, exponent = by_growth(growth, distances)
+    if repeats and flag != REGIME.index("chaotic"):
+        return Verdict(periodic, orbit.closest_return, exponent)
     is_regular = flag in (periodic, REGIME.index("quasi_periodic"))
-    if solve and is_regular and period == 0 and nearest > LONGEST_PERIOD // 2:
-        verdict = _proved(orbit, nearest, solve)
-        if verdict is not None and not math.isnan(abs(verdict.multiplier)):
+    if solve and is_regular and looks_like == 0 and nearest > LONGEST_PERIOD // 2:
+        verdict = search.proves(nearest, solve)
+        if verdict is not None:
             return verdict._replace(exponent=exponent)
     return Verdict(flag, 0, exponent)
 
@@ -127,35 +137,79 @@ class _Orbit:
         apart = np.linalg.norm(self.section - solution.section[place], axis=1)
         return np.asarray(apart / max(self.size, np.finfo(float).tiny))
 
-    def has_equal_ends(self, period: int) -> bool:
+    def has_equal_ends(self, period: int, tolerance: float = PERIOD_TOLERANCE) -> bool:
         """Whether the first cycles are those as many whole periods later as there are."""
         change = ends_change(self.cycles.reshape(self.n_revolution, -1), period)
-        return change <= PERIOD_TOLERANCE * self.size * math.sqrt(self.cycles.shape[2])
+        return change <= tolerance * self.size * math.sqrt(self.cycles.shape[2])
+
+    def repeats(self, period: int) -> bool:
+        """Whether its cycles are the same a period later, and at its ends."""
+        square = self._square_returns[period - 1]
+        return square <= EQUAL**2 * self.size**2 and self.has_equal_ends(period, EQUAL)
+
+    @cached_property
+    def closest_return(self) -> int:
+        """Revolutions after which the cycles return nearest."""
+        return closest_return(self._square_returns, self.size)
+
+    @cached_property
+    def _square_returns(self) -> Floats:
+        """Mean square distance of cycles 1, 2, ... revolutions apart, m2."""
+        n = self.n_revolution
+        longest = max(1, n // 3, min(n // 2, LONGEST_PERIOD))
+        apart = [self.cycles[k:] - self.cycles[: n - k] for k in range(1, longest + 1)]
+        return np.array([(one**2).sum(axis=1).mean() for one in apart])
 
 
-def _proved(orbit: _Orbit, period: int, solve: Callable[[int], Solution | None] | None) -> Verdict | None:
-    """Judge a record that looks periodic; None where it is not.
+def closest_return(square: Floats, size: float) -> int:
+    """Least n whose mean square distance `square[n - 1]` is as near as any, for a motion of a size."""
+    return int(np.argmax(square <= ALIKE**2 * square.min() + (NOISE * size) ** 2)) + 1
 
-    An unstable motion whose disturbances change sides in every period is followed to twice its period.
-    """
-    periodic = REGIME.index("periodic")
-    if solve is None:
-        return Verdict(periodic, period)
-    found = solve(period)
-    asked = period
-    while found is not None and found.multiplier.real < -1.0 and asked < MOST_DOUBLED:
-        asked = 2 * asked
-        found = solve(asked)
-    if found is None:
-        return Verdict(periodic, period) if orbit.has_equal_ends(period) else None
-    if abs(found.multiplier) >= 1.0:
-        return None
-    apart = orbit.distances(found)
-    first, last = apart[: found.period].max(), apart[-found.period :].max()
-    if last > PERIOD_TOLERANCE and (last > MOST_DISTANT or last > first):
-        return None
-    upper = complex(found.multiplier.real, abs(found.multiplier.imag))
-    return Verdict(periodic, found.period, multiplier=upper, is_reached=last <= PERIOD_TOLERANCE)
+
+class _Search:
+    """The search for a stable motion that a record agrees with, or draws near to."""
+
+    def __init__(self, orbit: _Orbit) -> None:
+        self._orbit = orbit
+        self.finds_nothing = True  # neither such a motion nor another one
+
+    def proves(self, period: int, solve: Solve, further: Further | None = None) -> Verdict | None:
+        """Judge by the motion of a period, by that of the closest return, and by what is found further on."""
+        asked: set[int] = set()
+        verdict = self._proved(period, solve, asked)
+        if verdict is not None or further is None:
+            return verdict
+        closest = self._orbit.closest_return
+        if closest not in asked and (verdict := self._proved(closest, solve, asked)):
+            return verdict
+        trials = (self._proved(n, search, set()) for n, search in further(closest))
+        return next((verdict for verdict in trials if verdict is not None), None)
+
+    def _proved(self, period: int, solve: Solve, asked: set[int]) -> Verdict | None:
+        """Judge by the motion of a period; None where that is none, unstable or elsewhere.
+
+        An unstable motion whose disturbances change sides in every period is followed to twice its period.
+        """
+        found = solve(period)
+        asked.add(period)
+        while found is not None and found.multiplier.real < -1.0 and period < MOST_DOUBLED:
+            self.finds_nothing = False
+            period = 2 * period
+            asked.add(period)
+            found = solve(period)
+        if found is None:
+            return None
+        self.finds_nothing = False
+        if abs(found.multiplier) >= 1.0:
+            return None
+        apart = self._orbit.distances(found)
+        first, last = apart[: found.period].max(), apart[-found.period :].max()
+        draws_near = found.is_led_to or (last <= MOST_DISTANT and last <= first)
+        if last > PERIOD_TOLERANCE and not draws_near:
+            return None
+        upper = complex(found.multiplier.real, abs(found.multiplier.imag))
+        is_reached = bool(last <= PERIOD_TOLERANCE)
+        return Verdict(REGIME.index("periodic"), found.period, multiplier=upper, is_reached=is_reached)
 
 
 def by_growth(growth: Iterable[float], distances: Floats | None) -> tuple[int, float]:

@@ -158,7 +158,7 @@ def closing(period, multiplier, whirl, shift=0.0):
     return lambda asked: Solution(period, multiplier, np.column_stack([section.real, section.imag]))
 
 
-def judged(whirl, solve, *, period=3, growth=None):
+def judged(whirl, solve, *, period=3, growth=None, further=None):
     verdict = regime(
         whirl.real,
         whirl.imag,
@@ -167,6 +167,7 @@ def judged(whirl, solve, *, period=3, growth=None):
         is_contact=True,
         growth=unread() if growth is None else growth,
         solve=solve,
+        further=further,
     )
     return REGIME[verdict.flag], verdict
 
@@ -234,6 +235,43 @@ def test_without_a_solution_the_growth_has_the_last_word():
     whirl = torus(1 / 3)
     name, verdict = judged(whirl, lambda asked: None, growth=iter([-0.1] * 16))
     assert (name, verdict.period, verdict.exponent) == ("periodic", 3, pytest.approx(-0.1))
+
+
+def test_torus_within_the_tolerance_is_none_the_less_a_torus():
+    """Cycles that differ by 0.4 % repeat themselves for neither period 1 nor any other."""
+    whirl = torus(GOLDEN, amount=0.002)
+    name, verdict = judged(whirl, lambda asked: None, period=1, growth=iter([0.0] * 64))
+    assert (name, verdict.period) == ("quasi_periodic", 0)
+    short = whirl[: 8 * SAMPLES]
+    assert judged(short, lambda asked: None, period=1)[0] == "undecided"
+
+
+@pytest.mark.parametrize("revolutions", [8, 16, 64])
+def test_period_at_which_the_record_returns_is_tried_too(revolutions):
+    """Period 4 within 1 % of an unstable motion of period 1, or of one that is not found."""
+    whirl = torus(1 / 4, amount=0.003)[: revolutions * SAMPLES]
+    locked = closing(4, 0.6, whirl)
+    for other in (lambda asked: None, closing(1, 1.02j, whirl)):
+        name, verdict = judged(
+            whirl,
+            lambda asked, other=other: locked(asked) if asked == 4 else other(asked),
+            period=1,
+            further=lambda period: (),
+        )
+        assert (name, verdict.period, verdict.multiplier) == ("periodic", 4, 0.6)
+
+
+def test_motion_that_is_found_further_on_proves_the_record():
+    """Once there, whatever its distance from the record: that has not settled then."""
+    whirl = torus(1 / 3)
+    for shift, is_reached in ((0.0, True), (0.3, False)):
+        found = closing(6, 0.5, whirl, shift)(6)._replace(is_led_to=True)
+        name, verdict = judged(
+            whirl,
+            lambda asked: None,
+            further=lambda n, found=found: [(n, lambda asked: None), (6, lambda asked: found)],
+        )
+        assert (name, verdict.period, verdict.is_reached) == ("periodic", 6, is_reached)
 
 
 def test_short_record_with_a_period_and_no_solution_is_what_it_looks_like():

@@ -1,11 +1,13 @@
-"""The proof of a record that begins on a motion that was solved for."""
+"""The proof of a record that begins on a motion that was solved for, or looks like another one."""
 
 import numpy as np
 import pytest
+from overhung_pump import pump
 
-from rubhpc import simulate
+from rubhpc import periodic, simulate
 from rubhpc.integrate import case
 from rubhpc.integrate.periodic_motions import proof
+from rubhpc.schema import REGIME
 
 TWICE = {
     "speed_ratio": 3.0, "clearance_ratio": 0.5, "friction": 0.2, "overrides": {"rotor.damping.alpha": 4.0},
@@ -45,3 +47,24 @@ def test_motion_that_the_record_has_left_is_solved_for_anew(monkeypatch):
     left = proof.Solver(setup, clearance, friction, away, (piecewise, orbit))
     assert left(2).section == pytest.approx(solved.section, rel=1e-6)
     assert left.has_begun
+
+
+@pytest.mark.parametrize("ratio", [0.948, 0.94798])
+def test_period_four_beside_a_second_frequency_does_not_pass_for_one(ratio):
+    """Just below 0.94801, where period 1 becomes unstable at nearly a quarter of a turn."""
+    case = {
+        "clearance": "400 um",
+        "friction": 0.1,
+        "restitution": 0.5,
+        "samples_per_revolution": 64,
+        "keep": (),
+    }
+    record = simulate(pump(), speed_ratio=ratio, transient=600, revolutions=16, **case)
+    assert REGIME[record.regime] == "periodic"
+    assert (record.period, record.settled) == (4, 1)
+    solved = periodic(pump(), speed_ratio=ratio, period=4, initial=record.final, **case)
+    assert solved.period == 4
+    assert record.largest_multiplier == pytest.approx(abs(solved.multipliers[0]), rel=1e-5)
+    inside = periodic(pump(), speed_ratio=ratio, period=1, initial=record.final, **case)
+    assert inside.period == 1
+    assert not inside.is_stable
