@@ -253,7 +253,7 @@ class Ranks:
         """Whether another rank has said so, or MPI knows of one that died: Open MPI has other errors too."""
         try:
             return bool(self._comm.Is_revoked()) or self._comm.Get_failed().size > 0
-        except (AttributeError, NotImplementedError, self._mpi.Exception):  # it does not outlive a rank
+        except (AttributeError, NotImplementedError, self._mpi.Exception):  # MPI without fault tolerance
             return False
 
 
