@@ -57,7 +57,8 @@ def campbell_diagram(
             continue
         for word, part in _stretches(words):
             ax.plot(rpm[part], frequency[i_mode, part], **STYLES[word])
-            if np.any(frequency[i_mode, part] < top):
+            at = frequency[i_mode, part]
+            if np.any(np.minimum(at[:-1], at[1:]) < top):  # NaN, where it is overdamped, draws nothing
                 drawn.add(word)
     ax.set(xlim=(rpm.min(), rpm.max()), ylim=(0, top))
     for order in ORDERS:

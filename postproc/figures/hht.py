@@ -73,7 +73,8 @@ def hht(
     shown = hilbert_huang(cases, signal, contact=contact, revolutions=revolutions, n_mode=mode)
     natural: dict[str, Any] = {}
     if signal == "stator_lateral":
-        natural = {"stator": stator_frequencies(cases)["lateral"]}
+        own = stator_frequencies(cases)
+        natural = {"stator": own["lateral"]} if "lateral" in own else {}  # a wall has none
     elif not signal.startswith(("stator", "contact")):
         kind = "torsional" if signal.startswith("torsion") else "lateral"
         natural = {name: f for name, f in natural_frequencies(cases).items() if name == kind}
@@ -148,6 +149,10 @@ def _draw_energy(
     from scipy.ndimage import gaussian_filter1d
 
     middle = float(median_frequency(hht, mode))
+    if not hht["signal"].any():
+        raise InputError(
+            f"hht: {hht.attrs['signal']} is zero throughout; select another stator, signal or case"
+        )
     if not np.isfinite(middle):
         raise InputError(
             f"hht: {hht.attrs['signal']} has no mode {mode} in these spans: it does not oscillate between "

@@ -68,6 +68,7 @@ def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
         phase.set(xlabel="Spin speed (rpm)", ylabel="Phase lead (\N{DEGREE SIGN})")
         phase.yaxis.set_major_locator(_right_angles(phase))
         phase.ticklabel_format(axis="x", style="plain")
+        phase.locator_params(axis="x", nbins=6)  # five digits of rpm take their room
         return axes
 
     return Drawing(shown=shown, draw=draw, panels=(2, 1), height=90)

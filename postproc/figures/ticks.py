@@ -20,7 +20,7 @@ _PANEL = 0.85  # of the room for axes and their labels, taken by the axes
 
 
 def tick_levels(ax: Axes, which: str, levels: xr.DataArray, at: NDArray[np.float64] | None = None) -> None:
-    """Tick the values of a coordinate, and label as many as have room, at equal steps of their number.
+    """Tick the values of a coordinate, and label the first and, going on, each that has room.
 
     Set limits and scale of the axes first. An axis of many values keeps its ticks.
 
@@ -41,14 +41,16 @@ def tick_levels(ax: Axes, which: str, levels: xr.DataArray, at: NDArray[np.float
         names = [flags[int(value)] for value in levels.values]
     axis: Axis = getattr(ax, f"{which}axis")
     ascending = np.argsort(places)
-    gaps = np.diff(_millimetres(ax, which, places[ascending]))
+    along = _millimetres(ax, which, places[ascending])
     need = _LINE if which == "y" else _GAP + _CHARACTER * max(map(len, names))
-    step = next(
-        (n for n in range(1, values.size) if _least_gap(gaps, n) >= need),
-        max(values.size - 1, 1),  # the first and the last
-    )
+    named = [0]
+    for k in range(1, values.size):
+        if abs(along[k] - along[named[-1]]) >= need:
+            named.append(k)
+    if len(named) == 1:
+        named.append(values.size - 1)
     labels = [""] * values.size
-    for i in ascending[::step]:
+    for i in ascending[named]:
         labels[i] = names[i]
     axis.set_ticks(places, labels)
     axis.set_minor_locator(NullLocator())
@@ -63,9 +65,3 @@ def _millimetres(ax: Axes, which: str, places: NDArray[np.float64]) -> NDArray[n
     pixels = box.width if which == "x" else box.height
     millimetres: NDArray[np.float64] = share * _PANEL * pixels / ax.figure.dpi * 25.4
     return millimetres
-
-
-def _least_gap(gaps: NDArray[np.float64], step: int) -> float:
-    """Return the least distance between every `step`-th of points with these gaps."""
-    at = np.concatenate(([0.0], np.cumsum(gaps)))[::step]
-    return float(np.diff(at).min()) if at.size > 1 else np.inf

@@ -136,7 +136,7 @@ def _print_sag(design: xr.Dataset) -> None:
     for node in sag["node"].values:
         one = sag.sel(node=node)
         parts = (1e6 * float(one[f"sag_{direction}"]) for direction in ("vertical", "horizontal"))
-        click.echo(f"{int(node):5d} " + " ".join(f"{part:12.4f}" for part in parts))
+        click.echo(f"{int(node):5d} " + " ".join(f"{round(part, 4) + 0.0:12.4f}" for part in parts))
 
 
 def _least(design: xr.Dataset) -> str:

@@ -57,15 +57,20 @@ def undamped_message(model: Model, spin: float) -> str:
 
 
 def stator_names(stators: Sequence[int]) -> str:
-    """Stators by their numbers, runs of them by their ends: "stators 1 to 8, 11"."""
+    """Stators by their numbers, runs of them by their ends: "stators 1 to 8 and 11"."""
     runs: list[list[int]] = []
     for number in stators:
         if runs and number == runs[-1][-1] + 1:
             runs[-1].append(number)
         else:
             runs.append([number])
-    listed = [f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs]
-    return f"stator{'s' * (len(stators) > 1)} {', '.join(listed)}"
+    listed = [
+        part
+        for run in runs
+        for part in ([f"{run[0]} to {run[-1]}"] if len(run) > 2 else [str(number) for number in run])
+    ]
+    names = " and ".join([", ".join(listed[:-1]), listed[-1]] if len(listed) > 1 else listed)
+    return f"stator{'s' * (len(stators) > 1)} {names}"
 
 
 def _named(lasting: list[Mode]) -> str:

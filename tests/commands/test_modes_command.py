@@ -4,10 +4,14 @@ import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
+from trial_rig import trial_rig
 
+from rubhpc import linear_design
+from rubhpc.commands.design import print_design
 from rubhpc.commands.modes import modes
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import PACKAGED
@@ -139,6 +143,15 @@ def test_design_is_printed_and_put_into_json():
     assert document["peaks"][0]["amplification_factor"] == pytest.approx(6.09, abs=0.01)
     assert document["threshold_speed"] is None
     assert len(document["static_sag"]) == 15
+
+
+def test_a_sag_that_rounds_to_nothing_has_no_sign(capsys):
+    rig = trial_rig(1)
+    design = linear_design(replace(rig, rotor=replace(rig.rotor, gravity=9.81)), (0.0, 20.0), n_speed=2)
+    print_design(design.assign(sag_horizontal=-1e-25 + 0.0 * design["sag_horizontal"]))
+    lines = capsys.readouterr().out.splitlines()
+    first = lines.index("Static sag at 0 rpm, um") + 2
+    assert [line.split()[2] for line in lines[first : first + 5]] == 5 * ["0.0000"]
 
 
 def test_response_and_shapes_are_drawn_and_written(tmp_path):

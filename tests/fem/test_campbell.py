@@ -128,6 +128,15 @@ def test_diagram_breaks_the_curve_where_a_mode_does_not_oscillate(curves):
     assert np.isfinite(np.delete(drawn, [5, 6, 7])).all()
 
 
+def test_legend_names_no_motion_that_is_not_drawn(curves):
+    shown = curves.isel(mode=[0]).copy(deep=True)
+    shown["whirl"] = (("mode", "speed"), [["backward"] + 15 * ["forward"]])
+    shown["damping_ratio"][0, 0] = 1.5  # the one stretch of backward whirl is overdamped
+    ax = Figure().subplots()
+    campbell_diagram(shown, ax)
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["Forward"]
+
+
 def test_diagram_changes_style_where_a_mode_changes_its_whirl(curves):
     shown = curves.isel(mode=[0]).copy(deep=True)
     shown["whirl"] = (("mode", "speed"), [["planar"] + 6 * ["backward"] + ["planar"] + 8 * ["forward"]])

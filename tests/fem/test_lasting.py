@@ -69,7 +69,7 @@ def test_growth_is_no_lack_of_damping():
 
 @pytest.mark.parametrize(
     ("numbers", "name"),
-    [([3], "stator 3"), ([1, 2], "stators 1, 2"), ([1, 2, 3, 4, 7], "stators 1 to 4, 7")],
+    [([3], "stator 3"), ([1, 2], "stators 1 and 2"), ([1, 2, 3, 4, 6, 7], "stators 1 to 4, 6 and 7")],
 )
 def test_runs_of_stators_are_named_by_their_ends(numbers, name):
     assert stator_names(numbers) == name

@@ -1,12 +1,14 @@
 """Figures of a linear design: what they show, and where they refuse."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from trial_rig import trial_rig
 
 from postproc.figures.linear_design import mode_shapes, unbalance_response
+from postproc.figures.style import house_style, new_figure
 from rubhpc import InputError, Rig, Unbalance, linear_design
 
 
@@ -30,6 +32,17 @@ def test_response_shows_amplitude_phase_and_the_operating_range(design, tmp_path
     assert drawing.save(tmp_path / "response.png").stat().st_size > 10_000
     with pytest.raises(InputError, match="node: 9 is not in the response; choose one of 1, 2, 3, 4, 5"):
         unbalance_response(design, 9)
+
+
+def test_speeds_of_five_digits_have_room_below_a_response():
+    wide = linear_design(trial_rig(1), (0.0, 20000 * np.pi / 30), n_speed=3)
+    with house_style():
+        figure, axes = new_figure(2, height=90)
+        unbalance_response(wide, 3).draw(axes)
+        figure.canvas.draw()
+        boxes = [label.get_window_extent() for label in axes[1].get_xticklabels() if label.get_text()]
+    assert len(boxes) >= 4
+    assert all(left.x1 + 0.3 * left.height < right.x0 for left, right in pairwise(boxes))
 
 
 def test_shapes_have_a_panel_each_and_unit_size(design, tmp_path):

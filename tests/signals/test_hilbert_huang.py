@@ -246,6 +246,18 @@ def test_no_median_of_nothing_is_given():
     assert hht(select(synthetic_store.make(), choice), mode=7).lines == ()
 
 
+def test_a_wall_has_no_natural_frequency_and_does_not_oscillate():
+    choice = {"speed_ratio": 1.5, "clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
+    record = select(synthetic_store.make(), choice)
+    record["stator_lateral"] = 0.0 * record["stator_lateral"]
+    record.attrs["rig"] = record.attrs["rig"] | {"stator": [{"node": 8, "rigid": True, "radius": 0.06}]}
+    del record.attrs["study"]
+    drawing = hht(record, "stator_lateral")
+    assert drawing.lines == ()
+    with pytest.raises(InputError, match="stator_lateral is zero throughout; select another stator"):
+        drawing.show()
+
+
 ONE = ["speed_ratio=1.5", "clearance=84 um", "friction=0.3", "stator.youngs_modulus=3 GPa"]
 
 
