@@ -6,23 +6,23 @@ import math
 import time
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from rubhpc.integrate.ahead import compile_ahead
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
-from rubhpc.integrate.lyapunov import Marches, growth
+from rubhpc.integrate.lyapunov import Growth, Marches
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.curved import CurvedMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
-from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.carried import carrier_displacement, tip_deflection
 from rubhpc.integrate.measuring.diverged_record import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of
+from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS
 from rubhpc.integrate.measuring.samples import (
     add_sag,
     by_name,
@@ -31,7 +31,6 @@ from rubhpc.integrate.measuring.samples import (
     probe_extents,
     samples_within,
 )
-from rubhpc.integrate.neighbour_motions import NeighbourMotions
 from rubhpc.integrate.periodic_motions.direct import pass_directly
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
@@ -41,6 +40,7 @@ from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import ModalSetup
 from rubhpc.integrate.start import start_of
+from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.schema import DONE, SECTION_NAMES, lyapunov_variables
 from rubhpc.spectra import amplitude_spectrum
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.periodic_motions.walk import Passed
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
+    from rubhpc.kernels.trail import Trail
     from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
@@ -184,6 +185,7 @@ def _integrate(
     else:
         energy_before = march.energy()
         accumulator.is_touching[:] = march.touching()  # a contact under way did not begin in the record
+        trail = _trail(march, recording)
         reason = march.advance(0, n_sample, samples, accumulator, is_recorded=True)
     if reason is not None:
         n_kept = samples_within(samples, march.sample, setup.displacement_limit)
@@ -201,6 +203,7 @@ def _integrate(
         add_sag(samples, accumulator, setup.model)
         signals, final = by_name(samples.whole, setup.model), march.final()
         solver = _solver(march, setup, clearance, friction, final, begun_on)
+        growth = Growth(lambda: _neighbours(march, trail, start, final, setup, recording))
         record = Record(
             status=DONE,
             samples_per_revolution=per_revolution,
@@ -218,7 +221,8 @@ def _integrate(
                 spin=setup.spin,
                 is_round=setup.is_updated,
                 samples_per_revolution=per_revolution,
-                growth=growth(lambda: _neighbours(march, solver, start, final, setup, recording)),
+                growth=growth,
+                within=growth.within,
                 solve=solver,
                 further=solver.further if solver is not None else None,
             )
@@ -306,19 +310,32 @@ def _solver(
     return None
 
 
+def _trail(march: March, recording: Recording) -> Trail | None:
+    """Have the events of a record noted, where its tangent may be carried along them."""
+    if (
+        isinstance(march, EventDrivenMarch)
+        and march.has_closed_form
+        and recording.revolutions >= LEAST_REVOLUTIONS
+    ):
+        trail = march.new_trail()
+        march.keep(trail)
+        return trail
+    return None
+
+
 def _neighbours(
     march: March,
-    solver: Solver | None,
+    trail: Trail | None,
     start: Callable[[State], March],
     final: State,
     setup: Setup,
     recording: Recording,
 ) -> Neighbours:
-    """The motion from where a march has ended, and one beside it."""
-    if solver is not None and solver.has_begun:
-        march = start(final)  # the tables may have been filled anew
-    if isinstance(march, EventDrivenMarch) and not isinstance(march, CurvedMarch | FrictionMarch):
-        return NeighbourMotions(march)
+    """A motion beside that from where a march has ended."""
+    if isinstance(march, EventDrivenMarch) and march.has_closed_form:
+        return TangentMotion(
+            cast("Callable[[State], EventDrivenMarch]", start), final, setup, recording, trail
+        )
     return Marches(start, final, setup, recording)
 
 

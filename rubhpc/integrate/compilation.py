@@ -20,7 +20,7 @@ _PARTS = {
     "advance_curved": "for curved gaps",
     "follow_piece": "for periodic motions",
     "advance_pieces": "for run-ups",
-    "part": "for neighbouring motions, which distinguish chaos from order",
+    "carry_along": "for neighbouring motions, which distinguish chaos from order",
 }
 _announced: set[str] = set()
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from rubhpc.integrate.measuring.regimes import N_ALL
 from rubhpc.integrate.transient import pass_revolutions
-from rubhpc.kernels.separation import DISPLACED, LOST
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 SPAN = 4  # revolutions: few enough that neighbours stay neighbours
 N_ALIGNING = 4  # spans in which the displacement turns into the direction that grows most
+DISPLACED = 1e-5  # of the motion: far above the resolution of events, far below the motion's features
+LOST = 1e-6  # of the displacement: what is left is rounding
 
 
 class Neighbours(Protocol):
@@ -33,38 +35,58 @@ class Neighbours(Protocol):
 
     Attributes
     ----------
-    most_spans : int
-        For how many spans they are worth following, alignment included.
+    n_aligning, most_spans : int
+        Spans in which their displacement turns into the direction that grows most, and for how many they are
+        worth following, these included.
+    within : list of float
+        Growth per revolution in the spans of the record, as far as it is known.
     """
 
+    n_aligning: int
     most_spans: int
+    within: list[float]
 
     def part(self, n_revolution: int) -> float | None:
-        """Go on with both; return their distance over what it was, or None where one cannot go on.
+        """Go on with both; return by how much the logarithm of their distance grows, or None at an end.
 
         The second is then as near as in the beginning again, in the direction in which it went.
         """
 
 
-def growth(begin: Callable[[], Neighbours]) -> Iterator[float]:
-    """Yield the logarithm of how much a small displacement grows per revolution, over spans of 4.
+class Growth:
+    """Logarithm of how much a small displacement grows per revolution, in spans of 4.
 
-    After each span the displacement is brought back to its first size (Benettin, Galgani, Giorgilli and
-    Strelcyn 1980). The mean of what is yielded tends to the largest Lyapunov exponent per revolution; it ends
-    where a motion cannot go on, or is not worth following.
+    Iterated, it yields spans from the end of a record on. After each the displacement is brought back to its
+    first size (Benettin, Galgani, Giorgilli and Strelcyn 1980). The mean tends to the largest Lyapunov
+    exponent per revolution; it ends where a motion cannot go on, or is not worth following.
 
     Parameters
     ----------
     begin : callable
-        Makes the two motions, once the first span is wanted.
+        Makes the motion and its displacement, once the first span is wanted.
     """
-    neighbours = begin()
-    for i in range(neighbours.most_spans):
-        ratio = neighbours.part(SPAN)
-        if ratio is None:
-            return
-        if i >= N_ALIGNING:
-            yield math.log(max(ratio, LOST)) / SPAN
+
+    def __init__(self, begin: Callable[[], Neighbours]) -> None:
+        """Begin when it is asked for."""
+        self._begin = begin
+
+    @cached_property
+    def _neighbours(self) -> Neighbours:
+        return self._begin()
+
+    def within(self) -> list[float]:
+        """Return the spans of the record, as far as they are known there."""
+        return self._neighbours.within
+
+    def __iter__(self) -> Iterator[float]:
+        """Yield span by span."""
+        neighbours = self._neighbours
+        for i in range(neighbours.most_spans):
+            grown = neighbours.part(SPAN)
+            if grown is None:
+                return
+            if i >= neighbours.n_aligning:
+                yield grown / SPAN
 
 
 class Marches:
@@ -82,6 +104,8 @@ class Marches:
         self, start: Callable[[State], March], state: State, setup: Setup, recording: Recording
     ) -> None:
         """Start at `state`, and beside it."""
+        self.n_aligning = N_ALIGNING
+        self.within: list[float] = []
         self.most_spans = N_ALIGNING + N_ALL  # of short steps; more may take minutes
         self._start, self._recording = start, recording
         self._model, self._spin = setup.model, setup.spin
@@ -103,7 +127,7 @@ class Marches:
             self._other = _between(self._state, self._other, 1.0 / ratio)
         else:
             self._other, self._size = self._displaced()
-        return ratio
+        return math.log(max(ratio, LOST))
 
     def _started(self, k: int, state: State) -> March:
         """The march of the last span, the first or the second, started at a new state, or a new one."""

@@ -61,6 +61,7 @@ from rubhpc.kernels.measuring import (
 )
 from rubhpc.kernels.mode_change import change_contacts
 from rubhpc.kernels.penalty_events import change_pressed
+from rubhpc.kernels.trail import Trail, no_trail, note_after, note_before, note_piece
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -120,7 +121,9 @@ def advance(
     is_begun = False
     while True:
         if progress.wanted >= 0 or not is_begun:
-            if not begin_mode(tables, reduced, clock, is_recorded, progress, z, z_next, motion, recorder):
+            if not begin_mode(
+                tables, reduced, clock, is_recorded, progress, z, z_next, motion, recorder, work.trail
+            ):
                 return MODE_WANTED
             is_begun = True
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
@@ -204,11 +207,19 @@ class EventWork(NamedTuple):
     impulse: Floats  # (q,), accumulated before the event, N s
     active: NDArray[np.bool_]  # (q,)
     elimination: Floats  # (q, q + 1)
+    trail: Trail  # of the motion
 
 
 def event_work(q: int) -> EventWork:
-    """Work space of the events of q pairs."""
-    return EventWork(np.zeros(q), np.zeros(q), np.zeros(q), np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1)))
+    """Work space of the events of q pairs, without a trail."""
+    return EventWork(
+        force=np.zeros(q),
+        speed=np.zeros(q),
+        impulse=np.zeros(q),
+        active=np.zeros(q, dtype=np.bool_),
+        elimination=np.zeros((q, q + 1)),
+        trail=no_trail(),
+    )
 
 
 @jit_lean_sum
@@ -222,12 +233,16 @@ def begin_mode(
     z_next: Floats,
     motion: Floats,
     recorder: Recorder,
+    trail: Trail,
 ) -> bool:
     """Enter the contact mode wanted, if any, with the reduced motion (2 n,), and begin to measure it.
 
     Returns False where the mode is not tabulated.
     """
-    is_entered = progress.wanted < 0 or enter_wanted(tables, reduced.clearance, clock, progress, motion, z)
+    is_entered = progress.wanted < 0
+    if not is_entered and enter_wanted(tables, reduced.clearance, clock, progress, motion, z):
+        is_entered = True
+        note_piece(trail, tables.mask[progress.mode], z)
     if is_entered and is_recorded:
         if progress.energy_from < 0:
             begin_span(tables, z, progress, recorder)
@@ -284,6 +299,7 @@ def take_event(
         tables, reduced, clock, is_recorded, progress, z, motion, work.impulse, recorder, accumulator
     ):
         return DIVERGED
+    note_before(work.trail, progress.tick, crossing, motion)
     angle = shaft_angle(clock, progress.tick)
     moment = (1 << FORCED_LEVEL) * clock.tick
     if reduced.spring > 0.0:
@@ -307,6 +323,7 @@ def take_event(
         )
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
         return CONTACT_UNSOLVED
+    note_after(work.trail, motion)
     if is_recorded:
         for i in range(reduced.radius.size):
             record_event(clock, progress, work.impulse, i, samples, accumulator)

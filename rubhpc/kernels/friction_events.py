@@ -23,6 +23,7 @@ from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - likewise
 from rubhpc.kernels.coulomb_friction import ROUNDING, UNNOTICED, friction_residual, solve_cones
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
 from rubhpc.kernels.mode_change import AT_REST, OPENING, product
+from rubhpc.kernels.trail import Trail, no_trail
 
 Floats = NDArray[np.float64]
 
@@ -40,10 +41,11 @@ class FrictionWork(NamedTuple):
     rest_impulse: Floats  # (2 q,), N s
     is_at_rest: NDArray[np.bool_]  # (2 q,)
     elimination: Floats  # (2 q, 2 q + 1)
+    trail: Trail  # of the motion
 
 
 def friction_work(solver: Workspace, q: int) -> FrictionWork:
-    """Work space of the events of q pairs, with that of their laws."""
+    """Work space of the events of q pairs, with that of their laws, without a trail."""
     return FrictionWork(
         solver=solver,
         rate=np.zeros(q),
@@ -55,6 +57,7 @@ def friction_work(solver: Workspace, q: int) -> FrictionWork:
         rest_impulse=np.zeros(2 * q),
         is_at_rest=np.zeros(2 * q, dtype=np.bool_),
         elimination=np.zeros((2 * q, 2 * q + 1)),
+        trail=no_trail(),
     )
 
 

@@ -58,6 +58,7 @@ from rubhpc.kernels.friction_events import FrictionWork, observe_states
 from rubhpc.kernels.friction_measuring import begin_friction, observe_friction, resolved_friction
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
 from rubhpc.kernels.measuring import Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.trail import note_after, note_before, note_piece
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -111,6 +112,7 @@ def advance_with_friction(
         if progress.wanted >= 0:
             if not enter_states(tables, reduced.clearance, clock, progress, motion, z):
                 return MODE_WANTED
+            note_piece(work.trail, mask[progress.mode], z)
             is_new = True
         if is_new:
             is_new = False
@@ -252,6 +254,7 @@ def take_change(
         end_energies(tables, clock, z, progress, recorder, accumulator)
         for i in range(work.impulse.size):
             work.impulse[i] = accumulator.impulse[i]
+    note_before(work.trail, progress.tick, crossing, motion)
     angle, moment = shaft_angle(clock, progress.tick), (1 << FORCED_LEVEL) * clock.tick
     cosine, sine = np.cos(angle), np.sin(angle)
     wanted = change_states(
@@ -274,5 +277,6 @@ def take_change(
                 record_touch(i, state_of(wanted, i) != OPEN, accumulator)
     if wanted < 0 or progress.n_event > MOST_EVENTS:
         return CONTACT_UNSOLVED
+    note_after(work.trail, motion)
     progress.wanted = wanted
     return UNDER_WAY

@@ -8,7 +8,7 @@ def test_each_part_is_announced_once(monkeypatch):
     monkeypatch.setattr(compilation, "_announced", set())
     before, texts = _jit.compilation.began, []
     with compilation.announced_by(texts.append):
-        for name in ("enter", "advance", "part", "enter", "part", "advance_by_steps"):
+        for name in ("enter", "advance", "carry_along", "enter", "carry_along", "advance_by_steps"):
             _jit.compilation.began(name)
     assert _jit.compilation.began is before
     common = "once after an installation: up to a minute"
@@ -20,9 +20,9 @@ def test_each_part_is_announced_once(monkeypatch):
 
 
 def test_parts_are_names_of_kernels():
-    from rubhpc.kernels import curved_loop, flow, piece_loop, separation, stepping_loop
+    from rubhpc.kernels import curved_loop, flow, piece_loop, stepping_loop, tangent
 
-    modules = flow, separation, stepping_loop, curved_loop, piece_loop
+    modules = flow, tangent, stepping_loop, curved_loop, piece_loop
     kernels = {name for module in modules for name in vars(module)}
     assert all(name in kernels for name in compilation._PARTS)
 

@@ -68,15 +68,19 @@ def use(scheme: str) -> None:
 def _use_neighbours() -> None:
     import rubhpc
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
-    from rubhpc.integrate.neighbour_motions import NeighbourMotions
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import prepare
-    from rubhpc.study.study import Contact, Integrator
+    from rubhpc.integrate.tangent_motion import TangentMotion
+    from rubhpc.study.study import Contact, Integrator, Recording
 
     shared = {"contact": Contact(), "integrator": Integrator(), "samples_per_revolution": 32}
     setup = prepare(rubhpc.read_rig("mokhtar2017"), 150.0, **shared)
-    march = EventDrivenMarch(setup, 1e-4, 0.3, State.at_rest(setup.model), None)
-    NeighbourMotions(march).part(1)
+    recording = Recording(samples_per_revolution=32)
+
+    def start(state: State) -> EventDrivenMarch:
+        return EventDrivenMarch(setup, 1e-4, 0.3, state, None)
+
+    TangentMotion(start, State.at_rest(setup.model), setup, recording).part(1)
 
 
 def use_own_cache(worker: str) -> None:

@@ -20,6 +20,7 @@ from rubhpc.kernels.contact_modes import FORCED_LEVEL
 from rubhpc.kernels.event_loop import advance, event_work
 from rubhpc.kernels.mode_change import change_contacts
 from rubhpc.kernels.sections_loop import advance_sections
+from rubhpc.kernels.trail import Trail, begin_trail, new_trail, no_trail
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -81,8 +82,12 @@ class EventDrivenMarch(ModalMarch):
         self._asked = {mask: n for mask, n in self._asked.items() if self._n_piece - n <= FORESEEN}
         self._enter_first(place.contact_force)
 
-    def _start_at(self, state: State) -> None:
+    def start_again(self, state: State) -> bool:
         """Start the same case anew at another state, with the contact modes that it has met."""
+        self._start_at(state)
+        return True
+
+    def _start_at(self, state: State) -> None:
         self._stride = ALL_SAMPLES
         self._begin_time()
         self._motion[:] = self.reduced(state)
@@ -189,6 +194,19 @@ class EventDrivenMarch(ModalMarch):
                 self.check()
         return sections, None
 
+    def new_trail(self) -> Trail:
+        """Room for a trail of the case."""
+        return new_trail(self._z.shape[1], self.bodies.stiffness.shape[0])
+
+    def keep(self, trail: Trail | None) -> None:
+        """Have the events from here on noted in a trail, or in none."""
+        self._note_in(no_trail() if trail is None else trail)
+        if trail is not None:
+            begin_trail(trail, self.states, self._z)
+
+    def _note_in(self, trail: Trail) -> None:
+        self._event_work = self._event_work._replace(trail=trail)
+
     @property
     def states(self) -> int:
         """Set of closed pairs, or of the states of all pairs under set-valued friction."""
@@ -205,6 +223,19 @@ class EventDrivenMarch(ModalMarch):
     def opened(self, mask: int) -> NDArray[np.bool_]:
         """Which pairs are open in a contact mode, and watched for their gap, (q,)."""
         return ~self.closed(mask)
+
+    def gaps_watched(self, mask: int) -> int:
+        """Bits of the switch functions that are gaps in a contact mode."""
+        stride = self.tables.switch_re.shape[1] // self._clearance.size
+        return sum(1 << stride * int(i) for i in np.flatnonzero(self.opened(mask)))
+
+    @cached_property
+    def impulse_of_change(self) -> Floats:
+        """Impulses of the pairs (q, n) behind a change of the velocities, the shortest where several are."""
+        bodies = self.bodies
+        if len(bodies.gap_jacobian) == 1:
+            return np.asarray(bodies.gap_jacobian / bodies.delassus)
+        return np.asarray(np.linalg.pinv(bodies.delassus, rcond=1e-12) @ bodies.gap_jacobian)
 
     def forces(self, mode: int, z: Floats) -> Floats:
         """Forces (q,), N, at coordinates (2, m) of a contact mode, given by its index in the tables."""

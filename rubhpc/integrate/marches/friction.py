@@ -25,6 +25,7 @@ from rubhpc.kernels.friction_change import change_states
 from rubhpc.kernels.friction_events import friction_work
 from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, MOST_PAIRS, OPEN, STUCK, FrictionBodies
+from rubhpc.kernels.trail import BROKEN
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.contact_pairs import Workspace
     from rubhpc.kernels.friction_events import FrictionWork
+    from rubhpc.kernels.trail import Trail
 
     Floats = NDArray[np.float64]
 
@@ -81,8 +83,16 @@ class FrictionMarch(EventDrivenMarch):
     def start_again(self, state: State) -> bool:
         """Start the same case anew at another state, with the contact modes that it has met."""
         self._n_short = 0
-        self._start_at(state)
-        return True
+        return super().start_again(state)
+
+    @cached_property
+    def impulse_of_change(self) -> Floats:
+        """Impulses of the pairs, then their tractions, (2 q, n), behind a change of the velocities."""
+        both = np.concatenate([self.bodies.gap_jacobian, -self.bodies.slip])
+        return np.asarray(np.linalg.pinv(both.T, rcond=1e-12))
+
+    def _note_in(self, trail: Trail) -> None:
+        self._work = self._work._replace(trail=trail)
 
     def closed(self, mask: int) -> NDArray[np.bool_]:
         """Which pairs are closed in a contact mode, (q,)."""
@@ -220,6 +230,7 @@ class FrictionMarch(EventDrivenMarch):
         self.n_left += 1
         clock = self.clock
         self._n_short = clock.samples_per_revolution << clock.sample_level
+        self._work.trail.n_event[0] = BROKEN
         follow(self._steps.progress, self.progress)
         self._steps.take_over(clock, self._recorder, self._motion)
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import StatorModel
-    from rubhpc.integrate.measuring.regimes import Further, Solution
+    from rubhpc.integrate.measuring.regimes import Further, Solution, Within
 
     Floats = NDArray[np.float64]
 
@@ -48,6 +48,7 @@ def measures_of(
     is_round: bool,
     samples_per_revolution: int,
     growth: Iterable[float],
+    within: Within | None,
     solve: Callable[[int], Solution | None] | None,
     further: Further | None,
 ) -> dict[str, Any]:
@@ -63,7 +64,9 @@ def measures_of(
     is_round : bool
         Whether the gap knows that the rim is round (updated normal).
     growth : iterable of float
-        How a small displacement grows after the record (`lyapunov.growth`); read where it decides the regime.
+        How a small displacement grows after the record (`lyapunov.Growth`); read where it decides the regime.
+    within : callable, optional
+        How it grows within the record (`lyapunov.Growth.within`).
     solve : callable, optional
         Finds periodic motions (`proof.Solver`).
     further : callable, optional
@@ -77,7 +80,13 @@ def measures_of(
     n_contact = np.maximum(accumulator.n_contact, 1)  # one that lasts throughout never begins in the record
     orbit = signals["vertical"], signals["horizontal"], samples_per_revolution
     verdict = regime(
-        *orbit, period=period(*orbit), is_contact=is_contact, growth=growth, solve=solve, further=further
+        *orbit,
+        period=period(*orbit),
+        is_contact=is_contact,
+        growth=growth,
+        solve=solve,
+        further=further,
+        within=within,
     )
     multiplier = verdict.multiplier
     rim = stators[0].radius * signals["torsion"]  # m, as the orbit

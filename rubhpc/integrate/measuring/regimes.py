@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     Solve = Callable[[int], "Solution | None"]
     Further = Callable[[int], Iterable[tuple[int, Solve]]]
+    Within = Callable[[], list[float]]
 
 Floats = NDArray[np.float64]
 
@@ -67,6 +68,7 @@ def regime(
     growth: Iterable[float],
     solve: Solve | None = None,
     further: Further | None = None,
+    within: Within | None = None,
 ) -> Verdict:
     """Judge a record.
 
@@ -89,6 +91,8 @@ def regime(
         Finds the motion of a period next to the end of the record (`proof.Solver`).
     further : callable, optional
         What else to try for a period, in turn (`proof.Solver.further`).
+    within : callable, optional
+        Growth of a small displacement within the record, span by span (`lyapunov.Growth.within`).
     """
     if not is_contact:
         return Verdict(REGIME.index("no_contact"), period)
@@ -110,7 +114,7 @@ def regime(
     repeats = is_open and orbit.repeats(orbit.closest_return)
     if orbit.n_revolution < LEAST_REVOLUTIONS:
         return Verdict(periodic, orbit.closest_return) if repeats else Verdict(REGIME.index("undecided"), 0)
-    flag, exponent = by_growth(growth, distances)
+    flag, exponent = by_growth(growth, distances, within)
     if repeats and flag != REGIME.index("chaotic"):
         return Verdict(periodic, orbit.closest_return, exponent)
     is_regular = flag in (periodic, REGIME.index("quasi_periodic"))
@@ -212,12 +216,17 @@ class _Search:
         return Verdict(REGIME.index("periodic"), found.period, multiplier=upper, is_reached=is_reached)
 
 
-def by_growth(growth: Iterable[float], distances: Floats | None) -> tuple[int, float]:
+def by_growth(
+    growth: Iterable[float], distances: Floats | None, within: Within | None = None
+) -> tuple[int, float]:
     """Judge by how neighbours part: flag of `schema.REGIME`, and the largest Lyapunov exponent or NaN."""
+    is_closed = distances is not None and is_torus(distances)  # the curve on which the cycles lie
+    if is_closed and within is not None and (grown := within()) and abs(np.mean(grown)) < CLEAR:
+        return REGIME.index("quasi_periodic"), float(np.mean(grown))
     spans = iter(growth)
     grown = list(islice(spans, N_FIRST))
     if len(grown) == N_FIRST and abs(np.mean(grown)) < CLEAR:
-        if distances is not None and is_torus(distances):
+        if is_closed:
             return REGIME.index("quasi_periodic"), float(np.mean(grown))
         grown += islice(spans, N_ALL - N_FIRST)
         if len(grown) == N_ALL and ZERO < abs(np.mean(grown)) < SURE * standard_error(grown):

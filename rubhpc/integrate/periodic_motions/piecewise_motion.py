@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -134,20 +133,6 @@ class PiecewiseMotion:
         )
         self.start = self.march.motion_of(*self.march.place())
         self.states = plain(closed_pairs)(self.march.progress, self._tables)
-
-    @cached_property
-    def force_of_change(self) -> Floats:
-        """Impulses of the pairs (q or 2 q, n), with their tractions under set-valued friction.
-
-        They are those behind a change of the velocities, the shortest where several are.
-        """
-        bodies = self.bodies
-        if self.has_states:
-            both = np.concatenate([bodies.gap_jacobian, -bodies.slip])
-            return np.asarray(np.linalg.pinv(both.T, rcond=1e-12))
-        if self.q == 1:
-            return np.asarray(bodies.gap_jacobian / bodies.delassus)
-        return np.asarray(np.linalg.pinv(bodies.delassus, rcond=1e-12) @ bodies.gap_jacobian)
 
     def size(self, motion: Floats) -> float:
         """Root of v'v + spin^2 u'u of a reduced motion (2 n,), in which the mass matrix is the identity."""

@@ -116,7 +116,7 @@ def _sliding(motion: PiecewiseMotion, change: Floats, velocity: Floats) -> tuple
     """Directions F and `(R F)^-1 R` of the impulses behind a change (n,) to a velocity (n,), of sliding."""
     bodies = motion.bodies
     normal = bodies.gap_jacobian
-    hit = _pressing(motion.force_of_change @ change)
+    hit = _pressing(motion.march.impulse_of_change @ change)
     has_parted = hit & (np.abs(normal @ velocity) > AT_REST)
     key = hit.tobytes() + has_parted.tobytes()
     if key not in motion.impacts:
@@ -130,7 +130,7 @@ def _with_states(motion: PiecewiseMotion, change: Floats, velocity: Floats) -> t
     """The same under set-valued friction, whose impulses are in proportion or stop a slip."""
     bodies = motion.bodies
     normal, along = bodies.gap_jacobian, -bodies.slip
-    force, traction = np.split(motion.force_of_change @ change, 2)
+    force, traction = np.split(motion.march.impulse_of_change @ change, 2)
     hit = np.flatnonzero(_pressing(force))
     share = traction[hit] / force[hit]
     moved = bodies.slip[hit] @ velocity

@@ -10,12 +10,12 @@ from impact_map import RESTITUTION, next_impact
 from scipy.optimize import brentq, fsolve
 
 from rubhpc import LumpedStator, Rig, State, Unbalance, simulate
-from rubhpc.integrate.lyapunov import N_ALIGNING, Marches, growth
+from rubhpc.integrate.lyapunov import N_ALIGNING, Growth, Marches
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
-from rubhpc.integrate.neighbour_motions import NeighbourMotions
 from rubhpc.integrate.setup import prepare
+from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.rig.reading import read_rig
 from rubhpc.schema import REGIME
 from rubhpc.study.study import Contact, Integrator, Recording
@@ -63,14 +63,12 @@ def growth_of(rig, given, state, n_span, march=EventDrivenMarch):
     start = partial(march, setup, given["clearance"], given["friction"], check=None)
 
     def begin():
-        if march is EventDrivenMarch:
-            neighbours = NeighbourMotions(start(initial=state))
-        else:
-            neighbours = Marches(lambda initial: start(initial=initial), state, setup, recording)
+        beside = TangentMotion if march is EventDrivenMarch else Marches
+        neighbours = beside(lambda initial: start(initial=initial), state, setup, recording)
         neighbours.most_spans = n_span + N_ALIGNING
         return neighbours
 
-    return np.array(list(islice(growth(begin), n_span)))
+    return np.array(list(islice(Growth(begin), n_span)))
 
 
 def slope(time, speed, spin, by=1e-6):
@@ -149,16 +147,19 @@ def test_chaotic_impacts_part_as_in_the_closed_form():
 
 
 def test_every_integrator_finds_one_exponent():
-    """Period 1 of the packaged rig: 0.52 per revolution, in steps of 2 us where steps are taken."""
+    """Period 1 of the packaged rig: 0.529 per revolution, in steps of 2 us where steps are taken.
+
+    Complex multipliers: the growth goes up and down with the angle of the displacement.
+    """
     given = {"speed_ratio": 0.75, "clearance": 84e-6, "friction": 0.3, "samples_per_revolution": 64}
     record = simulate("mokhtar2017", **given, revolutions=1)
     given = given | {"speed": float(record.spin_speed), "step": 2e-6}
     found = {
-        name: growth_of(read_rig("mokhtar2017"), given, record.final, 6, march)
+        name: growth_of(read_rig("mokhtar2017"), given, record.final, 14, march)
         for name, march in MARCHES.items()
     }
     for name in ("stepped", "central-difference"):
-        assert found[name].mean() == pytest.approx(found["modal"].mean(), rel=0.02), name
+        assert found[name].mean() == pytest.approx(found["modal"].mean(), rel=0.01), name
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,142 @@
+"""The exact tangent of a case in closed form: along the trail of its record, then from its end on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN, Marches
+from rubhpc.integrate.marches.friction import FrictionMarch
+from rubhpc.integrate.measuring.regimes import N_MOST
+from rubhpc.integrate.transient import pass_revolutions
+from rubhpc.kernels.tangent import ALL_CARRIED, TrailModes, carry_along, new_tangent
+from rubhpc.kernels.trail import BROKEN
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+    from rubhpc.integrate.record import State
+    from rubhpc.integrate.setup import Setup
+    from rubhpc.kernels.trail import Trail
+    from rubhpc.study.study import Recording
+
+    Floats = NDArray[np.float64]
+
+N_AT_ONCE = 4  # spans passed together beyond the record
+
+
+class TangentMotion:
+    """A small displacement of a motion, carried by its exact derivative (`kernels.tangent`).
+
+    Where pairs leave the closed form for short steps, it goes on with two motions (`lyapunov.Marches`).
+    """
+
+    def __init__(
+        self,
+        start: Callable[[State], EventDrivenMarch],
+        state: State,
+        setup: Setup,
+        recording: Recording,
+        trail: Trail | None = None,
+    ) -> None:
+        """Take where a record has ended, and the trail of its revolutions, if it was kept."""
+        self.n_aligning, self.most_spans = N_ALIGNING, N_ALIGNING + N_MOST
+        self.within: list[float] = []
+        self._start, self._recording, self._setup = start, recording, setup
+        self._state = state
+        self._march = march = start(state)
+        self._spare = march.new_trail()
+        n = march.bodies.stiffness.shape[0]
+        self._motion = np.cos(np.arange(2.0 * n))  # in no direction of its own
+        self._beside: Marches | None = None
+        self._grown: list[float] = []  # logarithms, revolution by revolution, not yet read
+        if trail is not None and self._carry(trail, 0, recording.revolutions):
+            grown, self._grown = np.array(self._grown[N_ALIGNING * SPAN :]), []
+            whole = grown.size - grown.size % SPAN
+            self.within = (grown[grown.size - whole :].reshape(-1, SPAN).sum(axis=1) / SPAN).tolist()
+
+    def part(self, n_revolution: int) -> float | None:
+        """Go on; see `lyapunov.Neighbours`.
+
+        Raises
+        ------
+        NoClosedForm
+            Only short steps can follow the motion.
+        """
+        while self._beside is None and len(self._grown) < n_revolution:
+            if not self._pass_on():
+                return None
+        if self._beside is not None:
+            return self._beside.part(n_revolution)
+        grown, self._grown = self._grown[:n_revolution], self._grown[n_revolution:]
+        return float(sum(grown))
+
+    def _pass_on(self) -> bool:
+        """Pass some more revolutions; returns whether the motion can go on."""
+        n_revolution = N_AT_ONCE * SPAN
+        march, trail = self._march, self._spare
+        march.start_again(self._state)
+        march.keep(trail)
+        reason = pass_revolutions(march, self._recording, n_revolution)
+        march.keep(None)
+        if reason is not None:
+            return False
+        clock = march.clock
+        first = -n_revolution * clock.samples_per_revolution << clock.sample_level
+        before, self._state = self._state, march.final()
+        if not self._carry(trail, first, n_revolution):
+            self._beside = Marches(self._start, before, self._setup, self._recording)
+            for _ in range(self._beside.n_aligning):
+                self._beside.part(SPAN)
+        return True
+
+    def _carry(self, trail: Trail, first: int, n_revolution: int) -> bool:
+        """Carry the displacement along a trail that begins at tick `first`; False where that is broken."""
+        if trail.n_event[0] == BROKEN:
+            return False
+        march = self._march
+        tangent = new_tangent(
+            trail.begun.shape[2],
+            len(march.bodies.gap_jacobian),
+            march.impulse_of_change,
+            self._motion,
+            n_revolution,
+        )
+        clock = march.clock
+        piece = 0
+        while piece != ALL_CARRIED:
+            march.find(int(trail.states[piece]))
+            piece = carry_along(
+                march.tables,
+                march.bodies,
+                clock.spin,
+                clock.tick,
+                first,
+                clock.samples_per_revolution << clock.sample_level,
+                trail,
+                self._modes_of(trail),
+                tangent,
+            )
+        self._motion = tangent.motion
+        self._grown += tangent.grown.tolist()
+        return True
+
+    def _modes_of(self, trail: Trail) -> TrailModes:
+        """The contact modes of a trail, as far as the tables hold them."""
+        march = self._march
+        distinct, of_piece = np.unique(trail.states[: trail.n_event[0] + 1], return_inverse=True)
+        masks = march.tables.mask.tolist()
+        m, k = trail.begun.shape[2], len(distinct)
+        place, opened = np.full(k, -1), np.zeros(k, dtype=np.int64)
+        exponent, drift = np.zeros((k, 2, m)), np.zeros((k, m))
+        for i, states in enumerate(distinct.tolist()):
+            if states in masks:
+                place[i] = masks.index(states)
+                exponent[i], drift[i] = march.exponents(states)
+                opened[i] = march.gaps_watched(states)
+        has_states = isinstance(march, FrictionMarch)
+        return TrailModes(of_piece.reshape(-1), place, exponent, drift, opened, has_states)

@@ -1,0 +1,309 @@
+"""The exact tangent of a motion carried along its trail: exponentials, and saltation at events.
+
+A small displacement d of a motion x moves an event, at which a switch function h vanishes, by
+`t = -(grad h . d) / (dh/dt)`. Before it d + t f-, with f the rate of the motion, is where the displaced
+motion meets the event; the derivative DR of the impact takes it over, and `- t f+` brings it back to the time
+of the event: `S d = DR (d + t f-) - t f+`, the saltation matrix (Leine and Nijmeijer 2004) without being
+formed. In modal coordinates the rates are products with the exponents, so that an event costs what entering a
+contact mode costs.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels.complementarity import solve_active
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot, floor_log2
+from rubhpc.kernels.mode_change import AT_REST, product
+from rubhpc.kernels.trail import Trail  # noqa: TC001 - part of a kernel's signature
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ALL_CARRIED = -1
+NO_IMPULSE = 1e-12  # of the largest impulse of an event
+STOPPED = 1e-9  # of the rim's speed: what slips less after an impact sticks
+LOST = 1e-280  # a displacement smaller than that is gone
+PIECE, REVOLUTION, PASSED, IS_ENTERED = range(4)  # items of `Tangent.reached`
+
+
+class TrailModes(NamedTuple):
+    """The k different contact modes of a trail."""
+
+    of_piece: Ints  # (room + 1,), which of them each piece is in
+    place: Ints  # (k,), in the tables, or -1
+    exponent: Floats  # (k, 2, m), 1/s
+    drift: Floats  # (k, m), of the coordinates with exponent 0
+    opened: Ints  # (k,), bits of the switch functions that are gaps
+    has_states: bool  # whether pairs slide in either sense and stick
+
+
+class Tangent(NamedTuple):
+    """A displacement that is carried, and work space; m coordinates, n reduced degrees, q pairs."""
+
+    reached: Ints  # (4,), piece, revolution, ticks passed, and whether the first mode is entered
+    motion: Floats  # (2 n,), the displacement where none is entered: at the beginning and at the end
+    generic: Floats  # (2 n,), what goes on in place of one that is lost
+    d: Floats  # (2, m)
+    z: Floats  # (2, m), the motion itself
+    grown: Floats  # (n_revolution,), filled in: logarithm of the growth in each revolution
+    impulse_of_change: Floats  # (q or 2 q, n), impulses, then tractions, behind a change of velocities
+    impulse: Floats  # (2 q,)
+    share: Floats  # (q,)
+    compliance: Floats  # (2 q, 2 q)
+    speed: Floats  # (2 q,)
+    found: Floats  # (2 q,)
+    active: NDArray[np.bool_]  # (2 q,)
+    elimination: Floats  # (2 q, 2 q + 1)
+
+
+def new_tangent(m: int, q: int, impulse_of_change: Floats, generic: Floats, n_revolution: int) -> Tangent:
+    """Begin with the displacement `generic` (2 n,), for a trail of some revolutions."""
+    return Tangent(
+        reached=np.zeros(4, dtype=np.int64),
+        motion=generic.copy(),
+        generic=generic,
+        d=np.zeros((2, m)),
+        z=np.zeros((2, m)),
+        grown=np.zeros(n_revolution),
+        impulse_of_change=impulse_of_change,
+        impulse=np.zeros(2 * q),
+        share=np.zeros(q),
+        compliance=np.zeros((2 * q, 2 * q)),
+        speed=np.zeros(2 * q),
+        found=np.zeros(2 * q),
+        active=np.zeros(2 * q, dtype=np.bool_),
+        elimination=np.zeros((2 * q, 2 * q + 1)),
+    )
+
+
+@jit_lean_sum
+def carry_along(
+    tables: ModeTables,
+    reduced: Reduced,
+    spin: float,
+    tick: float,
+    first: int,
+    per_revolution: int,
+    trail: Trail,
+    modes: TrailModes,
+    tangent: Tangent,
+) -> int:
+    """Carry a displacement along a trail: `tangent.grown.size` revolutions of `per_revolution` ticks.
+
+    The trail begins at tick `first`.
+
+    Its size is the root of v'v + spin^2 u'u in reduced coordinates, in which the mass matrix is the identity;
+    it is brought back to 1 after every revolution.
+
+    Returns
+    -------
+    int
+        ALL_CARRIED, or the piece whose contact mode is not tabulated: call again once it is.
+    """
+    reached, d, z = tangent.reached, tangent.d, tangent.z
+    n_event, n_revolution = trail.n_event[0], tangent.grown.size
+    while True:
+        k = reached[PIECE]
+        which = modes.of_piece[k]
+        place = modes.place[which]
+        if place < 0:
+            return int(k)
+        exponent, drift = modes.exponent[which], modes.drift[which]
+        if reached[IS_ENTERED] == 0:
+            enter_displacement(tables, place, 0.0, 0.0, tangent)
+            reached[IS_ENTERED] = 1
+        begun = trail.tick[k - 1] - first if k > 0 else 0
+        end = trail.tick[k] - first if k < n_event else n_revolution * per_revolution
+        while reached[REVOLUTION] < n_revolution and (reached[REVOLUTION] + 1) * per_revolution <= end:
+            turn = (reached[REVOLUTION] + 1) * per_revolution
+            move(tables, place, turn - reached[PASSED], d)
+            reached[PASSED] = turn
+            read_displacement(tables, place, tangent)
+            size = size_of(tangent.motion, spin)
+            tangent.grown[reached[REVOLUTION]] = np.log(max(size, LOST))
+            reached[REVOLUTION] += 1
+            if size > LOST:
+                for i in range(d.shape[1]):
+                    d[0, i] /= size
+                    d[1, i] /= size
+            else:
+                for i in range(tangent.motion.size):
+                    tangent.motion[i] = tangent.generic[i]
+                enter_displacement(tables, place, 0.0, 0.0, tangent)
+        if k == n_event:
+            read_displacement(tables, place, tangent)
+            return ALL_CARRIED
+        following = modes.of_piece[k + 1]
+        next_place = modes.place[following]
+        if next_place < 0:
+            return int(k + 1)
+        move(tables, place, end - reached[PASSED], d)
+        reached[PASSED] = end
+        crossing = trail.crossing[k]
+        is_touching = crossing & modes.opened[which] != 0
+        shift, cosine_rate, sine_rate = 0.0, 0.0, 0.0
+        if modes.has_states or is_touching:  # else a release, at which the forces are continuous
+            read_begun(trail, k, z)
+            move(tables, place, end - begun, z)
+            for i in range(z.shape[1]):
+                z[0, i] += drift[i] * (end - begun) * tick
+            j = floor_log2(crossing & -crossing)
+            rate = dot(tables.rate_re[place, j], tables.rate_im[place, j], z[0], z[1])
+            shift = -dot(tables.switch_re[place, j], tables.switch_im[place, j], d[0], d[1]) / rate
+            add_rate(shift, exponent, drift, z, d)
+            forced = tables.n_eigenmode[place]
+            cosine_rate, sine_rate = d[0, forced], d[1, forced]
+        read_displacement(tables, place, tangent)
+        if is_touching and reduced.spring == 0.0:
+            strike(reduced, modes.has_states, trail.velocity[k], tangent)
+        enter_displacement(tables, next_place, cosine_rate, sine_rate, tangent)
+        if shift != 0.0:
+            read_begun(trail, k + 1, z)
+            add_rate(-shift, modes.exponent[following], modes.drift[following], z, d)
+        forced = tables.n_eigenmode[next_place]
+        d[0, forced], d[1, forced] = 0.0, 0.0
+        reached[PIECE] = k + 1
+
+
+@jit_lean_sum
+def move(tables: ModeTables, place: int, n_tick: int, z: Floats) -> None:
+    """Coordinates (2, m) that many ticks later."""
+    power_re, power_im = tables.power_re[place], tables.power_im[place]
+    highest = power_re.shape[0] - 1
+    z_re, z_im = z[0], z[1]
+    left = n_tick
+    while left > 0:
+        level = min(highest, floor_log2(left))
+        left -= 1 << level
+        re, im = power_re[level], power_im[level]
+        for i in range(z_re.size):
+            a, b = z_re[i], z_im[i]
+            z_re[i] = re[i] * a - im[i] * b
+            z_im[i] = re[i] * b + im[i] * a
+
+
+@jit_lean_sum
+def read_begun(trail: Trail, piece: int, z: Floats) -> None:
+    """Coordinates (2, m) with which a piece begins."""
+    for i in range(z.shape[1]):
+        z[0, i], z[1, i] = trail.begun[piece, 0, i], trail.begun[piece, 1, i]
+
+
+@jit_inline_sum
+def add_rate(time: float, exponent: Floats, drift: Floats, z: Floats, d: Floats) -> None:
+    """Add to a displacement d what a motion z does in a time, s, both (2, m)."""
+    for i in range(z.shape[1]):
+        growth, turning = time * exponent[0, i], time * exponent[1, i]
+        d[0, i] += growth * z[0, i] - turning * z[1, i] + time * drift[i]
+        d[1, i] += growth * z[1, i] + turning * z[0, i]
+
+
+@jit_lean_sum
+def read_displacement(tables: ModeTables, place: int, tangent: Tangent) -> None:
+    """Fill `tangent.motion` from the coordinates."""
+    re, im, d, motion = tables.motion_re[place], tables.motion_im[place], tangent.d, tangent.motion
+    d_re, d_im = d[0], d[1]
+    for row in range(motion.size):
+        motion[row] = dot(re[row], im[row], d_re, d_im)
+
+
+@jit_lean_sum
+def enter_displacement(tables: ModeTables, place: int, cosine: float, sine: float, tangent: Tangent) -> None:
+    """Fill the coordinates from `tangent.motion`, and from a change of the shaft's cosine and sine."""
+    for part in range(2):
+        target = tangent.d[part]
+        from_cosine, from_sine = tables.enter_cosine[place, part], tables.enter_sine[place, part]
+        for i in range(target.size):
+            target[i] = -from_cosine[i] * cosine - from_sine[i] * sine
+        add_rows(tables.enter_re[place] if part == 0 else tables.enter_im[place], tangent.motion, target)
+
+
+@jit_lean_sum
+def size_of(motion: Floats, spin: float) -> float:
+    """Root of v'v + spin^2 u'u of a motion (2 n,)."""
+    n = motion.size // 2
+    square = 0.0
+    for i in range(n):
+        u, v = spin * motion[i], motion[n + i]
+        square += v * v + u * u
+    return float(np.sqrt(square))
+
+
+@jit_lean_sum
+def strike(reduced: Reduced, has_states: bool, velocity: Floats, tangent: Tangent) -> None:
+    """Apply the derivative of an impact to `tangent.motion`: `dv+ = dv- - F (R F)^-1 R dv-`.
+
+    The rows R are those of the gap velocities that impulses change, each times 1 + restitution where the pair
+    parts, and of the slips that they stop; F are the directions of these impulses, friction in proportion
+    included. `velocity` (2, n) are those before and after it.
+    """
+    q, n = reduced.gap_jacobian.shape
+    impulse, active, share = tangent.impulse, tangent.active, tangent.share
+    moved = tangent.motion[n:]
+    largest = 0.0
+    for i in range(tangent.impulse_of_change.shape[0]):
+        total = 0.0
+        for k in range(n):
+            total += tangent.impulse_of_change[i, k] * (velocity[1, k] - velocity[0, k])
+        impulse[i] = total
+        if i < q:
+            largest = max(largest, abs(total))
+    if largest == 0.0:
+        return
+    for i in range(q):
+        active[q + i] = False
+        active[i] = impulse[i] > NO_IMPULSE * largest
+        share[i] = 0.0
+        if active[i]:
+            parts = abs(product(reduced.gap_jacobian[i], velocity[1])) > AT_REST
+            scale = 1.0 + reduced.restitution if parts else 1.0
+            tangent.speed[i] = scale * product(reduced.gap_jacobian[i], moved)
+            if has_states:
+                slip = reduced.rim_speed[i] + product(reduced.slip[i], velocity[1])
+                if abs(slip) <= STOPPED * reduced.rim_speed[i]:
+                    active[q + i] = True
+                    tangent.speed[q + i] = product(reduced.slip[i], moved)
+                else:
+                    share[i] = impulse[q + i] / impulse[i]
+    for j in range(q):
+        if active[j]:
+            for i in range(q):
+                if active[i]:
+                    tangent.compliance[i, j] = along(
+                        reduced, has_states, reduced.gap_jacobian[i], j, share[j]
+                    )
+                    if active[q + i]:
+                        tangent.compliance[q + i, j] = along(
+                            reduced, has_states, reduced.slip[i], j, share[j]
+                        )
+                    if active[q + j]:
+                        tangent.compliance[i, q + j] = product(reduced.gap_jacobian[i], reduced.slip[j])
+                        if active[q + i]:
+                            tangent.compliance[q + i, q + j] = product(reduced.slip[i], reduced.slip[j])
+    if not solve_active(tangent.compliance, tangent.speed, active, tangent.found, tangent.elimination):
+        return
+    for i in range(q):
+        if active[i]:
+            for k in range(n):
+                if has_states:
+                    moved[k] += tangent.found[i] * (
+                        reduced.gap_jacobian[i, k] - share[i] * reduced.slip[i, k]
+                    )
+                else:
+                    moved[k] += tangent.found[i] * reduced.force_direction[i, k]
+        if active[q + i]:
+            for k in range(n):
+                moved[k] += tangent.found[q + i] * reduced.slip[i, k]
+
+
+@jit_inline_sum
+def along(reduced: Reduced, has_states: bool, row: Floats, j: int, share: float) -> float:
+    """Product of a row (n,) with the direction of the impulse of pair j."""
+    if has_states:
+        return product(row, reduced.gap_jacobian[j]) - share * product(row, reduced.slip[j])
+    return product(row, reduced.force_direction[j])

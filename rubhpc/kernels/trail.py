@@ -1,0 +1,91 @@
+"""The trail of a motion from event to event: what its tangent is carried along by afterwards."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MOST_BYTES = 2**25  # of a trail
+MOST_EVENTS = 2**14
+BROKEN = -1  # in place of the number of events: there were more, or short steps between them
+
+
+class Trail(NamedTuple):
+    """Pieces of a motion, m modal coordinates and n reduced degrees; without room none are noted.
+
+    Piece k + 1 begins where event k ends piece k.
+    """
+
+    n_event: Ints  # (1,), events noted, or BROKEN
+    states: Ints  # (room + 1,), set of closed pairs, or of the states of all pairs
+    tick: Ints  # (room,), of each event
+    crossing: Ints  # (room,), bits of the switch functions that vanish there
+    begun: Floats  # (room + 1, 2, m), modal coordinates with which each piece begins
+    velocity: Floats  # (room, 2, n), reduced velocities before and after each event
+
+
+def new_trail(m: int, n: int) -> Trail:
+    """Room for a trail of a case with m modal coordinates and n reduced degrees."""
+    room = max(1, min(MOST_EVENTS, MOST_BYTES // (16 * (m + n))))
+    return _with_room(room, m, n)
+
+
+def no_trail() -> Trail:
+    """Nothing is noted in this one."""
+    return _with_room(0, 1, 1)
+
+
+def _with_room(room: int, m: int, n: int) -> Trail:
+    return Trail(
+        n_event=np.zeros(1, dtype=np.int64),
+        states=np.zeros(room + 1, dtype=np.int64),
+        tick=np.zeros(room, dtype=np.int64),
+        crossing=np.zeros(room, dtype=np.int64),
+        begun=np.empty((room + 1, 2, m)),
+        velocity=np.empty((room, 2, n)),
+    )
+
+
+def begin_trail(trail: Trail, states: int, z: Floats) -> None:
+    """Note where a motion stands: its states and modal coordinates (2, m)."""
+    trail.n_event[0], trail.states[0], trail.begun[0] = 0, states, z
+
+
+@jit_inline
+def note_before(trail: Trail, tick: int, crossing: int, motion: Floats) -> None:
+    """Note an event, and the motion (2 n,) before it."""
+    room, k = trail.tick.size, trail.n_event[0]
+    if room > 0 and k >= 0:
+        if k == room:
+            trail.n_event[0] = BROKEN
+        else:
+            trail.tick[k], trail.crossing[k] = tick, crossing
+            for i in range(trail.velocity.shape[2]):
+                trail.velocity[k, 0, i] = motion[trail.velocity.shape[2] + i]
+
+
+@jit_inline
+def note_after(trail: Trail, motion: Floats) -> None:
+    """Note the motion (2 n,) after the event."""
+    k = trail.n_event[0]
+    if trail.tick.size > 0 and k >= 0:
+        for i in range(trail.velocity.shape[2]):
+            trail.velocity[k, 1, i] = motion[trail.velocity.shape[2] + i]
+
+
+@jit_inline
+def note_piece(trail: Trail, states: int, z: Floats) -> None:
+    """Note the states and coordinates (2, m) that go on after the event."""
+    k = trail.n_event[0]
+    if trail.tick.size > 0 and k >= 0:
+        trail.states[k + 1] = states
+        for i in range(z.shape[1]):
+            trail.begun[k + 1, 0, i], trail.begun[k + 1, 1, i] = z[0, i], z[1, i]
+        trail.n_event[0] = k + 1
