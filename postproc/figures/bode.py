@@ -9,6 +9,7 @@ import numpy as np
 from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import RPM, critical_speeds, written_speeds
+from postproc.figures.ticks import degree_steps
 from postproc.signals.orders import order_over_speed
 from postproc.store.run_ups import is_run_up
 from postproc.store.units import short_name
@@ -68,8 +69,6 @@ def draw_bode(
     critical: Sequence[float] = (),
 ) -> None:
     """Draw amplitude (zero to peak) and phase lag, which grows downwards; critical speeds in rad/s."""
-    from matplotlib.ticker import MultipleLocator
-
     top, bottom = axes
     along = "revolution" if is_run_up(data) else "speed"
     speeds = data["speed"]
@@ -110,8 +109,7 @@ def draw_bode(
         bottom.legend(*top.get_legend_handles_labels(), fontsize=6, frameon=False, **place)
     bottom.set(xlabel="Spin speed (rpm)", ylabel="Phase lag (\N{DEGREE SIGN})")
     bottom.invert_yaxis()
-    high, low = bottom.get_ylim()
-    bottom.yaxis.set_major_locator(MultipleLocator(90 * max(1, round((high - low) / 450))))
+    bottom.yaxis.set_major_locator(degree_steps(bottom))
     bottom.ticklabel_format(axis="x", style="plain", useOffset=False)
     top.figure.align_ylabels(axes)
 

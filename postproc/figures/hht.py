@@ -101,7 +101,7 @@ def energy_time_frequency(
     Parameters
     ----------
     limit : float, optional
-        End of the ordinate, Hz; by default twice the median frequency.
+        End of the ordinate, Hz; by default twice the median frequency: out of contact, or else in it.
     natural : mapping of name to Hz, optional
         Natural frequencies to be marked.
     colorbar : bool
@@ -148,16 +148,9 @@ def _draw_energy(
     import matplotlib
     from scipy.ndimage import gaussian_filter1d
 
-    middle = float(median_frequency(hht, mode))
-    if not hht["signal"].any():
-        raise InputError(
-            f"hht: {hht.attrs['signal']} is zero throughout; select another stator, signal or case"
-        )
-    if not np.isfinite(middle):
-        raise InputError(
-            f"hht: {hht.attrs['signal']} has no mode {mode} in these spans: it does not oscillate between "
-            "contacts; take more samples a revolution, or another signal"
-        )
+    middle = next(filter(math.isfinite, (f for _, f in _middles(hht, mode))), None)
+    if middle is None:
+        raise InputError(f"hht: {hht.attrs['signal']} {_refusal(hht, mode)}")
     limit = limit or 2.0 * max(middle, *natural.values(), 0.0)
     picture = energy_picture(hht, limit, n_frequency=200, mode=mode)
     time = scale_for("s", float(hht["time"].values[-1]))
@@ -200,9 +193,32 @@ def _add_bar(ax: Axes, beside: list[Axes], mesh: ScalarMappable) -> None:
     bar.set_label("Energy (dB of its peak)")
 
 
+def _middles(hht: xr.Dataset, mode: int) -> Iterator[tuple[str, float]]:
+    """Yield the median frequency out of contact and in it, Hz."""
+    yield "out of contact", float(median_frequency(hht, mode))
+    yield "in contact", float(median_frequency(hht, mode, contact=True))
+
+
+def _refusal(hht: xr.Dataset, mode: int) -> str:
+    """Say why a signal has no frequency, and what to do."""
+    if not hht["signal"].any():
+        return "is zero throughout; select another stator or signal"
+    if hht["contact"].all() and hht.attrs["contact"] == "masked":
+        return (
+            "is in contact throughout these revolutions; keep contact (--contact kept) or select one stator"
+        )
+    where = "between contacts" if hht.attrs["contact"] == "masked" else "between contacts, nor in them"
+    return (
+        f"has no mode {mode} in these spans: it does not oscillate {where}; take more samples a revolution, "
+        "or another signal"
+    )
+
+
 def _medians(shown: xr.Dataset, mode: int) -> Iterator[str]:
-    middle = float(median_frequency(shown, mode))
-    if not math.isfinite(middle):  # the drawing refuses such spans, with the reason
+    (_, middle), (where, touching) = _middles(shown, mode)
+    if not math.isfinite(middle):  # where no span oscillates the drawing refuses, with the reason
+        if math.isfinite(touching):
+            yield f"median frequency {where} {touching:.2f} Hz; no span out of contact oscillates"
         return
     each = ", ".join(f"{f:.1f}" for f in span_frequencies(shown, mode).dropna("span").values)
     yield f"median frequency out of contact {middle:.2f} Hz (span by span: {each})"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.figures.drawing import Drawing
+from postproc.figures.ticks import degree_steps
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
         _name_peaks(amplitude, peaks)
         amplitude.legend(loc="best", fontsize=6)
         phase.set(xlabel="Spin speed (rpm)", ylabel="Phase lead (\N{DEGREE SIGN})")
-        phase.yaxis.set_major_locator(_right_angles(phase))
+        phase.yaxis.set_major_locator(degree_steps(phase))
         phase.ticklabel_format(axis="x", style="plain")
         phase.locator_params(axis="x", nbins=6)  # five digits of rpm take their room
         return axes
@@ -148,13 +149,6 @@ def _along(design: xr.Dataset) -> tuple[np.ndarray[Any, Any], str]:
     if np.isfinite(positions).all():
         return positions, "Position along the shaft (m)"
     return design["node"].values, "Node"
-
-
-def _right_angles(ax: Axes) -> Any:
-    from matplotlib.ticker import MultipleLocator
-
-    low, high = ax.get_ylim()
-    return MultipleLocator(90 * max(1, round((high - low) / 90 / 5)))
 
 
 def _listed(nodes: np.ndarray[Any, Any]) -> str:

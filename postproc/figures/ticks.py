@@ -12,10 +12,12 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.ticker import Locator
     from numpy.typing import NDArray
 
 MOST = 10  # values; an axis of more has round ticks
 _CHARACTER, _GAP, _LINE = 1.5, 1.5, 3.6  # mm, of labels of 8 pt
+_DEGREES = (1, 2, 5, 10, 15, 30, 45)  # between ticks of a phase
 _PANEL = 0.85  # of the room for axes and their labels, taken by the axes
 
 
@@ -65,3 +67,14 @@ def _millimetres(ax: Axes, which: str, places: NDArray[np.float64]) -> NDArray[n
     pixels = box.width if which == "x" else box.height
     millimetres: NDArray[np.float64] = share * _PANEL * pixels / ax.figure.dpi * 25.4
     return millimetres
+
+
+def degree_steps(ax: Axes) -> Locator:
+    """Return ticks for the phase on an ordinate, degrees: right angles, or parts of them where it has few."""
+    from matplotlib.ticker import MaxNLocator, MultipleLocator
+
+    low, high = sorted(ax.get_ylim())
+    if high - low < _DEGREES[0]:
+        return MaxNLocator(4, steps=[1, 2, 5, 10])
+    step = next((step for step in _DEGREES if high - low <= 4 * step), 90 * max(1, round((high - low) / 450)))
+    return MultipleLocator(step)

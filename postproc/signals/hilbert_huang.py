@@ -178,10 +178,10 @@ def hilbert_huang(
     )
 
 
-def median_frequency(hht: xr.Dataset, mode: int = 1) -> xr.DataArray:
-    """Return the amplitude-weighted median of a mode's frequency out of contact, Hz; NaN where none."""
+def median_frequency(hht: xr.Dataset, mode: int = 1, *, contact: bool = False) -> xr.DataArray:
+    """Return the amplitude-weighted median of a mode's frequency out of contact or in it, Hz; or NaN."""
     one = hht.sel(mode=mode)
-    median = _quantiles(one, one["span"].values >= 0, (0.5,))[0]
+    median = _quantiles(one, (one["span"].values < 0) == contact, (0.5,))[0]
     return xr.DataArray(median, name="frequency", attrs={"units": "Hz", "long_name": "median frequency"})
 
 

@@ -12,6 +12,7 @@ from rubhpc.storage.in_progress import forget
 from rubhpc.storage.ledger import count
 from rubhpc.storage.lock import InUse
 from rubhpc.storage.refined import status_of
+from rubhpc.storage.runs import end_run
 from rubhpc.storage.store import Store
 from rubhpc.storage.summary import Summary
 
@@ -30,6 +31,8 @@ def finish_run(job: Job, request: RunRequest, computed: int, seconds: float) -> 
     store.pack(ledger)
     ledger.status = status_of(store.manifest, ledger.status, ledger.measures)
     _clean_up(store, ledger)
+    with disk_errors(store.path):
+        end_run(store.path, job.run)
     return _summary(job, store, ledger, computed, seconds)
 
 
@@ -46,6 +49,8 @@ def finish_part(job: Job, request: RunRequest, computed: int, seconds: float) ->
         request.lock = None
     stopping = request.stopping
     try:
+        with disk_errors(store.path):
+            end_run(store.path, job.run)
         with (
             disk_errors(store.path),
             store.parts.alone(part, stopping.look, lambda: stopping.ask("the loss of its lock")),

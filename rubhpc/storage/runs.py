@@ -6,7 +6,7 @@ import json
 import os
 import platform
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from rubhpc.storage.disk import write_whole
@@ -67,18 +67,32 @@ def record_run(store: Path, number: int, n_rank: int, part: str = "") -> None:
     write_whole(folder / f"run{number:06d}.json", json.dumps(asdict(run)).encode())
 
 
+def end_run(store: Path, number: int) -> None:
+    """Put down when a run wrote its last case: in a copy of the store, journals have the time of the copy."""
+    path = store / PRIVATE / "runs" / f"run{number:06d}.json"
+    run, wrote = read_record(path, Run), _last_written(store).get(number)
+    if run is not None and wrote is not None:
+        write_whole(path, json.dumps(asdict(run) | {"wrote": wrote}).encode())
+
+
 def read_runs(store: Path) -> list[Run]:
     """Return the runs that put a case down, in their order; damaged files are skipped."""
-    wrote: dict[int, float] = {}
+    written = _last_written(store)
+    recorded = [read_record(path, Run) for path in sorted((store / PRIVATE / "runs").glob("run*.json"))]
+    return [
+        replace(run, wrote=run.wrote or written[run.number])  # 0 while it goes on, or if it was killed
+        for run in recorded
+        if run is not None and run.number in written
+    ]
+
+
+def _last_written(store: Path) -> dict[int, float]:
+    """When the journals of each run were last written, seconds since 1970."""
+    written: dict[int, float] = {}
     for path in journals(store / PRIVATE / "journal"):
         number = int(path.name[3:9])
-        wrote[number] = max(wrote.get(number, 0.0), path.stat().st_mtime)
-    runs = []
-    for path in sorted((store / PRIVATE / "runs").glob("run*.json")):
-        run = read_record(path, Run)
-        if run is not None and run.number in wrote:
-            runs.append(Run(**asdict(run) | {"wrote": wrote[run.number]}))
-    return runs
+        written[number] = max(written.get(number, 0.0), path.stat().st_mtime)
+    return written
 
 
 def _processor() -> str:

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 
-from postproc.figures.ticks import tick_levels
+from postproc.figures.ticks import degree_steps, tick_levels
 
 
 def labelled(values: list[float], width: float) -> list[str]:
@@ -31,3 +31,24 @@ def test_equal_steps_are_labelled_at_equal_steps():
 
 def test_where_two_have_room_the_ends_are_labelled():
     assert labelled([1000.0, 1001.0, 1002.0], 0.5) == ["1000", "1002"]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "step"),
+    [
+        (-3.0, 720.0, 180),
+        (-60.0, 300.0, 90),
+        (0.0, 170.0, 45),
+        (3.0, 98.0, 30),
+        (10.0, 14.0, 1),
+        (2.0, 2.35, 0.1),
+    ],
+)
+def test_a_phase_has_a_few_ticks_at_round_angles(low, high, step):
+    ax = Figure().subplots()
+    ax.set_ylim(high, low)  # a lag grows downwards
+    ticks = degree_steps(ax).tick_values(low, high)
+    inside = ticks[(ticks >= low) & (ticks <= high)]
+    assert np.diff(inside) == pytest.approx(step)
+    assert 3 <= inside.size <= 6
+    assert inside / step == pytest.approx(np.round(inside / step))

@@ -246,6 +246,20 @@ def test_no_median_of_nothing_is_given():
     assert hht(select(synthetic_store.make(), choice), mode=7).lines == ()
 
 
+def test_a_motion_that_is_always_in_contact_is_shown_in_contact():
+    choice = {"speed_ratio": 1.5, "clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
+    record = select(synthetic_store.make(), choice)
+    record["contact_force"] = 1.0 + record["contact_force"]
+    record["torsion"] = record["torsion"].copy(data=np.sin(8 * math.pi * record["revolution"].values))
+    with pytest.raises(InputError, match=r"torsion is in contact throughout .*\(--contact kept\)"):
+        hht(record).show()
+    drawing = hht(record, contact="kept")
+    (line,) = drawing.lines
+    assert line.startswith("median frequency in contact ")
+    assert float(line.split()[4]) == pytest.approx(4 * 1.5 * synthetic_store.FIRST_LATERAL, rel=0.03)
+    drawing.show()
+
+
 def test_a_wall_has_no_natural_frequency_and_does_not_oscillate():
     choice = {"speed_ratio": 1.5, "clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
     record = select(synthetic_store.make(), choice)

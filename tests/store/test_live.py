@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -52,6 +54,16 @@ def test_what_only_the_journals_know_is_reported(store: Path) -> None:
     assert run["host"]
     assert run["processor"]
     assert 0 <= run["wrote"] - run["began"] < 120
+
+
+def test_a_run_of_a_copied_store_lasted_as_long(store: Path, tmp_path: Path) -> None:
+    copied = shutil.copytree(store, tmp_path / "copy.zarr")
+    for path in copied.rglob("*"):
+        os.utime(path, (4e9, 4e9))
+    assert read_runs(copied) == read_runs(store)
+    (record,) = (copied / ".rubhpc" / "runs").iterdir()
+    record.write_text(json.dumps(json.loads(record.read_text()) | {"wrote": 0.0}))  # was killed
+    assert [run.wrote for run in read_runs(copied)] == [4e9]
 
 
 def test_a_second_run_that_computes_nothing_leaves_no_trace(store: Path, tmp_path: Path) -> None:
