@@ -93,10 +93,14 @@ class Progress:
         self._shown = now
         n_ended = self._n_done + sums.n_case
         if self._bar is None:
-            print(f"{n_ended}/{self._n_case} cases; {self._rest(sums)}", flush=True)
+            among = (
+                f"/{self._n_case} cases" if n_ended <= self._n_case else f" cases, {self._n_case} foreseen"
+            )
+            print(f"{n_ended}{among}; {self._rest(sums)}", flush=True)
             self._gap = min(max(self._gap, 0.1 * (now - seconds_compiling() - self._began)), _LONGEST_GAP)
         else:
-            self._bar.update(self._bar.task_ids[0], completed=n_ended, rest=self._rest(sums))
+            total = max(self._n_case, n_ended)
+            self._bar.update(self._bar.task_ids[0], completed=n_ended, total=total, rest=self._rest(sums))
 
     def say(self, doing: str) -> None:
         """Take what the case that is computed here has come to, of a case that takes long; "" at its end."""
@@ -108,7 +112,7 @@ class Progress:
         texts = [self._doing] if self._doing else []
         if sums.n_case or not texts:
             texts.append(f"{sums.n_case / seconds:.3g} a second")
-        if sums.cost:
+        if sums.cost and self._n_done + sums.n_case <= self._n_case:
             left = seconds * (self._cost - sums.cost) / sums.cost
             texts.append(f"{duration(max(left, 0.0))} left")
         if sums.failed:

@@ -62,6 +62,18 @@ def test_a_case_that_takes_long_says_where_it_is(clock, capsys):
     ]
 
 
+def test_a_refined_map_of_more_cases_than_foreseen_does_not_say_that_it_ends(clock, capsys):
+    with Progress(20, 100, n_done=0, quiet=False, has_bar=False) as shown:
+        shown.expect(10)
+        for done in (9, 12):
+            clock.time += 10
+            shown.update(Totals(done=done, cost=5 * done))
+    assert capsys.readouterr().out.splitlines()[1:] == [
+        "9/10 cases; 0.9 a second, 1 s left",
+        "12 cases, 10 foreseen; 0.6 a second",
+    ]
+
+
 def test_lines_grow_rarer(clock, capsys):
     with Progress(10**6, 10**6, n_done=0, quiet=False, has_bar=False) as shown:
         for _ in range(3600):
