@@ -25,9 +25,9 @@ from rubhpc.integrate.reduced_model.contact_mode import (
     solve_parts,
 )
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
+from rubhpc.integrate.reduced_model.friction_library import FrictionLibrary
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_library import (
-    FrictionLibrary,
     ModeLibrary,
     PenaltyLibrary,
     Shared,
@@ -233,9 +233,9 @@ class ModalSetup:
             found.update({friction: library.n_byte for friction, library in held.items()})
         return found
 
-    def n_mode(self, friction: float) -> int:
-        """Contact modes of a friction that are solved."""
-        return sum(len(held[friction].masks) for held in self._all_libraries if friction in held)
+    def n_solved(self, friction: float) -> int:
+        """Contact modes of a friction that were solved, those that were given up and met again included."""
+        return sum(held[friction].n_solved for held in self._all_libraries if friction in held)
 
     def forget(self, friction: float) -> None:
         """Free the contact modes of a friction."""

@@ -123,7 +123,7 @@ class Pilots:
             whole += (1.0 - done) * slope
         if not _is_ring(setup):
             return modes, whole, done == 1.0
-        a_mode = modes / max(_n_mode(setup, case), 1)
+        a_mode = modes / max(_n_solved(setup, case), 1)
         whole += modes
         if done < 1.0:
             n_later, longer = self._to_come(case, setup, done)
@@ -134,9 +134,9 @@ class Pilots:
                 setup, done = set_up(self._study, case, setup.model), 1.0
                 whole = self._run(case, setup, self._study.recording, _PATIENCE * limit)
             if done == 1.0 and (other := self._alike(case)) is not None:
-                met = _n_mode(setup, case)
+                met = _n_solved(setup, case)
                 later = self._run(other, setup, self._study.recording, _PATIENCE * limit)
-                shared = min(a_mode * max(2 * met - _n_mode(setup, case), 0), 0.9 * whole)
+                shared = min(a_mode * max(2 * met - _n_solved(setup, case), 0), 0.9 * whole)
                 return shared, 0.5 * (whole - shared + later), True
         except _Enough:
             return 0.0, max(whole, _PATIENCE * limit), False
@@ -150,11 +150,11 @@ class Pilots:
         those of neighbouring motions included.
         """
         recording = self._study.recording
-        met = _n_mode(setup, case)
+        met = _n_solved(setup, case)
         if self._final is None or not met:
             return 0.0, 0.0
         self._run(case, setup, shortened(recording, done), initial=self._final)
-        n_later = _n_mode(setup, case) - met
+        n_later = _n_solved(setup, case) - met
         if n_later <= _GROWING * met:
             return float(n_later), 0.0
         self.irregular.add(case.index)
@@ -325,9 +325,9 @@ def _is_ring(setup: Setup) -> bool:
     return len(setup.model.stators) > 1
 
 
-def _n_mode(setup: Setup, case: Case) -> int:
-    """Contact modes that cases of this friction have met so far."""
-    return setup.n_mode(case.friction) if isinstance(setup, ModalSetup) else 0
+def _n_solved(setup: Setup, case: Case) -> int:
+    """Contact modes that cases of this friction have had solved so far."""
+    return setup.n_solved(case.friction) if isinstance(setup, ModalSetup) else 0
 
 
 def arrays_of(record: Record | RunUpRecord) -> dict[str, NDArray[Any]]:

@@ -29,7 +29,7 @@ CHANGING_SPEED = 8  # run-ups and drives
 COULOMB = 5  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 6  # method = "modal" with gaps that are curved
-MANY_STATORS = 3  # more than five, whose sets of closed contacts or states may be more than 256
+MANY_STATORS = 4  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 4  # [branch]: the motion with a weak impact next to a grazing
 MANY_EVENTS = 1  # restitution, or method = "modal" where a case may have 200 000 events
 ALONG_SPEED = 1  # branches along a speed

@@ -122,7 +122,7 @@ def test_contact_modes_of_an_irregular_motion_grow_by_a_power(revolutions, met, 
     found = pilot_cases.Pilots(SimpleNamespace(study=SimpleNamespace(recording=recording)))
     found._final = SimpleNamespace()
     counts = iter(met)
-    monkeypatch.setattr(pilot_cases, "_n_mode", lambda *_: next(counts))
+    monkeypatch.setattr(pilot_cases, "_n_solved", lambda *_: next(counts))
     ran = []
     monkeypatch.setattr(
         found, "_run", lambda _case, _setup, part, initial: ran.append((part.longest_transient, initial))

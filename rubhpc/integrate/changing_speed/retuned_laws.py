@@ -9,8 +9,9 @@ import numpy as np
 from rubhpc.integrate.changing_speed.mode_parts import Linear
 from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
 from rubhpc.integrate.reduced_model.contact_mode import confine
+from rubhpc.integrate.reduced_model.friction_library import MOST_FRICTION_MODES
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, solve_friction_mode, states_of
-from rubhpc.integrate.reduced_model.mode_library import MOST_FRICTION_MODES, SPARE
+from rubhpc.integrate.reduced_model.mode_library import SPARE
 from rubhpc.integrate.reduced_model.penalty_mode import overlap_rows, solve_penalty_mode
 from rubhpc.kernels.friction_coordinates import LANES
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, lifted_place

@@ -26,10 +26,7 @@ class CurvedLibrary(ModeLibrary):
         """Contact modes that there is room for."""
         return super().n_most if self._curved is None else min(super().n_most, self._curved.n_most)
 
-    @property
-    def followed(self) -> ModeLibrary:
-        """Itself: curved gaps are the same whether they are recorded or not."""
-        return self
+    _is_parted = False  # curved gaps are the same whether they are recorded or not
 
     @property
     def n_byte(self) -> int:

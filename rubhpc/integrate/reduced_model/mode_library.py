@@ -8,19 +8,23 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 import numpy as np
 
 from rubhpc.integrate.reduced_model.contact_mode import ContactMode, count_coordinates, solve_contact_mode
-from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, solve_friction_mode
-from rubhpc.integrate.reduced_model.mode_tables import MOST_BYTES, MOST_MODES, TableStack, tabulate
+from rubhpc.integrate.reduced_model.mode_tables import (
+    MOST_BYTES,
+    MOST_MODES,
+    TableStack,
+    mode_of,
+    tabulate,
+)
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.friction_coordinates import LANES
-from rubhpc.kernels.friction_states import FORWARD
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import Solved
-    from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
     from rubhpc.kernels import contact_modes as kernel
 
     Floats = NDArray[np.float64]
@@ -29,8 +33,8 @@ if TYPE_CHECKING:
 # Coordinates that a set of several contacts may have beyond any single one. The width is settled before the
 # first case: that of the tables decides in which order sums are taken, and so the last bits of every case.
 SPARE = 8
+FEW_PAIRS = 5  # whose outputs take little of the memory
 VACANT = -3  # in place of a set of closed contacts: one that has been given up
-MOST_FRICTION_MODES = 1024  # sets of states of one speed and friction: up to four for each of closed pairs
 
 
 class Shared(TypedDict, total=False):
@@ -58,7 +62,7 @@ class ModeLibrary:
         2^sample_level ticks are the interval of samples; exponentials are tabulated over 1, 2, ...,
         2^(n_level - 1) ticks.
     is_measured : bool
-        Whether the tables hold outputs and energies, or what a motion is followed with alone.
+        Whether the tables hold slip, outputs and energies, or what a motion is followed with alone.
     """
 
     def __init__(
@@ -77,13 +81,19 @@ class ModeLibrary:
         """Start with every pair open; of one pair also with it closed."""
         self.reduced = reduced
         self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
-        self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
+        self._tick, self._sample_level = tick, sample_level
+        self._n_level = self._n_level_followed = n_level
         self._is_measured = is_measured
         self._opened, self._known = opened, known
         q = len(self.gap_jacobian)
         self.first_masks = [0] if q > 1 else [0, self._closed]
         modes = [self._solved(mask) for mask in self.first_masks]
         self.width = self._width([mode.exponent.size for mode in modes])
+        if self._is_measured:
+            n_byte = sum(field.nbytes for field in self._tables_of(modes[0], reduced))
+            self._is_large = self._is_parted and self._most_modes * n_byte > MOST_BYTES
+        if self._is_large and q > FEW_PAIRS:
+            self._n_ahead, self._n_level = 1, sample_level + 1
         self._tables = TableStack(1 + q, self._most_modes, MOST_BYTES)
         self.masks = [mode.mask for mode in modes]
         self._exponents: dict[int, tuple[Floats, Floats]] = {}
@@ -96,18 +106,23 @@ class ModeLibrary:
     def followed(self) -> ModeLibrary:
         """Contact modes with which a motion is followed where nothing is recorded.
 
-        Of large ones memory holds few: without outputs and energies it holds two to three times as many.
+        Of large ones memory holds few; without slip, outputs and energies it holds more, and half as much
+        memory again is theirs. What one of the two libraries holds the other does not solve again.
         """
-        if not (self._is_measured and self._tables.is_short_of_memory):
+        if not self._is_large:
             return self
-        if self._followed is None:
-            self._followed = made = copy(self)
-            made._is_measured = False
-            made._tables = TableStack(1 + len(self.gap_jacobian), self._most_modes, MOST_BYTES)
+        if self._other is None:
+            self._other = made = copy(self)
+            made._other = self
+            made._is_measured = made._is_large = False
+            made._n_solved = 0
+            made._n_level = self._n_level_followed
+            n_least, most_bytes = 1 + len(self.gap_jacobian), MOST_BYTES + MOST_BYTES // 2
+            made._tables = TableStack(n_least, self._most_modes, most_bytes)
             made.masks, made._exponents, made.derived, made._chance = [], {}, {}, np.random.default_rng(0)
             for mask in self.first_masks:
                 made.add(mask)
-        return self._followed
+        return self._other
 
     @property
     def n_most(self) -> int:
@@ -117,7 +132,12 @@ class ModeLibrary:
     @property
     def n_byte(self) -> int:
         """Memory that its tables hold."""
-        return self._tables.n_byte + (self._followed.n_byte if self._followed else 0)
+        return self._tables.n_byte + (self._other._tables.n_byte if self._other else 0)
+
+    @property
+    def n_solved(self) -> int:
+        """Contact modes that were solved for these tables and those of `followed`, again where given up."""
+        return self._n_solved + (self._other._n_solved if self._other else 0)
 
     @property
     def is_full(self) -> bool:
@@ -126,7 +146,10 @@ class ModeLibrary:
 
     def add(self, mask: int) -> bool:
         """Solve the mode with these pairs closed; returns whether the tables are wide enough for it."""
-        mode = self._solved(mask)
+        mode = self._other._recovered(mask) if self._other else None
+        if mode is None:
+            mode = self._solved(mask)
+            self._n_solved += 1
         if mode.exponent.size > self.width:
             return False
         if VACANT in self.masks:
@@ -135,6 +158,13 @@ class ModeLibrary:
             self.masks.append(mask)
         self._tabulate(mode)
         return True
+
+    def _recovered(self, mask: int) -> ContactMode | None:
+        """The contact mode with these pairs closed, from its tables; None where they are not here."""
+        if mask not in self.masks:
+            return None
+        row = self._tables.row(self.masks.index(mask))
+        return mode_of(row, type(self._opened), self._exponents[mask])
 
     def make_room(self) -> None:
         """Give up any contact mode but those to begin with.
@@ -175,7 +205,11 @@ class ModeLibrary:
         """Of the coordinates of a mode, 1/s: (2, m), real and imaginary, and the drift (m,) of those of 0."""
         return self._exponents[mask]
 
-    _followed: ModeLibrary | None = None
+    _n_solved = 0
+    _other: ModeLibrary | None = None  # of a large one's: that which is followed, or which is measured
+    _is_large = False  # so that memory does not hold as many as may be wanted
+    _is_parted = True  # whether large ones are followed with other tables than they are measured with
+    _n_ahead = SAMPLES_AT_ONCE
     _chance: np.random.Generator | None = None
     _most_modes = MOST_MODES
     _closed = 1  # set of one pair that is closed
@@ -221,6 +255,7 @@ class ModeLibrary:
             sample_level=self._sample_level,
             n_level=self._n_level,
             is_measured=self._is_measured,
+            n_ahead=self._n_ahead,
         )
 
 
@@ -252,50 +287,6 @@ class PenaltyLibrary(ModeLibrary):
         tables = super()._tables_of(mode, self._penalty.damped(reduced, mode.mask))
         tables.loss[0] += self._penalty.stored_energy(mode, self.width)
         return tables
-
-
-class FrictionLibrary(ModeLibrary):
-    """Contact modes of pairs that slide in either sense or stick; masks hold two bits a pair.
-
-    Under a penalty they hold a third, and its springs and dampers are counted as in `PenaltyLibrary`.
-    """
-
-    _most_modes = MOST_FRICTION_MODES
-
-    def __init__(
-        self,
-        reduced: ReducedModel,
-        model: Model,
-        pairs: FrictionPairs,
-        **shared: Unpack[Shared],
-    ) -> None:
-        """Start as `ModeLibrary` does, with one pair sliding forward."""
-        self._pairs = pairs
-        super().__init__(reduced, model, pairs.friction, **shared)
-
-    _closed = FORWARD
-
-    def _width(self, sizes: list[int]) -> int:
-        return -(-(max(sizes) + SPARE) // LANES) * LANES
-
-    def _solved(self, mask: int) -> ContactMode:
-        if mask == 0:
-            return self._opened
-        return solve_friction_mode(self.reduced, self._pairs, mask, self._known)
-
-    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
-        if not self._pairs.stiffness or not self._is_measured:
-            return super()._tables_of(mode, reduced)
-        tables = super()._tables_of(mode, self._pairs.damped(reduced, mode.mask))
-        tables.loss[0] += self._pairs.stored_energy(mode, self.width)
-        return tables
-
-    def _slip_rows(self) -> Floats:
-        return self.slip[:0]
-
-    def _friction_of(self, mode: ContactMode) -> Complexes | None:
-        assert isinstance(mode, FrictionMode)
-        return mode.friction_forces(self._pairs)
 
 
 def padded_width(widest: int, q: int) -> int:

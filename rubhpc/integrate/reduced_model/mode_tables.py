@@ -10,6 +10,7 @@ from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 from rubhpc.kernels import contact_modes as kernel
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
+from rubhpc.kernels.measuring import LANES
 
 if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 MOST_MODES = 1024  # sets of closed contacts of one speed and friction
 FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
-WIDENING = 8  # times the room when it is full: what is there has to be copied
+NEXT_ROOM = 16  # for a case that goes on rubbing; then for all, since what is there has to be copied
 MOST_BYTES = 2**30  # of their tables
 GONE = -40.0  # exponent of what has died away
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
@@ -38,7 +39,7 @@ class TableStack:
 
     def __init__(self, n_least: int, n_most: int = MOST_MODES, most_bytes: int = MOST_BYTES) -> None:
         self._most_bytes = most_bytes
-        self._n_asked = self.n_most = max(n_least, n_most)
+        self.n_most = max(n_least, n_most)
         self._n_least, self._n_filled, self._n_written = n_least, 0, 0
         self._vacant: int | None = None  # place for the next one
         self._room: list[Any] = []
@@ -60,7 +61,7 @@ class TableStack:
             self._room = [np.empty((n_room, *field.shape[1:]), field.dtype) for field in rows]
             self._kind = type(row)
         elif end > len(self._room[0]):  # memory that is not written yet is not taken
-            n_room = max(end, min(WIDENING * first, self.n_most))
+            n_room = max(end, min(NEXT_ROOM, self.n_most) if end <= NEXT_ROOM else self.n_most)
             for i, field in enumerate(self._room):  # one after the other: all at once would take it twice
                 self._room[i] = np.empty((n_room, *field.shape[1:]), field.dtype)
                 self._room[i][:first] = field[:first]
@@ -68,11 +69,6 @@ class TableStack:
             field[first:end] = new
         self._n_filled, self._n_written = end, max(self._n_written, end)
         self._view = None
-
-    @property
-    def is_short_of_memory(self) -> bool:
-        """Whether there is room for fewer than were asked for."""
-        return self.n_most < self._n_asked
 
     def clear(self) -> None:
         """Give all room back to contact modes to come."""
@@ -86,6 +82,10 @@ class TableStack:
     def n_byte(self) -> int:
         """Memory that is held."""
         return self.n_byte_of_one * self._n_written
+
+    def row(self, place: int) -> Any:
+        """The tables of one mode, (1, ...) each."""
+        return self._kind(*(field[place : place + 1] for field in self._room))
 
     @property
     def n_byte_of_one(self) -> int:
@@ -110,6 +110,7 @@ def tabulate(
     sample_level: int,
     n_level: int,
     is_measured: bool = True,
+    n_ahead: int = kernel.SAMPLES_AT_ONCE,
 ) -> kernel.ModeTables:
     """Tables of one mode, (1, ...) each, its coordinates padded to `width`.
 
@@ -123,7 +124,9 @@ def tabulate(
     sample_level, n_level : int
         As in `mode_library.ModeLibrary`.
     is_measured : bool
-        Outputs and energies are empty where not.
+        Slip, outputs and energies are empty where not.
+    n_ahead : int
+        Samples whose outputs are read from one set of coordinates; with one, no step may pass a sample.
     """
     n, m = reduced.stiffness.shape[0], width
     end, n_filled = mode.exponent.size, len(mode.enter)
@@ -138,7 +141,7 @@ def tabulate(
     growth = np.exp(np.maximum(exponent.real, 0.0) * steps[-1])
     power = np.exp(exponent * steps[:, None]) * used
     rate = switch * exponent
-    sliding = slip @ motion[n:]
+    sliding = (slip if is_measured else slip[:0]) @ motion[n:]
     growing = Growth()
     if isinstance(mode, FrictionMode):
         growing = Growth(
@@ -153,7 +156,7 @@ def tabulate(
     output, loss = np.zeros((2 * m, 0)), np.zeros((0, 0))
     work, steady_power = np.zeros((2, 0), dtype=complex), np.zeros(2)
     if is_measured:
-        output = _outputs(reduced, exponent, motion, tick * 2.0**sample_level)
+        output = _outputs(reduced, exponent, motion, tick * 2.0**sample_level, n_ahead)
         loss, work, steady_power = _energies(reduced, exponent, motion, rubbing, mode.n_eigenmode, growing)
     halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q or more, 2, m)
     row = kernel.ModeTables(
@@ -184,7 +187,7 @@ def tabulate(
         work_im=work.imag,
         steady_power=steady_power,
     )
-    fields: list[Any] = [np.array(field[None], order="C") for field in row]
+    fields: list[Any] = [np.ascontiguousarray(np.asarray(field)[None]) for field in row]
     return kernel.ModeTables(*fields)
 
 
@@ -196,8 +199,44 @@ class Growth(NamedTuple):
     steady: int = -1  # the coordinate that is 1
 
 
-def _outputs(reduced: ReducedModel, exponent: Complexes, motion: Complexes, interval: float) -> Floats:
-    """Output rows (`kernels.contact_modes`) at coming samples, `interval` (s) apart: (2 m, samples o)."""
+def mode_of(row: kernel.ModeTables, kind: type[ContactMode], exponents: tuple[Floats, Floats]) -> ContactMode:
+    """Return the contact mode that tables (1, ...) and exponents (`mode_library.ModeLibrary.exponents`) hold.
+
+    `kind` is ContactMode or FrictionMode. It is the mode that was tabulated, bit for bit.
+    """
+    (parts, drift), m, q = exponents, int(row.n_eigenmode[0]), row.enter_constant.shape[1]
+    rest: dict[str, Any] = {}
+    if issubclass(kind, FrictionMode):  # the last row is of the coordinate that is 1
+        end = n_filled = m + 2 * q
+        rest = {"n_mode": m, "growth": drift[:end]}
+    else:
+        end, n_filled = m + 1 + q, m
+    halves = np.concatenate([row.enter_cosine, row.enter_sine, row.enter_constant[0]])  # (2 + q, 2, m)
+    return kind(
+        mask=int(row.mask[0]),
+        exponent=_joined(parts[0, :end], parts[1, :end]),
+        motion=_joined(row.motion_re[0, :, :end], row.motion_im[0, :, :end]),
+        enter=_joined(row.enter_re[0, :, :n_filled], row.enter_im[0, :, :n_filled]).T,
+        take_off=_joined(halves[:, 0, :n_filled], halves[:, 1, :n_filled]),
+        switch=_joined(row.switch_re[0, :, :end], row.switch_im[0, :, :end]),
+        **rest,
+    )
+
+
+def _joined(real: Floats, imaginary: Floats) -> Complexes:
+    """Complex numbers of these parts, the signs of zeros included."""
+    joined = np.empty(real.shape, dtype=np.complex128)
+    joined.real, joined.imag = real, imaginary
+    return joined
+
+
+def _outputs(
+    reduced: ReducedModel, exponent: Complexes, motion: Complexes, interval: float, n_ahead: int
+) -> Floats:
+    """Output rows (`kernels.contact_modes`) at coming samples, `interval` (s) apart: (2 m, samples o).
+
+    Zeros fill the rows up to whole vectors of the kernels.
+    """
     n = reduced.stiffness.shape[0]
     displacement, rate = reduced.output @ motion[:n], reduced.output @ motion[n:]
     rows = [displacement, rate, rate[2:] * exponent]
@@ -207,10 +246,13 @@ def _outputs(reduced: ReducedModel, exponent: Complexes, motion: Complexes, inte
         rows += [carrier @ motion[:n], carrier[[1]] @ motion[n:]]
     positions, rates, accelerations = reduced.probe
     rows.append(positions @ motion[:n] + rates @ motion[n:] + (accelerations @ motion[n:]) * exponent)
-    later = interval * np.arange(kernel.SAMPLES_AT_ONCE)
+    later = interval * np.arange(n_ahead)
     ahead = np.concatenate(rows) * np.exp(exponent * later[:, None])[:, None]  # (sample, o, m)
     table = ahead.reshape(-1, exponent.size).T
-    return np.concatenate([table.real, -table.imag])
+    outputs = np.zeros((2 * exponent.size, -(-table.shape[1] // LANES) * LANES))
+    outputs[: exponent.size, : table.shape[1]] = table.real
+    outputs[exponent.size :, : table.shape[1]] = -table.imag
+    return outputs
 
 
 def _energies(

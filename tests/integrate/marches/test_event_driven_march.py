@@ -102,10 +102,12 @@ def test_sets_are_made_anew_where_there_is_no_room_for_all(monkeypatch):
 @pytest.mark.parametrize(
     "law", [{}, {"friction_law": "coulomb"}, {"law": "penalty", "stiffness": 1e6, "damping": 5.0}]
 )
-def test_little_memory_holds_other_tables_between_records(monkeypatch, law):
-    """What is not recorded needs no outputs and energies: the case is the same."""
+@pytest.mark.parametrize("few", [5, 2])
+def test_little_memory_holds_other_tables_between_records(monkeypatch, law, few):
+    """What is not recorded needs no outputs and energies, more pairs those of one sample: the same case."""
     usual = simulate(trial_rig(3), **CLOSE, **law)
     monkeypatch.setattr(mode_library, "MOST_BYTES", 2**17)
+    monkeypatch.setattr(mode_library, "FEW_PAIRS", few)
     recorded = []
     add = ModeLibrary.add
 

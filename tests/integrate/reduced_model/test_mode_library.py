@@ -8,6 +8,7 @@ from scipy.linalg import expm
 from trial_rig import trial_rig
 
 from rubhpc.fem.assemble import assemble
+from rubhpc.integrate.reduced_model import mode_library
 from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode, solve_parts
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.reduction import directions, reduce_model
@@ -294,3 +295,46 @@ def test_phase_is_found_by_its_set(case):
 def test_longest_step_within_a_count_of_ticks(count):
     level = floor_log2(count)
     assert 2**level <= count < 2 ** (level + 1)
+
+
+@pytest.mark.parametrize("law", ["sliding", "coulomb"])
+def test_large_modes_are_solved_once_for_both_tables(monkeypatch, law):
+    """What the tables hold that a motion is followed with those of its record take over, bit for bit."""
+    monkeypatch.setattr(mode_library, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(mode_library, "FEW_PAIRS", 2)
+
+    def library():
+        setup = prepare(
+            trial_rig(3),
+            180.0,
+            contact=Contact(friction_law=law),
+            integrator=Integrator(),
+            samples_per_revolution=64,
+        )
+        return setup, setup.friction_library(0.2) if law == "coulomb" else setup.library(0.2)
+
+    setup, both = library()
+    _, alone = library()
+    for mask in (1, 3, 5):
+        assert both.followed.add(mask)
+        assert both.add(mask)
+        assert alone.add(mask)
+    assert setup.n_solved(0.2) == 3
+    for name, taken, solved in zip(both.tables()._fields, both.tables(), alone.tables(), strict=True):
+        assert taken.tobytes() == solved.tobytes(), name
+    assert both.tables().output.shape[2] < SAMPLES_AT_ONCE * (N_ROTOR_ROW + 9)
+    assert both.followed.tables().slip_re.shape[1] == 0
+
+
+def test_modes_that_were_given_up_are_counted_again():
+    """A plan has to know what contact modes cost, not how many there are."""
+    setup = prepare(
+        trial_rig(3), 180.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
+    )
+    library = setup.library(0.2)
+    for mask in (1, 2):
+        library.add(mask)
+    library.forget()
+    library.add(2)
+    assert len(library.masks) == 2
+    assert setup.n_solved(0.2) == 3
