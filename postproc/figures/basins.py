@@ -90,7 +90,10 @@ def basins(
     if is_plane:
         entropy, boundary = basin_entropy(found, across, up)
         shown["basin_entropy"], shown["boundary_basin_entropy"] = entropy, boundary
-        notes.append(f"basin entropy {entropy:.3g}, on the boundaries {boundary:.3g} (fractal above 0.693)")
+        is_mixed = np.isfinite(boundary)
+        near = f"{boundary:.3g} (fractal above 0.693)" if is_mixed else "none: there is one motion"
+        if np.isfinite(entropy):  # NaN of a grid that is smaller than a box
+            notes.append(f"basin entropy {entropy:.3g}, on the boundaries {near}")
     if shown["fraction"].dims != ("attractor",) or not shown["attractor"].size:
         return Drawing(
             shown=shown,

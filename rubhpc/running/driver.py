@@ -171,11 +171,6 @@ def _run_in(
     return summary
 
 
-def _clock() -> float:
-    """Seconds, but for those in which this rank compiles."""
-    return time.monotonic() - seconds_compiling()
-
-
 def _say(text: str) -> None:
     print(text, flush=True)
 
@@ -186,19 +181,25 @@ def _say_nothing(text: str) -> None:
 
 def _run(request: RunRequest, pool: Pool) -> Summary:
     """Run the study, again on those that are left where ranks are lost on the way."""
-    began, n_rank = _clock(), pool.size
+    began, compiled, n_rank = time.monotonic(), seconds_compiling(), pool.size
+
+    def elapsed() -> float:
+        """Seconds but for those of compilations: of the rank with most, which the others waited for."""
+        compiling = max(pool.gather(seconds_compiling() - compiled))
+        return max(time.monotonic() - began - compiling, 0.0)
+
     is_broken = False
     while True:
         try:
             if is_broken:
                 pool.leave_lost()
                 is_broken = False
-            return replace(_round(request, pool, began), lost=n_rank - pool.size)
+            return replace(_round(request, pool, elapsed), lost=n_rank - pool.size)
         except RankLost:
             is_broken = True
 
 
-def _round(request: RunRequest, pool: Pool, began: float) -> Summary:
+def _round(request: RunRequest, pool: Pool, elapsed: Callable[[], float]) -> Summary:
     """Compute what is missing, together."""
     job = pool.from_first(lambda: prepare_job(request, pool.size))
     request.token = job.token
@@ -211,7 +212,8 @@ def _round(request: RunRequest, pool: Pool, began: float) -> Summary:
     if not reason and job.part is None:
         together(pool, lambda: _pack_blocks(job, pool, request.stopping, is_end=True))
     finish = finish_run if job.part is None else finish_part
-    summary = pool.from_first(lambda: finish(job, request, pool.totals().n_case, _clock() - began))
+    seconds = elapsed()
+    summary = pool.from_first(lambda: finish(job, request, pool.totals().n_case, seconds))
     n_missing = summary.counts[MISSING]
     if n_missing and reason:
         raise StoppedEarly(

@@ -43,6 +43,17 @@ def test_cells_have_the_colour_of_their_motion(plane, tmp_path):
     assert drawing.save(tmp_path / "basins.png").stat().st_size > 5000
 
 
+def test_no_entropy_is_printed_of_boundaries_that_are_not_there(plane):
+    (said,) = [line for line in FIGURE.of(plane).lines if "basin entropy" in line]
+    assert "(fractal above 0.693)" in said
+    alone = store_of(
+        np.full((6, 7), "free"), initial_vertical=np.arange(6) * 1e-4, initial_horizontal=np.arange(7) * 1e-4
+    )
+    assert "basin entropy 0, on the boundaries none: there is one motion" in FIGURE.of(alone).lines
+    few = plane.isel(initial_vertical=slice(2), initial_horizontal=slice(2))
+    assert not any("nan" in line for line in FIGURE.of(few).lines)
+
+
 def test_shares_are_stacked_along_an_axis(plane):
     stores = [plane.assign(regime=plane.regime), plane]
     both = xr.concat(stores, xr.DataArray([1.0, 1.2], dims="speed_ratio", name="speed_ratio"), join="exact")

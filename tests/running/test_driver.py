@@ -19,6 +19,7 @@ from rubhpc.errors import InputError, StoppedEarly, StoreError
 from rubhpc.kernels._jit import compilation
 from rubhpc.running import case_setup, computing, driver, job, stopping, worker
 from rubhpc.running.driver import run
+from rubhpc.running.pool import Alone
 from rubhpc.running.preparations import count_preparations
 from rubhpc.schema import (
     DIVERGED,
@@ -396,6 +397,19 @@ def test_compilations_are_announced_and_are_no_time_of_the_run(physics, study, m
     assert summary.seconds < time.perf_counter() - began - 0.49
     first = capsys.readouterr().out.splitlines()[0]
     assert first == "compiling kernels, once after an installation: up to a minute"
+
+
+def test_what_another_rank_compiles_is_no_time_of_the_run_either(physics, study, monkeypatch):
+    monkeypatch.setattr(job, "_warm_up", lambda *_: time.sleep(0.25))  # for the other rank's kernels
+    gathered = Alone.gather
+    monkeypatch.setattr(
+        Alone,
+        "gather",
+        lambda self, value: [value, value + 0.2] if isinstance(value, float) else gathered(self, value),
+    )
+    began = time.perf_counter()
+    summary = run(study, quiet=True)
+    assert 0.05 <= summary.seconds < time.perf_counter() - began - 0.19
 
 
 SWEEP = '{ start = 0.9, stop = 2.0, num = 12, sweep = "up" }'
