@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.integrate.case import compile_kernels
 from rubhpc.running.beginning import begin, begin_part
-from rubhpc.running.case_setup import set_up
+from rubhpc.running.case_setup import set_up_for_kernels
 from rubhpc.running.stopping import Stopped, Stopping
 from rubhpc.schema import FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
@@ -196,7 +196,7 @@ def _warm_up(grid: CaseGrid, block: Block, stopping: Stopping) -> None:
     with suppress(Exception):  # what is wrong with these cases will be their reason to fail
         for case in grid.with_each_law(block.start):
             compile_kernels(
-                set_up(grid.study, case),
+                set_up_for_kernels(grid.study, case),
                 clearance=case.clearance,
                 friction=case.friction,
                 recording=grid.study.recording,

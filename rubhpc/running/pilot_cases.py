@@ -16,7 +16,7 @@ from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN
 from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS, N_FIRST
 from rubhpc.integrate.setup import ModalSetup
-from rubhpc.running.case_setup import operation_of, set_up
+from rubhpc.running.case_setup import operation_of, set_up, set_up_for_kernels
 from rubhpc.running.shorter_cases import parts, shortened
 from rubhpc.running.worker import integrate
 from rubhpc.schema import FINAL_STATE
@@ -179,7 +179,7 @@ class Pilots:
         if case.contact not in self._compiled:
             compiled, began = seconds_compiling(), time.process_time()
             compile_kernels(
-                set_up(self._study, case),
+                set_up_for_kernels(self._study, case),
                 clearance=case.clearance,
                 friction=case.friction,
                 recording=self._study.recording,
