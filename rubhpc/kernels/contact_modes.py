@@ -39,6 +39,9 @@ class ModeTables(NamedTuple):
     rate_re: Floats  # (p, q, m), its time derivative
     rate_im: Floats
     bound: Floats  # (p, q, m), bound on its second time derivative for a unit coordinate
+    bend_re: Floats  # (p, q, m), its second time derivative; under set-valued friction alone, as the next
+    bend_im: Floats
+    turn: Floats  # (p, q, m), bound on its third time derivative for a unit coordinate
     pace: Floats  # (p, m), size of the exponent, 1/s, or DYING
     power_re: Floats  # (p, n_level, m), exponential of each mode over 2^level ticks
     power_im: Floats

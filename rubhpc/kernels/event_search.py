@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum
-from rubhpc.kernels.contact_modes import ModeTables, dot, floor_log2, positive_interval
+from rubhpc.kernels.contact_modes import ModeTables, dot, floor_log2, positive_interval, propagate
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.friction_coordinates import used_width
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+THIRD, SIXTH = 1.0 / 3.0, 1.0 / 6.0
+FREE, SURE = range(2)  # rows of what is known of the switch functions
 NEWTON_TRIES = 6  # places tried before the bracket is halved instead
 
 
@@ -35,15 +37,18 @@ def free_until(
     switch_im: Floats,
     rate_re: Floats,
     rate_im: Floats,
+    bend_re: Floats,
+    bend_im: Floats,
     bound: Floats,
+    turn: Floats,
     z_re: Floats,
     z_im: Floats,
     now: int,
     tick: float,
     longest: int,
     known: Ints,
-) -> int:
-    """Tick before which no switch function (2 q, m) of a set of states can reach zero.
+) -> tuple[int, int]:
+    """How long no switch function (2 q, m) of a set of states can vanish unseen.
 
     Parameters
     ----------
@@ -51,45 +56,106 @@ def free_until(
         Tick at which the coordinates stand; each lasts `tick` (s).
     longest : int
         Ticks beyond which none is asked for.
-    known : (2 q,)
-        The same for each of them, as it was proved last: those alone are asked anew that come before the
-        others. In place.
+    known : (2, 2 q)
+        The tick before which each of them cannot vanish, and that before which it does so once at most and
+        stays negative, as they were proved last: those alone are asked anew that come before the others. In
+        place.
+
+    Returns
+    -------
+    int
+        Tick before which none can vanish.
+    int
+        Tick before which one that has vanished is negative still: that is seen at the end of a step.
     """
-    first = -1
-    for j in range(known.size):
+    n_switch, first = known.shape[1], -1
+    for j in range(n_switch):
         is_watched = j % 2 == 0 or state_of(states, j // 2) != OPEN
-        if is_watched and (first < 0 or known[j] < known[first]):
+        if is_watched and (first < 0 or known[SURE, j] < known[SURE, first]):
             first = j
-    reached = now + longest
-    for turn in range(known.size):  # the one that comes first, then the others
-        j = (first + turn) % known.size
-        if known[j] < reached and (j % 2 == 0 or state_of(states, j // 2) != OPEN):
+    reached, most = now + longest, longest * tick
+    for turn_of in range(n_switch):  # the one that comes first, then the others
+        j = first + turn_of
+        j = j - n_switch if j >= n_switch else j
+        if known[SURE, j] < reached and (j % 2 == 0 or state_of(states, j // 2) != OPEN):
             re, im, turning_re, turning_im = (
                 switch_re[mode, j],
                 switch_im[mode, j],
                 rate_re[mode, j],
                 rate_im[mode, j],
             )
-            weight, value, rate, bend = bound[mode, j], 0.0, 0.0, 0.0
-            for k in range(z_re.size):  # in one loop: three would wait for their sums three times
+            bending_re, bending_im, weight, next_weight = (
+                bend_re[mode, j],
+                bend_im[mode, j],
+                bound[mode, j],
+                turn[mode, j],
+            )
+            value, rate, bend, most_bend, most_turn = 0.0, 0.0, 0.0, 0.0, 0.0
+            for k in range(z_re.size):  # in one loop: five would wait for their sums five times
                 a, b = z_re[k], z_im[k]
+                size = abs(a) + abs(b)
                 value += re[k] * a - im[k] * b
                 rate += turning_re[k] * a - turning_im[k] * b
-                bend += weight[k] * (abs(a) + abs(b))
-            known[j] = now + int(min(positive_interval(value, rate, bend) / tick, 1.0 * longest))
-            reached = min(reached, known[j])
-    return reached
+                bend += bending_re[k] * a - bending_im[k] * b
+                most_bend += weight[k] * size
+                most_turn += next_weight[k] * size
+            free = min(positive_interval(value, rate, most_bend), most)
+            if value > 0.0:
+                while free < most and is_positive(value, rate, bend, most_turn, 2.0 * free):
+                    free *= 2.0
+            sure = max(free, falling_until(rate, bend, most_turn, free)) if value > 0.0 else free
+            known[FREE, j] = now + int(free / tick)
+            known[SURE, j] = now + int(min(sure, most) / tick)
+            reached = min(reached, known[SURE, j])
+    free_to = reached
+    for j in range(n_switch):
+        if j % 2 == 0 or state_of(states, j // 2) != OPEN:
+            free_to = min(free_to, known[FREE, j])
+    return free_to, reached
+
+
+@jit_inline_sum
+def is_positive(value: float, rate: float, bend: float, turn: float, time: float) -> bool:
+    """Whether `value + rate t + bend t^2 / 2 - turn t^3 / 6` is positive up to a time (s).
+
+    It is if its coefficients in Bernstein's polynomials are.
+    """
+    third, sixth = rate * time * THIRD, bend * time * time * SIXTH
+    second = value + 2.0 * third + sixth
+    last = value + 3.0 * third + 3.0 * sixth - turn * time * time * time * SIXTH
+    return value > 0.0 and value + third > 0.0 and second > 0.0 and last > 0.0
+
+
+@jit_inline_sum
+def falling_until(rate: float, bend: float, turn: float, begin: float) -> float:
+    """Time (s) until which `rate + bend t + turn t^2 / 2` is negative from `begin` on; 0 where it is not."""
+    if not rate + begin * (bend + 0.5 * begin * turn) < 0.0:
+        return 0.0
+    root = np.sqrt(max(bend * bend - 2.0 * turn * rate, 0.0))
+    if bend > 0.0:  # this form of it does not cancel
+        return float(-2.0 * rate / (root + bend))
+    return float((root - bend) / turn) if turn > 0.0 else np.inf
 
 
 @jit_inline_sum
 def find_change(
-    states: int, mode: int, switch_re: Floats, switch_im: Floats, z_re: Floats, z_im: Floats
+    states: int,
+    mode: int,
+    switch_re: Floats,
+    switch_im: Floats,
+    z_re: Floats,
+    z_im: Floats,
+    tick: int,
+    known: Ints,
 ) -> int:
-    """Bits of the switch functions (2 q, m) of a set of states that are negative."""
+    """Bits of the switch functions (2 q, m) of a set of states that are negative at a tick.
+
+    Those that are known to be positive until then (`free_until`) are not looked at.
+    """
     crossing = int(np.int64(0))
     for j in range(switch_re.shape[1]):
         is_open = state_of(states, j // 2) == OPEN
-        if is_open and j % 2 == 1:
+        if (is_open and j % 2 == 1) or known[FREE, j] >= tick:
             continue
         if dot(switch_re[mode, j], switch_im[mode, j], z_re, z_im) < (-GAP_TOLERANCE if is_open else 0.0):
             crossing |= 1 << j
@@ -97,11 +163,13 @@ def find_change(
 
 
 @jit_inline_sum
-def changes_at(tables: ModeTables, mode: int, z: Floats) -> int:
-    """As `find_change`, for coordinates (2, m)."""
+def changes_at(tables: ModeTables, mode: int, z: Floats, tick: int, known: Ints) -> int:
+    """Bits of the switch functions that are negative at coordinates (2, m)."""
     used = used_width(tables, mode)
     z_re, z_im = z[0, :used], z[1, :used]
-    return int(find_change(tables.mask[mode], mode, tables.switch_re, tables.switch_im, z_re, z_im))
+    return int(
+        find_change(tables.mask[mode], mode, tables.switch_re, tables.switch_im, z_re, z_im, tick, known)
+    )
 
 
 @jit_inline_sum
@@ -111,6 +179,37 @@ def turn_by(re: Floats, im: Floats, z_re: Floats, z_im: Floats) -> None:
         a, b = z_re[k], z_im[k]
         z_re[k] = re[k] * a - im[k] * b
         z_im[k] = re[k] * b + im[k] * a
+
+
+@jit_inline_sum
+def take_step(
+    count: int,
+    mode: int,
+    power_re: Floats,
+    power_im: Floats,
+    z_re: Floats,
+    z_im: Floats,
+    re: Floats,
+    im: Floats,
+) -> None:
+    """Fill `re` and `im` with modal coordinates `count` ticks later, at least one, as `move_ticks` does."""
+    level = lowest_level(count)
+    propagate(power_re[mode, level], power_im[mode, level], z_re, z_im, re, im)
+    rest = count >> (level + 1)
+    while rest > 0:
+        level += 1
+        if rest & 1 == 1:
+            turn_by(power_re[mode, level], power_im[mode, level], re, im)
+        rest >>= 1
+
+
+@jit_inline_sum
+def lowest_level(count: int) -> int:
+    """Level of the shortest of the powers of two that make up a count of at least one."""
+    level = 0
+    while (count >> level) & 1 == 0:
+        level += 1
+    return level
 
 
 @jit_inline_sum
@@ -183,12 +282,14 @@ def approach_change(
     clock: Clock,
     mode: int,
     crossing: int,
-    level: int,
+    count: int,
     z: Floats,
     work: Floats,
     kept: Floats,
+    now: int,
+    known: Ints,
 ) -> tuple[int, int]:
-    """Go to the last tick before a switch function is negative, within a step of 2^level ticks.
+    """Go to the last tick before a switch function is negative, within a step of `count` ticks.
 
     Parameters
     ----------
@@ -200,6 +301,10 @@ def approach_change(
         Those at its end; overwritten.
     kept : (2, m)
         Work space: those at the last tick that is known to lie before.
+    now : int
+        Tick at the beginning.
+    known : (2, 2 q)
+        As `free_until` fills it.
 
     Returns
     -------
@@ -208,7 +313,7 @@ def approach_change(
     int
         Bits of the switch functions that are negative a tick later.
     """
-    before, after = 0, 1 << level
+    before, after = 0, count
     used = used_width(tables, mode)
     root = root_between(tables, mode, crossing, after, clock.tick, z, work)
     tried = 0
@@ -218,7 +323,7 @@ def approach_change(
         if tried <= NEWTON_TRIES and 0.0 <= root < 1.0 * after:
             place = min(max(int(root), before + 1), after - 1)
         move_ticks(tables, bodies, mode, place, clock.tick, z, work)
-        found = changes_at(tables, mode, work)
+        found = changes_at(tables, mode, work, now + place, known)
         if found != 0:
             after, crossing = place, found
         else:

@@ -92,24 +92,30 @@ def leave_states(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> No
 def read_energies(tables: ModeTables, mode: int, z: Floats, entry: Floats) -> None:
     """Fill `entry` (2,), J, with what grows by damping loss and unbalance work in a contact mode.
 
-    The form of the loss is symmetric: half of its diagonal blocks is read.
+    The form of the loss is symmetric: what is beside its diagonal is read once.
     """
     m, used, first = z.shape[1], used_width(tables, mode), tables.n_eigenmode[mode]
     form, z_re, z_im = tables.loss[mode], z[0, :used], z[1, :used]
     loss = 0.0
-    for k in range(used):
-        row, along = form[k], 0.0
-        for j in range(k):
-            along += row[j] * z_re[j]
-        loss += (2.0 * along + row[k] * z_re[k]) * z_re[k]
-        if z_im[k] != 0.0:
-            row, along, across = form[m + k], 0.0, 0.0
+    for k in range(0, used, 4):  # four rows at a time: one would wait for its sum
+        block = k - k % LANES  # where the block on the diagonal begins
+        one, two, three, four = form[k], form[k + 1], form[k + 2], form[k + 3]
+        a, b, c, d = z_re[k], z_re[k + 1], z_re[k + 2], z_re[k + 3]
+        aside, within = 0.0, 0.0
+        for j in range(block):
+            aside += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * z_re[j]
+        for j in range(block, block + LANES):
+            within += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * z_re[j]
+        one, two, three, four = form[m + k], form[m + k + 1], form[m + k + 2], form[m + k + 3]
+        a, b, c, d = z_im[k], z_im[k + 1], z_im[k + 2], z_im[k + 3]
+        if a != 0.0 or b != 0.0 or c != 0.0 or d != 0.0:
             for j in range(used):
-                across += row[j] * z_re[j]
-            behind = row[m:]
-            for j in range(k):
-                along += behind[j] * z_im[j]
-            loss += (2.0 * (along + across) + behind[k] * z_im[k]) * z_im[k]
+                aside += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * z_re[j]
+            for j in range(block):
+                aside += (a * one[m + j] + b * two[m + j] + c * three[m + j] + d * four[m + j]) * z_im[j]
+            for j in range(block, block + LANES):
+                within += (a * one[m + j] + b * two[m + j] + c * three[m + j] + d * four[m + j]) * z_im[j]
+        loss += 2.0 * aside + within
     cosine, sine = z[0, first], z[1, first]
     work = 0.0
     for part in range(2):  # exp(i angle), then its conjugate

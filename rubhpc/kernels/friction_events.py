@@ -34,7 +34,9 @@ class FrictionWork(NamedTuple):
     solver: Workspace  # compliances are those of velocities, 1/kg
     rate: Floats  # (q,), of gaps, m/s
     slip: Floats  # (q,), m/s
-    free_until: NDArray[np.int64]  # (2 q,), tick before which each switch function cannot vanish
+    free_until: NDArray[
+        np.int64
+    ]  # (2, 2 q), what is known of the switch functions: `event_search.free_until`
     impulse: Floats  # (q,), accumulated before the event, N s
     rest: Floats  # (2 q, 2 q), rates of the gaps, then slips, by impulses along them, 1/kg
     rest_speed: Floats  # (2 q,), m/s
@@ -50,7 +52,7 @@ def friction_work(solver: Workspace, q: int) -> FrictionWork:
         solver=solver,
         rate=np.zeros(q),
         slip=np.zeros(q),
-        free_until=np.zeros(2 * q, dtype=np.int64),
+        free_until=np.zeros((2, 2 * q), dtype=np.int64),
         impulse=np.zeros(q),
         rest=np.zeros((2 * q, 2 * q)),
         rest_speed=np.zeros(2 * q),

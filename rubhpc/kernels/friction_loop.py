@@ -32,9 +32,8 @@ from rubhpc.kernels.contact_modes import (
     ModeTables,
     Reduced,
     is_beyond,
-    propagate,
 )
-from rubhpc.kernels.event_search import approach_change, find_change, free_until
+from rubhpc.kernels.event_search import approach_change, find_change, free_until, take_step
 from rubhpc.kernels.event_steps import (
     choose_step,
     contact_age,
@@ -100,6 +99,7 @@ def advance_with_friction(
     # Tuples are opened here: a field read inside the loop would count a reference at every step.
     mask, switch_re, switch_im = tables.mask, tables.switch_re, tables.switch_im
     rate_re, rate_im, bound = tables.rate_re, tables.rate_im, tables.bound
+    bend_re, bend_im, turn = tables.bend_re, tables.bend_im, tables.turn
     power_re, power_im, n_eigenmode = tables.power_re, tables.power_im, tables.n_eigenmode
     rim_speed = bodies.rim_speed
     q = rim_speed.size
@@ -116,7 +116,9 @@ def advance_with_friction(
             is_new = True
         if is_new:
             is_new = False
-            free_to = renewed_at = progress.tick  # until when no event can be; from when that is asked anew
+            free_to = sure_to = renewed_at = (
+                progress.tick
+            )  # until when none can be, or pass unseen; is asked anew
             work.free_until[:] = progress.tick
             used = used_width(tables, progress.mode)
             z_re, z_im, next_re, next_im = z[0, :used], z[1, :used], z_next[0, :used], z_next[1, :used]
@@ -137,21 +139,27 @@ def advance_with_friction(
         states = mask[mode]
         is_ahead = is_sample and states == 0
         longest = longest_step(clock, last_tick, highest_level, is_recorded, is_ahead, progress.tick)
-        if is_recorded and states != 0:
+        is_measured, finest = is_recorded and states != 0, clock.contact_level
+        if is_measured and progress.tick > progress.entered:
             age = contact_age(progress)
             if age != progress.contact_age:
-                resolved = resolved_friction(tables, mode, z_re, z_im)
+                since = (progress.tick - progress.entered) * clock.tick
+                resolved = resolved_friction(tables, mode, since, z_re, z_im)
                 note_resolved(resolved, clock, highest_level, age, progress)
-            longest = min(longest, clock.contact_level, max(age, FORCED_LEVEL), progress.resolved_level)
-        if not is_at_event and progress.tick >= renewed_at and progress.tick + (1 << longest) > free_to:
-            free_to = free_until(
+            finest = min(clock.contact_level, progress.resolved_level)
+            longest = min(longest, finest)
+        if not is_at_event and progress.tick >= renewed_at and progress.tick + (1 << longest) > sure_to:
+            free_to, sure_to = free_until(
                 states,
                 mode,
                 switch_re,
                 switch_im,
                 rate_re,
                 rate_im,
+                bend_re,
+                bend_im,
                 bound,
+                turn,
                 z_re,
                 z_im,
                 progress.tick,
@@ -159,10 +167,14 @@ def advance_with_friction(
                 1 << highest_level,
                 work.free_until,
             )
-            renewed_at = free_to - (free_to - progress.tick) // WORTH_ASKING
-        level, is_event_free = choose_step(clock, progress, longest, (free_to - progress.tick) * clock.tick)
-        step = (1 << level) * clock.tick
-        propagate(power_re[mode, level], power_im[mode, level], z_re, z_im, next_re, next_im)
+            renewed_at = sure_to - (sure_to - progress.tick) // WORTH_ASKING
+        is_forced = progress.is_after_event == 1
+        level, _ = choose_step(clock, progress, longest, (sure_to - progress.tick) * clock.tick)
+        count = 1 << level
+        if is_measured and not is_forced and not is_at_event:
+            count = measured_step(clock, last_tick, finest, sure_to, progress)
+        step = count * clock.tick
+        take_step(count, mode, power_re, power_im, z_re, z_im, next_re, next_im)
         if stuck_pairs(states) != 0:
             first = n_eigenmode[mode] + 2 + q
             for i in range(q):
@@ -170,17 +182,30 @@ def advance_with_friction(
                     next_re[first + i] += rim_speed[i] * step
         progress.n_step += 1
         crossing = int(np.int64(0))
-        if not is_event_free:
-            crossing = find_change(states, mode, switch_re, switch_im, next_re, next_im)
+        ends = progress.tick + count
+        if not is_forced and ends > free_to:
+            crossing = find_change(
+                states, mode, switch_re, switch_im, next_re, next_im, ends, work.free_until
+            )
         if crossing != 0 and level > clock.sample_level:
             progress.halving_level = level - 1
             continue
         if is_sample:
             sample_step(tables, clock, level, z[0], z[1], progress, recorder, samples, accumulator)
-        passed = 1 << level
+        passed = count
         if crossing != 0:
             passed, crossing = approach_change(
-                tables, bodies, clock, mode, crossing, level, z, z_next, z_kept
+                tables,
+                bodies,
+                clock,
+                mode,
+                crossing,
+                count,
+                z,
+                z_next,
+                z_kept,
+                progress.tick,
+                work.free_until,
             )
         else:
             for k in range(z_re.size):
@@ -220,6 +245,20 @@ def advance_with_friction(
             )
             if outcome != UNDER_WAY:
                 return outcome
+
+
+@jit_inline_sum
+def measured_step(clock: Clock, last_tick: int, finest: int, sure_to: int, progress: Progress) -> int:
+    """Ticks of the next step of a closed pair that is recorded: on to the next sample in equal steps.
+
+    None is longer than 2^finest ticks, nor, but for a search for events, ends after the tick `sure_to`.
+    """
+    now = progress.tick
+    next_sample = ((now >> clock.sample_level) + 1) << clock.sample_level
+    ahead = min(last_tick, next_sample) - now
+    most = min(1 << finest, max(sure_to - now, 1 << clock.search_level))
+    n_step = (ahead + most - 1) // most
+    return (ahead + n_step - 1) // n_step
 
 
 @jit_inline_sum

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum
 from rubhpc.kernels.accumulators import DAMPING_LOSS, DRIVE_WORK, FRICTION_LOSS, observe_force
 from rubhpc.kernels.contact_modes import DYING, RESOLVED, ModeTables
-from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, FrictionBodies, state_of
+from rubhpc.kernels.cubics import turning_value
+from rubhpc.kernels.force_average import AVERAGING_TIME
+from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
 from rubhpc.kernels.measuring import (
     FORCE,
     FORCE_RATE,
@@ -26,8 +28,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-# Steps in contact of a pair that slides over those of steady sliding: the least slip is read at their ends.
-FINER = 0.5
+# Of the averaging time: until that age of a contact, steps may miss more of what lasts for a shorter time.
+SETTLED = 0.125
 
 
 @jit_inline_sum
@@ -57,17 +59,18 @@ def read_friction(
 
 
 @jit_inline_sum
-def resolved_friction(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
+def resolved_friction(tables: ModeTables, mode: int, age: float, z_re: Floats, z_im: Floats) -> float:
     """Time, s, over which cubics follow the switch functions of the pairs closed in contact mode `mode`.
 
-    As `contact_modes.resolved_time`, and half of that where a pair slides.
+    As `contact_modes.resolved_time`, but for what an event has set off less than a share of the averaging
+    time ago: of that, impulses and works are asked for, not values, and the shorter the `age` (s) of the
+    contact, the less of them can be missed.
     """
     fourth, pace = np.inf, tables.pace[mode]
     for i in range(tables.switch_re.shape[1] // 2):
         state = state_of(tables.mask[mode], i)
         if state == OPEN:
             continue
-        share = 1.0 if state == STUCK else FINER**4
         for j in range(2 * i, 2 * i + 2):
             # Of the slip, but for that of the steady spin.
             least = DYING if state == STUCK or j == 2 * i else 0.0
@@ -80,8 +83,9 @@ def resolved_friction(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats)
                     size += part
                     bend += part * square * square
             if bend > 0.0:
-                fourth = min(fourth, share * RESOLVED * size / bend)
-    return float(np.sqrt(np.sqrt(fourth)))
+                fourth = min(fourth, size / bend)
+    spared = max(1.0, SETTLED * AVERAGING_TIME / age)
+    return float(np.sqrt(np.sqrt(RESOLVED * spared * fourth)))
 
 
 @jit_inline_sum
@@ -149,6 +153,13 @@ def observe_friction(
             accumulator.friction_work[i] += friction_work
             accumulator.energy[FRICTION_LOSS] += friction_work
             accumulator.energy[DAMPING_LOSS] -= friction_work
-            accumulator.least_slip[i] = min(accumulator.least_slip[i], across_before, across_after)
+            least = min(across_before, across_after)
+            if across_rate_before < 0.0 and across_rate_after > 0.0:
+                least = turning_value(
+                    across_before, across_rate_before, across_after, across_rate_after, step
+                )
+            if state == FORWARD:
+                least = max(least, 0.0)
+            accumulator.least_slip[i] = min(accumulator.least_slip[i], least)
         accumulator.energy[DRIVE_WORK] += bodies.rim_speed[i] * rubbed
         accumulator.energy[DAMPING_LOSS] += bodies.rim_speed[i] * rubbed

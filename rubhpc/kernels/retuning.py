@@ -127,6 +127,9 @@ def retune_to(
         tables.switch_re[mode, i, m], tables.switch_im[mode, i, m] = switch.real, switch.imag
         switch = switch * turning
         tables.rate_re[mode, i, m], tables.rate_im[mode, i, m] = switch.real, switch.imag
+        if i < tables.bend_re.shape[1]:
+            switch = switch * turning
+            tables.bend_re[mode, i, m], tables.bend_im[mode, i, m] = switch.real, switch.imag
     for i in range(held.slip.shape[0]):
         slip = 0j
         for a in range(n):
@@ -181,7 +184,10 @@ def _retune_powers(tables: ModeTables, mode: int, exponent: Complexes, end: int,
         growth = np.exp(exponent[k].real * tick * 2.0 ** (n_level - 1)) if exponent[k].real > 0.0 else 1.0
         for i in range(tables.bound.shape[1]):
             re_of, im_of = tables.switch_re[mode, i, k], tables.switch_im[mode, i, k]
-            tables.bound[mode, i, k] = np.sqrt(re_of * re_of + im_of * im_of) * size * size * growth
+            bound = np.sqrt(re_of * re_of + im_of * im_of) * size * size * growth
+            tables.bound[mode, i, k] = bound
+            if i < tables.turn.shape[1]:
+                tables.turn[mode, i, k] = bound * size
         is_gone = exponent[k].real * tick * 2.0**FORCED_LEVEL < GONE
         tables.pace[mode, k] = DYING if is_gone else size
 

@@ -26,7 +26,7 @@ PHYSICS = 17  # version of the physics: raised whenever a study gives other resu
 MODAL = 2  # method = "modal": modes kept for torsional accelerations, and `modal_error` of these
 DIRECT = 4  # transient = "direct"
 CHANGING_SPEED = 8  # run-ups and drives
-COULOMB = 5  # set-valued friction
+COULOMB = 6  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 6  # method = "modal" with gaps that are curved
 MANY_STATORS = 4  # more than five, whose sets of closed contacts or states may be more than 256

@@ -22,7 +22,7 @@ NAMES = (
     "dot",
     "state_of",
 )
-NAMES += ("stuck_pairs", "used_width", "floor_log2", "positive_interval")
+NAMES += ("stuck_pairs", "used_width", "floor_log2", "positive_interval", "is_positive", "falling_until")
 
 
 @pytest.fixture(autouse=True)
@@ -43,6 +43,9 @@ def tables_of(exponents, rows, state):
         rate_re=rate.real[None],
         rate_im=rate.imag[None],
         bound=(abs(rows) * abs(exponents) ** 2)[None],
+        bend_re=(rate * exponents).real[None],
+        bend_im=(rate * exponents).imag[None],
+        turn=(abs(rows) * abs(exponents) ** 3)[None],
         power_re=power.real[None],
         power_im=power.imag[None],
     )
@@ -59,11 +62,12 @@ def search(exponents, rows, state=FORWARD):
     z = np.array([np.ones(exponents.size), np.zeros(exponents.size)])
     end, kept = np.empty((2, 2, exponents.size))
     plain(event_search.move_ticks)(tables, BODIES, 0, N_TICK, TICK, z, end)
-    crossing = plain(event_search.changes_at)(tables, 0, end)
+    known = np.zeros((2, 2), dtype=np.int64)
+    crossing = plain(event_search.changes_at)(tables, 0, end, N_TICK, known)
     assert crossing != 0
     clock = SimpleNamespace(tick=TICK)
     passed, crossing = plain(event_search.approach_change)(
-        tables, BODIES, clock, 0, crossing, LEVEL, z, end, kept
+        tables, BODIES, clock, 0, crossing, N_TICK, z, end, kept, 0, known
     )
     assert z[0] + 1j * z[1] == pytest.approx(np.exp(exponents * TICK * passed), rel=1e-12)
     return passed, crossing
@@ -134,24 +138,45 @@ def test_an_open_pair_is_looked_at_for_its_gap_alone():
     assert search(exponents, np.stack([row, -row]), state=OPEN) == (400, 1)
 
 
-def test_no_function_changes_within_the_interval_that_is_promised():
-    random = np.random.default_rng(3)
-    for _ in range(200):
+def test_no_function_changes_unseen_within_the_interval_that_is_promised():
+    random, n_seen = np.random.default_rng(3), 0
+    for _ in range(400):
         m = 4
         exponents = (-random.uniform(0.0, 1e-3, m) + 1j * random.uniform(0.0, 1e-2, m)) / TICK
         rows = random.normal(size=(2, m)) + 1j * random.normal(size=(2, m))
         rows *= np.sign(rows.real.sum(axis=1))[:, None]  # positive at first
         tables = tables_of(exponents, rows, FORWARD)
         z_re, z_im = np.ones(m), np.zeros(m)
-        fields = (tables.switch_re, tables.switch_im, tables.rate_re, tables.rate_im, tables.bound)
-        known = np.zeros(2, dtype=np.int64)
+        names = ("switch_re", "switch_im", "rate_re", "rate_im", "bend_re", "bend_im", "bound", "turn")
+        fields = [getattr(tables, name) for name in names]
+        known = np.zeros((2, 2), dtype=np.int64)
         now, longest = 7, 10_000
-        free = plain(event_search.free_until)(FORWARD, 0, *fields, z_re, z_im, now, TICK, longest, known)
-        assert now <= free == known.min() <= now + longest
+        given = (FORWARD, 0, *fields, z_re, z_im, now, TICK, longest)
+        free, sure = plain(event_search.free_until)(*given, known)
+        assert now <= free <= sure == known[1].min() <= now + longest
+        assert free <= known[0].min()
+        assert (known[0] <= known[1]).all()
         assert values_of(exponents, rows, np.linspace(0.0, free - now, 200)).min() > -1e-12
+        for j in range(2):  # one that has vanished is negative from then on
+            is_negative = values_of(exponents, rows, np.linspace(0.0, known[1, j] - now, 400))[j] < -1e-12
+            assert not (is_negative[:-1] & ~is_negative[1:]).any()
+            n_seen += is_negative.any()
         # What is known, and comes later than another, is not asked anew.
-        later = int(known.argmax())
-        known[later] = marked = known[later] + 1
-        asked = plain(event_search.free_until)(FORWARD, 0, *fields, z_re, z_im, now, TICK, longest, known)
-        assert asked == free
-        assert known[later] == marked
+        later = int(known[1].argmax())
+        known[1, later] = marked = known[1, later] + 1
+        assert plain(event_search.free_until)(*given, known) == (free, sure)
+        assert known[1, later] == marked
+    assert n_seen > 100
+
+
+def test_a_step_of_any_ticks_is_made_up_of_powers_of_two(monkeypatch):
+    for name in ("propagate", "lowest_level", "turn_by"):
+        monkeypatch.setattr(event_search, name, plain(getattr(event_search, name)))
+    exponents = np.array([-300.0 + 4000.0j, -5.0 + 90.0j])
+    tables = tables_of(exponents, np.ones((2, 2), dtype=complex), FORWARD)
+    for count in (1, 2, 3, 12, 37, 640, 1023, N_TICK):
+        re, im = np.empty((2, 2))
+        plain(event_search.take_step)(
+            count, 0, tables.power_re, tables.power_im, np.ones(2), np.zeros(2), re, im
+        )
+        assert re + 1j * im == pytest.approx(np.exp(exponents * TICK * count), rel=1e-12)

@@ -142,8 +142,9 @@ def tabulate(
     power = np.exp(exponent * steps[:, None]) * used
     rate = switch * exponent
     sliding = (slip if is_measured else slip[:0]) @ motion[n:]
-    growing = Growth()
+    growing, bend = Growth(), np.zeros((0, m), dtype=complex)
     if isinstance(mode, FrictionMode):
+        bend = switch * exponent**2
         growing = Growth(
             np.flatnonzero(mode.growth),
             mode.growth[mode.growth != 0.0],
@@ -167,6 +168,9 @@ def tabulate(
         rate_re=rate.real,
         rate_im=rate.imag,
         bound=np.abs(switch) * np.abs(exponent) ** 2 * growth,
+        bend_re=bend.real,
+        bend_im=bend.imag,
+        turn=np.abs(bend) * np.abs(exponent) * growth,
         pace=np.where(exponent.real * tick * 2**kernel.FORCED_LEVEL < GONE, kernel.DYING, np.abs(exponent)),
         power_re=power.real,
         power_im=power.imag,
