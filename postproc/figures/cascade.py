@@ -15,6 +15,7 @@ from postproc.figures.ticks import tick_levels
 from postproc.signals.cascade import below, default_axis, hold_peaks, hold_rows
 from postproc.signals.cascade import cascade as cascade_data
 from postproc.signals.lines import SPIKE, parse_orders, spikes
+from postproc.signals.spectra import signal_or_whirl
 from postproc.store.axes import find_axis
 from postproc.store.rig_of_case import natural_frequencies
 from postproc.store.select import first_of_rest
@@ -79,7 +80,7 @@ def cascade(
     lines = parse_orders(order_lines, "--order-lines")
     along = find_axis(cases, along) if along else default_axis(cases)
     cases, notes = first_of_rest(cases, [along, "stator"], "status")
-    spectra = cascade_data(cases, "whirl" if full else signal, along)
+    spectra = cascade_data(cases, signal_or_whirl(signal, full), along)
     frequencies: dict[str, Any] = dict(natural_frequencies(cases, str(spectra.dims[0])))
     if spectra.name == "spectrum_whirl":  # lateral motion alone
         frequencies.pop("torsional", None)

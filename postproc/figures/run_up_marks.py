@@ -65,7 +65,8 @@ def written_speeds(speeds: Iterable[float]) -> str:
 def name_speeds(ax: Axes, curves: Sequence[tuple[Floats, Floats]], speed: Floats) -> None:
     """Mark speeds (rad/s) along the first curve, with the rpm, where they are far enough apart to be read.
 
-    Each is written where it covers least of curves and of other labels, with a leader where that is far.
+    Each is written where it covers least of curves and of other labels, those of the grid included, with a
+    leader where that is far.
     """
     x, y = curves[0]
     size = math.hypot(np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()))
@@ -113,31 +114,41 @@ class _Written:
         self._scale = float(np.min(box / spans))  # axes of equal scale
         self._size = spans * self._scale
         self._points = np.concatenate([self._at(_filled(np.column_stack(curve))) for curve in curves])
-        self._boxes: list[Floats] = []
+        self._boxes: list[tuple[Floats, Floats]] = []  # middles, and halves of their sizes
+        for text in ax.texts:
+            if text.get_transform() == ax.transData:
+                self._boxes.append((self._at(np.array(text.get_position())), _half(text.get_text())))
 
     def place(self, text: str, at: Floats, away: Floats) -> tuple[Floats, bool]:
         """Where the middle of a label goes from its point, points, if possible the way `away`.
 
         And whether that is so far that it needs a leader.
         """
-        half = 0.5 * np.array([_LETTER * len(text), _HEIGHT])
+        half = _half(text)
         found, least = half, math.inf
         for farther, direction in itertools.product(_FARTHER, _AROUND):
             offset = np.array(direction) * (_GAP + half + farther)
             middle = self._at(at) + offset
             covered = np.all(np.abs(self._points - middle) < half, axis=1).sum()
-            covered += 200 * sum(bool(np.all(np.abs(box - middle) < 2.0 * half)) for box in self._boxes)
+            covered += 200 * sum(
+                bool(np.all(np.abs(at_box - middle) < size + half)) for at_box, size in self._boxes
+            )
             covered += 200 * bool(np.any(middle < half) or np.any(middle > self._size - half))
             cost = float(covered) + farther - float(away @ direction) / math.hypot(*direction)
             if cost < least:
                 found, least, is_far, box = offset, cost, farther > 0.0, middle
-        self._boxes.append(box)
+        self._boxes.append((box, half))
         return found, is_far
 
     def _at(self, points: Floats) -> Floats:
         """Data, (..., 2), in points."""
         placed: Floats = (points - self._low) * self._scale
         return placed
+
+
+def _half(text: str) -> Floats:
+    """Half the size of a label, points."""
+    return 0.5 * np.array([_LETTER * len(text), _HEIGHT])
 
 
 def _filled(points: Floats) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
 from postproc.signals.lines import SPIKE, spikes, strongest_lines
-from postproc.signals.spectra import spectrum_data
+from postproc.signals.spectra import signal_or_whirl, spectrum_data
 from postproc.store.units import scale_of, short_name
 from postproc.store.variables import require_results
 
@@ -61,7 +61,7 @@ def spectrum(
     over
         Draw the cases along AXIS over one another.
     """
-    shown = spectrum_data(cases, "whirl" if full else signal, over).compute()
+    shown = spectrum_data(cases, signal_or_whirl(signal, full), over).compute()
     abscissa = "order" if orders else "frequency"
     limit = max or default_limit(shown, abscissa)
     found = strongest_lines(shown, lines) if over is None and lines else None

@@ -149,6 +149,21 @@ def with_frequency(spectrum: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataA
     return spectrum.assign_coords(frequency=frequency.transpose(*dims))
 
 
+def signal_or_whirl(signal: str, full: bool) -> str:
+    """Return the name of what is drawn: the whirl for a full spectrum, which has no other signal.
+
+    Raises
+    ------
+    InputError
+        A full spectrum, and a signal other than torsion, the default of the figures.
+    """
+    if full and signal not in ("torsion", WHIRL):
+        raise InputError(
+            f"--full is of the orbit and conflicts with --signal {signal}; leave out one of them"
+        )
+    return WHIRL if full else signal
+
+
 def check_signal(signal: str) -> None:
     """Refuse a name that is no recorded signal."""
     if not is_signal(signal):

@@ -161,6 +161,17 @@ def test_any_signal_in_its_panels(visit: Visit, pages: dict[str, str]) -> None:
     assert page.evaluate("panels.spectrum.figure.below[0].axis_label").startswith("Order")
 
 
+def test_names_of_lines_stay_within_their_panel(visit: Visit, pages: dict[str, str]) -> None:
+    page = visit(pages["whole"])
+    first, last = page.evaluate("""() => {
+        const values = Array.from({ length: 1000 }, (_, i) => (i === 9 || i === 997 ? 1 : 0));
+        panels.spectrum.name({ name: "torsion", values }, 0.01, 1, 10, 1);
+        return panels.spectrum.names.data.x;
+    }""")
+    assert 0.3 < first < 1.0  # its line is at 0.1
+    assert 9.0 < last < 9.8  # at 9.98
+
+
 @pytest.mark.parametrize("name", ["whole", "line", "single", "scalars"])
 def test_the_page_fits_its_window(visit: Visit, pages: dict[str, str], name: str) -> None:
     page = visit(pages[name], 390)

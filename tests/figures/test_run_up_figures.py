@@ -146,6 +146,18 @@ def test_a_polar_plot_names_all_critical_speeds():
         assert [text.get_text() for text in ax.get_legend().get_texts()][-1] == words
 
 
+def test_speeds_of_a_polar_plot_keep_clear_of_the_names_of_the_rays():
+    """Of a signal that leads by 6 degrees, whose speeds lie beside the name of the ray without lag."""
+    cases = run_up()
+    cases["phase_probe_left"] = 0.0 * cases["phase_probe_left"] + math.radians(6)
+    ax = polar(cases, "probe_left").show()
+    boxes = {text.get_text(): text.get_window_extent() for text in ax.texts if text.get_text()}
+    speeds = [box for name, box in boxes.items() if name.isdigit() and int(name) > 400]
+    assert speeds
+    ray = boxes["0\N{DEGREE SIGN} lag"]
+    assert not any(box.overlaps(ray) for box in speeds)
+
+
 def test_critical_speeds_are_those_that_the_unbalance_excites():
     cases = run_up(rig=mass_of_1_kg(1e4, 9e6).as_dict())
     assert critical_speeds(cases, 50.0, 150.0) == pytest.approx([100.0])

@@ -7,8 +7,10 @@ import pytest
 import synthetic_store
 import xarray as xr
 
+from postproc.figures.cascade import cascade as cascade_figure
 from postproc.figures.cascade import intensity, waterfall
 from postproc.figures.cascade_lines import draw_frequencies, draw_orders
+from postproc.figures.spectrum import spectrum as spectrum_figure
 from postproc.figures.style import house_style, new_figure
 from postproc.signals.cascade import below, cascade, hold_peaks
 from postproc.signals.spectra import WHIRL, full_spectrum, spectrum_data
@@ -102,6 +104,12 @@ def test_a_cascade_of_full_spectra_has_both_sides(speeds, limit):
             if abs(order * rate) < limit * 0.99 and limit < 100:
                 near = row.sel(frequency=order * rate, method="nearest")
                 assert float(near) == pytest.approx(radius)
+
+
+@pytest.mark.parametrize("figure", [spectrum_figure, cascade_figure])
+def test_a_full_spectrum_of_a_signal_is_refused(speeds, figure):
+    with pytest.raises(InputError, match="--full is of the orbit and conflicts with --signal vertical"):
+        figure(speeds, "vertical", full=True)
 
 
 @pytest.mark.parametrize("draw", [waterfall, intensity])

@@ -216,7 +216,10 @@ class Spectrum extends Panel {
       if (named.every((k) => Math.abs(i - k) * spacing * rate > 0.075 * end)) named.push(i);
     }
     const text = named.map((i) => orderName((i + 1) * spacing, spacing / 2));
-    this.names.data = { x: named.map((i) => (i + 1) * spacing * rate), y: named.map((i) => a[i]), text };
+    // Centred over its line, but within the frame.
+    const half = (k) => 0.014 * text[k].length * end;
+    const x = named.map((i, k) => Math.min(Math.max((i + 1) * spacing * rate, half(k)), end - half(k)));
+    this.names.data = { x, y: named.map((i) => a[i]), text };
     return named.map((i, k) => `${text[k]} ${withUnit(a[i], facts.signals[s.name].unit, 3)}`);
   }
 
