@@ -40,8 +40,8 @@ _FIRST_STEPS = 50_000  # predicted, of the first run of a case that is shortened
 _LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
 _FIRST_TURNS = 64  # revolutions of a changing speed that are tried first
 _WHOLE_TURNS = 3.0  # s: such cases are run whole if that takes no longer
-_NEIGHBOURS = 2 * SPAN * (N_ALIGNING + N_FIRST)  # revolutions of two neighbours of an irregular motion
-_GROWING = 0.1  # new contact modes over those of as many revolutions before: beyond, a motion is irregular
+_NEIGHBOURS = SPAN * (N_ALIGNING + N_FIRST)  # revolutions for which an irregular motion's tangent is carried
+_GROWING = 0.01  # new contact modes over those of all revolutions before: beyond, a motion is irregular
 _LATE = 0.25  # least pace of what is left of a shortened case, over that of what was timed
 
 
@@ -86,6 +86,8 @@ class Pilots:
         self._grid, self._study = grid, grid.study
         self._compiled: set[Contact] = set()
         self._paces: list[float] = []  # of the cases so far, seconds a predicted step
+        # Of cases that were run whole after another one: what shared contact modes and the rest took, s.
+        self._taken: dict[tuple[int, ...], tuple[float, float]] = {}
         self.was_cut = False
         self.loading = self.compiling = 0.0
         self.shortened: set[tuple[int, ...]] = set()
@@ -105,7 +107,11 @@ class Pilots:
         rig, speed, setup = self._prepared(case)
         if case.speed_law is not None:
             return Pace(self._turning(case, setup, case.speed_law) / steps, rig, speed, 0.0)
-        modes, whole, is_whole = self._modes_and_rest(case, setup, steps, limit)
+        modes, whole, is_whole = (
+            (*self._taken[index], True)
+            if index in self._taken
+            else self._modes_and_rest(case, setup, steps, limit)
+        )
         if not is_whole:
             self.shortened.add(index)
         self._paces.append(whole / steps)
@@ -126,7 +132,7 @@ class Pilots:
         a_mode = modes / max(_n_solved(setup, case), 1)
         whole += modes
         if done < 1.0:
-            n_later, longer = self._to_come(case, setup, done)
+            n_later, longer = self._to_come(case, setup, done, max(limit, 2.0 * modes))
             whole += n_later * a_mode + longer * (whole - modes)
         try:
             if done < 1.0 and whole <= limit:
@@ -137,31 +143,38 @@ class Pilots:
                 met = _n_solved(setup, case)
                 later = self._run(other, setup, self._study.recording, _PATIENCE * limit)
                 shared = min(a_mode * max(2 * met - _n_solved(setup, case), 0), 0.9 * whole)
+                self._taken[other.index] = shared, later
                 return shared, 0.5 * (whole - shared + later), True
         except _Enough:
             return 0.0, max(whole, _PATIENCE * limit), False
         return 0.0, whole, done == 1.0
 
-    def _to_come(self, case: Case, setup: Setup, done: float) -> tuple[float, float]:
-        """Contact modes that the rest of a case meets, and revolutions of neighbours over those of the case.
+    def _to_come(self, case: Case, setup: Setup, done: float, limit: float) -> tuple[float, float]:
+        """Contact modes that the rest of a case meets, and revolutions of its tangent over those of the case.
 
-        It is followed further, as far as it has been. Where it meets hardly any mode that is new, it is taken
-        to come back to them for ever. Elsewhere it is irregular; modes grow by a power of the revolutions,
-        those of neighbouring motions included.
+        It is followed further, for as long again each time, until `limit` s have gone by. Where it meets
+        hardly any mode that is new, it is taken to come back to them for ever. Elsewhere it is irregular;
+        modes grow by the power of the revolutions that all doublings show, its tangent's included: such
+        motions are calm at times.
         """
         recording = self._study.recording
-        met = _n_solved(setup, case)
+        first = before = met = _n_solved(setup, case)
         if self._final is None or not met:
             return 0.0, 0.0
-        self._run(case, setup, shortened(recording, done), initial=self._final)
-        n_later = _n_solved(setup, case) - met
-        if n_later <= _GROWING * met:
-            return float(n_later), 0.0
+        left, n_doubling = limit, 0
+        while True:
+            n_doubling += 1
+            left -= self._run(case, setup, shortened(recording, done), initial=self._final)
+            before, met, done = met, _n_solved(setup, case), 2.0 * done
+            if met - before <= _GROWING * before:
+                return float(met - first), 0.0
+            if 2.0 * done > 1.0 or left <= 0.0:
+                break
         self.irregular.add(case.index)
         n_turn = recording.longest_transient + recording.revolutions
         longer = _NEIGHBOURS / n_turn if recording.revolutions >= LEAST_REVOLUTIONS else 0.0
-        power = min(1.0, math.log2(1.0 + n_later / met))
-        return met * (((1.0 + longer) / done) ** power - 1.0), longer
+        power = min(1.0, math.log2(met / first) / n_doubling)
+        return met * ((1.0 + longer) / done) ** power - first, longer
 
     def _alike(self, case: Case) -> Case | None:
         """Another case, far along one axis, that shares the contact modes of this one."""

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 _WITHIN = 0.95  # by Student's distribution: few cases rarely hold the dearest, so that it is 0.8 to 0.95
+_FEWEST_FREE = 3  # degrees of freedom of that distribution, at least
 _OFF = 0.25  # standard deviation of a time foreseen from part of a case, as a share of it (18 cases, 4 laws)
 _OFF_IRREGULAR = 0.4  # the same where its motion still met contact modes: it may settle, or meet yet more
 
@@ -60,6 +61,11 @@ class Sample:
         self.seconds.append(seconds)
         self.is_whole.append(is_whole)
         self.is_irregular.append(is_irregular)
+
+    @property
+    def known(self) -> float:
+        """Seconds of the cases that were run whole."""
+        return float(sum(t for t, is_whole in zip(self.seconds, self.is_whole, strict=True) if is_whole))
 
     @property
     def correction(self) -> float:
@@ -118,10 +124,14 @@ def _line(steps: Floats, seconds: Floats, weight: Floats) -> tuple[float, float]
     return (float(base), float(slope)) if base > 0.0 else (0.0, float(mean / middle))
 
 
-def within(seconds: float, error: float, n: int) -> tuple[float, float]:
-    """Range of the time, of eight to nine plans in ten: Student's distribution of its logarithm, n cases."""
+def within(seconds: float, error: float, n: int, known: float = 0.0) -> tuple[float, float]:
+    """Range of the time, of eight to nine plans in ten: Student's distribution of its logarithm, n cases.
+
+    Of three cases or fewer it is that of four, so that it does not reach beyond what anyone can use, and what
+    is `known`, s, was timed: all will not take less.
+    """
     from scipy.special import stdtrit
 
     relative = error / seconds if seconds > 0.0 else 0.0
-    reach = float(stdtrit(max(n - 1, 1), 0.5 + 0.5 * _WITHIN)) * relative
-    return seconds * math.exp(-reach), seconds * math.exp(reach)
+    reach = float(stdtrit(max(n - 1, _FEWEST_FREE), 0.5 + 0.5 * _WITHIN)) * relative
+    return max(seconds * math.exp(-reach), min(known, seconds)), seconds * math.exp(reach)

@@ -48,6 +48,8 @@ class Timing:
     spread : float
         Standard error of the time of all cases, as a share of it: 0 where all were timed, NaN where one of
         several was.
+    known : float
+        Seconds of the cases that were run whole.
     is_bound : bool
         Whether a case took longer than is waited for, so that the pace is a lower bound.
     seconds : float
@@ -59,6 +61,7 @@ class Timing:
     pace: Pace
     n_pilot: int = 0
     spread: float = math.nan
+    known: float = 0.0
     is_bound: bool = False
     seconds: float = 0.0
     failures: tuple[str, ...] = ()
@@ -130,6 +133,7 @@ def time_pilots(
         pace=mean._replace(step=step, case=case, block=block),
         n_pilot=len(paces),
         spread=_spread(sample),
+        known=sample.known,
         is_bound=is_bound,
         seconds=seconds,
         failures=tuple(failures),

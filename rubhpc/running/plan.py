@@ -119,7 +119,7 @@ class Plan:
         timing, seconds = self.timing, 3600.0 * self.core_hours
         if timing.is_bound or not _AGREED < timing.spread < math.inf:
             return ""
-        return span(*within(seconds, timing.spread * seconds, timing.n_pilot))
+        return span(*within(seconds, timing.spread * seconds, timing.n_pilot, timing.known))
 
     @property
     def _idle(self) -> str:

@@ -85,3 +85,11 @@ def test_a_motion_that_still_meets_contact_modes_widens_the_range():
     regular, irregular = (error(is_whole=False, is_irregular=given) for given in (False, True))
     assert irregular == pytest.approx(0.4 / 0.25 * regular)
     assert error(is_whole=True, is_irregular=True) == 0.0
+
+
+def test_range_of_three_cases_begins_where_time_was_taken():
+    """Cases of 14, 2 and 40 s out of six do not make a range from zero to an hour."""
+    low, high = within(100.0, 70.0, 3, known=56.0)
+    assert low == 56.0
+    assert high == pytest.approx(100.0 * np.exp(0.7 * 3.182), rel=1e-3)
+    assert within(100.0, 10.0, 3, known=56.0)[0] == pytest.approx(100.0 * np.exp(-0.1 * 3.182), rel=1e-3)

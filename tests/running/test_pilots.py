@@ -107,27 +107,39 @@ def test_dearest_case_is_run_whole(monkeypatch, n_case, left):
 
 
 @pytest.mark.parametrize(
-    ("revolutions", "met", "expected"),
+    ("revolutions", "limit", "met", "expected"),
     [
-        (16, (75, 150), (75 * (56 / 3 * (1 + 160 / 56) - 1), 160 / 56)),  # each part meets as many
-        (16, (75, 106), (75 * ((56 / 3 * (1 + 160 / 56)) ** np.log2(106 / 75) - 1), 160 / 56)),
-        (16, (75, 80), (5.0, 0.0)),  # it comes back to what it has met
-        (8, (75, 150), (75 * (48 / 3 - 1), 0.0)),  # too short for neighbours
+        (16, 0.5, (75, 150), (150 * (56 + 80) / 6 - 75, 80 / 56)),  # each part meets as many
+        (16, 0.5, (75, 106), (106 * ((56 + 80) / 6) ** np.log2(106 / 75) - 75, 80 / 56)),
+        (16, 1.5, (75, 106, 130), (130 * ((56 + 80) / 12) ** (np.log2(130 / 75) / 2) - 75, 80 / 56)),
+        (16, 1.5, (75, 106, 107), (32.0, 0.0)),
+        (
+            16,
+            99.0,
+            (75, 95, 120, 150, 190),
+            (190 * ((56 + 80) / 48) ** (np.log2(190 / 75) / 4) - 75, 80 / 56),
+        ),
+        (16, 0.5, (200, 202), (2.0, 0.0)),  # it comes back to what it has met
+        (8, 0.5, (75, 150), (150 * 48 / 6 - 75, 0.0)),  # too short for its tangent to be carried on
     ],
-    ids=["irregular", "less and less", "regular", "short"],
+    ids=["irregular", "less and less", "followed on", "at last regular", "nearly whole", "regular", "short"],
 )
-def test_contact_modes_of_an_irregular_motion_grow_by_a_power(revolutions, met, expected, monkeypatch):
-    """With those of its neighbours; of all, three revolutions are run, and three that follow."""
+def test_contact_modes_of_an_irregular_motion_grow_by_a_power(revolutions, limit, met, expected, monkeypatch):
+    """With those of its tangent; three revolutions were run, then as many again, and again, a second each."""
     recording = Recording(transient=40, revolutions=revolutions, samples_per_revolution=16)
     found = pilot_cases.Pilots(SimpleNamespace(study=SimpleNamespace(recording=recording)))
     found._final = SimpleNamespace()
     counts = iter(met)
     monkeypatch.setattr(pilot_cases, "_n_solved", lambda *_: next(counts))
     ran = []
-    monkeypatch.setattr(
-        found, "_run", lambda _case, _setup, part, initial: ran.append((part.longest_transient, initial))
-    )
+
+    def run(_case, _setup, part, initial):
+        ran.append((part.longest_transient, initial))
+        return 1.0
+
+    monkeypatch.setattr(found, "_run", run)
     share = 3 / (40 + revolutions)
-    assert found._to_come(SimpleNamespace(index=(3,)), None, share) == pytest.approx(expected)
-    assert found.irregular == ({(3,)} if met[1] > 1.1 * met[0] else set())
-    assert ran == [(round(40 * share), found._final)]
+    assert found._to_come(SimpleNamespace(index=(3,)), None, share, limit) == pytest.approx(expected)
+    assert found.irregular == ({(3,)} if met[-1] > 1.01 * met[-2] else set())
+    parts = [share * 2**k for k in range(len(met) - 1)]
+    assert ran == [(round(40 * part), found._final) for part in parts]
