@@ -116,8 +116,12 @@ def ringing_of(model: Model, spin: float) -> Ringing:
     signals = [mode[row] for row in output_degrees(model) if row >= 0]
     twist_row = output_degrees(model)[TWIST]
     turned = mode[twist_row] if twist_row >= 0 else np.zeros(frequency.size)
+    displaced, moving, accelerated = model.probe_rows @ mode
+    lively = np.vstack(  # the torsional acceleration, and probes: what each sees of a unit of the mode
+        [turned * frequency**2, np.hypot(displaced - accelerated * frequency**2, moving * frequency)]
+    )
     rungs: list[Floats] = []
-    accelerations: list[Floats] = []  # torsional, the square of the frequency times the displacement
+    probed: list[Floats] = []
     impact = 0.0
     for stator, degree in zip(model.stators, degrees_of(model), strict=True):
         v, w, twist, axial, lateral = (mode[row] if row >= 0 else np.zeros(frequency.size) for row in degree)
@@ -129,16 +133,17 @@ def ringing_of(model: Model, spin: float) -> Ringing:
         rungs.append(np.vstack([(across**2 + axial**2) * pulse, rung * (axial - across)]))
         along = lateral + ez * v - ey * w - stator.radius * twist
         rungs.append(np.vstack([np.zeros(frequency.size), rung * along]))
-        accelerations.append(turned * pulse * frequency * np.stack([axial - across, along]))
+        seen = lively * pulse / frequency
+        probed.append(np.vstack([seen * (axial - across), seen * along]))
     coupled = coupled_ringing(damping, frequency) ** 2
-    share, accelerating = (
-        shares(np.vstack(those), len(model.stators), coupled, lasting) for those in (rungs, accelerations)
+    share, lively_share = (
+        shares(np.vstack(those), len(model.stators), coupled, lasting) for those in (rungs, probed)
     )
     # An event that is late by a share of the contact's time shifts what rings faster by more of its own.
     ratio = frequency / standstill.contact_frequency
     is_fast = ratio > CUTOFF_RATIO
-    late = float((accelerating[:, is_fast] @ ratio[is_fast] ** 2).max(initial=1.0))
-    return Ringing(np.vstack([share * late, accelerating]), impact)
+    late = float((lively_share[:, is_fast] @ ratio[is_fast] ** 2).max(initial=1.0))
+    return Ringing(np.vstack([share * late, lively_share]), impact)
 
 
 def shares(rung: Floats, n_stator: int, coupled: Floats, lasting: Floats) -> Floats:
