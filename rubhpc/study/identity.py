@@ -33,6 +33,7 @@ MANY_STATORS = 4  # more than five, whose sets of closed contacts or states may 
 BRANCHES = 4  # [branch]: the motion with a weak impact next to a grazing
 MANY_EVENTS = 1  # restitution, or method = "modal" where a case may have 200 000 events
 ALONG_SPEED = 1  # branches along a speed
+PROBED = 1  # method = "modal" with probes, for whose sake modes are kept
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
@@ -55,6 +56,7 @@ def physics_of(study: Study) -> int:
         + BRANCHES * (study.branch is not None)
         + MANY_EVENTS * _has_many_events(study)
         + ALONG_SPEED * (study.branch is not None and study.branch.along in SPEED_AXES)
+        + PROBED * (study.integrator.method == "modal" and bool(study.recording.probe))
     )
 
 
