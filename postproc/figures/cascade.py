@@ -82,7 +82,7 @@ def cascade(
     cases, notes = first_of_rest(cases, [along, "stator"], "status")
     spectra = cascade_data(cases, signal_or_whirl(signal, full), along)
     frequencies: dict[str, Any] = dict(natural_frequencies(cases, str(spectra.dims[0])))
-    if spectra.name == "spectrum_whirl":  # lateral motion alone
+    if full:  # lateral motion alone
         frequencies.pop("torsional", None)
     for name, value in (mark or {}).items():
         frequencies[name] = hertz(value, f"--mark {name}")

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 ORDERS = tuple(Fraction(*f) for f in ((1, 3), (1, 2), (2, 3), (1, 1), (3, 2), (2, 1), (3, 1)))
 _CHARACTER = 0.018  # of the axes, for a letter of a name
+_CORNER = 0.16  # of the ordinate, above which the bar that shows the size of spectra may be
 
 
 def draw_orders(
@@ -38,6 +39,8 @@ def draw_orders(
     left, right = ax.get_xlim()
     style: dict[str, Any] = {"color": color, "linewidth": 0.4, "linestyle": (0, (4, 3)), "zorder": 2.5}
     tagged: list[float] = []
+    bottom, top = ax.get_ylim()
+    highest = top - _CORNER * (top - bottom)
     # Whole multiples first, so that they keep their names where there is no room for all.
     signed = [*orders, *(-o for o in orders)] if left < 0 else list(orders)
     for order in sorted(signed, key=lambda o: (o.denominator, abs(o))):
@@ -51,8 +54,11 @@ def draw_orders(
                 _tag(ax, float(x[-1]), float(rows[-1]), f"{order}X", color, ground, "center")
                 tagged.append(float(x[-1]))
         else:
-            end, side = (right, "right") if order > 0 else (left, "left")
-            _tag(ax, end, float(np.interp(abs(end), np.abs(x), rows)), f"{order}X", color, ground, side)
+            at, side = (right, "right") if order > 0 else (left, "left")
+            y = float(np.interp(abs(at), np.abs(x), rows))
+            if y > highest:
+                at, y = float(np.interp(highest, rows, x)), highest
+            _tag(ax, at, y, f"{order}X", color, ground, side)
     return ax
 
 

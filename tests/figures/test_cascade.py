@@ -10,6 +10,7 @@ import pytest
 import synthetic_store
 import xarray as xr
 
+from postproc.figures.cascade import cascade as cascade_figure
 from postproc.figures.cascade import default_limit, intensity, waterfall
 from postproc.figures.cascade_lines import draw_frequencies, draw_orders
 from postproc.figures.style import house_style, new_figure
@@ -233,6 +234,24 @@ def test_names_of_orders_stand_above_the_spectra(spectra, ax):
     (name,) = [text for text in ax.texts if text.get_text() == "1X"]
     lowest = ax.transData.inverted().transform(name.get_window_extent())[0, 1]
     assert lowest > max(highest, *bar)
+
+
+def test_the_name_of_an_order_that_leaves_in_the_corner_is_below_the_bar_of_the_scale(ax):
+    spectra = made([[0, 1e-4, 0], [0, 1e-4, 0], [0, 1e-4, 0]], [20.0, 30.0, 40.0], spacing=1.0)
+    waterfall(spectra, ax, 45.0)
+    draw_orders(ax, spectra, [Fraction(1)])  # at the right edge above the last row, where the bar is
+    ax.figure.canvas.draw()
+    (name,) = [text for text in ax.texts if text.get_text() == "1X"]
+    (scale,) = [text for text in ax.texts if "rad" in text.get_text()]
+    assert name.get_window_extent().y1 < scale.get_window_extent().y0
+    x, y = name.get_position() if name.get_transform() == ax.transData else name.xy
+    assert x == pytest.approx(y)  # on its line
+
+
+def test_a_cascade_of_whirl_names_no_torsional_frequency(cases):
+    named = [text.get_text() for text in cascade_figure(cases, full=True).show().texts]
+    assert any(text.startswith("lateral") for text in named)
+    assert not any(text.startswith("torsional") for text in named)
 
 
 def test_the_waterfall_has_a_curve_for_each_finished_case(ax):
