@@ -20,6 +20,7 @@ _PARTS = {
     "advance_curved": "for curved gaps",
     "follow_piece": "for periodic motions",
     "advance_pieces": "for run-ups",
+    "advance_friction_pieces": "for run-ups under friction with stick",
     "carry_along": "for neighbouring motions, which distinguish chaos from order",
 }
 _announced: set[str] = set()

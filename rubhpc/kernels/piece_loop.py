@@ -2,56 +2,40 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
-from rubhpc.kernels.accumulators import Accumulator
-from rubhpc.kernels.case_progress import (
-    DIVERGED,
-    FINISHED,
-    LONG_AGO,
-    MODE_WANTED,
-    NONE,
-    Clock,
-    Progress,
-)
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, enter, find_mode, is_within
+from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels.case_progress import DIVERGED, FINISHED, MODE_WANTED, Clock, Progress
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, is_within
 from rubhpc.kernels.event_loop import EventWork, advance
 from rubhpc.kernels.penalty_events import pressed_pairs
+from rubhpc.kernels.pieces import (
+    IN_PART,
+    PART,
+    PART_TO_BEGIN,
+    PIECE,
+    STAGE,
+    TO_BEGIN,
+    TO_ENTER,
+    Pieces,
+    begin_part,
+    begin_piece,
+    clock_of,
+    end_piece,
+    read_motion,
+    row_of,
+    set_masks,
+    start_piece,
+)
 
 if TYPE_CHECKING:
-    from rubhpc.kernels.accumulators import Samples
+    from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.measuring import Recorder
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
-PIECE, PART, STAGE = range(3)  # of `Pieces.at`
-TO_BEGIN, TO_ENTER, PART_TO_BEGIN, IN_PART = range(4)  # stages of a piece
-
-
-class Pieces(NamedTuple):
-    """Pieces that have matrices and a number of samples in common, k of them, in c parts each."""
-
-    spin: Floats  # (k,), rad/s
-    tick: Floats  # (k,), s
-    search_level: Ints  # (k,)
-    force: Floats  # (k, 2, n), of the unbalance: times cosine and sine of the shaft's angle
-    since: Floats  # (k,), s, from the beginning of the piece before to that of this one
-    table: Ints  # (p,), set of closed pairs of each of the tables, NONE for one that is not tuned
-    n_room: int  # tables of each set, one a piece
-    n_sample: int  # of a piece
-    n_part_sample: int  # of each of its parts, which have sums of their own
-    energy_limit: float  # J
-    at: Ints  # (3,), which piece, which part of it, and the stage that it is in
-    motion: Floats  # (k + 1, 2 n), at the beginning of each piece; of the first one given
-    pressing: Floats  # (k + 1, q), N, contact forces there
-    seen: Floats  # (2, 3 + places), `Recorder.last` at the beginning of the piece under way
-    n_step: Ints  # (k,), steps taken
-    whole: Floats  # (o, k n_sample), samples
 
 
 @jit_lean_sum
@@ -94,30 +78,9 @@ def advance_pieces(
     while at[PIECE] < pieces.spin.size:
         piece = at[PIECE]
         set_masks(tables.mask, pieces.table, pieces.n_room, piece)
-        spin, tick = pieces.spin[piece], pieces.tick[piece]
-        now = Clock(
-            spin,
-            tick,
-            clock.sample_level,
-            clock.samples_per_revolution,
-            pieces.search_level[piece],
-            clock.contact_level,
-            pieces.n_sample,
-        )
+        now = clock_of(clock, pieces, piece)
         if at[STAGE] == TO_BEGIN:
-            for k in range(reduced.force_cosine.size):
-                reduced.force_cosine[k], reduced.force_sine[k] = (
-                    pieces.force[piece, 0, k],
-                    pieces.force[piece, 1, k],
-                )
-            for i in range(reduced.radius.size):
-                reduced.rim_speed[i] = reduced.radius[i] * abs(spin)
-            for row in range(2):
-                for j in range(pieces.seen.shape[1]):
-                    pieces.seen[row, j] = recorder.last[row, j]
-            for row in range(samples.whole.shape[0]):
-                for j in range(pieces.n_sample):
-                    samples.whole[row, j] = 0.0
+            start_piece(reduced, pieces, piece, recorder, samples)
             progress.wanted = first_set(reduced, pieces.motion[piece], pieces.pressing[piece])
             at[STAGE] = TO_ENTER
         if at[STAGE] == TO_ENTER:
@@ -164,20 +127,8 @@ def advance_pieces(
             at[PART] += 1
             at[STAGE] = PART_TO_BEGIN
         read_forces(tables, progress.mode, z, pieces.pressing[piece + 1])
-        pieces.n_step[piece] = progress.n_step
-        first = piece * pieces.n_sample
-        for row in range(samples.whole.shape[0]):
-            for j in range(pieces.n_sample):
-                pieces.whole[row, first + j] = samples.whole[row, j]
-        at[PIECE], at[STAGE] = piece + 1, TO_BEGIN
+        end_piece(pieces, piece, progress.n_step, samples)
     return FINISHED
-
-
-@jit_inline_sum
-def set_masks(mask: Ints, table: Ints, n_room: int, piece: int) -> None:
-    """Show the tables that are tuned to a piece, and no others."""
-    for place in range(mask.size):
-        mask[place] = table[place] if place % n_room == piece else NONE
 
 
 @jit_lean_sum
@@ -193,71 +144,9 @@ def first_set(reduced: Reduced, motion: Floats, pressing: Floats) -> int:
 
 
 @jit_lean_sum
-def begin_piece(tables: ModeTables, reduced: Reduced, motion: Floats, progress: Progress, z: Floats) -> bool:
-    """Begin in the set wanted, at the shaft's angle 0; False where it is not tuned."""
-    mode = find_mode(tables.mask, progress.wanted)
-    if mode < 0:
-        return False
-    enter(tables, mode, reduced.clearance, 1.0, 0.0, motion, z)
-    progress.tick, progress.mode, progress.wanted, progress.n_step = 0, mode, NONE, 0
-    progress.n_event, progress.counted_from, progress.next_sample = 0, 0, 0
-    progress.entered, progress.energy_from, progress.contact_age = LONG_AGO, NONE, NONE
-    progress.resolved_level, progress.halving_level, progress.is_after_event = 0, NONE, 0
-    return True
-
-
-@jit_lean_sum
-def read_motion(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
-    """Fill in the reduced motion (2 n,) of coordinates (2, m)."""
-    for row in range(motion.size):
-        motion[row] = dot(tables.motion_re[mode, row], tables.motion_im[mode, row], z[0], z[1])
-
-
-@jit_lean_sum
 def read_forces(tables: ModeTables, mode: int, z: Floats, force: Floats) -> None:
     """Fill in the contact forces (q,), N, of coordinates (2, m)."""
     for i in range(force.size):
         force[i] = 0.0
         if (tables.mask[mode] >> i) & 1:
             force[i] = dot(tables.switch_re[mode, i], tables.switch_im[mode, i], z[0], z[1])
-
-
-@jit_inline_sum
-def begin_part(part: Accumulator, before: Accumulator, since: float, closed: int) -> None:
-    """Go on from the sums before, whose clock began `since` (s) ago, with the pairs of `closed` touching."""
-    q, n_row, n = part.force_piece.shape
-    for i in range(q):
-        for row in range(n_row):
-            for k in range(n):
-                part.force_piece[i, row, k] = before.force_piece[i, row, k]
-        for k in range(2):
-            part.force_held[i, k] = before.force_held[i, k]
-    part.origin[0] = before.origin[0] + since
-    for i in range(part.is_touching.size):
-        part.is_touching[i] = (closed >> i) & 1 == 1
-
-
-@jit_inline_sum
-def row_of(sums: Accumulator, i: int) -> Accumulator:
-    """Those of one part."""
-    return Accumulator(
-        sums.highest[i],
-        sums.lowest[i],
-        sums.is_touching[i],
-        sums.n_contact[i],
-        sums.contact_time[i],
-        sums.impulse[i],
-        sums.stick_time[i],
-        sums.sense[i],
-        sums.reversals[i],
-        sums.friction_work[i],
-        sums.least_slip[i],
-        sums.peak_force[i],
-        sums.force_piece[i],
-        sums.force_held[i],
-        sums.origin[i],
-        sums.peak_lateral[i],
-        sums.energy[i],
-        sums.pivots[i],
-        sums.residual[i],
-    )

@@ -58,9 +58,7 @@ def test_a_run_up_over_constant_speed(seconds, capsys):
         lines.append(f"{name:18} {1e3 * rise:7.1f} ms for {1e3 * at_constant:6.1f}: {ratios[name]:.2f}")
     with capsys.disabled():
         print(f"\n{speed_law.n_revolution} revolutions in {seconds:g} s\n" + "\n".join(lines))
-    assert max(ratios["sliding"], ratios["penalty"]) < 3.0
-    assert max(ratios["Coulomb"], ratios["Coulomb, penalty"]) < 4.0  # 2.7 to 3.6 on a busy machine
-    assert ratios["updated normal"] < 4.5  # 3.6 and 4.1
+    assert max(ratios.values()) < 3.0
 
 
 @on_one_thread
@@ -90,5 +88,4 @@ def test_an_overhung_pump_in_a_ring_of_eight(capsys):
         )
     with capsys.disabled():
         print("\nring of 8\n" + "\n".join(lines))
-    assert max(ratio for name, ratio in ratios.items() if "Coulomb" not in name) < 3.0
-    assert max(ratios.values()) < 3.5  # 2.3 to 3.0
+    assert max(ratios.values()) < 3.0

@@ -20,9 +20,9 @@ def test_each_part_is_announced_once(monkeypatch):
 
 
 def test_parts_are_names_of_kernels():
-    from rubhpc.kernels import curved_loop, flow, piece_loop, stepping_loop, tangent
+    from rubhpc.kernels import curved_loop, flow, friction_pieces, piece_loop, stepping_loop, tangent
 
-    modules = flow, tangent, stepping_loop, curved_loop, piece_loop
+    modules = flow, tangent, stepping_loop, curved_loop, friction_pieces, piece_loop
     kernels = {name for module in modules for name in vars(module)}
     assert all(name in kernels for name in compilation._PARTS)
 

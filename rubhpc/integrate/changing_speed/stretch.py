@@ -12,7 +12,7 @@ from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import stacked_accumulators
 from rubhpc.kernels.accumulators import Accumulator, Samples
 from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, PAUSED
-from rubhpc.kernels.piece_loop import PIECE, TO_BEGIN, Pieces, advance_pieces
+from rubhpc.kernels.pieces import PIECE, TO_BEGIN, Pieces
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -88,7 +88,7 @@ def take_stretch(
     for field, before in zip(sums, earlier[0], strict=True):
         field[first * n_part] = before
     while True:
-        outcome = march.advance_through(advance_pieces, pieces, samples, sums)
+        outcome = march.advance_through(pieces, samples, sums)
         if outcome not in (MODE_WANTED, PAUSED):
             break
         if check is not None:

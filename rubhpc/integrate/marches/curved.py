@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Progress
+    from rubhpc.kernels.contact_modes import ModeTables
 
     Floats = NDArray[np.float64]
 
@@ -95,8 +96,8 @@ class CurvedMarch(EventDrivenMarch):
         motion[n:] -= self._work.rate[0] @ shift
         return motion
 
-    def find(self, mask: int) -> None:
-        """See that the tables hold a set of contacts.
+    def _add(self, mask: int) -> None:
+        """See that the library holds a set of contacts.
 
         Raises
         ------
@@ -104,12 +105,15 @@ class CurvedMarch(EventDrivenMarch):
             Too many sets for bent stators, of which short steps know nothing.
         """
         try:
-            super().find(mask)
+            super()._add(mask)
         except NoClosedForm:
             if not self._is_bent:
                 raise
             problem = "too many sets of contacts for second_order"
             raise InputError(f'[stator] geometry: {problem}; take geometry = "linear"') from None
+
+    def _use(self, tables: ModeTables) -> None:
+        super()._use(tables)
         assert isinstance(self._library, CurvedLibrary)
         self._curved = self._library.curved_tables()
 

@@ -19,6 +19,7 @@ from rubhpc.kernels.case_progress import (
 from rubhpc.kernels.contact_modes import FORCED_LEVEL
 from rubhpc.kernels.event_loop import advance, event_work
 from rubhpc.kernels.mode_change import change_contacts
+from rubhpc.kernels.piece_loop import advance_pieces
 from rubhpc.kernels.sections_loop import advance_sections
 from rubhpc.kernels.trail import Trail, begin_trail, new_trail, no_trail
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Progress
+    from rubhpc.kernels.pieces import Pieces
 
     Floats = NDArray[np.float64]
 
@@ -102,7 +104,7 @@ class EventDrivenMarch(ModalMarch):
         self._met = set(self._library.first_masks)  # sets of closed contacts
         if self.is_foreseeing:
             for foreseen in list(self._asked)[-MOST_FORESEEN:]:
-                self.find(foreseen)
+                self._add(foreseen)
         mask = self._first_mask(contact_force)
         self.find(mask)
         self._start(self._library.masks.index(mask))
@@ -139,14 +141,18 @@ class EventDrivenMarch(ModalMarch):
         """Sets of closed contacts that this piece has met, or is expected to meet."""
         return self._met
 
-    def advance_through(
-        self, kernel: Callable[..., int], pieces: Any, samples: Samples, sums: Accumulator
-    ) -> int:
+    def advance_through(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
         """Advance through several pieces by a kernel that begins them (`kernels.piece_loop`).
 
         What it saw of a piece that it could not take to the end is forgotten.
         """
-        outcome = kernel(
+        outcome = self._advance_pieces(pieces, samples, sums)
+        if outcome not in (FINISHED, MODE_WANTED, PAUSED):
+            self._recorder.last[:] = pieces.seen
+        return outcome
+
+    def _advance_pieces(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
+        return advance_pieces(
             self.tables,
             self.bodies,
             self.clock,
@@ -160,9 +166,6 @@ class EventDrivenMarch(ModalMarch):
             samples,
             sums,
         )
-        if outcome not in (FINISHED, MODE_WANTED, PAUSED):
-            self._recorder.last[:] = pieces.seen
-        return outcome
 
     def pass_sections(
         self, n_revolution: int, samples: Samples, accumulator: Accumulator
@@ -305,6 +308,17 @@ class EventDrivenMarch(ModalMarch):
         The kernel is shown no set but those that this case has met: what it does must not depend on what
         other cases have left in the library.
         """
+        self._add(mask)
+        tables = self._library.tables()
+        unmet = self._library.unmet(self._met)
+        if unmet:
+            shown = tables.mask.copy()
+            shown[unmet] = -1
+            tables = tables._replace(mask=shown)
+        self._use(tables)
+
+    def _add(self, mask: int) -> None:
+        """See that the library holds a set of contacts."""
         self._met.add(mask)
         if len(self._met) > MOST_REFILLS * self._measured.followed.n_most:
             raise NoClosedForm
@@ -313,13 +327,6 @@ class EventDrivenMarch(ModalMarch):
                 self._library.make_room()
             if not self._library.add(mask):
                 raise NoClosedForm
-        tables = self._library.tables()
-        unmet = self._library.unmet(self._met)
-        if unmet:
-            shown = tables.mask.copy()
-            shown[unmet] = -1
-            tables = tables._replace(mask=shown)
-        self._use(tables)
 
     def find_wanted(self) -> None:
         """See that the tables hold the set of contacts that the kernel asks for."""

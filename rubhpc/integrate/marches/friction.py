@@ -24,6 +24,7 @@ from rubhpc.kernels.contact_modes import FORCED_LEVEL
 from rubhpc.kernels.friction_change import change_states
 from rubhpc.kernels.friction_events import friction_work
 from rubhpc.kernels.friction_loop import advance_with_friction
+from rubhpc.kernels.friction_pieces import AT_REST, LEAST_FORCE, advance_friction_pieces
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, MOST_PAIRS, OPEN, STUCK, FrictionBodies
 from rubhpc.kernels.trail import BROKEN
 
@@ -39,12 +40,10 @@ if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.contact_pairs import Workspace
     from rubhpc.kernels.friction_events import FrictionWork
+    from rubhpc.kernels.pieces import Pieces
     from rubhpc.kernels.trail import Trail
 
     Floats = NDArray[np.float64]
-
-_LEAST = float(np.finfo(float).tiny)  # N, of a closed pair
-AT_REST = 1e-4  # of the rim speed: a pair that slips less than that at the beginning of a case has stuck
 
 
 class FrictionMarch(EventDrivenMarch):
@@ -54,7 +53,6 @@ class FrictionMarch(EventDrivenMarch):
     short steps; then the case goes on from event to event.
     """
 
-    has_piece_loop = False
     most_pairs = MOST_PAIRS
     take_change = staticmethod(change_states)
 
@@ -102,7 +100,8 @@ class FrictionMarch(EventDrivenMarch):
         q = self._clearance.size
         if q > self.most_pairs:
             raise NoClosedForm
-        self._entered_with = np.append(self._clearance, 1.0)
+        self._entered_with = np.ones(q + 1)
+        self._entered_with[:q] = self._clearance
         self.bodies = self.bodies._replace(clearance=self._entered_with)
         self._friction = self._friction_bodies()
         return setup.friction_library(friction)
@@ -224,6 +223,24 @@ class FrictionMarch(EventDrivenMarch):
             accumulator,
         )
 
+    def _advance_pieces(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
+        return advance_friction_pieces(
+            self.tables,
+            self.bodies,
+            self._friction,
+            self.clock,
+            pieces,
+            self._bare_progress,
+            self._z,
+            self._z_next,
+            self._z_kept,
+            self._motion,
+            self._work,
+            self._recorder,
+            samples,
+            sums,
+        )
+
     def _hand_over(self) -> None:
         """Go over to short steps, from the motion at the tick reached."""
         self._steps = self._steps or self._make_steps()
@@ -263,5 +280,5 @@ class FrictionMarch(EventDrivenMarch):
             pressed, turned = value[i].tolist()
             if state == STUCK:
                 pressed = 0.5 * (pressed + turned) / (float(self._friction.static[i]) or 1.0)
-            force[i] = max(pressed, _LEAST)
+            force[i] = max(pressed, LEAST_FORCE)
         return force

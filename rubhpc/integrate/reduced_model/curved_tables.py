@@ -32,8 +32,8 @@ Complexes = NDArray[np.complex128]
 
 UNBENT = 1e-8  # bending displacement over the largest of a stator, below which it is none
 LONGEST_STEP = 1e-3  # s, of closed contacts
-SERIES, N_TERM = 3.0, 26  # |x| below which the phi functions are series, which cancel less there; their terms
-_SERIES = [1.0 / math.factorial(N_NODE + j) for j in range(N_TERM)]  # of the last phi function
+# |x| below which the phi functions are series, which cancel less there, and their terms.
+SERIES = ((0.1, 10), (3.0, 26))
 SKEWED = 1e-14  # skew part of the stiffness over its largest entry, below which it is rounding
 UNDAMPED = 1e-14  # eigenvalue of the damping over the largest, below which it is none
 
@@ -213,7 +213,10 @@ def tuned_tables(
     free = -reduced.stiffness @ motion[:n] - reduced.damping @ motion[n:]
     free[:, still.first] += reduced.force[0] - 1j * reduced.force[1]
     read = np.concatenate([flat @ motion[:n], row @ motion[n:], flat @ free], axis=1)
-    weight = _weights(exponent, steps)
+    is_loaded = bool(still.load.any())  # without a closed pair nothing is loaded
+    weight = np.zeros((steps.size, N_NODE - 1, N_NODE, exponent.size), dtype=complex)
+    if is_loaded:
+        weight = _weights(exponent, steps)
     growth = np.exp(np.maximum(exponent.real, 0.0) * steps[-1])
     inverse = np.divide(1.0, exponent, out=np.zeros_like(exponent), where=exponent != 0.0)
     node = np.exp(np.multiply.outer(np.multiply.outer(steps, NODES[1:]), exponent))
@@ -221,10 +224,10 @@ def tuned_tables(
     lone = np.zeros((steps.size, 2, width, n_read))
     reach = np.zeros((steps.size, N_NODE * (d + 2), n_read))
     if still.is_lone:
-        seen = np.einsum("lam,rm->lmar", node, read[0]).reshape(steps.size, width, n_read)
-        lone[:, 0], lone[:, 1] = seen.real, -seen.imag
-        met = np.einsum("lakm,rm,jm->lkjar", weight, read[0], still.load[0], optimize=True)
-        reach[:] = met.real.reshape(reach.shape)
+        seen = node.swapaxes(1, 2)[..., np.newaxis] * read[0].T[:, np.newaxis]  # (l, m, 4, r)
+        lone[:, 0] = seen.real.reshape(lone[:, 0].shape)
+        np.negative(seen.imag.reshape(lone[:, 1].shape), out=lone[:, 1])
+        reach[:] = _reach(weight, read[0], still.load[0]).reshape(reach.shape)
     forces = np.concatenate([still.dampers, reduced.force])  # (r + 2, n)
     drain = forces @ motion[n:]
     used = np.flatnonzero(np.any(motion != 0.0, axis=0))[-1] + 1
@@ -252,6 +255,17 @@ def tuned_tables(
         sign=np.sign(still.size),
         drain_moved=forces @ still.shift.T,
     )
+
+
+def _reach(weight: Complexes, read: Complexes, load: Complexes) -> Floats:
+    """What is read (r, m) at nodes under unit loads (j, m) at all of them, (step, 5, j, 4, r)."""
+    n_step, n_at, n_node, width = weight.shape
+    both = (read[:, np.newaxis] * load).reshape(-1, width)  # (r j, m)
+    columns = np.concatenate([both.real, -both.imag], axis=1).T
+    rows = np.concatenate([weight.real, weight.imag], axis=-1).reshape(-1, 2 * width)
+    found = (rows @ columns).reshape(n_step, n_at, n_node, len(read), len(load))
+    reached: Floats = found.transpose(0, 2, 4, 1, 3)
+    return reached
 
 
 def _outputs(reduced: ReducedModel) -> Floats:
@@ -284,9 +298,12 @@ def _weights(exponent: Complexes, steps: Floats) -> Complexes:
     reached = np.multiply.outer(steps, NODES[1:])
     # All at once: of one step NumPy takes longer to begin than to compute.
     phi = phi_functions(np.multiply.outer(reached, exponent).ravel())
-    scale = [reached * NODES[1:] ** power * math.factorial(power) for power in range(N_NODE)]
-    term = np.stack(scale)[..., np.newaxis] * phi.reshape(N_NODE, *reached.shape, exponent.size)
-    weights: Complexes = LAGRANGE @ np.moveaxis(term, 0, 2)
+    phi = phi.reshape(N_NODE, *reached.shape, exponent.size)
+    for power in range(N_NODE):
+        phi[power] *= (reached * NODES[1:] ** power * math.factorial(power))[..., np.newaxis]
+    # Reals: a real matrix would be turned into a complex one.
+    found = (LAGRANGE @ phi.reshape(N_NODE, -1).view(np.float64)).view(np.complex128)
+    weights: Complexes = np.moveaxis(found.reshape(phi.shape), 0, 2)
     return weights
 
 
@@ -295,19 +312,23 @@ def phi_functions(x: Complexes) -> Complexes:
 
     Of small x the last one is a series, and `phi_(k-1) = x phi_k + 1 / (k - 1)!` gives those before.
     """
-    phi = np.zeros((N_NODE, x.size), dtype=complex)
-    is_small = np.abs(x) < SERIES
-    small, large = x[is_small], x[~is_small]
-    total = np.full(small.shape, _SERIES[-1], dtype=complex)
-    for coefficient in _SERIES[-2::-1]:
-        total *= small
-        total += coefficient
-    phi[-1, is_small] = total
-    for k in range(N_NODE - 1, 0, -1):
-        total = small * total + 1.0 / math.factorial(k)
-        phi[k - 1, is_small] = total
-    before = np.exp(large)
+    phi = np.empty((N_NODE, x.size), dtype=complex)
+    size, least = np.abs(x), -1.0
+    for limit, n_term in SERIES:
+        these = np.flatnonzero((size > least) & (size <= limit))
+        small, least = x[these], limit
+        total = np.full(small.shape, 1.0 / math.factorial(N_NODE + n_term - 1), dtype=complex)
+        for k in range(N_NODE + n_term - 2, N_NODE - 1, -1):
+            total *= small
+            total += 1.0 / math.factorial(k)
+        phi[-1, these] = total
+        for k in range(N_NODE - 1, 0, -1):
+            total = small * total + 1.0 / math.factorial(k)
+            phi[k - 1, these] = total
+    those = np.flatnonzero(size > least)
+    large = x[those]
+    before, inverse = np.exp(large), 1.0 / large
     for k in range(N_NODE):
-        before = (before - 1.0 / math.factorial(k)) / large
-        phi[k, ~is_small] = before
+        before = (before - 1.0 / math.factorial(k)) * inverse
+        phi[k, those] = before
     return phi

@@ -15,7 +15,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.changing_speed import stretch
 from rubhpc.integrate.changing_speed.run_up import integrate_run_up
 from rubhpc.integrate.setup import prepare
-from rubhpc.kernels.piece_loop import Pieces
+from rubhpc.kernels.pieces import Pieces
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.spectra import track_orders
 from rubhpc.study.initial import Initial
@@ -221,7 +221,10 @@ def test_a_law_of_constant_speed_is_a_simulation():
     assert mean.friction_work.values == pytest.approx(steady.friction_work, rel=1e-4)
 
 
-@pytest.mark.parametrize("contact", [{}, {"law": "penalty", "stiffness": 1e6, "damping": 20.0}])
+SPRINGS, STICK = {"law": "penalty", "stiffness": 1e6}, {"friction_law": "coulomb"}
+
+
+@pytest.mark.parametrize("contact", [{}, SPRINGS | {"damping": 20.0}, STICK, STICK | SPRINGS])
 @pytest.mark.parametrize("pieces", [None, 8])
 def test_pieces_together_are_pieces_one_by_one(monkeypatch, contact, pieces):
     """From before the contact on, with pieces of a part of a revolution, of one and of several."""
@@ -326,9 +329,6 @@ def test_pieces_of_several_revolutions_are_as_accurate_as_short_ones():
         expected = fine[name].values[: touched + 64 * 6]
         error = np.abs(found[name].values[: touched + 64 * 6] - expected).max()
         assert error < 0.01 * np.abs(expected).max(), name
-
-
-SPRINGS, STICK = {"law": "penalty", "stiffness": 1e6}, {"friction_law": "coulomb"}
 
 
 @pytest.mark.parametrize(
