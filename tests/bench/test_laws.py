@@ -9,6 +9,7 @@ import pytest
 
 from rubhpc import read_rig
 from rubhpc.integrate.case import run_case
+from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.study import Contact, Integrator, Recording
@@ -33,9 +34,8 @@ ROWS = [  # rig, friction, cases (speed ratio, clearance), law, the ratio asked 
     ("one stator, 52 cases", 1, 0.5, GRID, "restitution 0.5", {"restitution": 0.5}, 3.0),
     ("one stator, 52 cases", 1, 0.5, GRID, "Coulomb, restitution 0.5", COULOMB | {"restitution": 0.5}, 3.0),
     ("one stator, 52 cases", 1, 0.5, GRID, "Coulomb, penalty", COULOMB | PENALTY, 3.0),
-    # 10 is asked of both; 8.6 and 10.6 were measured of the second: chaotic cases differ twofold
     ("one stator, 12 cases", 1, 0.3, MAP, "updated normal", UPDATED, 10.0),
-    ("one stator, 12 cases", 1, 0.3, MAP, "second order, updated", UPDATED | BENT, 12.0),
+    ("one stator, 12 cases", 1, 0.3, MAP, "second order, updated", UPDATED | BENT, 10.0),
     ("ring of 16, 2 cases", 16, 0.1, RUBS, "Coulomb", COULOMB, 5.0),
 ]
 
@@ -60,9 +60,12 @@ def seconds_of(rig, cases, friction, law):
             samples_per_revolution=SAMPLES,
         )
         run_case(setup, clearance=clearance, friction=friction, recording=FIRST)
-        began = time.process_time()
-        run_case(setup, clearance=clearance, friction=friction, recording=RECORDING)
-        total += time.process_time() - began
+        compiled = math.nan
+        while compiled != seconds_compiling():  # what only some cases need is compiled by the first of them
+            compiled, began = seconds_compiling(), time.process_time()
+            run_case(setup, clearance=clearance, friction=friction, recording=RECORDING)
+            taken = time.process_time() - began
+        total += taken
     return total / len(cases)
 
 
