@@ -18,7 +18,8 @@ from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.curved import CurvedMarch
-from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.carried import carrier_displacement, tip_deflection
 from rubhpc.integrate.measuring.diverged_record import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of

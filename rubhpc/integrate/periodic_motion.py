@@ -14,7 +14,7 @@ from rubhpc.errors import InputError, NoPeriodicMotion
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.initial_state import fit_to_gaps
 from rubhpc.integrate.marches.closed_form import closed_form_march
-from rubhpc.integrate.marches.event_driven import NoClosedForm
+from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.periodic_motions.piecewise_motion import Change, PiecewiseMotion
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.record import Record, State

@@ -8,7 +8,7 @@ import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.initial_state import fit_to_gaps
-from rubhpc.integrate.marches.event_driven import NoClosedForm
+from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 from rubhpc.integrate.start import start_of

@@ -12,7 +12,8 @@ from rubhpc.integrate.case import march_of
 from rubhpc.integrate.changing_speed.carried_modes import Standing, carried, standing
 from rubhpc.integrate.changing_speed.stretch import Stretch, take_stretch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
-from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.marches.modal import ModalMarch, Place
 from rubhpc.integrate.measuring.samples import empty_samples, following_accumulator
 from rubhpc.integrate.record import State

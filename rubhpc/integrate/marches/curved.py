@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.march import NO_FORCES
+from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.curved_tables import curved_pairs
 from rubhpc.kernels.case_progress import ask_for, begin_in
@@ -96,8 +97,8 @@ class CurvedMarch(EventDrivenMarch):
         motion[n:] -= self._work.rate[0] @ shift
         return motion
 
-    def _add(self, mask: int) -> None:
-        """See that the library holds a set of contacts.
+    def find(self, mask: int) -> None:
+        """See that the tables hold a set of contacts.
 
         Raises
         ------
@@ -105,7 +106,7 @@ class CurvedMarch(EventDrivenMarch):
             Too many sets for bent stators, of which short steps know nothing.
         """
         try:
-            super()._add(mask)
+            super().find(mask)
         except NoClosedForm:
             if not self._is_bent:
                 raise
@@ -114,8 +115,8 @@ class CurvedMarch(EventDrivenMarch):
 
     def _use(self, tables: ModeTables) -> None:
         super()._use(tables)
-        assert isinstance(self._library, CurvedLibrary)
-        self._curved = self._library.curved_tables()
+        assert isinstance(self.library, CurvedLibrary)
+        self._curved = self.library.curved_tables()
 
     def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
         return setup.curved_library(friction)

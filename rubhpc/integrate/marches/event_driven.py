@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from rubhpc.integrate.marches.march import ALL_SAMPLES
+from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
 from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.measuring.samples import new_accumulator
 from rubhpc.kernels.case_progress import (
@@ -38,16 +39,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-FORESEEN, MOST_FORESEEN = 8, 4  # pieces for which a set of contacts is found again at their beginning; sets
-MOST_REFILLS = 4  # of tables that one case may meet; where it meets more, short steps cost less
-
-
-class NoClosedForm(Exception):  # noqa: N818 - a state of the motion, never seen by users
-    """What only short steps can follow.
-
-    Contacts open and close without end, or in too many combinations to tabulate.
-    """
-
 
 class EventDrivenMarch(ModalMarch):
     """A case that goes from one contact mode to another; `NoClosedForm` leaves it to contact stepping."""
@@ -68,8 +59,7 @@ class EventDrivenMarch(ModalMarch):
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(setup, clearance, friction, initial, check)
         self._event_work = event_work(self._clearance.size)
-        self._n_piece = 0
-        self._asked: dict[int, int] = {}  # piece in which each set of contacts was last asked for
+        self._modes = MetModes(is_foreseeing=self.is_foreseeing)
         self._enter_first(initial.contact_force)
 
     def begin(self, setup: ModalSetup, place: Place) -> None:
@@ -80,8 +70,6 @@ class EventDrivenMarch(ModalMarch):
         if place.sag is not setup.model.sag and (moved := place.sag - setup.model.sag).any():
             n = self.bodies.stiffness.shape[0]
             self._motion[:n] += setup.reduced.project[:, : moved.size] @ moved
-        self._n_piece += 1
-        self._asked = {mask: n for mask, n in self._asked.items() if self._n_piece - n <= FORESEEN}
         self._enter_first(place.contact_force)
 
     def start_again(self, state: State) -> bool:
@@ -93,33 +81,29 @@ class EventDrivenMarch(ModalMarch):
         self._stride = ALL_SAMPLES
         self._begin_time()
         self._motion[:] = self.reduced(state)
-        mask = self._first_mask(state.contact_force)
-        self.find(mask)
-        self._start(self._library.masks.index(mask))
+        self._enter(self._first_mask(state.contact_force))
 
     def _enter_first(self, contact_force: Floats) -> None:
         """Enter the contact mode with which the case begins; forces (q,), N."""
-        self._measured = self._find_library(self._setup, self._coefficient)
-        self._library = self._measured.followed
-        self._met = set(self._library.first_masks)  # sets of closed contacts
-        if self.is_foreseeing:
-            for foreseen in list(self._asked)[-MOST_FORESEEN:]:
-                self._add(foreseen)
-        mask = self._first_mask(contact_force)
+        self._modes.begin_piece(self._find_library(self._setup, self._coefficient))
+        self._enter(self._first_mask(contact_force))
+
+    def _enter(self, mask: int) -> None:
+        """Enter a contact mode from the motion."""
         self.find(mask)
-        self._start(self._library.masks.index(mask))
+        self._start(self.library.masks.index(mask))
 
     def begin_tuned(self, setup: ModalSetup, place: Place) -> ModeLibrary | None:
         """Begin where a kernel takes piece after piece; None where pieces are begun one by one."""
         if not self.has_piece_loop:
             return None
         self.begin(setup, place)
-        return self._library
+        return self.library
 
     @property
     def library(self) -> ModeLibrary:
         """Contact modes of the case."""
-        return self._library
+        return self._modes.library
 
     @property
     def mask(self) -> int:
@@ -139,7 +123,7 @@ class EventDrivenMarch(ModalMarch):
     @property
     def met(self) -> set[int]:
         """Sets of closed contacts that this piece has met, or is expected to meet."""
-        return self._met
+        return self._modes.met
 
     def advance_through(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
         """Advance through several pieces by a kernel that begins them (`kernels.piece_loop`).
@@ -247,12 +231,12 @@ class EventDrivenMarch(ModalMarch):
 
     def exponents(self, mask: int) -> tuple[Floats, Floats]:
         """Exponents of the coordinates of a contact mode and their drift (`ModeLibrary.exponents`)."""
-        return self._library.exponents(mask)
+        return self.library.exponents(mask)
 
     @property
     def derived(self) -> dict[int, Any]:
         """What is kept of the contact modes as long as their tables are (`ModeLibrary.derived`)."""
-        return self._library.derived
+        return self.library.derived
 
     def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
         """Take an event: `motion` (2 n,) after it, in place, and the contact mode that goes on, or -1.
@@ -300,52 +284,29 @@ class EventDrivenMarch(ModalMarch):
 
     def has_met(self, masks: list[int]) -> bool:
         """Whether this case has met these sets of contacts."""
-        return self._met.issuperset(masks)
+        return self.met.issuperset(masks)
 
     def find(self, mask: int) -> None:
-        """See that the tables hold a set of contacts.
-
-        The kernel is shown no set but those that this case has met: what it does must not depend on what
-        other cases have left in the library.
-        """
-        self._add(mask)
-        tables = self._library.tables()
-        unmet = self._library.unmet(self._met)
-        if unmet:
-            shown = tables.mask.copy()
-            shown[unmet] = -1
-            tables = tables._replace(mask=shown)
-        self._use(tables)
-
-    def _add(self, mask: int) -> None:
-        """See that the library holds a set of contacts."""
-        self._met.add(mask)
-        if len(self._met) > MOST_REFILLS * self._measured.followed.n_most:
-            raise NoClosedForm
-        if mask not in self._library.masks:
-            if self._library.is_full:
-                self._library.make_room()
-            if not self._library.add(mask):
-                raise NoClosedForm
+        """See that the tables hold a set of contacts."""
+        self._use(self._modes.tables_with(mask))
 
     def find_wanted(self) -> None:
         """See that the tables hold the set of contacts that the kernel asks for."""
         mask = int(self._bare_progress["wanted"])
-        self._asked.pop(mask, None)
-        self._asked[mask] = self._n_piece  # the last one asked for comes last
+        self._modes.ask_for(mask)
         self.find(mask)
 
     def _take_library(self, library: ModeLibrary) -> None:
         """Go on with the tables of another library, in the same coordinates."""
-        if library is not self._library:
+        if library is not self.library:
             mask, z = int(self.tables.mask[self._bare_progress["mode"]]), self._z
-            self._library = library
+            self._modes.library = library
             self.find(mask)
             self._z[:] = z
             self._bare_progress["mode"] = library.masks.index(mask)
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
-        self._take_library(self._measured if is_recorded else self._measured.followed)
+        self._take_library(self._modes.library_for(is_recorded=is_recorded))
         while (outcome := self._advance(last_tick, samples, accumulator, is_recorded)) == MODE_WANTED:
             self.find_wanted()
         return outcome

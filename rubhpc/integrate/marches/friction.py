@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
-from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.march import NO_FORCES
+from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.marches.workspace import empty_workspace
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, states_of

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rubhpc.integrate.marches.event_driven import EventDrivenMarch, NoClosedForm
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.kernels.penalty_events import MOST_PAIRS, change_pressed, pressed_pairs
 
 if TYPE_CHECKING:

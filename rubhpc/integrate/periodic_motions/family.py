@@ -11,7 +11,7 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
-from rubhpc.integrate.marches.event_driven import NoClosedForm
+from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
 from rubhpc.integrate.periodic_motions.saltation import by_clearance
 from rubhpc.integrate.record import State

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.marches.closed_form import closed_form_march
-from rubhpc.integrate.marches.event_driven import NoClosedForm
 from rubhpc.integrate.marches.friction import FrictionMarch
+from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.periodic_motions.piece_mode import Mode, mode_of
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.case_progress import closed_pairs

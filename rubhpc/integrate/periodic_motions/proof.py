@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.marches.event_driven import NoClosedForm
+from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.orbit_measures import PERIOD_TOLERANCE
 from rubhpc.integrate.measuring.regimes import MOST_DOUBLED, Solution, closest_return
 from rubhpc.integrate.packing import output_degrees

@@ -17,7 +17,7 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import steady_response
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches import event_driven as event_driven_march
-from rubhpc.integrate.marches import march
+from rubhpc.integrate.marches import march, met_modes
 from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.reduced_model import mode_library
@@ -83,7 +83,7 @@ def test_sets_are_made_anew_where_there_is_no_room_for_all(monkeypatch):
     """What is forgotten and met again is tabulated to the same numbers."""
     usual = simulate(trial_rig(3), **CLOSE)
     monkeypatch.setattr(ModeLibrary, "_most_modes", 4)
-    monkeypatch.setattr(event_driven_march, "MOST_REFILLS", 1000)
+    monkeypatch.setattr(met_modes, "MOST_REFILLS", 1000)
     made = []
     add = ModeLibrary.add
 
@@ -131,7 +131,7 @@ def _started(setup, state):
 
 def test_neighbours_do_not_depend_on_what_is_forgotten(monkeypatch):
     """Not even their last bits: other cases, which other ranks compute, fill the same tables."""
-    monkeypatch.setattr(event_driven_march, "MOST_REFILLS", 1000)
+    monkeypatch.setattr(met_modes, "MOST_REFILLS", 1000)
     ratios = []
     for most in (1024, 4):
         monkeypatch.setattr(ModeLibrary, "_most_modes", most)
@@ -173,7 +173,7 @@ def test_endless_events_are_left_to_short_steps(monkeypatch, too_many):
     exact = simulate(trial_rig(3), **CLOSE)
     if too_many == "sets":
         monkeypatch.setattr(ModeLibrary, "_most_modes", 4)
-        monkeypatch.setattr(event_driven_march, "MOST_REFILLS", 1)
+        monkeypatch.setattr(met_modes, "MOST_REFILLS", 1)
     else:
         monkeypatch.setattr(event_driven_march, "advance", lambda *_: CONTACT_UNSOLVED)
     stepped = simulate(trial_rig(3), step="0.25 us", **CLOSE)

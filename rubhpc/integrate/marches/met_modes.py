@@ -1,0 +1,80 @@
+"""The contact modes that one case has met, out of a library that all cases of a set-up share."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
+    from rubhpc.kernels.contact_modes import ModeTables
+
+FORESEEN, MOST_FORESEEN = 8, 4  # pieces for which a set of contacts is found again at their beginning; sets
+MOST_REFILLS = 4  # of tables that one case may meet; where it meets more, short steps cost less
+
+
+class NoClosedForm(Exception):  # noqa: N818 - a state of the motion, never seen by users
+    """What only short steps can follow.
+
+    Contacts open and close without end, or in too many combinations to tabulate.
+    """
+
+
+class MetModes:
+    """Sets of closed contacts that a case has met, and the library that holds them.
+
+    What the kernel does must not depend on what other cases have left in the library: it is shown no set but
+    those that this case has met.
+    """
+
+    def __init__(self, *, is_foreseeing: bool) -> None:
+        """Begin with no library; `is_foreseeing` if a piece begins with sets that those before have met."""
+        self._is_foreseeing = is_foreseeing
+        self._n_piece = -1
+        self._asked: dict[int, int] = {}  # piece in which each set of contacts was last asked for
+
+    def begin_piece(self, measured: ModeLibrary) -> None:
+        """Begin at another speed, or for the first time, with the library of that speed."""
+        self._n_piece += 1
+        self._asked = {mask: n for mask, n in self._asked.items() if self._n_piece - n <= FORESEEN}
+        self._measured = measured
+        self.library = measured.followed
+        self.met = set(self.library.first_masks)
+        if self._is_foreseeing:
+            for foreseen in list(self._asked)[-MOST_FORESEEN:]:
+                self._add(foreseen)
+
+    def library_for(self, *, is_recorded: bool) -> ModeLibrary:
+        """Contact modes with which a motion is recorded, or followed alone."""
+        return self._measured if is_recorded else self._measured.followed
+
+    def ask_for(self, mask: int) -> None:
+        """Note that the case has come to a set of contacts that it had not met."""
+        self._asked.pop(mask, None)
+        self._asked[mask] = self._n_piece  # the last one asked for comes last
+
+    def tables_with(self, mask: int) -> ModeTables:
+        """Return the tables of the sets that this case has met, and of one more.
+
+        Raises
+        ------
+        NoClosedForm
+            It has met too many.
+        """
+        self._add(mask)
+        tables, unmet = self.library.tables(), self.library.unmet(self.met)
+        if unmet:
+            shown = tables.mask.copy()
+            shown[unmet] = -1
+            tables = tables._replace(mask=shown)
+        return tables
+
+    def _add(self, mask: int) -> None:
+        """See that the library holds a set of contacts."""
+        self.met.add(mask)
+        if len(self.met) > MOST_REFILLS * self._measured.followed.n_most:
+            raise NoClosedForm
+        if mask not in self.library.masks:
+            if self.library.is_full:
+                self.library.make_room()
+            if not self.library.add(mask):
+                raise NoClosedForm
