@@ -75,7 +75,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 GROWTH = 2  # steps are no longer than 2^this times what the contact has lasted
-OBSERVED = 3e-4  # of the tolerance of loads, while recording, so that energies balance
+OBSERVED = 3e-3  # of the tolerance of loads, while recording, so that energies balance
 
 
 @jit_lean_sum

@@ -60,6 +60,7 @@ MOST_SWEEPS = 12  # over the nodes
 # went on: |t (t - 1/2) (t - 1) (t^2 - t + 1/7)| is at most 0.0029 within a step, 6.4 a step further.
 INTERPOLATED = 5e-4
 SETTLED = 0.1  # share of the loads' tolerance to which the iteration goes
+OBSERVED_SETTLED = 0.1  # of that while recording, so that energies balance
 EASY, VERY_EASY = 0.02, 5e-4  # shares of the tolerance below which steps may be twice, four times as long
 STALE = 2  # sweeps after which slopes are taken anew
 ANSWERED = 0.5  # share of the tolerance below which one more move errs by less than `SETTLED`
@@ -109,6 +110,7 @@ def take_step(
         if is_closed(mask, i):
             scale = max(scale, work.force[0, i], pairs.stiffness[i] * LEAST_TRAVEL * pairs.clearance[i])
     allowed = tolerance * scale
+    settled = SETTLED * allowed * (OBSERVED_SETTLED if is_recorded else 1.0)
     predict_loads(mask, step, work)
     is_lone = lone_pair(mask, pairs.radius.size) == 0
     if is_lone:
@@ -135,7 +137,7 @@ def take_step(
         for j in range(n):
             point[MISSED, j] = point[IMAGE, j] - point[LOADS, j]
         moved = size_of(point[MISSED], n, n_load, point[FORCES])
-        if moved <= SETTLED * allowed or sweep == MOST_SWEEPS:
+        if moved <= settled or sweep == MOST_SWEEPS:
             break
         first = moved if sweep == 0 else first
         if sweep >= HOPELESS and not moved <= FALLEN * first:
@@ -170,7 +172,7 @@ def take_step(
     for j in range(n):
         point[MOVE, j] = point[LOADS, j] - point[GUESS, j]
     missed = INTERPOLATED * size_of(point[MOVE], n, n_load, point[FORCES])
-    is_settled, work.span[SWEEPS] = is_last or moved <= SETTLED * allowed, 1.0 * sweep
+    is_settled, work.span[SWEEPS] = is_last or moved <= settled, 1.0 * sweep
     if is_settled:
         work.span[PATIENCE] = max(work.span[PATIENCE] - 1.0, 0.0)
     else:

@@ -28,7 +28,7 @@ DIRECT = 4  # transient = "direct"
 CHANGING_SPEED = 9  # run-ups and drives
 COULOMB = 6  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
-CURVED = 7  # method = "modal" with gaps that are curved
+CURVED = 8  # method = "modal" with gaps that are curved
 MANY_STATORS = 4  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 4  # [branch]: the motion with a weak impact next to a grazing
 MANY_EVENTS = 1  # restitution, or method = "modal" where a case may have 200 000 events
