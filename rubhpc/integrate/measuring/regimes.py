@@ -75,7 +75,7 @@ def regime(
     A record that looks periodic is so if a stable periodic motion is found next to its end, which the record
     agrees with or draws near to: of the period that it looks like, of that at which it returns nearest, or
     further on. If none is found, its cycles must be the same within 1e-5. Where motions cannot be solved for
-    at all, it is taken for what it looks like.
+    at all, it is taken for what it looks like, if its first cycles are its last ones within 1 %.
     A record shorter than 16 revolutions without a period leaves the motion undecided: it is too short for
     some periods. From 16 to 31 the growth alone decides, for it is measured beyond the record; a longer
     record may show a torus, or a period beyond 16, by itself.
@@ -105,7 +105,7 @@ def regime(
         nearest = int(square.argmin()) + 1
         if period == 0 and square.min() <= PERIOD_TOLERANCE**2 * orbit.size**2:
             looks_like = nearest
-    if solve is None and (period > 0 or (looks_like > 0 and orbit.has_equal_ends(looks_like))):
+    if solve is None and looks_like > 0 and orbit.has_equal_ends(looks_like):
         return Verdict(periodic, period)
     search = _Search(orbit)
     if solve and looks_like > 0 and (verdict := search.proves(looks_like, solve, further)):
@@ -122,7 +122,8 @@ def regime(
         verdict = search.proves(nearest, solve)
         if verdict is not None:
             return verdict._replace(exponent=exponent)
-    return Verdict(flag, 0, exponent)
+    is_settling = solve is None and flag == periodic
+    return Verdict(flag, period if is_settling else 0, exponent, is_reached=not (is_settling and period > 0))
 
 
 class _Orbit:

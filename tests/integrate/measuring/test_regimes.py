@@ -6,6 +6,7 @@ from itertools import repeat
 import numpy as np
 import pytest
 
+from rubhpc.integrate.measuring.orbit_measures import period as period_of
 from rubhpc.integrate.measuring.regimes import Solution, cycle_distances, is_torus, regime
 from rubhpc.schema import REGIME
 
@@ -58,6 +59,22 @@ def test_period_makes_a_motion_periodic_at_no_cost():
     name, exponent = of(torus(1 / 3), unread(), period=3)
     assert name == "periodic"
     assert math.isnan(exponent)
+
+
+@pytest.mark.parametrize(
+    ("growth", "expected"), [(-0.2, ("periodic", 1, False)), (0.3, ("chaotic", 0, True))]
+)
+def test_drift_of_cycles_that_follow_one_another_closely_is_no_period(growth, expected):
+    """Each cycle is the last one within 0.1 %, the last the first within 6 %: what follows decides."""
+    whirl = swollen(np.linspace(0.0, 0.3, REVOLUTIONS))
+    assert period_of(whirl.real, whirl.imag, SAMPLES) == 1
+    verdict = regime(whirl.real, whirl.imag, SAMPLES, period=1, is_contact=True, growth=repeat(growth))
+    assert (REGIME[verdict.flag], verdict.period, verdict.is_reached) == expected
+
+
+def test_drift_of_a_short_record_is_undecided():
+    whirl = swollen(np.linspace(0.0, 0.3, REVOLUTIONS))[: 12 * SAMPLES]
+    assert of(whirl, unread(), period=1)[0] == "undecided"
 
 
 def test_period_beyond_sixteen_is_one_too():
