@@ -10,7 +10,7 @@ from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import RPM, critical_speeds, written_speeds
 from postproc.figures.ticks import degree_steps
-from postproc.signals.orders import order_over_speed
+from postproc.signals.orders import order_over_speed, written_lag
 from postproc.store.run_ups import is_run_up
 from postproc.store.units import short_name
 from postproc.store.variables import require_results
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from postproc.figures.options import Axis, Positive
-
-FIRST_LAG = 120.0  # degrees, to which that of the first curve lies near where it begins: from -60 to 300
 
 
 def bode(
@@ -83,17 +81,14 @@ def draw_bode(
     for name in signals:
         amplitude, phase = data[f"amplitude_{name}"], data[f"phase_{name}"]
         curves = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
-        first_lag = FIRST_LAG
+        lag: np.ndarray[Any, Any] | None = None
         for i_case, ((case, height), (_, lead)) in enumerate(curves):
             own_speeds = speeds.isel({over: i_case}) if over in speeds.dims else speeds
             rpm = own_speeds.values * RPM
             own = name.removeprefix("probe_").replace("_", " ") if len(signals) > 1 else None
             label = ", ".join(text for text in (own, case) if text) or None
             top.plot(rpm, height.values * scale.factor, label=label, **style)
-            lag = -np.degrees(lead.values)
-            if np.isfinite(lag).any():  # whole turns apart a lag is the same
-                lag -= 360.0 * np.round((lag[np.isfinite(lag)][0] - first_lag) / 360.0)
-                first_lag = lag[np.isfinite(lag)][0]
+            lag = written_lag(lead.values, lag)
             bottom.plot(rpm, lag, **style)
             n_curve += 1
     shown = [signal_name(data[f"amplitude_{signals[0]}"])] if len(signals) == 1 else []

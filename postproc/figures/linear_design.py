@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.ticks import degree_steps
+from postproc.signals.orders import written_lag
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ _ROOM = 0.12  # of the abscissa: that the name of a peak takes
 _CIRCLE = 0.1  # of the square of an orbit's size: difference of those of its axes, below which it is a circle
 _RPM = 30 / math.pi
 _BAND: dict[str, Any] = {"color": "0.9", "zorder": 0, "linewidth": 0}
+_MAJOR: dict[str, Any] = {"color": "0.7", "linewidth": 2.0}  # seen below those of a circle
 _PROBES: tuple[dict[str, Any], ...] = (
     {"color": "C0", "linestyle": "-"},
     {"color": "C1", "linestyle": (0, (4, 1.5))},
@@ -39,7 +41,8 @@ def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
     -------
     Drawing
         Of two panels. Above, the major semi-axis of the orbit and the amplitudes at the probes, peaks with
-        their speed and amplification factor, and the operating range as a band; below, the phase.
+        their speed and amplification factor, and the operating range as a band; below, the phase lag, which
+        grows downwards as in `postproc.figures.bode` and as API RP 684 and machinery diagnostics draw it.
     """
     if node not in design["node"].values:
         raise InputError(
@@ -55,18 +58,21 @@ def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
         if "operating" in design.attrs:
             for ax in axes:
                 ax.axvspan(*(_RPM * np.array(design.attrs["operating"])), **_BAND)
-        amplitude.plot(rpm, 1e6 * shown["major_axis"].values, color="k", label="major semi-axis")
+        amplitude.plot(rpm, 1e6 * shown["major_axis"].values, label="major semi-axis", **_MAJOR)
+        lags: list[np.ndarray[Any, Any]] = []
         for i, angle in enumerate(shown["probe"].values):
             style = _PROBES[i % len(_PROBES)]
             label = f"probe at {math.degrees(angle):.3g}\N{DEGREE SIGN}"
             seen = shown.sel(probe=angle)
             amplitude.plot(rpm, 1e6 * seen["amplitude"].values, label=label, **style)
-            phase.plot(rpm, np.degrees(seen["phase"].values), **style)
+            lags.append(written_lag(seen["phase"].values, lags[-1] if lags else None))
+            phase.plot(rpm, lags[-1], **style)
         highest = 1e6 * float(shown["major_axis"].max()) or 1.0
         amplitude.set(ylabel="Amplitude (\N{MICRO SIGN}m)", ylim=(0, 1.25 * highest), xlim=(rpm[0], rpm[-1]))
         _name_peaks(amplitude, peaks)
         amplitude.legend(loc="best", fontsize=6)
-        phase.set(xlabel="Spin speed (rpm)", ylabel="Phase lead (\N{DEGREE SIGN})")
+        phase.set(xlabel="Spin speed (rpm)", ylabel="Phase lag (\N{DEGREE SIGN})")
+        phase.invert_yaxis()
         phase.yaxis.set_major_locator(degree_steps(phase))
         phase.ticklabel_format(axis="x", style="plain")
         phase.locator_params(axis="x", nbins=6)  # five digits of rpm take their room

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 WHOLE = 0.02  # of a revolution: by how much an order may miss a whole number of periods of a record
 NEAR = 1e-3  # of an order, within which a run-up follows it
+_FIRST_LAG = 120.0  # degrees
 
 
 def order_over_speed(
@@ -69,6 +70,27 @@ def order_over_speed(
         )
     found["speed"].attrs |= {"units": "rad s-1", "long_name": "spin speed"}
     return found
+
+
+def written_lag(lead: NDArray[np.float64], before: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    """Return the lag of a phase, degrees: the whole turns are left out that take it far from another one.
+
+    Parameters
+    ----------
+    lead : (n,)
+        rad; NaN where there is none.
+    before : (n,), optional
+        Lag of the curve drawn before, near which it begins; the first one begins from -60 to 300 degrees.
+    """
+    lag = -np.degrees(lead)
+    if np.isfinite(lag).any():
+        near = _FIRST_LAG if before is None or not np.isfinite(before).any() else _first(before)
+        lag -= 360.0 * np.round((_first(lag) - near) / 360.0)
+    return lag
+
+
+def _first(values: NDArray[np.float64]) -> float:
+    return float(values[np.isfinite(values)][0])
 
 
 def _unwrap(phase: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -85,6 +85,7 @@ def test_every_figure_is_a_method_with_its_signature_and_docstring(store: xr.Dat
 
 def test_a_figure_has_its_options_by_name_in_help() -> None:
     text = " ".join(pydoc.render_doc(Rub.spectrum, renderer=pydoc.plaintext).split())
+    text = text.replace("( ", "(")  # from Python 3.13 on a long signature has a line for each parameter
     assert "spectrum(self, /, signal: str = 'torsion', *, full: bool = False, orders: bool" in text
     assert "lines: int = 6, log: bool = False" in text
 

@@ -23,9 +23,12 @@ def test_response_shows_amplitude_phase_and_the_operating_range(design, tmp_path
     curve = amplitude.lines[0]
     assert curve.get_xdata() == pytest.approx(30 / np.pi * design.response_speed.values)
     assert curve.get_ydata() == pytest.approx(1e6 * design.major_axis.sel(node=3).values)
-    assert phase.lines[0].get_ydata()[5] == pytest.approx(
-        np.degrees(float(design.phase.sel(node=3).isel(response_speed=5, probe=0)))
-    )
+    lag = phase.lines[0].get_ydata()
+    lead = np.degrees(design.phase.sel(node=3).isel(probe=0).values)
+    assert np.exp(1j * np.radians(lag[5])) == pytest.approx(np.exp(-1j * np.radians(lead[5])))
+    assert phase.get_ylabel().startswith("Phase lag")
+    assert phase.yaxis_inverted()
+    assert 90.0 < lag[-1] - lag[1] < 180.0, "past the resonance it falls behind"
     named = [text.get_text() for text in amplitude.texts]
     speed, factor = float(design.peak_speed[0]), float(design.amplification_factor[0])
     assert f"{30 / np.pi * speed:.0f}\nAF {factor:.3g}" in named
