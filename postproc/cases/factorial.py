@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 _PASSES = 200  # of the fill, at most; each takes an unbalanced grid closer to least squares
 _CLOSE = 1e-10  # of the spread: the fill has converged
+_LEAST_SHARE = 1e-6  # by which a share of the variance is off through rounding, at most
 
 
 def grid_indices(values: Floats, weights: list[Floats] | None = None) -> Floats:
@@ -94,8 +95,9 @@ def half_widths(
         case[is_filled] += random.choice(residuals, int(is_filled.sum()))
         weights = [_level_weights(random, n) for n in values.shape]
         with np.errstate(divide="ignore", invalid="ignore"):
-            # A draw may by chance take levels between which the measure does not change: no information.
             drawn[i] = grid_indices(case, weights)
+    # By chance a draw takes levels between which the measure changes by rounding alone: no information.
+    drawn[~((drawn > -_LEAST_SHARE) & (drawn < 1.0 + _LEAST_SHARE)).all(axis=(1, 2))] = np.nan
     width: Floats = norm.ppf(0.5 + confidence / 2) * np.nanstd(drawn, axis=0, ddof=1)
     return width
 

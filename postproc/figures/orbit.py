@@ -100,7 +100,8 @@ def _draw_probes(probes: list[tuple[str, float]], ax: Axes, reach: float) -> Non
         side = "left" if at[0] < 0.0 else "right"  # towards the middle
         text = name.replace("_", " ")
         above: dict[str, Any] = {"textcoords": "offset points", "xytext": (0, 7), "ha": side, "va": "bottom"}
-        ax.annotate(text, at, fontsize=7, color="0.35", **above)
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8}  # over an orbit
+        ax.annotate(text, at, fontsize=7, color="0.35", zorder=6, bbox=box, **above)
         ax.update_datalim([(at[0], at[1] + 0.25 * reach)])
 
 

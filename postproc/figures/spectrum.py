@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
+from postproc.figures.small_multiples import write_over
 from postproc.signals.lines import SPIKE, spikes, strongest_lines
 from postproc.signals.spectra import signal_or_whirl, spectrum_data
 from postproc.store.units import scale_of, short_name
@@ -108,6 +109,8 @@ def draw_spectrum(
     is_full = bool((amplitude["order"].values < 0).any())
     ax.set_xlim(-end if is_full else 0.0, end)
     top = float(amplitude.max()) * scale.factor or 1.0
+    if float(amplitude.max()) == 0.0:
+        write_over(ax, "0 throughout")
     if log:
         ax.set_yscale("log")
         ax.set_ylim(top * _FLOOR, top * 6)

@@ -11,8 +11,10 @@ from postproc.cases.maps import MAPPABLE, VALIDITY, is_mappable, validity
 from postproc.figures.cells import cell_edges, is_geometric
 from postproc.figures.palette import categories
 from postproc.store.axes import axes_of, drawn_axes
+from postproc.store.rig_of_case import has_beams
 from postproc.store.units import displayed, meanings, short_name
 from postproc.store.worst import worst_word
+from rubhpc.errors import RubError
 from rubhpc.schema import DIVERGED, HAS_VALUES, PROBE, SIGNAL_NAMES, VARIABLES
 from rubhpc.units import Scale, scale_for
 
@@ -48,6 +50,7 @@ _SHARED = (
     (("peak_torsion",), ("torsion",)),
     (("peak_contact_force",), ("contact_force",)),
 )
+_OF_BEAMS = ("force_over_euler_load", "tip_deflection_ratio")
 _MATHTEXT = re.compile(r"\s*\$[^$]*\$")
 
 
@@ -59,6 +62,8 @@ class Measures:
         store = store.assign(validity=validity(store)).reset_coords(self._drawn)
         of_probes = [n for n in map(str, store.data_vars) if n not in MAPPABLE and is_mappable(n)]
         names = [n for n in (*MAPPABLE, "validity", *of_probes, *self._drawn) if n in store.data_vars]
+        if not _has_beams(store):
+            names = [n for n in names if n not in _OF_BEAMS]
         names.sort(key=lambda n: _FIRST.index(n) if n in _FIRST else len(_FIRST))
         self._data = store[names].load()
         self._dims = axes_of(store)
@@ -158,6 +163,14 @@ class Measures:
             {"code": c, "name": text, "color": to_hex(color)}
             for c, (text, color) in categories(name, np.array(codes)).items()
         ]
+
+
+def _has_beams(store: xr.Dataset) -> bool:
+    """Whether what beams alone have, a length and an Euler load, is worth showing."""
+    try:
+        return has_beams(store)
+    except RubError:  # the page says elsewhere that the rig cannot be read
+        return True
 
 
 def _measured(name: str) -> str:

@@ -34,6 +34,7 @@ from postproc.store.branch_points import check_points
 from postproc.store.rig_of_case import natural_frequencies, rig_axes, rig_of, stator_places
 from postproc.store.run_ups import is_run_up, measures_alone
 from rubhpc.errors import RubError
+from rubhpc.integrate.measuring.orbit_measures import LONGEST_PERIOD
 from rubhpc.version import __version__
 
 if TYPE_CHECKING:
@@ -139,6 +140,7 @@ class Page:
             "isRunUp": self.is_run_up,
             "places": self._places(),
             "frequencies": self._frequencies(),
+            "longestPeriod": LONGEST_PERIOD,
             "validity": {code: validity_text(code) for code in codes},
             "reasons": {str(i): text for i, text in store.attrs.get("reasons", {}).items()},
         }

@@ -9,6 +9,7 @@ import xarray as xr
 from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import rig_from_dict, with_keys
+from rubhpc.rig.stators import Stator
 from rubhpc.study.axes import coordinate_of, is_of_table
 
 if TYPE_CHECKING:
@@ -107,6 +108,13 @@ def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
         return []
     stators = rig_of(case).stator
     return [(s.angle, s.clearance_offset) for s in stators if s.node == stators[0].node]
+
+
+def has_beams(case: xr.Dataset) -> bool:
+    """Whether a stator is a beam, with a length and an Euler load; true where no rig says otherwise."""
+    if not isinstance(case.attrs.get("rig"), dict):
+        return True
+    return any(isinstance(stator, Stator) for stator in rig_of(case).stator)
 
 
 def is_carried(case: xr.Dataset) -> bool:

@@ -78,6 +78,8 @@ def stores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "empty": synthetic_store.make(keep=()),
     }
     made["empty"]["status"][...] = MISSING
+    made["scalars"]["period"][...] = 0
+    made["scalars"]["settled"][{"friction": 1}] = 0
     for name, dataset in made.items():
         synthetic_store.write(folder / f"{name}.zarr", dataset)
     return {name: folder / f"{name}.zarr" for name in made}

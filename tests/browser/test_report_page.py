@@ -209,6 +209,17 @@ def test_a_store_of_measures_has_maps_alone(visit: Visit, pages: dict[str, str])
     expect(page.locator("#right")).to_contain_text("The store contains only measures")
 
 
+@pytest.mark.parametrize(
+    ("friction", "words"),
+    [(0, "regime periodic, with a longer period than 16 revolutions,"), (1, "regime periodic once settled,")],
+)
+def test_a_periodic_motion_without_a_period_says_why(
+    visit: Visit, pages: dict[str, str], friction: int, words: str
+) -> None:
+    page = visit(f"{pages['scalars']}#at=1.1.{friction}.0")
+    expect(page.locator("#case-text")).to_contain_text(words)
+
+
 def test_a_case_that_was_left_out_says_how_to_see_it(visit: Visit, pages: dict[str, str]) -> None:
     page = visit(pages["cut"])
     left_out = page.evaluate(

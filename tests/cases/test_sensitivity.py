@@ -154,6 +154,17 @@ def without(store: xr.Dataset, share: float) -> xr.Dataset:
     return store
 
 
+def test_a_measure_that_is_zero_in_most_cases_has_its_intervals() -> None:
+    values = np.zeros((6, 5, 4))
+    values[4:, 3:, :] = [1.0, 1.5, 2.0, 2.5]  # rub in a corner; draws of levels that miss it say nothing
+    axes = tuple(np.arange(float(n)) for n in values.shape)
+    found = sensitivity(store_of(values, axes), "peak_torsion")
+    ends = [found[f"{name}_{end}"].values for name in ("first_order", "total") for end in ("low", "high")]
+    assert np.isfinite(ends).all()
+    assert (ends[1] > ends[0]).all()
+    assert (ends[3] > ends[2]).all()
+
+
 def test_cases_without_a_value_are_filled_and_reported() -> None:
     store = without(sines(20), share=0.05)
     whole = grid_indices(ishigami(*(middles(20),) * 3))

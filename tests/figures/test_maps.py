@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from postproc.cases.maps import default_axes, facet_axes, map_data
 from postproc.catalogue import figures
 from postproc.figures.cells import cell_edges
+from postproc.figures.map import map as draw_map
 from postproc.figures.map import value_maps
 from postproc.figures.small_multiples import name_facets
 from postproc.figures.style import house_style, new_figure
@@ -106,6 +107,13 @@ def test_command_draws_a_panel_for_each_value(synthetic_path, tmp_path, monkeypa
     assert said[-2:] == ["study_map.png", "map.csv"]
     table = np.genfromtxt("map.csv", delimiter=",", names=True, deletechars="")
     assert len(table) == 2 * 3 * 5
+
+
+@pytest.mark.parametrize("value", ["regime", "period", "status"])
+def test_flags_have_no_logarithmic_scale(synthetic_path, value):
+    store = open_store(synthetic_path).isel(friction=0, stator_youngs_modulus=0)
+    with pytest.raises(InputError, match=f"map: {value} has no scale; draw it without --log"):
+        draw_map(store, value, log=True).show()
 
 
 def test_maps_spread_over_what_the_facets_leave(synthetic_path):

@@ -20,7 +20,7 @@ from postproc.cases.maps import validity
 from postproc.report import budget
 from postproc.report.budget import write_report
 from postproc.report.cases import Cases
-from postproc.report.grid import described_axes
+from postproc.report.grid import Measures, described_axes
 from postproc.report.page import Page, least_size
 from postproc.store.open import open_store
 from rubhpc.commands.report import report
@@ -321,3 +321,13 @@ def test_measures_say_which_stator_is_the_worst(two_stator_path: Path) -> None:
     worst = {v["name"]: v["worst"] for v in facts["variables"] if v["by_stator"]}
     assert worst["peak_contact_force"] == "largest"
     assert worst["minimum_slip_speed"] == "smallest"
+
+
+def test_masses_have_no_euler_load() -> None:
+    beams = synthetic_store.make(n_stator=2)
+    mass = {"node": 8, "radius": 0.06, "mass": 1e-3, "stiffness": 1e6, "lateral_stiffness": 1e5}
+    masses = beams.assign_attrs(rig=beams.attrs["rig"] | {"stator": [mass, mass | {"angle": 1.0}]})
+    of_beams = {"force_over_euler_load", "tip_deflection_ratio"}
+    assert of_beams <= set(Measures(beams).names)
+    assert of_beams.isdisjoint(Measures(masses).names)
+    assert set(Measures(beams).names) - of_beams == set(Measures(masses).names)

@@ -196,11 +196,19 @@ async function caseTable(flat) {
     const isRing = v.by_stator && facts.nStator > 1;
     const cell = element("td", { className: "number" }, ...(isRing ? stators(v, values, flat, worst) : [worst]));
     rows.push(element("tr", {}, element("th", { scope: "row", textContent: v.label + ofStators(v, WORST) }), cell));
-    if (["regime", "peak_contact_force", "peak_torsion"].includes(v.name) || v.name === state.value) said.push(`${v.label.toLowerCase()} ${text}${ofStators(v, state.stator).replace(/^, (.*)/, " ($1)")}`);
+    if (v.name === "regime" && text === "periodic") said.push(`regime periodic${await periodNote(flat)}`);
+    else if (["regime", "peak_contact_force", "peak_torsion"].includes(v.name) || v.name === state.value) said.push(`${v.label.toLowerCase()} ${text}${ofStators(v, state.stator).replace(/^, (.*)/, " ($1)")}`);
     if (facts.isServed && !v.by_stator && rows.length > 40) break;
   }
   byId("case-table").replaceChildren(element("tbody", {}, ...rows));
   return said.join(", ");
+}
+
+// What a periodic motion without a period is.
+async function periodNote(flat) {
+  if (!variable.period || (await valuesOf("period"))[flat] !== 0) return "";
+  const isSettling = variable.settled && (await valuesOf("settled"))[flat] === 0;
+  return isSettling ? " once settled" : `, with a longer period than ${facts.longestPeriod} revolutions`;
 }
 
 // The worst value; behind it those of all stators, the worst first, and last those without any.
