@@ -107,7 +107,7 @@ class TangentMotion:
             n_revolution,
         )
         clock = march.clock
-        piece = 0
+        modes, piece = _ModesOfTrail(trail, march), 0
         while piece != ALL_CARRIED:
             march.find(int(trail.states[piece]))
             piece = carry_along(
@@ -118,25 +118,43 @@ class TangentMotion:
                 first,
                 clock.samples_per_revolution << clock.sample_level,
                 trail,
-                self._modes_of(trail),
+                modes.placed(),
                 tangent,
             )
         self._motion = tangent.motion
         self._grown += tangent.grown.tolist()
         return True
 
-    def _modes_of(self, trail: Trail) -> TrailModes:
-        """The contact modes of a trail, as far as the tables hold them."""
-        march = self._march
+
+class _ModesOfTrail:
+    """The contact modes that a trail goes through, each read when the tables first hold it.
+
+    Large rings meet more of them than the tables have room for, so that places change while a trail is read.
+    """
+
+    def __init__(self, trail: Trail, march: EventDrivenMarch) -> None:
+        self._march = march
         distinct, of_piece = np.unique(trail.states[: trail.n_event[0] + 1], return_inverse=True)
-        masks = march.tables.mask.tolist()
+        self._states: list[int] = distinct.tolist()
+        self._is_read = [False] * len(distinct)
         m, k = trail.begun.shape[2], len(distinct)
-        place, opened = np.full(k, -1), np.zeros(k, dtype=np.int64)
-        exponent, drift = np.zeros((k, 2, m)), np.zeros((k, m))
-        for i, states in enumerate(distinct.tolist()):
-            if states in masks:
-                place[i] = masks.index(states)
-                exponent[i], drift[i] = march.exponents(states)
-                opened[i] = march.gaps_watched(states)
-        has_states = isinstance(march, FrictionMarch)
-        return TrailModes(of_piece.reshape(-1), place, exponent, drift, opened, has_states)
+        self._modes = TrailModes(
+            of_piece.reshape(-1),
+            np.full(k, -1),
+            np.zeros((k, 2, m)),
+            np.zeros((k, m)),
+            np.zeros(k, dtype=np.int64),
+            isinstance(march, FrictionMarch),
+        )
+
+    def placed(self) -> TrailModes:
+        """They, with their places in the tables as those are now."""
+        march, modes = self._march, self._modes
+        place_of = {states: place for place, states in enumerate(march.tables.mask.tolist())}
+        for i, states in enumerate(self._states):
+            modes.place[i] = place = place_of.get(states, -1)
+            if place >= 0 and not self._is_read[i]:
+                modes.exponent[i], modes.drift[i] = march.exponents(states)
+                modes.opened[i] = march.gaps_watched(states)
+                self._is_read[i] = True
+        return modes

@@ -8,10 +8,13 @@ from trial_rig import trial_rig
 
 from rubhpc import simulate
 from rubhpc.integrate.case import march_of
+from rubhpc.integrate.marches import met_modes
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.saltation import carried
+from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.setup import prepare
-from rubhpc.integrate.tangent_motion import TangentMotion
+from rubhpc.integrate.tangent_motion import TangentMotion, _ModesOfTrail
 from rubhpc.study.study import Contact, Integrator, Recording
 
 SPEED, CLEARANCE, FRICTION, N_REVOLUTION = 170.0, 80e-6, 0.2, 6
@@ -51,3 +54,43 @@ def test_tangent_is_that_of_the_saltation_matrices(law):
         begin, states = revolution.end, revolution.states
     assert n_event > 2 * N_REVOLUTION
     assert found == pytest.approx(known, abs=1e-4)
+
+
+def test_contact_modes_without_room_are_read_once(monkeypatch):
+    """Tables that hold fewer modes than a motion meets: the same tangent, and each read once a trail."""
+    rig = trial_rig(3)
+    record = simulate(
+        rig,
+        speed=SPEED,
+        clearance=40e-6,
+        friction=FRICTION,
+        transient=5,
+        revolutions=1,
+        samples_per_revolution=64,
+    )
+
+    def tangent():
+        setup = prepare(rig, SPEED, contact=Contact(), integrator=Integrator(), samples_per_revolution=64)
+
+        def start(state):
+            return march_of(setup.scheme, setup)(setup, 40e-6, FRICTION, state, None)
+
+        return TangentMotion(start, record.final, setup, Recording(samples_per_revolution=64))
+
+    expected = tangent().part(N_REVOLUTION)
+    read, n_asked, trails = [], [], []
+    exponents, placed = EventDrivenMarch.exponents, _ModesOfTrail.placed
+    begin = _ModesOfTrail.__init__
+
+    def begun(modes, trail, march):
+        begin(modes, trail, march)
+        trails.append(len(modes._states))
+
+    monkeypatch.setattr(_ModesOfTrail, "__init__", begun)
+    monkeypatch.setattr(EventDrivenMarch, "exponents", lambda m, s: read.append(s) or exponents(m, s))
+    monkeypatch.setattr(_ModesOfTrail, "placed", lambda modes: n_asked.append(1) or placed(modes))
+    monkeypatch.setattr(ModeLibrary, "_most_modes", 4)
+    monkeypatch.setattr(met_modes, "MOST_REFILLS", 1000)
+    assert tangent().part(N_REVOLUTION) == expected
+    assert len(n_asked) > 2 * len(trails)
+    assert len(read) <= sum(trails)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 WORST_CONDITION = 1e11  # of the eigenvectors; beyond it their sum loses its digits, and they are set apart
 SMALL = 64  # states of a part that is kept
-MOST_BYTES = 2**28  # of parts that are kept
+MOST_BYTES = 2**29  # of parts that are kept
 
 
 class KeptParts(dict[bytes, "tuple[Complexes, Complexes, Complexes]"]):

@@ -106,8 +106,9 @@ class ModeLibrary:
     def followed(self) -> ModeLibrary:
         """Contact modes with which a motion is followed where nothing is recorded.
 
-        Of large ones memory holds few; without slip, outputs and energies it holds more, and half as much
-        memory again is theirs. What one of the two libraries holds the other does not solve again.
+        Of large ones memory holds few; without slip, outputs and energies it holds more, and twice as much
+        memory is theirs: an irregular motion that finds no room for all of them solves them again and again.
+        What one of the two libraries holds the other does not solve again.
         """
         if not self._is_large:
             return self
@@ -117,8 +118,7 @@ class ModeLibrary:
             made._is_measured = made._is_large = False
             made._n_solved = 0
             made._n_level = self._n_level_followed
-            n_least, most_bytes = 1 + len(self.gap_jacobian), MOST_BYTES + MOST_BYTES // 2
-            made._tables = TableStack(n_least, self._most_modes, most_bytes)
+            made._tables = TableStack(1 + len(self.gap_jacobian), 2 * self._most_modes, 2 * MOST_BYTES)
             made.masks, made._exponents, made.derived, made._chance = [], {}, {}, np.random.default_rng(0)
             for mask in self.first_masks:
                 made.add(mask)
