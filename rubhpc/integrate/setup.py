@@ -63,6 +63,7 @@ if TYPE_CHECKING:
 L = TypeVar("L", bound=ModeLibrary)
 FINEST_TICK = 1.5e-9  # s
 CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
+LONGEST_TURN = FINEST_TICK * 2**46  # s, a day: 64 bits count the ticks of a hundred thousand
 FEWEST_STEPS = 16  # a revolution: none is longer than the power of two below it
 
 
@@ -121,8 +122,13 @@ class ModalSetup:
 
     @cached_property
     def sample_level(self) -> int:
-        """2^sample_level ticks are the interval of samples."""
-        return max(2, math.ceil(math.log2(self.interval / FINEST_TICK)))
+        """2^sample_level ticks are the interval of samples; no step of contact is shorter than a tick."""
+        return max(2, self._contact_levels, math.ceil(math.log2(self.interval / FINEST_TICK)))
+
+    @property
+    def _contact_levels(self) -> int:
+        """By how many levels the longest step of a recorded contact is below the interval of samples."""
+        return max(0, math.ceil(math.log2(CONTACT_STEPS / self.samples_per_revolution)))
 
     @cached_property
     def tick(self) -> float:
@@ -132,14 +138,13 @@ class ModalSetup:
     @cached_property
     def clock(self) -> Clock:
         """How time is counted, from the shaft's angle 0 on, before a record is asked for."""
-        turn = self.interval * self.samples_per_revolution
         return Clock(
             spin=self.spin,
             tick=self.tick,
             sample_level=self.sample_level,
             samples_per_revolution=self.samples_per_revolution,
             search_level=self.level_within(self.step),
-            contact_level=math.floor(math.log2(min(self.interval, turn / CONTACT_STEPS) / self.tick)),
+            contact_level=self.sample_level - self._contact_levels,
             n_sample=0,
         )
 
@@ -297,7 +302,7 @@ def prepare(
     ------
     InputError
         If the step asked for is above the stability limit of the assembled matrices, the rig has no stator,
-        the speed is zero, or a probe has nothing to measure.
+        the speed is zero or, for the modal scheme, all but zero, or a probe has nothing to measure.
     """
     if not rig.stator:
         raise InputError(f"rig {rig.name}: [[stator]]: none; a rub case needs at least one")
@@ -310,6 +315,12 @@ def prepare(
     is_bent = any(stator.squared_slope is not None for stator in model.stators)
     scheme = scheme_of(contact, integrator, is_bent=is_bent)
     if integrator.method == "modal":
+        if 2.0 * math.pi / abs(speed) > LONGEST_TURN:
+            least = 2.0 * math.pi / LONGEST_TURN
+            raise InputError(
+                f"speed: {speed:.3g} rad/s is too slow for events timed to 1.5 ns; take {least:.1g} rad/s "
+                "or more"
+            )
         return ModalSetup(
             scheme=scheme,
             model=model,

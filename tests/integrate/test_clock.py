@@ -1,0 +1,46 @@
+"""How time is counted, whatever the speed: kernels take steps of whole ticks."""
+
+import math
+
+import pytest
+
+import rubhpc
+from rubhpc import InputError
+from rubhpc.integrate.setup import CONTACT_STEPS, FINEST_TICK, LONGEST_TURN, prepare
+from rubhpc.rig.reading import read_rig
+from rubhpc.study.study import Contact, Integrator
+
+
+def clock(speed: float, samples: int):
+    setup = prepare(
+        read_rig("mokhtar2017"),
+        speed,
+        contact=Contact(),
+        integrator=Integrator(),
+        samples_per_revolution=samples,
+    )
+    return setup.clock
+
+
+@pytest.mark.parametrize("samples", [16, 100, 128, 1024, 3000])
+@pytest.mark.parametrize("speed", [1e-3, 1.0, 150.0, 1e4, 1e6, 1e8, -1e10, 1e14])
+def test_steps_are_whole_ticks_and_resolve_a_contact(speed: float, samples: int) -> None:
+    counted = clock(speed, samples)
+    turn = 2.0 * math.pi / abs(speed)
+    assert counted.tick * samples * 2**counted.sample_level == pytest.approx(turn)
+    assert counted.tick <= FINEST_TICK
+    assert 0 <= counted.contact_level <= counted.sample_level, "a shift by less is undefined"
+    longest = counted.tick * 2**counted.contact_level
+    assert longest <= min(turn / samples, turn / CONTACT_STEPS) * (1.0 + 1e-12)
+    assert (
+        2.0 * longest > min(turn / samples, turn / CONTACT_STEPS)
+        or counted.contact_level == counted.sample_level
+    )
+    assert 0 <= counted.search_level <= counted.sample_level
+
+
+def test_a_speed_at_which_ticks_cannot_be_counted_is_refused() -> None:
+    slowest = 2.0 * math.pi / LONGEST_TURN
+    assert clock(1.01 * slowest, 128).samples_per_revolution == 128
+    with pytest.raises(InputError, match=r"too slow for events timed to 1\.5 ns; take 6e-05 rad/s or more"):
+        rubhpc.simulate("mokhtar2017", speed=-0.9 * slowest, clearance="80 um", friction=0.1)
