@@ -225,8 +225,9 @@ class Manifest:
             )
         if store.is_file():
             raise StoreError(f"{store}: is not a rubhpc store but a file")
-        what = "is not a rubhpc store" if store.exists() else "no such store"
-        raise StoreError(f"{store}: {what}; give the directory that a study was run into")
+        if not store.exists():
+            raise StoreError(f"{store}: no such store; give the directory that a study was run into")
+        raise StoreError(no_store(store, "give the directory that a study was run into"))
 
     @classmethod
     def _of_json(cls, content: dict[str, Any]) -> Self:
@@ -258,6 +259,21 @@ def _probed(parts: dict[str, Any]) -> list[tuple[str, str]]:
 
 class _OtherFormat(Exception):  # noqa: N818 - becomes the text of a StoreError
     """A manifest that another version wrote."""
+
+
+def no_store(path: Path, advice: str) -> str:
+    """Return why there is no manifest at a path that exists: what it lacks, or is not, and what to do.
+
+    What a store without its private directory holds can be read, and no run overwrites it.
+    """
+    if (path / "zarr.json").is_file() and not (path / PRIVATE).is_dir():
+        return (
+            f"{path}: its directory {PRIVATE} is missing, which holds what is done and all checksums; "
+            "copy it too (cp -r STORE, not STORE/*), or move this store away and run the study anew"
+        )
+    if (path / PRIVATE / "journal").is_dir():
+        return f"{path}: both copies of its manifest are missing; put one back from a backup, or {advice}"
+    return f"{path}: is not a rubhpc store; {advice}"
 
 
 def manifests(store: Path) -> list[Path]:

@@ -13,10 +13,10 @@ from rubhpc.schema import DIVERGED, DONE
 from rubhpc.storage.differences import differences, is_other_version
 from rubhpc.storage.drafts import remove_drafts
 from rubhpc.storage.growth import finish_growth, grow
-from rubhpc.storage.manifest import Manifest, manifests
+from rubhpc.storage.manifest import Manifest, manifests, no_store
 from rubhpc.storage.measures import added_measures
 from rubhpc.storage.new_manifest import manifest_of
-from rubhpc.storage.store import Store
+from rubhpc.storage.store import ELSEWHERE, Store
 from rubhpc.storage.tidy import tidy
 from rubhpc.study.cases import CaseGrid
 
@@ -43,10 +43,12 @@ def grid_for(study: Study, *, accept_version: bool = False) -> CaseGrid:
     ------
     StoreError
         The store at the study's output is of another study, or of another version of the physics that is
-        not accepted; the text lists the differences.
+        not accepted; the text lists the differences. Or there is something else.
     """
     grid = CaseGrid(study)
     if not is_store(study.output):
+        if os.path.isdir(study.output) and any(os.scandir(study.output)):
+            raise StoreError(no_store(study.output, ELSEWHERE))
         return grid
     manifest = Manifest.read(study.output)
     _refuse_other(manifest, manifest_of(grid), study.output, accept_version=accept_version)

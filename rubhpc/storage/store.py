@@ -28,7 +28,7 @@ from rubhpc.storage.drafts import remove_drafts
 from rubhpc.storage.journal import Entry, Journal
 from rubhpc.storage.ledger import Ledger, replay
 from rubhpc.storage.lock import Lock
-from rubhpc.storage.manifest import GROWTH, PRIVATE, Manifest
+from rubhpc.storage.manifest import GROWTH, PRIVATE, Manifest, no_store
 from rubhpc.storage.packed import PackingNote, state_of_journals, write_packed
 from rubhpc.storage.parts import Parts
 from rubhpc.storage.refined import status_of
@@ -39,6 +39,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.study.cases import CaseGrid
+
+
+ELSEWHERE = "move it away or choose another --output"
 
 
 class Store:
@@ -72,14 +75,10 @@ class Store:
                 layout.build(draft, grid)
                 draft.rename(place)
             except (FileExistsError, NotADirectoryError):
-                raise StoreError(
-                    f"{path}: is no rubhpc store; move it away or choose another --output"
-                ) from None
+                raise StoreError(no_store(path, ELSEWHERE)) from None
             except OSError as error:
                 if path.is_dir() and any(path.iterdir()):
-                    raise StoreError(
-                        f"{path}: is no rubhpc store; move it away or choose another --output"
-                    ) from error
+                    raise StoreError(no_store(path, ELSEWHERE)) from error
                 raise
             finally:
                 shutil.rmtree(draft, ignore_errors=True)

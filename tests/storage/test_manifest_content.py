@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
@@ -10,6 +11,7 @@ import pytest
 
 from rubhpc.errors import StoreError
 from rubhpc.storage.manifest import Manifest
+from rubhpc.storage.resume import grid_for
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
 from rubhpc.study.cases import CaseGrid
@@ -143,3 +145,28 @@ def test_a_garbled_note_of_the_packing_is_named(store, content):
     assert verify(store).arrays == ("packed.json",)
     assert not note.exists()  # the next run packs again
     assert not verify(store)
+
+
+@pytest.mark.parametrize(
+    ("lost", "said"),
+    [
+        ((".rubhpc",), r"its directory \.rubhpc is missing, .*copy it too"),
+        ((".rubhpc/manifest.json", ".rubhpc/manifest.copy.json"), "both copies of its manifest are missing"),
+        ((".rubhpc", "zarr.json"), "is not a rubhpc store"),
+    ],
+)
+def test_what_a_store_has_lost_is_named_and_nothing_is_overwritten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lost: tuple[str, ...], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.toml").write_text(STUDY)
+    study = read_study(tmp_path / "s.toml")
+    store = Store.create(study.output, CaseGrid(study)).path
+    for name in lost:
+        place = store / name
+        shutil.rmtree(place) if place.is_dir() else place.unlink()
+    left = sorted(store.rglob("*"))
+    for use in (Store, lambda _: grid_for(study), lambda _: Store.create(store, CaseGrid(study))):
+        with pytest.raises(StoreError, match=said):
+            use(store)
+    assert sorted(store.rglob("*")) == left

@@ -229,7 +229,7 @@ def test_what_changes_no_result_is_no_difference(tmp_path, store):
 def test_a_directory_of_something_else_is_left_alone(study):
     study.output.mkdir()
     (study.output / "thesis.tex").write_text("x")
-    with pytest.raises(StoreError, match="no rubhpc store"):
+    with pytest.raises(StoreError, match="not a rubhpc store"):
         open_store(CaseGrid(study))
     assert [path.name for path in study.output.iterdir()] == ["thesis.tex"]
     with pytest.raises(StoreError, match="not a rubhpc store"):
@@ -238,7 +238,7 @@ def test_a_directory_of_something_else_is_left_alone(study):
 
 def test_a_file_in_the_way_is_left_alone(study):
     study.output.write_text("x")
-    with pytest.raises(StoreError, match="no rubhpc store"):
+    with pytest.raises(StoreError, match="not a rubhpc store"):
         open_store(CaseGrid(study))
     assert study.output.read_text() == "x"
 
