@@ -146,6 +146,7 @@ class ModalSetup:
             search_level=self.level_within(self.step),
             contact_level=self.sample_level - self._contact_levels,
             n_sample=0,
+            growth=0.0,
         )
 
     def level_within(self, step: float) -> int:

@@ -27,6 +27,7 @@ class Clock(NamedTuple):
     search_level: int  # event-search steps, up to 2^level ticks, need no bound; they are checked at their end
     contact_level: int  # longest step with a pair closed while recording
     n_sample: int  # samples of the record; it ends where the next one would stand
+    growth: float  # 1/s, of the unbalance force from tick 0 on; 0 at a constant speed
 
 
 class Progress(Protocol):
@@ -104,3 +105,11 @@ def shaft_angle(clock: Clock, tick: int) -> float:
     """Angle of the shaft at a tick, rad, counted from the beginning of its revolution."""
     ticks_per_revolution = clock.samples_per_revolution << clock.sample_level
     return rim_sense(clock.spin) * 2.0 * np.pi * (tick % ticks_per_revolution) / ticks_per_revolution
+
+
+@jit_inline_sum
+def shaft_turn(clock: Clock, tick: int, after: float = 0.0) -> tuple[float, float]:
+    """Cosine and sine of the shaft's angle a time `after` (s) a tick, as large as the unbalance has grown."""
+    angle = shaft_angle(clock, tick) + clock.spin * after
+    size = np.exp(clock.growth * (tick * clock.tick + after))
+    return size * np.cos(angle), size * np.sin(angle)

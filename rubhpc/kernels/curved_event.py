@@ -15,7 +15,7 @@ from rubhpc.kernels.case_progress import (
     UNDER_WAY,
     Clock,
     Progress,
-    shaft_angle,
+    shaft_turn,
 )
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
 from rubhpc.kernels.curved_change import change_curved
@@ -59,7 +59,7 @@ def take_curved_event(
         tables, reduced, clock, is_recorded, progress, z, motion, events.impulse, recorder, accumulator
     ):
         return DIVERGED
-    angle = shaft_angle(clock, progress.tick)
+    cosine, sine = shaft_turn(clock, progress.tick)
     progress.wanted = change_curved(
         pairs,
         reduced,
@@ -67,8 +67,8 @@ def take_curved_event(
         crossing,
         clock.spin,
         (1 << FORCED_LEVEL) * clock.tick,
-        np.cos(angle),
-        np.sin(angle),
+        cosine,
+        sine,
         motion,
         is_recorded,
         work,

@@ -23,7 +23,7 @@ from rubhpc.kernels.case_progress import (
     UNDER_WAY,
     Clock,
     Progress,
-    shaft_angle,
+    shaft_turn,
 )
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
@@ -127,8 +127,7 @@ def advance_curved(
             if closed == 0:
                 begin_span(tables, z, progress, recorder)
             else:
-                angle = shaft_angle(clock, progress.tick)
-                begin_curved_span(pairs, tables, curved, angle, z, progress, work)
+                begin_curved_span(pairs, tables, curved, clock, z, progress, work)
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
         is_end = progress.tick >= last_tick
         is_last = is_end and is_recorded and progress.tick == clock.n_sample << clock.sample_level
@@ -140,7 +139,7 @@ def advance_curved(
                 pairs,
                 reduced,
                 mode,
-                shaft_angle(clock, progress.tick),
+                shaft_turn(clock, progress.tick),
                 z_re,
                 z_im,
                 i_sample,
@@ -306,8 +305,8 @@ def enter_curved(
             for k in range(n):
                 motion[k] += curved.shift[found, i, k] * work.h[0, i]
                 motion[n + k] += curved.shift[found, i, k] * work.rate[0, i]
-    angle = shaft_angle(clock, progress.tick)
-    enter(tables, found, reduced.clearance, np.cos(angle), np.sin(angle), motion, z)
+    cosine, sine = shaft_turn(clock, progress.tick)
+    enter(tables, found, reduced.clearance, cosine, sine, motion, z)
     progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
     progress.resolved_level, progress.halving_level, progress.is_after_event = FORCED_LEVEL, NONE, 1
     progress.contact_age = NONE

@@ -20,7 +20,7 @@ from rubhpc.kernels.accumulators import (
     observe_force,
     observe_sense,
 )
-from rubhpc.kernels.case_progress import Clock, Progress, shaft_angle
+from rubhpc.kernels.case_progress import Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import (
     DYING,
     LATERAL_ROW,
@@ -78,12 +78,12 @@ def begin_curved_span(
     pairs: CurvedPairs,
     tables: ModeTables,
     curved: CurvedTables,
-    angle: float,
+    clock: Clock,
     z: Floats,
     progress: Progress,
     work: CurvedWork,
 ) -> None:
-    """Begin to add up energies amid closed contacts, the shaft at an angle (rad).
+    """Begin to add up energies amid closed contacts, at the tick reached.
 
     What goes on by itself from here is set apart, the coordinates but for where the loads hold them: steps
     must resolve that alone.
@@ -94,7 +94,8 @@ def begin_curved_span(
         a, b = curved.inverse_re[mode, k], curved.inverse_im[mode, k]
         re, im = work.response[0, 0, k], work.response[0, 1, k]
         transient[0, k], transient[1, k] = z[0, k] + a * re - b * im, z[1, k] + a * im + b * re
-    observe_power(pairs, tables, curved, mode, 0, angle, z, work)
+    turn = shaft_turn(clock, progress.tick)
+    observe_power(pairs, tables, curved, mode, 0, turn, z, work)
     progress.energy_from = progress.tick
 
 
@@ -145,11 +146,11 @@ def observe_power(
     curved: CurvedTables,
     mode: int,
     node: int,
-    angle: float,
+    turn: tuple[float, float],
     z: Floats,
     work: CurvedWork,
 ) -> None:
-    """Power (W) that damping takes and the unbalance gives at a node, the shaft at an angle (rad)."""
+    """Power (W) that damping takes and the unbalance gives at a node; the turn is that of `shaft_turn`."""
     seen, n_loss = work.seen, curved.sign.shape[1]
     for r in range(n_loss + 2):
         seen[r] = 0.0
@@ -160,7 +161,7 @@ def observe_power(
         rate = work.rate[node, i]
         for r in range(n_loss + 2):
             seen[r] -= curved.drain_moved[mode, r, i] * rate
-    loss, gain = 0.0, seen[n_loss] * np.cos(angle) + seen[n_loss + 1] * np.sin(angle)
+    loss, gain = 0.0, seen[n_loss] * turn[0] + seen[n_loss + 1] * turn[1]
     for r in range(n_loss):
         loss += curved.sign[mode, r] * seen[r] * seen[r]
     if pairs.skew.shape[0] > 0:
@@ -187,15 +188,14 @@ def observe_energies(
     """Add what damping takes and the unbalance gives in a step of 2^level ticks from `z`."""
     mode = progress.mode
     step = (1 << level) * clock.tick
-    begun = shaft_angle(clock, progress.tick)
     loss, gain = LOBATTO[0] * work.power[0, 0], LOBATTO[0] * work.power[0, 1]
     for node in range(1, N_NODE):
         there = z_next
         if node < N_NODE - 1:
             there = work.middle
             move_coordinates(curved, mode, level, node, z, work, there)
-        angle = begun + NODES[node] * clock.spin * step
-        observe_power(pairs, tables, curved, mode, node, angle, there, work)
+        turn = shaft_turn(clock, progress.tick, NODES[node] * step)
+        observe_power(pairs, tables, curved, mode, node, turn, there, work)
         loss += LOBATTO[node] * work.power[node, 0]
         gain += LOBATTO[node] * work.power[node, 1]
     accumulator.energy[DAMPING_LOSS] += loss * step
@@ -255,7 +255,7 @@ def take_curved_sample(
     pairs: CurvedPairs,
     reduced: Reduced,
     mode: int,
-    angle: float,
+    turn: tuple[float, float],
     z_re: Floats,
     z_im: Floats,
     i_sample: int,
@@ -267,11 +267,11 @@ def take_curved_sample(
 ) -> None:
     """Record a sample at the beginning of a step; the one past the record counts for extrema alone.
 
-    The angle (rad) is that of the shaft, the interval (s) that between samples.
+    The turn is that of the shaft (`shaft_turn`), the interval (s) that between samples.
     """
     n, value = reduced.stiffness.shape[0], recorder.value
     place(tables, curved, mode, z_re, z_im, work.h[0], work.rate[0], work.state)
-    cosine, sine = np.cos(angle), np.sin(angle)
+    cosine, sine = turn
     for k in range(n):
         total = reduced.force_cosine[k] * cosine + reduced.force_sine[k] * sine
         stiffness, damping = reduced.stiffness[k], reduced.damping[k]

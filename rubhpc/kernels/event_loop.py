@@ -29,7 +29,7 @@ from rubhpc.kernels.case_progress import (
     UNDER_WAY,
     Clock,
     Progress,
-    shaft_angle,
+    shaft_turn,
 )
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
@@ -300,7 +300,7 @@ def take_event(
     ):
         return DIVERGED
     note_before(work.trail, progress.tick, crossing, motion)
-    angle = shaft_angle(clock, progress.tick)
+    cosine, sine = shaft_turn(clock, progress.tick)
     moment = (1 << FORCED_LEVEL) * clock.tick
     if reduced.spring > 0.0:
         progress.wanted = change_pressed(reduced, closed, crossing, motion)
@@ -311,8 +311,8 @@ def take_event(
             crossing,
             spin,
             moment,
-            np.cos(angle),
-            np.sin(angle),
+            cosine,
+            sine,
             motion,
             is_recorded,
             work.force,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import observe_force
-from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_angle
+from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
     SAMPLES_AT_ONCE,
@@ -39,8 +39,8 @@ def enter_wanted(
     found = find_mode(tables.mask, progress.wanted)
     if found < 0:
         return False
-    angle = shaft_angle(clock, progress.tick)
-    enter(tables, found, clearance, np.cos(angle), np.sin(angle), motion, z)
+    cosine, sine = shaft_turn(clock, progress.tick)
+    enter(tables, found, clearance, cosine, sine, motion, z)
     progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
     progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
     return True

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import DAMPING_LOSS, UNBALANCE_WORK, Accumulator
-from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_angle
+from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import ModeTables, add_rows, dot, find_mode
 from rubhpc.kernels.measuring import Recorder  # noqa: TC001 - part of a kernel's signature
 
@@ -38,8 +38,7 @@ def enter_states(
     mode = find_mode(tables.mask, progress.wanted)
     if mode < 0:
         return False
-    angle = shaft_angle(clock, progress.tick)
-    cosine, sine = np.cos(angle), np.sin(angle)
+    cosine, sine = shaft_turn(clock, progress.tick)
     first, used = tables.n_eigenmode[mode], used_width(tables, mode)
     for part in range(2):
         rows = tables.enter_re[mode] if part == 0 else tables.enter_im[mode]

@@ -25,7 +25,7 @@ from rubhpc.kernels.case_progress import (
     UNDER_WAY,
     Clock,
     Progress,
-    shaft_angle,
+    shaft_turn,
 )
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
@@ -294,8 +294,7 @@ def take_change(
         for i in range(work.impulse.size):
             work.impulse[i] = accumulator.impulse[i]
     note_before(work.trail, progress.tick, crossing, motion)
-    angle, moment = shaft_angle(clock, progress.tick), (1 << FORCED_LEVEL) * clock.tick
-    cosine, sine = np.cos(angle), np.sin(angle)
+    (cosine, sine), moment = shaft_turn(clock, progress.tick), (1 << FORCED_LEVEL) * clock.tick
     wanted = change_states(
         reduced,
         bodies,

@@ -27,6 +27,7 @@ class Pieces(NamedTuple):
     """Pieces that have matrices and a number of samples in common, k of them, in c parts each."""
 
     spin: Floats  # (k,), rad/s
+    growth: Floats  # (k,), 1/s, of the unbalance force
     tick: Floats  # (k,), s
     search_level: Ints  # (k,)
     force: Floats  # (k, 2, n), of the unbalance: times cosine and sine of the shaft's angle
@@ -55,6 +56,7 @@ def clock_of(clock: Clock, pieces: Pieces, piece: int) -> Clock:
         pieces.search_level[piece],
         clock.contact_level,
         pieces.n_sample,
+        pieces.growth[piece],
     )
 
 

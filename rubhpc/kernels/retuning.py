@@ -61,6 +61,7 @@ class Speeds(NamedTuple):
     spin: Floats  # (k,), rad/s
     share: Floats  # (k,), of the speed at which the matrices are
     factor: Complexes  # (k,), by which the unbalance at unit speed acts: spin^2 exp(i angle) if steady, 1/s^2
+    growth: Floats  # (k,), 1/s, of the unbalance force; the factor is that at the beginning
     tick: Floats  # (k,), s, resolution of events
     interval: Floats  # (k,), s, of samples
 
@@ -76,7 +77,7 @@ def retune(tables: ModeTables, place: int, held: HeldMode, speeds: Speeds, first
             tables,
             place + j,
             held,
-            speeds.spin[j],
+            complex(speeds.growth[j], speeds.spin[j]),
             speeds.share[j],
             speeds.factor[j],
             speeds.tick[j],
@@ -89,16 +90,19 @@ def retune_to(
     tables: ModeTables,
     mode: int,
     held: HeldMode,
-    spin: float,
+    turning: complex,
     share: float,
     factor: complex,
     tick: float,
     interval: float,
 ) -> None:
-    """Bring tables of a mode to one speed, `mode` being their index; the rest as in `Speeds`."""
+    """Bring tables of a mode to one speed, `mode` being their index.
+
+    `turning` (1/s) is the exponent of the unbalance force, its growth and i times the spin; the rest are as
+    in `Speeds`.
+    """
     m, width = held.is_pair.size, held.exponent.size
     n, end = held.slip.shape[1], held.n_coordinate
-    turning = 1j * spin
     if held.rim.one >= 0:
         move_rim(tables, mode, held.rim, share, held.rate, held.resisting, held.row, held.work)
     exponent = held.exponent
@@ -157,7 +161,7 @@ def retune_to(
             ahead *= onward
     _retune_energies(tables, mode, held, x, factor)
     if held.rim.one >= 0:
-        follow_growth(tables, mode, held.rim, share, spin, m, x, held.resisting)
+        follow_growth(tables, mode, held.rim, share, turning, m, x, held.resisting)
     if held.springs.gap.shape[0] > 0:
         stretch_springs(tables, mode, held.springs, m, held.rim.one)
 
@@ -222,6 +226,8 @@ def _retune_energies(tables: ModeTables, mode: int, held: HeldMode, x: Complexes
         steady += (x[n + a] * np.conj(own[a])).real
         driven += (x[n + a] * np.conj(factor * held.phasor[a])).real
     held.work[0, m], held.work[1, m] = work, work_conjugate
+    if 2.0 * abs(turning.real) > least:  # no power of the response is steady; the forms hold it
+        steady, driven = 0.0, 0.0
     tables.steady_power[mode, 0], tables.steady_power[mode, 1] = 0.5 * steady, 0.5 * driven
     for k in range(held.n_coordinate):
         across, across_conjugate, down, down_conjugate = 0j, 0j, 0j, 0j
@@ -245,7 +251,7 @@ def _retune_energies(tables: ModeTables, mode: int, held: HeldMode, x: Complexes
         loss[width + m, k] = loss[k, width + m] = im_re
         loss[width + m, width + k] = loss[width + k, width + m] = im_im
         first = 0.5 * _primitive(factor * held.work[0, k], exponent[k] + turning, least)
-        second = 0.5 * _primitive(np.conj(factor) * held.work[1, k], exponent[k] - turning, least)
+        second = 0.5 * _primitive(np.conj(factor) * held.work[1, k], exponent[k] + np.conj(turning), least)
         tables.work_re[mode, 0, k], tables.work_im[mode, 0, k] = first.real, first.imag
         tables.work_re[mode, 1, k], tables.work_im[mode, 1, k] = second.real, second.imag
 

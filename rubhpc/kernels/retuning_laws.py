@@ -93,17 +93,20 @@ def follow_growth(
     mode: int,
     rim: RimPart,
     share: float,
-    spin: float,
+    turning: complex,
     first: int,
     x: Complexes,
     resisting: Complexes,
 ) -> None:
-    """Add what coordinates that grow share with the response `x` (2 n,), the coordinate `first`."""
+    """Add what coordinates that grow share with the response `x` (2 n,), the coordinate `first`.
+
+    `turning` (1/s) is the exponent of the response.
+    """
     tables.steady_power[mode, 0] += share * share * rim.power
     width, n = tables.loss.shape[1] // 2, x.size // 2
     itself, conjugate = 0j, 0j
     for g in range(rim.growing.size):
-        speed = share * rim.speed[g] / (spin * spin)  # over the square of i W, which is negative
+        speed = -share * rim.speed[g] / (turning * turning)
         for a in range(n):
             against = resisting[rim.growing[g], a]
             itself += speed * (x[n + a] * against)

@@ -56,16 +56,23 @@ class ContactImpulses(NamedTuple):
 
 @jit_lean_sum
 def book_step(
-    reduced: Reduced, skew: Floats, step: float, angle: float, x: Floats, x_after: Floats, energy: Floats
+    reduced: Reduced,
+    skew: Floats,
+    step: float,
+    cosine: float,
+    sine: float,
+    x: Floats,
+    x_after: Floats,
+    energy: Floats,
 ) -> None:
     """Add what damping took and the unbalance gave in a step of contact (s), at its mean velocity.
 
-    `x` and `x_after` (n,) are the reduced displacements at its ends, `angle` is that of the shaft amid it;
-    `skew` is the skew part of the stiffness, without rows where there is none. A kick sets off a burst of the
-    fastest modes, which force spread over the step would not: the mean leaves it out.
+    `x` and `x_after` (n,) are the reduced displacements at its ends, `cosine` and `sine` are those of the
+    shaft amid it (`shaft_turn`); `skew` is the skew part of the stiffness, without rows where there is none.
+    A kick sets off a burst of the fastest modes, which force spread over the step would not: the mean leaves
+    it out.
     """
     n = x.size
-    cosine, sine = np.cos(angle), np.sin(angle)
     loss, gain = 0.0, 0.0
     for k in range(n):
         moved = x_after[k] - x[k]
@@ -272,7 +279,9 @@ def advance_by_steps(
                     x[k] = dot(motion_re[0, k], motion_im[0, k], z_re, z_im)
                 x_after[k] = dot(motion_re[0, k], motion_im[0, k], next_re, next_im)
             angle = clock.spin * clock.tick * (t % per_revolution) + 0.5 * clock.spin * step
-            book_step(reduced, impulses.skew, step, angle, x, x_after, accumulator.energy)
+            size = np.exp(clock.growth * (t * clock.tick + 0.5 * step))
+            cosine, sine = size * np.cos(angle), size * np.sin(angle)
+            book_step(reduced, impulses.skew, step, cosine, sine, x, x_after, accumulator.energy)
             for k in range(x.size):
                 x[k] = x_after[k]
         elif is_recorded and progress.energy_from < 0:

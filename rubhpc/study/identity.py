@@ -25,7 +25,7 @@ PHYSICS = 18  # version of the physics: raised whenever a study gives other resu
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
 MODAL = 2  # method = "modal": modes kept for torsional accelerations, and `modal_error` of these
 DIRECT = 4  # transient = "direct"
-CHANGING_SPEED = 9  # run-ups and drives
+CHANGING_SPEED = 10  # run-ups and drives
 COULOMB = 6  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 8  # method = "modal" with gaps that are curved

@@ -33,15 +33,15 @@ class Standing(NamedTuple):
     library: RetunedLibrary
     end: Place
     constants: Floats  # values of the coordinates that do not move
-    angle: float  # rad, since the piece began
+    time: float  # s, since the piece began
 
 
-def standing(march: EventDrivenMarch, setup: PieceSetup, end: Place, angle: float) -> Standing | None:
+def standing(march: EventDrivenMarch, setup: PieceSetup, end: Place, time: float) -> Standing | None:
     """Where a march has ended a piece; None where modes are not carried over."""
     library = march.library
     if not isinstance(library, RetunedLibrary):
         return None
-    return Standing(setup, library, end, march.constants, angle)
+    return Standing(setup, library, end, march.constants, time)
 
 
 def carried(
@@ -67,7 +67,7 @@ def carried(
     if was is None or now is None or was.exponent.size != now.exponent.size:
         return begun
     old, new = before.setup, setup
-    z_before = was.entered(before.end.motion, before.constants, *_turning(old), before.angle)
+    z_before = was.entered(before.end.motion, before.constants, *_turning(old), before.time)
     z = now.entered(march.begun_motion, march.constants, *_turning(new), 0.0)
     pairs = np.flatnonzero(now.is_pair & (np.abs(now.exponent.imag) > LOWEST * abs(new.spin)))
     share = 0.5 * now.enter[pairs] @ was.motion
@@ -80,6 +80,6 @@ def carried(
     return Place(motion, setup.model.sag, begun.contact_force)
 
 
-def _turning(setup: PieceSetup) -> tuple[float, complex]:
-    """Spin of a piece (rad/s) and the factor of its unbalance (1/s^2)."""
-    return setup.spin, complex(setup.speeds.factor[setup.place])
+def _turning(setup: PieceSetup) -> tuple[complex, complex]:
+    """Exponent of the unbalance force of a piece (1/s) and the factor of its unbalance (1/s^2)."""
+    return complex(setup.clock.growth, setup.spin), complex(setup.speeds.factor[setup.place])

@@ -24,6 +24,7 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.integrate.changing_speed.free_piece import DRIVEN_LAG, Spin
 from rubhpc.integrate.changing_speed.run_up import RunUp
+from rubhpc.integrate.changing_speed.sample_times import bring_to_angles
 from rubhpc.integrate.changing_speed.turns import Turns
 from rubhpc.integrate.measuring.measures import LEAST_EXCHANGE
 from rubhpc.integrate.measuring.samples import empty_samples
@@ -103,6 +104,7 @@ def integrate_driven(
     if pieces_per_revolution is not None and per_revolution != fixed * pieces_per_revolution:
         problem = f"{pieces_per_revolution} is no divisor of the {per_revolution} samples in a revolution"
         raise InputError(f"pieces_per_revolution: {problem}; choose another number")
+    late, cuts = np.zeros(n * per_revolution), [0]
     whole = empty_samples(model.n_place, n * per_revolution, model.n_probe).whole
     gathered = Turns(n, model)
     driven_by, braked = np.zeros((2, n))
@@ -123,6 +125,8 @@ def integrate_driven(
         passed = taken.passed
         n_step += passed.n_step
         whole[:, at : at + length] = passed.whole
+        late[at : at + length] = taken.late
+        cuts.append(at + length)
         turns = max(length // per_revolution, 1)
         for i, accumulator in enumerate(passed.accumulators):
             turn = at // per_revolution + i
@@ -152,9 +156,11 @@ def integrate_driven(
             "give it more inertia, or less torque"
         )
     lasts = np.diff(begins[: n_done + 1])
+    n_sample = n_done * per_revolution
+    bring_to_angles(whole[:, :n_sample], late, np.unique(np.minimum(cuts, n_sample)), model.n_place)
     return DrivenRun(
         reason=reason,
-        whole=whole[:, : n_done * per_revolution],
+        whole=whole[:, :n_sample],
         speed=2.0 * np.pi / lasts,
         time=begins[:n_done],
         contact_fraction=gathered.contact_time[:n_done] / lasts[:, np.newaxis],

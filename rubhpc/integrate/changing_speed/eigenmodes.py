@@ -23,12 +23,17 @@ class Eigenmodes(NamedTuple):
     mirrored_drive: Complexes  # (m,)
 
     def entered(
-        self, motion: Floats, constants: Floats, spin: float, factor: complex, angle: float
+        self, motion: Floats, constants: Floats, turning: complex, factor: complex, time: float
     ) -> Complexes:
-        """Coordinates (m,) of a motion (2 n,) at an angle of the shaft (rad); the rest as in `Speeds`."""
-        direct = self.drive * factor / (1j * spin - self.exponent)
-        mirrored = self.mirrored_drive * factor / (1j * spin - self.exponent.conj())
+        """Coordinates (m,) of a motion (2 n,) at a time, s.
+
+        `turning` (1/s) is the exponent of the unbalance force, `factor` (1/s^2) that of the unbalance at unit
+        speed at time 0.
+        """
+        direct = self.drive * factor / (turning - self.exponent)
+        mirrored = self.mirrored_drive * factor / (turning - self.exponent.conj())
         other = np.where(self.is_pair, mirrored, direct).conj()
-        response = 0.5 * (direct * np.exp(1j * angle) + other * np.exp(-1j * angle))
+        turned = np.exp(turning * time)
+        response = 0.5 * (direct * turned + other * turned.conj())
         coordinates: Complexes = self.enter @ motion - constants @ self.constant - response
         return coordinates

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rubhpc.integrate.case import march_of
 from rubhpc.integrate.changing_speed.carried_modes import Standing, carried, standing
+from rubhpc.integrate.changing_speed.piece_setup import with_values
 from rubhpc.integrate.changing_speed.stretch import Stretch, take_stretch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
@@ -64,10 +65,11 @@ class Passing:
         if self._check is not None:
             self._check()
         try:
-            return self._pass(self._begin(setup, begun), setup, n_sample, earlier, is_balanced)
+            return self._pass(self._begin(setup, n_sample, begun), setup, n_sample, earlier, is_balanced)
         except NoClosedForm:  # contacts that chatter: short steps need no events
             self._march = None
-            steps = ContactSteppingMarch(setup, *self._case, state_at(begun, setup), self._check)
+            even = evenly_forced(setup, n_sample)
+            steps = ContactSteppingMarch(even, *self._case, state_at(begun, setup), self._check)
             return self._pass(steps, setup, n_sample, earlier, is_balanced)
 
     def continued(
@@ -83,8 +85,7 @@ class Passing:
         """Where the piece that was taken last has ended, in its own modes, if it has some."""
         if self._march is None or not isinstance(end, Place):
             return None
-        angle = setup.spin * setup.interval * n_sample
-        return standing(self._march, setup, end, angle)
+        return standing(self._march, setup, end, setup.interval * n_sample)
 
     def take_several(
         self,
@@ -102,13 +103,16 @@ class Passing:
         room = self._room_for(setups[first].model, n_sample)
         return take_stretch(self._march, setups, first, room, begun, earlier, self._check)
 
-    def _begin(self, setup: PieceSetup, begun: State | Place) -> ModalMarch:
+    def _begin(self, setup: PieceSetup, n_sample: int, begun: State | Place) -> ModalMarch:
         """The march that stands where a piece begins."""
         march = self._march
         if march is not None and isinstance(begun, Place):
             march.begin(setup, begun)
             return march
-        made = march_of(setup.scheme, setup)(setup, *self._case, state_at(begun, setup), self._check)
+        kind = march_of(setup.scheme, setup)
+        is_stepped = kind is ContactSteppingMarch
+        taken = evenly_forced(setup, n_sample) if is_stepped else setup
+        made = kind(taken, *self._case, state_at(begun, setup), self._check)
         assert isinstance(made, ModalMarch)
         if isinstance(made, EventDrivenMarch):
             self._march = made
@@ -143,6 +147,18 @@ class Passing:
         if n_sample not in self._room:
             self._room[n_sample] = empty_samples(model.n_place, n_sample, model.n_probe)
         return self._room[n_sample]
+
+
+def evenly_forced(setup: PieceSetup, n_sample: int) -> PieceSetup:
+    """The set-up of a piece whose unbalance force keeps its size in the middle, for short steps."""
+    growth = setup.clock.growth
+    grown = math.exp(0.5 * growth * setup.interval * n_sample)
+    return with_values(
+        setup,
+        clock=setup.clock._replace(growth=0.0),
+        reduced=with_values(setup.reduced, force=grown * setup.reduced.force),
+        _open_tables={},
+    )
 
 
 def state_at(begun: State | Place, setup: PieceSetup) -> State:

@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 
 SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the speed is taken
 LONGEST_FALL = 1.0 / 3.0  # half of the range over the first speed of a coast-down, which stays above 0
+LEAST_GROWTH = 1e-5  # of the unbalance force in a piece
 MOST_HELD = 4  # matrices at hand, of a spin that swings between them
-MOST_BYTES = 2**29  # of contact modes that are kept, with their matrices, for other cases
+MOST_BYTES = 3 * 2**29  # of contact modes that are kept, with their matrices, for other cases
 
 # Of each set-up, the matrices by speed, acceleration and slope of the torque, the latest last, for other
 # cases too.
@@ -123,18 +124,22 @@ class Pieces:
         if angle[0] == 0.0 and held.first is not None and held.first[0] == asked:
             return held.first[1]
         lag = acceleration * duration**2 / 12.0
-        factor = (speed**2 - 1j * acceleration) * np.exp(1j * (angle - lag))
+        growth = growth_of(speed, acceleration, duration)
+        begins = np.exp(1j * (angle - lag) - 0.5 * growth * duration)
+        factor = (speed**2 - 1j * acceleration) * begins
         phasor = factor[:, np.newaxis] * self._phasor
         force = np.stack([phasor.real, -phasor.imag], axis=1)
         interval = 2.0 * math.pi / (np.abs(speed) * self._fastest.samples_per_revolution)
         tick = interval / (1 << held.sample_level)
-        speeds = speeds_of(speed, factor, tick, held.reduced.spin, held.sample_level)
+        speeds = speeds_of(speed, factor, growth, tick, held.reduced.spin, held.sample_level)
         template, found = held.template, []
         steady = template.clock
         longest = np.floor(np.log2(template.step / tick)).astype(int)
         search_level = np.clip(longest, 0, held.sample_level)
-        lists = (column.tolist() for column in (speed, interval, tick, search_level))
-        for place, (spin, every, resolution, search, pushing) in enumerate(zip(*lists, force, strict=True)):
+        lists = (column.tolist() for column in (speed, interval, tick, search_level, growth))
+        for place, (spin, every, resolution, search, grows, pushing) in enumerate(
+            zip(*lists, force, strict=True)
+        ):
             reduced = with_values(held.reduced, spin=spin, force=pushing)
             found.append(
                 with_values(
@@ -144,7 +149,7 @@ class Pieces:
                     spin=spin,
                     interval=every,
                     tick=resolution,
-                    clock=Clock(spin, resolution, *steady[2:4], search, *steady[5:]),
+                    clock=Clock(spin, resolution, *steady[2:4], search, *steady[5:7], grows),
                     speeds=speeds,
                     place=place,
                     _open_tables={},  # which are of this speed alone
@@ -227,7 +232,7 @@ class Pieces:
             accuracy=fastest.accuracy,
             displacement_limit=fastest.displacement_limit,
             held=held,
-            speeds=speeds_of([speed], [complex(speed**2)], [1.0], speed, held.sample_level),
+            speeds=speeds_of([speed], [complex(speed**2)], [0.0], [1.0], speed, held.sample_level),
             place=0,
             most_energy=fastest.energy_limit,
         )
@@ -250,3 +255,13 @@ class Pieces:
         damping = self._basis.T @ damping @ self._basis - slope * np.outer(self._turning, self._turning)
         stiffness = self._basis.T @ stiffness @ self._basis + acceleration * self._momentum
         return model, damping, stiffness
+
+
+def growth_of(speed: Floats, acceleration: Floats, duration: Floats) -> Floats:
+    """Growth of the unbalance force over pieces, 1/s: from the square of the first speed to that of the last.
+
+    Speeds (rad/s) are means. What changes by less than `LEAST_GROWTH` is held: its energies are steady.
+    """
+    half = 0.5 * acceleration * duration / speed
+    growth = 2.0 * np.log((1.0 + half) / (1.0 - half)) / duration
+    return np.where(np.abs(growth * duration) > LEAST_GROWTH, growth, 0.0)

@@ -17,6 +17,8 @@ from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_m
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
 from rubhpc.integrate.reduced_model.mode_tables import TableStack
 from rubhpc.integrate.reduced_model.reduction import directions
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
+from rubhpc.kernels.measuring import LANES
 from rubhpc.kernels.retuning import HeldMode, Speeds, retune
 from rubhpc.kernels.retuning_laws import Springs
 
@@ -60,6 +62,7 @@ class RetunedLibrary(ModeLibrary):
     """
 
     at_once = AT_ONCE
+    _n_ahead = 0  # outputs are filled in for each speed
 
     def __init__(
         self,
@@ -95,7 +98,7 @@ class RetunedLibrary(ModeLibrary):
         self._place: dict[int, int] = {}
         self._tuned: dict[int, int] = {}
         self._speeds = speeds_of(
-            [reduced.spin], [complex(reduced.spin**2)], [tick], reduced.spin, sample_level
+            [reduced.spin], [complex(reduced.spin**2)], [0.0], [tick], reduced.spin, sample_level
         )
         self._at = 0  # piece among those at hand
         self.masks: list[int] = []
@@ -111,7 +114,12 @@ class RetunedLibrary(ModeLibrary):
     def n_byte(self) -> int:
         """Memory that its contact modes hold."""
         fields = (field for kept in self._held.values() for part in kept for field in part)
-        return sum(field.nbytes for field in fields if isinstance(field, np.ndarray) and any(field.strides))
+        sizes = {
+            id(field): field.nbytes
+            for field in fields
+            if isinstance(field, np.ndarray) and any(field.strides)
+        }
+        return sum(sizes.values())
 
     @property
     def n_most(self) -> int:
@@ -204,7 +212,11 @@ class RetunedLibrary(ModeLibrary):
     def _tabulate(self, mode: ContactMode) -> None:
         self._note_exponents(mode)
         row = self._tables_of(mode, self.reduced)
-        row = row._replace(output=np.broadcast_to(0.0, row.output.shape))  # is filled in for each speed
+        n_output = -(-SAMPLES_AT_ONCE * len(self._output) // LANES) * LANES
+        shapes = {"output": (1, 2 * self.width, n_output)} | {
+            name: getattr(row, name).shape for name in ("power_re", "power_im", "bound")
+        }
+        row = row._replace(**{name: np.broadcast_to(0.0, shape) for name, shape in shapes.items()})
         self._held[mode.mask] = row, self._hold(mode, row)
 
     def _put(self, mask: int) -> None:
@@ -297,12 +309,19 @@ class RetunedLibrary(ModeLibrary):
 
 
 def speeds_of(
-    spin: ArrayLike, factor: ArrayLike, tick: ArrayLike, held_spin: float, sample_level: int
+    spin: ArrayLike,
+    factor: ArrayLike,
+    growth: ArrayLike,
+    tick: ArrayLike,
+    held_spin: float,
+    sample_level: int,
 ) -> Speeds:
     """Speeds (rad/s) to which modes are tuned whose matrices are those at `held_spin`.
 
-    `factor` (1/s^2) is what the unbalance at unit speed acts by, `tick` (s) the resolution of events.
+    `factor` (1/s^2) is what the unbalance at unit speed acts by, which grows by `growth` (1/s), `tick` (s)
+    the resolution of events.
     """
     spins, ticks = np.asarray(spin, dtype=np.float64), np.asarray(tick, dtype=np.float64)
     factors = np.asarray(factor, dtype=np.complex128)
-    return Speeds(spins, np.abs(spins / held_spin), factors, ticks, ticks * 2.0**sample_level)
+    grown = np.asarray(growth, dtype=np.float64)
+    return Speeds(spins, np.abs(spins / held_spin), factors, grown, ticks, ticks * 2.0**sample_level)

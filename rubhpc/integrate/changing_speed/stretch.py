@@ -67,6 +67,7 @@ def take_stretch(
     lasts = n_sample * speeds.interval
     pieces = Pieces(
         spin=speeds.spin,
+        growth=speeds.growth,
         tick=speeds.tick,
         search_level=np.array([setup.clock.search_level for setup in setups]),
         force=np.array([setup.reduced.force for setup in setups]),

@@ -10,7 +10,7 @@ from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.marches.workspace import workspace
 from rubhpc.integrate.packing import pairs_of
-from rubhpc.kernels.case_progress import FINISHED, NONE, shaft_angle
+from rubhpc.kernels.case_progress import FINISHED, NONE, shaft_turn
 from rubhpc.kernels.contact_modes import enter
 from rubhpc.kernels.contact_pairs import N_DEGREE
 from rubhpc.kernels.measuring import end_span
@@ -87,8 +87,8 @@ class ContactSteppingMarch(ModalMarch):
         Up to the next whole step the motion is that of open contacts.
         """
         self.clock, self._recorder = clock, recorder
-        angle = shaft_angle(clock, self.progress.tick)
-        enter(self.tables, 0, self._clearance, np.cos(angle), np.sin(angle), motion, self._z)
+        cosine, sine = shaft_turn(clock, self.progress.tick)
+        enter(self.tables, 0, self._clearance, cosine, sine, motion, self._z)
         level = 0
         while self.progress.tick % (1 << self._impulses.level):
             if self.progress.tick & 1 << level:

@@ -126,7 +126,8 @@ def tabulate(
     is_measured : bool
         Slip, outputs and energies are empty where not.
     n_ahead : int
-        Samples whose outputs are read from one set of coordinates; with one, no step may pass a sample.
+        Samples whose outputs are read from one set of coordinates; with one, no step may pass a sample. With
+        none, outputs are left to others.
     """
     n, m = reduced.stiffness.shape[0], width
     end, n_filled = mode.exponent.size, len(mode.enter)
@@ -241,6 +242,8 @@ def _outputs(
 
     Zeros fill the rows up to whole vectors of the kernels.
     """
+    if n_ahead == 0:
+        return np.zeros((2 * exponent.size, 0))
     n = reduced.stiffness.shape[0]
     displacement, rate = reduced.output @ motion[:n], reduced.output @ motion[n:]
     rows = [displacement, rate, rate[2:] * exponent]

@@ -18,7 +18,9 @@ from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction
 from rubhpc.integrate.reduced_model.mode_tables import tabulate
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
 from rubhpc.integrate.reduced_model.reduction import directions
+from rubhpc.kernels.contact_modes import enter
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, lifted_place
+from rubhpc.kernels.measuring import energy_forms
 
 
 def setup(q):
@@ -128,7 +130,7 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
         library.add(mask)
     spin, tick = 231.0, 0.9 * base.tick
     factor = (spin**2 - 40.0j) * np.exp(0.7j)
-    columns = [170.0, spin], [0.5 + 0.3j, factor], [base.tick, tick]
+    columns = [170.0, spin], [0.5 + 0.3j, factor], [3.0, 0.0], [base.tick, tick]
     speeds = speeds_of(*columns, base.spin, base.sample_level)
     library.tune(speeds, 0)
     for mask in masks:  # the next speed is tuned with this one where there is room
@@ -150,6 +152,42 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
             assert np.abs(values - anew).max(initial=0.0) <= 1e-9 * largest, name
 
 
+@pytest.mark.parametrize("growth", [0.0, 1e-4, 9.0])
+def test_energy_balances_while_the_unbalance_force_grows(growth):
+    """What the motion gains is the work of the unbalance less what damping and friction take."""
+    base, spin, law = setup(3), 231.0, Sliding()
+    phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
+    factor = (spin**2 - 40.0j) * np.exp(0.7j)
+    levels = {"sample_level": base.sample_level, "n_level": base._n_level}
+    library = law.kind(base.reduced, base.model, 0.2, phasor=phasor, known={}, tick=base.tick, **levels)
+    library.tune(speeds_of([spin], [factor], [growth], [base.tick], base.spin, base.sample_level), 0)
+    reduced, n, time = base.reduced, len(base.reduced.stiffness), 1e-3
+    for mask in law.masks[3]:
+        library.add(mask)
+        tables, place = library.tables(), library.masks.index(mask)
+        first = tables.n_eigenmode[place]
+        exponent = library._held[mask][1].exponent
+        assert exponent[first] == complex(growth, spin)
+        shape = tables.motion_re[place] + 1j * tables.motion_im[place]
+        if mask == 0:
+            s = exponent[first]
+            impedance = s**2 * np.eye(n) + s * reduced.damping + reduced.stiffness
+            response = np.linalg.solve(impedance, factor * phasor)
+            assert np.abs(shape[:n, first] - response).max() < 1e-9 * np.abs(response).max()
+        free = tables.motion_re[place] @ np.linalg.pinv(tables.motion_re[place])  # of the gaps that are held
+        motion = free @ np.random.default_rng(3).normal(size=2 * n) * 1e-4
+        z = np.zeros((2, library.width))
+        enter(tables, place, np.zeros(3), 0.8, 0.6, motion, z)
+        later = np.exp(exponent * time) * (z[0] + 1j * z[1])
+        held, entries = [], np.zeros((2, 2))
+        for entry, at in zip(entries, (z, np.array([later.real, later.imag])), strict=True):
+            energy_forms(tables.loss, tables.work_re, tables.work_im, first, place, at, entry)
+            u, v = (shape @ (at[0] + 1j * at[1])).real.reshape(2, n)
+            held.append(0.5 * (v @ v + u @ reduced.stiffness @ u))
+        loss, work = entries[1] - entries[0] + tables.steady_power[place] * time
+        assert held[1] - held[0] == pytest.approx(work - loss, abs=1e-9 * max(abs(held[0]), abs(work)))
+
+
 @pytest.mark.parametrize("q", [1, 3])
 def test_tables_of_curved_gaps_are_those_at_that_speed(q):
     base = setup(q)
@@ -165,7 +203,7 @@ def test_tables_of_curved_gaps_are_those_at_that_speed(q):
     )
     for mask in Sliding.masks[q]:
         library.add(mask)
-    library.tune(speeds_of([spin], [factor], [tick], base.spin, base.sample_level), 0)
+    library.tune(speeds_of([spin], [factor], [0.0], [tick], base.spin, base.sample_level), 0)
     opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
     anew = CurvedLibrary(reduced, *case, opened=opened, tick=tick, **levels)
     for mask in Sliding.masks[q]:

@@ -150,8 +150,8 @@ def test_free_passages_meet_full_order_stepping_in_second_order():
         rows = np.array([found.vertical, found.horizontal])
         errors.append(np.linalg.norm(rows - expected[:2]) / np.linalg.norm(expected[:2]))
         assert found.torsion.values == pytest.approx(expected[2], rel=1e-6)  # of the shaft's own inertia
-    assert errors[0] < 8e-3
-    assert errors[2] < errors[0] / 12
+    assert errors[0] < 1e-3
+    assert errors[2] < min(errors[0] / 12, 5e-5)
 
 
 @pytest.mark.parametrize(("start", "stop", "time"), [(150.0, 250.0, 4.0), (235.0, 205.0, 1.2)])
@@ -172,7 +172,17 @@ def test_rub_in_a_passage_meets_full_order_stepping(start, stop, time):
     expected = stepped(*law.values(), 32, clearance=6e-4, friction=0.2, most=end)
     rows = np.array([found.vertical, found.horizontal, found.torsion])[:, :end]
     scale = np.abs(expected).max(axis=1)
-    assert (np.abs(rows - expected).max(axis=1) / scale).max() < 5e-4
+    assert (np.abs(rows - expected).max(axis=1) / scale).max() < 5e-5
+
+
+def exact_peak(start, stop, time):
+    """Peak of an undamped mass with a natural frequency of 100 rad/s, by Duhamel's integral, m."""
+    t, rate = np.linspace(0.0, time, 400_001), (stop - start) / time
+    spin, angle = start + rate * t, start * t + rate * t**2 / 2.0
+    force = (1e-5 * (spin**2 - 1j * rate) * np.exp(1j * angle)).real * np.exp(-100j * t)
+    impulse = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]))]) * t[1]
+    at_first = 1e-5 * start**2 / (100.0**2 - start**2)  # steady, at its largest
+    return np.abs((np.exp(100j * t) * impulse).imag / 100.0 + at_first * np.cos(100.0 * t)).max()
 
 
 @pytest.mark.parametrize("time", [1.5, 5.0, 12.0])
@@ -181,7 +191,8 @@ def test_passage_through_resonance_reaches_what_lewis_found(time):
 
     It is 3.69 sqrt(q) + 0.2 where the speed falls. q is the square of the natural frequency over the rate of
     the frequency, both in cycles. The force of an unbalance, taken at resonance, grows with the speed: by
-    what a run-up is higher for that, a coast-down is lower.
+    what a run-up is higher for that, a coast-down is lower. Lewis' mean is within 1 % of the exact peaks, and
+    these are reached within 0.15 %.
     """
     rig = Rig.from_matrices(
         np.diag([1.0, 1.0]),
@@ -196,7 +207,9 @@ def test_passage_through_resonance_reaches_what_lewis_found(time):
     ratios = []
     for (start, stop), expected in (((60.0, 130.0), 3.67 * root + 0.25), ((130.0, 60.0), 3.69 * root + 0.2)):
         found = run_up(rig, start=start, stop=stop, time=time, clearance=1.0)
-        ratios.append(float(abs(found.vertical).max()) / static / expected)
+        exact = exact_peak(start, stop, time)
+        assert float(abs(found.vertical).max()) == pytest.approx(exact, rel=1.5e-3)
+        ratios.append(exact / static / expected)
     assert ratios == pytest.approx([1.0, 1.0], rel=0.05)
     assert math.sqrt(math.prod(ratios)) == pytest.approx(1.0, rel=0.01)
 
