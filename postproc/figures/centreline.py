@@ -10,6 +10,7 @@ from postproc.figures.drawing import Drawing
 from postproc.figures.run_up_marks import draw_rotation, name_speeds
 from postproc.signals.run_up_spectra import mean_positions
 from postproc.signals.waveforms import seen_by_two
+from postproc.store.rig_of_case import rig_of
 from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
@@ -17,8 +18,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+FAR = 5.0  # times the farthest position: a clearance beyond is not drawn
+RING = 3  # stators around the disc at least
+
+
 def centreline(cases: xr.Dataset, *, probes: tuple[str, str] | None = None) -> Drawing:
-    """Shaft centreline of a run-up: the mean position of every revolution.
+    """Shaft centreline of a run-up: the mean position over the speed, and the clearance where a ring has one.
 
     Parameters
     ----------
@@ -30,16 +35,33 @@ def centreline(cases: xr.Dataset, *, probes: tuple[str, str] | None = None) -> D
     seen = cases if probes is None else seen_by_two(cases, probes, others=["speed"])
     shown = mean_positions(seen, ["vertical", "horizontal"])
     where = "the disc" if probes is None else str(seen["vertical"].attrs["of_probes"])
-    return Drawing(shown=shown, draw=lambda axes: draw_centreline(shown, axes[0], where), height=85)
+    clearance = _clearance(cases) if probes is None else None
+    return Drawing(
+        shown=shown, draw=lambda axes: draw_centreline(shown, axes[0], where, clearance), height=85
+    )
 
 
-def draw_centreline(data: xr.Dataset, ax: Axes, where: str = "the disc") -> Axes:
-    """Draw the mean position, vertical over horizontal; positive spin turns clockwise."""
+def draw_centreline(
+    data: xr.Dataset, ax: Axes, where: str = "the disc", clearance: float | None = None
+) -> Axes:
+    """Draw the mean position, vertical over horizontal; positive spin turns clockwise.
+
+    A `clearance` (m) is drawn as a circle around the shaft without loads, unless it is far beyond.
+    """
     x, y, speed = (data[name].values for name in ("horizontal", "vertical", "speed"))
     scale = scale_for("m", float(np.nanmax(np.hypot(x, y))))
     x, y = x * scale.factor, y * scale.factor
     reach = 0.62 * max(float(np.ptp(x)), float(np.ptp(y)), 1e-3 * float(np.abs([x, y]).max()))
     middle = 0.5 * (x.max() + x.min()), 0.5 * (y.max() + y.min())
+    radius = 0.0 if clearance is None else clearance * scale.factor
+    if 0.0 < radius < FAR * float(np.hypot(x, y).max()):
+        reach, middle = 1.08 * max(radius, float(np.abs([x, y]).max())), (0.0, 0.0)
+        around = np.linspace(0.0, 2.0 * np.pi, 361)
+        ax.plot(
+            radius * np.cos(around), radius * np.sin(around), color="0.5", linewidth=0.7, label="clearance"
+        )
+        ax.plot(0.0, 0.0, "+", color="0.5", markersize=5, markeredgewidth=0.7)
+        ax.legend(loc="lower right", fontsize=6, frameon=False)
     ax.set(
         xlim=(middle[0] - reach, middle[0] + reach),
         ylim=(middle[1] - reach, middle[1] + reach),
@@ -52,3 +74,13 @@ def draw_centreline(data: xr.Dataset, ax: Axes, where: str = "the disc") -> Axes
     draw_rotation(ax)
     ax.set_title(f"Centreline of {where}, speeds in rpm", fontsize=8)
     return ax
+
+
+def _clearance(cases: xr.Dataset) -> float | None:
+    """Radial clearance of a ring around the disc, m; None where no ring stands there, or it is unknown."""
+    if "rig" not in cases.attrs or "clearance" not in cases.coords or cases["clearance"].size != 1:
+        return None
+    rig = rig_of(cases)
+    around = [stator.node for stator in rig.stator]
+    is_ring = len(around) >= RING and set(around) == {rig.rotor.recorded_node(around)}
+    return float(cases["clearance"].item()) if is_ring else None

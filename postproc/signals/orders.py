@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 WHOLE = 0.02  # of a revolution: by how much an order may miss a whole number of periods of a record
 NEAR = 1e-3  # of an order, within which a run-up follows it
+JUMP = 0.25 * np.pi  # rad a revolution, faster than the phase of an order of a window of six goes
+AROUND = 4  # revolutions on either side of a jump in which there is no phase
 _FIRST_LAG = 120.0  # degrees
 
 
@@ -45,7 +47,8 @@ def order_over_speed(
     Dataset
         `amplitude_NAME` in the unit of the signal and `phase_NAME`, rad, by which it leads the order of the
         shaft's angle, unwrapped, over `speed` (rad/s), rising, and `over`; of run-ups over `revolution`, with
-        `speed` as a variable.
+        `speed` as a variable. Where the phase of a run-up jumps, the order is lost in other motion, and the
+        phase is NaN.
 
     Raises
     ------
@@ -64,7 +67,10 @@ def order_over_speed(
         found = found.sortby("speed")
     for signal in signals:
         phase = found[f"phase_{signal}"]
-        unwrapped = np.apply_along_axis(_unwrap, phase.get_axis_num(along), phase.values)
+        values = phase.values
+        if along == "revolution":
+            values = np.apply_along_axis(_without_jumps, phase.get_axis_num(along), values)
+        unwrapped = np.apply_along_axis(_unwrap, phase.get_axis_num(along), values)
         found[f"phase_{signal}"] = phase.copy(
             data=unwrapped - 2 * np.pi * round(_mean(unwrapped) / (2 * np.pi))
         )
@@ -99,6 +105,14 @@ def _unwrap(phase: NDArray[np.float64]) -> NDArray[np.float64]:
     finite = np.isfinite(phase)
     found[finite] = np.unwrap(phase[finite])
     return found
+
+
+def _without_jumps(phase: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A phase (n_revolution,), rad, with NaN around its jumps."""
+    step = np.angle(np.exp(1j * np.diff(phase)))
+    jumps = (np.abs(step) > JUMP).astype(float)
+    near = np.convolve(jumps, np.ones(2 * AROUND), mode="full")[AROUND - 1 : AROUND + phase.size - 1]
+    return np.where(near > 0.5, np.nan, phase)
 
 
 def _mean(values: NDArray[np.float64]) -> float:

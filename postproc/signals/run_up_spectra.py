@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+MEANS = 6  # revolutions, whole periods of 1/2X and 1/3X
+
 
 def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> xr.Dataset:
     """Return amplitude spectra of a run-up at `count` places, each over `window` revolutions, loaded.
@@ -72,17 +74,23 @@ def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> x
 
 
 def mean_positions(store: xr.Dataset, signals: Sequence[str]) -> xr.Dataset:
-    """Return the mean of signals over every revolution of a run-up, with its `speed` (rad/s), loaded."""
+    """Return the mean position during a run-up, with its `speed` (rad/s), loaded.
+
+    It is the mean over six revolutions of means over six: parts of 1/2X and 1/3X leave nothing of themselves
+    in it, and those of a whirl at any other order little.
+    """
     data, per_revolution, n = _case(store, signals)
-    means = {
-        name: (
-            "revolution",
-            data[name].values.astype(float)[: n * per_revolution].reshape(n, -1).mean(axis=1),
-            data[name].attrs,
-        )
-        for name in signals
-    }
-    means["speed"] = "revolution", data["speed"].values[:n], data["speed"].attrs
+    half = min(MEANS, (n + 1) // 2)
+    weight = np.convolve(np.ones(half), np.ones(half)) / half**2
+
+    def smooth(values: Floats) -> Floats:
+        return np.convolve(values, weight, mode="valid")
+
+    means = {}
+    for name in signals:
+        turns = data[name].values.astype(float)[: n * per_revolution].reshape(n, -1)
+        means[name] = "revolution", smooth(turns.mean(axis=1)), data[name].attrs
+    means["speed"] = "revolution", smooth(data["speed"].values[:n]), data["speed"].attrs
     return xr.Dataset(means, coords={name: at for name, at in data.coords.items() if at.ndim == 0})
 
 

@@ -95,14 +95,47 @@ def test_the_phase_lag_grows_downwards():
     assert phase.get_ylim()[0] > phase.get_ylim()[1]
 
 
-def test_a_centreline_is_the_mean_of_each_revolution():
+def test_a_centreline_is_a_mean_that_whirl_leaves_alone():
     alone = mean_positions(run_up(), ["vertical", "horizontal"])
-    expected = 1e-8 * (np.arange(TURNS) + 0.5 * (N - 1) / N)
+    expected = 1e-8 * (np.arange(5, TURNS - 5) + 0.5 * (N - 1) / N)
     assert alone["vertical"].values == pytest.approx(expected, abs=1e-12)
     ax = centreline(run_up(), probes=("left", "right")).show()
     scale = 1e9 if "nm" in ax.get_ylabel() else 1e6
     assert ax.lines[0].get_ydata() == pytest.approx(expected * scale, rel=1e-6)
     assert ax.lines[0].get_xdata() == pytest.approx(0.0, abs=1e-9 * scale)
+    whirling = run_up()
+    for order, left in ((1 / 3, 1e-12), (0.5, 1e-12), (0.43, 5e-7)):  # 1.4e-5 of single revolutions
+        whirl = 2e-5 * np.cos(2 * math.pi * order * whirling["turned"].values)
+        found = mean_positions(whirling.assign(vertical=("sample", whirl)), ["vertical"])
+        assert np.abs(found["vertical"].values).max() < left
+
+
+def test_a_centreline_lies_in_the_clearance_of_a_ring():
+    tips = [LumpedStator(node=1, angle=2.0 * i, mass=1e-3, stiffness=1e5, radius=0.1) for i in range(3)]
+    rig = Rig.from_matrices(
+        np.eye(2), None, 1e4 * np.eye(2), degrees=[(1, "v"), (1, "w")], stators=tips, unbalance=[]
+    )
+    case = run_up(rig=rig.as_dict()).assign_coords(clearance=1e-6)
+    ax = centreline(case).show()
+    assert np.hypot(*ax.lines[0].get_xydata().T) == pytest.approx(
+        1e-6 * (1e9 if "nm" in ax.get_ylabel() else 1e6)
+    )
+    assert ax.get_legend().get_texts()[0].get_text() == "clearance"
+    far = centreline(case.assign_coords(clearance=1e-3)).show()
+    assert far.get_legend() is None
+
+
+def test_there_is_no_phase_where_an_order_is_lost_in_other_motion():
+    passed = run_up()
+    phase = passed["phase_probe_left"].values.copy()
+    phase[20:40, 1] = np.random.default_rng(1).uniform(-math.pi, math.pi, 20)
+    phase[45:, 1] = -math.pi / 6 - 0.5 * np.arange(TURNS - 45)  # as fast as on passing a resonance
+    passed["phase_probe_left"] = passed["phase_probe_left"].copy(data=phase)
+    _, drawn = bode(passed, "probe_left").show()
+    lag = drawn.lines[0].get_ydata()
+    assert np.isnan(lag[20:40]).all()
+    assert lag[:15] == pytest.approx(30.0)
+    assert (lag[45:] - lag[44]) == pytest.approx(np.degrees(0.5) * np.arange(TURNS - 45))
 
 
 @pytest.mark.parametrize("turns", [0.7, 1.6, 3.0])
