@@ -70,6 +70,8 @@ SLOW = (
     "integrate/changing_speed/test_run_up_machines.py",
     "integrate/test_simulate.py::test_energy_balances[3-",
     "integrate/test_simulate.py::test_run_goes_on_from_its_final_state[3",
+    "integrate/test_tangent_motion.py::test_after_short_steps",
+    "integrate/test_tangent_motion.py::test_tangent_is_that_of_the_saltation_matrices[ring",
     "integrate/test_transient.py::test_laws_without_closed_form_settle_as_with_auto",
     "kernels/test_accumulators.py",
     "kernels/test_complementarity.py",

@@ -188,6 +188,7 @@ def _integrate(
         accumulator.is_touching[:] = march.touching()  # a contact under way did not begin in the record
         trail = _trail(march, recording)
         reason = march.advance(0, n_sample, samples, accumulator, is_recorded=True)
+    n_step, n_left = n_step + march.n_step, n_left + march.n_left
     if reason is not None:
         n_kept = samples_within(samples, march.sample, setup.displacement_limit)
         revolution = n_transient + min(n_kept // per_revolution + 1, recording.revolutions)
@@ -203,6 +204,7 @@ def _integrate(
     else:
         add_sag(samples, accumulator, setup.model)
         signals, final = by_name(samples.whole, setup.model), march.final()
+        energy = energy_before, march.energy()
         solver = _solver(march, setup, clearance, friction, final, begun_on)
         growth = Growth(lambda: _neighbours(march, trail, start, final, setup, recording))
         record = Record(
@@ -217,7 +219,7 @@ def _integrate(
                 accumulator,
                 signals,
                 deflection=tip_deflection(samples, accumulator, setup.model),
-                energy=(energy_before, march.energy()),
+                energy=energy,
                 stators=setup.model.stators,
                 spin=setup.spin,
                 is_round=setup.is_updated,
@@ -225,7 +227,7 @@ def _integrate(
                 growth=growth,
                 within=growth.within,
                 solve=solver,
-                further=solver.further if solver is not None else None,
+                later=solver.later if solver is not None else None,
             )
             | {"carrier_displacement": carrier_displacement(samples, setup.model)}
             | probe_extents(signals),
@@ -238,11 +240,7 @@ def _integrate(
             record.measures.update(_spectrum(march, begin, final, recording.lyapunov))
         if "waveform" not in recording.keep:
             record.signals.clear()
-    record.measures.update(
-        transient_revolutions=n_transient,
-        steps=n_step + march.n_step,
-        left_closed_form=n_left + march.n_left,
-    )
+    record.measures.update(transient_revolutions=n_transient, steps=n_step, left_closed_form=n_left)
     return record
 
 
@@ -307,7 +305,7 @@ def _solver(
 ) -> Solver | None:
     """What finds periodic motions next to where a march has ended; None where it has no closed form."""
     if isinstance(march, EventDrivenMarch) and march.has_closed_form and isinstance(setup, ModalSetup):
-        return Solver(setup, clearance, friction, final, begun_on)
+        return Solver(setup, clearance, friction, final, begun_on, march)
     return None
 
 

@@ -19,7 +19,9 @@ import numpy as np
 from postproc.signals import contacts
 from postproc.signals.hilbert_huang import hilbert_huang, median_frequency
 from rubhpc import LumpedStator, read_rig, simulate
+from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.rig.reading import with_keys
+from rubhpc.schema import REGIME
 
 if TYPE_CHECKING:
     from rubhpc import Rig
@@ -148,6 +150,37 @@ def short_records() -> None:
     print(f"{without} of 416 without a period; alike with 24 revolutions {same[24]}, with 16 {same[16]}")
 
 
+def settling() -> None:
+    """Cases of the packaged map beside the same after 3000 revolutions (theory, records: regime, 5)."""
+    axes = np.linspace(0.6, 6.0, 55), np.linspace(0.40, 0.95, 12), (0.1, 0.3, 0.5)
+    cases = list(product(*axes))
+    drawn = [cases[i] for i in np.sort(np.random.default_rng(15).permutation(len(cases))[:500])]
+
+    def judged(transient: int) -> list[tuple[int, int, int, float]]:
+        found = []
+        for ratio, clearance, friction in drawn:
+            case = {"speed_ratio": ratio, "clearance_ratio": clearance, "friction": friction}
+            record = simulate(STIFF, **case, transient=transient, revolutions=64, keep=())
+            found.append((record.regime, record.period, record.settled, float(record.peak_contact_force[0])))
+        return found
+
+    follow, truth = Solver.later, judged(3000)
+    for name, later in (("not followed", lambda solver: iter(())), ("followed", follow)):
+        Solver.later = later  # type: ignore[method-assign]
+        pairs = list(zip(judged(120), truth, strict=True))
+        regimes = Counter((REGIME[a[0]], REGIME[b[0]]) for a, b in pairs if a[0] != b[0])
+        periods = sum(a[0] == b[0] and a[1] != b[1] for a, b in pairs)
+        both_chaotic = REGIME.index("chaotic")
+        off = [
+            a for a, b in pairs
+            if a[2] == 1 and abs(a[3] - b[3]) > 0.05 * b[3] and not a[0] == b[0] == both_chaotic
+        ]  # fmt: skip
+        unsettled = sum(a[2] == 0 for a, _ in pairs)
+        print(f"{name}: other regime {sum(regimes.values())} {dict(regimes)}, other period {periods}")
+        print(f"    settled and another peak {len(off)}, not settled {unsettled}")
+    Solver.later = follow  # type: ignore[method-assign]
+
+
 def default_accuracy() -> None:
     """Distance of the modal scheme from the central difference (guide, performance: accuracy)."""
     soft = PACKAGED
@@ -199,7 +232,7 @@ def signals() -> None:
 
 
 if __name__ == "__main__":
-    known = [closed_form, bounces, peaks, rigid, rounding, short_records, default_accuracy, signals]
+    known = [closed_form, bounces, peaks, rigid, rounding, short_records, settling, default_accuracy, signals]
     for function in known:
         if len(sys.argv) == 1 or function.__name__ in sys.argv[1:]:
             function()

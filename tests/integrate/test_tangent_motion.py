@@ -1,6 +1,7 @@
 """The tangent carried along a trail against the saltation matrices of the same events, formed one by one."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,11 +11,14 @@ from rubhpc import simulate
 from rubhpc.integrate.case import march_of
 from rubhpc.integrate.marches import met_modes
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.measuring.regimes import N_ALL
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.saltation import carried
+from rubhpc.integrate.periodic_motions.shooting import shoot
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.tangent_motion import TangentMotion, _ModesOfTrail
+from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
 from rubhpc.study.study import Contact, Integrator, Recording
 
 SPEED, CLEARANCE, FRICTION, N_REVOLUTION = 170.0, 80e-6, 0.2, 6
@@ -22,27 +26,39 @@ SOFT = {"law": "penalty", "stiffness": 1e6, "damping": 20.0}
 LAWS = [{}, {"restitution": 0.5}, {"friction_law": "coulomb"}, SOFT, SOFT | {"friction_law": "coulomb"}]
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: "-".join(map(str, law.values())) or "sliding")
-def test_tangent_is_that_of_the_saltation_matrices(law):
-    rig = trial_rig(3)
-    record = simulate(
-        rig,
-        speed=SPEED,
-        clearance=CLEARANCE,
-        friction=FRICTION,
-        transient=5,
-        revolutions=1,
-        samples_per_revolution=64,
-        **law,
-    )
-    setup = prepare(rig, SPEED, contact=Contact(**law), integrator=Integrator(), samples_per_revolution=64)
+LAW_NAMES = [("-".join(map(str, law.values())) or "sliding") for law in LAWS]
 
-    def start(state):
-        return march_of(setup.scheme, setup)(setup, CLEARANCE, FRICTION, state, None)
 
-    tangent = TangentMotion(start, record.final, setup, Recording(samples_per_revolution=64))
+def ring(count):
+    """The rig with so many equal stators."""
+    rig = trial_rig(1)
+    angles = 2.0 * math.pi * np.arange(count) / count
+    return replace(rig, stator=tuple(replace(rig.stator[0], angle=float(angle)) for angle in angles))
+
+
+def prepared(rig, speed, law):
+    """A set-up, and what starts its march from a state."""
+    setup = prepare(rig, speed, contact=Contact(**law), integrator=Integrator(), samples_per_revolution=64)
+    return setup, lambda state: march_of(setup.scheme, setup)(setup, CLEARANCE, FRICTION, state, None)
+
+
+def ended(rig, speed, transient, law):
+    """Where a case ends."""
+    given = {"clearance": CLEARANCE, "friction": FRICTION, "samples_per_revolution": 64, "keep": ()}
+    return simulate(rig, speed=speed, transient=transient, revolutions=1, **given, **law).final
+
+
+@pytest.mark.parametrize(
+    ("rig", "law"),
+    [(trial_rig(3), law) for law in LAWS] + [(ring(16), {}), (ring(16), LAWS[2])],
+    ids=[*LAW_NAMES, "ring-sliding", "ring-coulomb"],
+)
+def test_tangent_is_that_of_the_saltation_matrices(rig, law):
+    final = ended(rig, SPEED, 5, law)
+    setup, start = prepared(rig, SPEED, law)
+    tangent = TangentMotion(start, final, setup, Recording(samples_per_revolution=64))
     found = [tangent.part(1) for _ in range(N_REVOLUTION)]
-    motion = PiecewiseMotion(setup, CLEARANCE, FRICTION, record.final)
+    motion = PiecewiseMotion(setup, CLEARANCE, FRICTION, final)
     displacement, known, n_event = np.cos(np.arange(2.0 * motion.n)), [], 0
     begin, states = motion.start, motion.states
     for _ in range(N_REVOLUTION):
@@ -94,3 +110,50 @@ def test_contact_modes_without_room_are_read_once(monkeypatch):
     assert tangent().part(N_REVOLUTION) == expected
     assert len(n_asked) > 2 * len(trails)
     assert len(read) <= sum(trails)
+
+
+def solved(setup, final):
+    """The periodic motion of period 1 that a case has come to."""
+    motion = PiecewiseMotion(setup, CLEARANCE, FRICTION, final)
+    return motion, shoot(motion, motion.start, motion.states, 1)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=LAW_NAMES)
+def test_on_a_periodic_motion_it_is_the_monodromy_matrix(law):
+    """Period by period, whose sum goes with the logarithm of the largest multiplier to a bounded rest."""
+    rig, speed = trial_rig(2), 230.0
+    setup, start = prepared(rig, speed, law)
+    motion, orbit = solved(setup, ended(rig, speed, 100, law))
+    assert len(orbit.revolutions[0].pieces) > 2
+    state = motion.march.state_of(orbit.motion, motion.contact_force(orbit.states, orbit.motion))
+    tangent = TangentMotion(start, state, setup, Recording(samples_per_revolution=64))
+    found = [tangent.part(1) for _ in range(160)]
+    known, displacement = [], np.cos(np.arange(2.0 * motion.n))
+    displacement /= motion.size(displacement)
+    for _ in found:
+        displacement = orbit.monodromy @ displacement
+        known.append(math.log(motion.size(displacement)))
+        displacement /= motion.size(displacement)
+    assert found[1:] == pytest.approx(known[1:], abs=1e-4)
+    assert sum(found[32:]) == pytest.approx(128 * math.log(abs(orbit.multipliers[0])), abs=4.0)
+
+
+def test_after_short_steps_it_goes_on_beside_a_second_motion(monkeypatch):
+    """One revolution in short steps breaks the trail: two motions then part as the multipliers say."""
+    law, rig, speed = LAWS[2], trial_rig(2), 230.0
+    setup, start = prepared(rig, speed, law)
+    final = ended(rig, speed, 100, law)
+    _, orbit = solved(setup, final)
+    kernel, n_call = EventDrivenMarch._kernel, 0
+
+    def left_once(march, *args):
+        nonlocal n_call
+        n_call += 1
+        return CONTACT_UNSOLVED if n_call == 1 else kernel(march, *args)
+
+    monkeypatch.setattr(EventDrivenMarch, "_kernel", left_once)
+    tangent = TangentMotion(start, final, setup, Recording(samples_per_revolution=64))
+    found = [tangent.part(4) / 4 for _ in range(24)]
+    assert tangent._march.n_left == 1
+    assert n_call > N_ALL // 4  # marches of two motions, span by span
+    assert np.mean(found) == pytest.approx(math.log(abs(orbit.multipliers[0])), abs=0.02)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import StatorModel
-    from rubhpc.integrate.measuring.regimes import Further, Solution, Within
+    from rubhpc.integrate.measuring.regimes import Later, Solution, Within
 
     Floats = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def measures_of(
     growth: Iterable[float],
     within: Within | None,
     solve: Callable[[int], Solution | None] | None,
-    further: Further | None,
+    later: Later | None,
 ) -> dict[str, Any]:
     """Measures of a finished case; those of a contact that never happened are zero, or NaN where undefined.
 
@@ -69,8 +69,8 @@ def measures_of(
         How it grows within the record (`lyapunov.Growth.within`).
     solve : callable, optional
         Finds periodic motions (`proof.Solver`).
-    further : callable, optional
-        Finds them where that does not (`proof.Solver.further`).
+    later : callable, optional
+        Finds them in later revolutions, where that does not (`proof.Solver.later`).
     """
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution
@@ -85,8 +85,8 @@ def measures_of(
         is_contact=is_contact,
         growth=growth,
         solve=solve,
-        further=further,
         within=within,
+        later=later,
     )
     multiplier = verdict.multiplier
     rim = stators[0].radius * signals["torsion"]  # m, as the orbit

@@ -17,12 +17,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     Solve = Callable[[int], "Solution | None"]
-    Further = Callable[[int], Iterable[tuple[int, Solve]]]
+    Later = Callable[[], Iterable[tuple[int, Solve]]]
     Within = Callable[[], list[float]]
 
 Floats = NDArray[np.float64]
 
 MOST_DOUBLED = 2 * LONGEST_PERIOD  # revolutions, to which period doublings are followed
+STEEPEST = -2.0  # multiplier of a motion beside a stable one of twice the period; -1.60 where doublings end
 MOST_DISTANT = 0.1  # of the orbit's size: a record that is farther from a motion does not settle on it
 LEAST_REVOLUTIONS = LONGEST_PERIOD  # of a record without a period that is worth following further
 TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may show a torus, or a longer period, by itself
@@ -67,18 +68,19 @@ def regime(
     is_contact: bool,
     growth: Iterable[float],
     solve: Solve | None = None,
-    further: Further | None = None,
     within: Within | None = None,
+    later: Later | None = None,
 ) -> Verdict:
     """Judge a record.
 
     A record that looks periodic is so if a stable periodic motion is found next to its end, which the record
-    agrees with or draws near to: of the period that it looks like, of that at which it returns nearest, or
-    further on. If none is found, its cycles must be the same within 1e-5. Where motions cannot be solved for
-    at all, it is taken for what it looks like, if its first cycles are its last ones within 1 %.
+    agrees with or draws near to: of the period that it looks like, of that at which it returns nearest, or in
+    later revolutions. If none is found, its cycles must be the same within 1e-5. Where motions cannot be
+    solved for at all, it is taken for what it looks like, if its first cycles are its last ones within 1 %.
     A record shorter than 16 revolutions without a period leaves the motion undecided: it is too short for
     some periods. From 16 to 31 the growth alone decides, for it is measured beyond the record; a longer
-    record may show a torus, or a period beyond 16, by itself.
+    record may show a torus, or a period beyond 16, by itself. A motion that shows no period, but comes to a
+    periodic motion in later revolutions, is that and has not settled.
 
     Parameters
     ----------
@@ -89,10 +91,10 @@ def regime(
         Growth of a small displacement per revolution, span by span; read only where it is needed.
     solve : callable, optional
         Finds the motion of a period next to the end of the record (`proof.Solver`).
-    further : callable, optional
-        What else to try for a period, in turn (`proof.Solver.further`).
     within : callable, optional
         Growth of a small displacement within the record, span by span (`lyapunov.Growth.within`).
+    later : callable, optional
+        What to try in later revolutions, in turn (`proof.Solver.later`).
     """
     if not is_contact:
         return Verdict(REGIME.index("no_contact"), period)
@@ -108,7 +110,7 @@ def regime(
     if solve is None and looks_like > 0 and orbit.has_equal_ends(looks_like):
         return Verdict(periodic, period)
     search = _Search(orbit)
-    if solve and looks_like > 0 and (verdict := search.proves(looks_like, solve, further)):
+    if solve and looks_like > 0 and (verdict := search.proves(looks_like, solve, later)):
         return verdict
     is_open = looks_like > 0 and search.finds_nothing
     repeats = is_open and orbit.repeats(orbit.closest_return)
@@ -122,6 +124,8 @@ def regime(
         verdict = search.proves(nearest, solve)
         if verdict is not None:
             return verdict._replace(exponent=exponent)
+    if later and looks_like == 0 and (verdict := search.proves_any(later())):
+        return verdict._replace(exponent=exponent)
     is_settling = solve is None and flag == periodic
     return Verdict(flag, period if is_settling else 0, exponent, is_reached=not (is_settling and period > 0))
 
@@ -178,26 +182,31 @@ class _Search:
         self._orbit = orbit
         self.finds_nothing = True  # neither such a motion nor another one
 
-    def proves(self, period: int, solve: Solve, further: Further | None = None) -> Verdict | None:
-        """Judge by the motion of a period, by that of the closest return, and by what is found further on."""
+    def proves(self, period: int, solve: Solve, later: Later | None = None) -> Verdict | None:
+        """Judge by the motion of a period, by that of the closest return, and by what is found later on."""
         asked: set[int] = set()
         verdict = self._proved(period, solve, asked)
-        if verdict is not None or further is None:
+        if verdict is not None or later is None:
             return verdict
         closest = self._orbit.closest_return
         if closest not in asked and (verdict := self._proved(closest, solve, asked)):
             return verdict
-        trials = (self._proved(n, search, set()) for n, search in further(closest))
-        return next((verdict for verdict in trials if verdict is not None), None)
+        return self.proves_any(later())
+
+    def proves_any(self, trials: Iterable[tuple[int, Solve]]) -> Verdict | None:
+        """Judge by the first of these searches that finds such a motion."""
+        verdicts = (self._proved(period, solve, set()) for period, solve in trials)
+        return next((verdict for verdict in verdicts if verdict is not None), None)
 
     def _proved(self, period: int, solve: Solve, asked: set[int]) -> Verdict | None:
         """Judge by the motion of a period; None where that is none, unstable or elsewhere.
 
-        An unstable motion whose disturbances change sides in every period is followed to twice its period.
+        An unstable motion whose disturbances change sides in every period is followed to twice its period, if
+        they do not grow by more than double: where doublings accumulate they grow by 1.60 (Feigenbaum 1978).
         """
         found = solve(period)
         asked.add(period)
-        while found is not None and found.multiplier.real < -1.0 and period < MOST_DOUBLED:
+        while found and STEEPEST < found.multiplier.real < -1.0 and period < MOST_DOUBLED:
             self.finds_nothing = False
             period = 2 * period
             asked.add(period)
@@ -213,7 +222,7 @@ class _Search:
         if last > PERIOD_TOLERANCE and not draws_near:
             return None
         upper = complex(found.multiplier.real, abs(found.multiplier.imag))
-        is_reached = bool(last <= PERIOD_TOLERANCE)
+        is_reached = bool(max(first, last) <= PERIOD_TOLERANCE)
         return Verdict(REGIME.index("periodic"), found.period, multiplier=upper, is_reached=is_reached)
 
 

@@ -19,6 +19,7 @@ from rubhpc.kernels.flow import BEFORE, GRADIENT, RATE_BEGUN, RATE_ENDED, follow
 from rubhpc.kernels.friction_states import STUCK, state_of
 
 if TYPE_CHECKING:
+    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import ModalSetup
 
@@ -111,13 +112,26 @@ class PiecewiseMotion:
     ----------
     initial : State
         Where the case begins; `integrate.initial_state.fit_to_gaps` makes it fit.
+    march : EventDrivenMarch, optional
+        Of the case, that is needed no more: it is started anew.
     """
 
-    def __init__(self, setup: ModalSetup, clearance: float, friction: float, initial: State) -> None:
+    def __init__(
+        self,
+        setup: ModalSetup,
+        clearance: float,
+        friction: float,
+        initial: State,
+        march: EventDrivenMarch | None = None,
+    ) -> None:
         """Take a case in closed form; `NoClosedForm` where it has none."""
-        march = closed_form_march(setup)
-        self.has_states = issubclass(march, FrictionMarch)
-        self.march = march(setup, clearance, friction, initial, None)
+        made = closed_form_march(setup)
+        self.has_states = issubclass(made, FrictionMarch)
+        if march is None:
+            march = made(setup, clearance, friction, initial, None)
+        else:
+            march.start_again(initial)
+        self.march = march
         self.setup = setup
         self.turn = setup.interval * setup.samples_per_revolution
         self.bodies = self.march.bodies

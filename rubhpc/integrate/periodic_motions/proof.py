@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.orbit_measures import PERIOD_TOLERANCE
 from rubhpc.integrate.measuring.regimes import MOST_DOUBLED, Solution, closest_return
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import ModalSetup
 
@@ -28,9 +31,12 @@ if TYPE_CHECKING:
 
 MOST_ITERATIONS, LEAST_STEP = 6, 1.0  # a record that looks periodic is near the solution
 MOST_EVENTS = 160  # in a period; the time that a proof takes goes with them
-# Where that finds no stable motion that the record agrees with: with shorter steps, and from further on.
-PATIENT_ITERATIONS, PATIENT_STEP = 12, 1 / 8
-FURTHER = 64, 192  # revolutions
+PATIENT_ITERATIONS, PATIENT_STEP = 12, 1 / 8  # with shorter steps, from a motion that has come to it
+# Where that finds no stable motion that the record agrees with: revolutions after which it is looked at, 512
+# in all; the distance, of its size, in which the motion then returns if it has come to one, and in which it
+# does if it draws near.
+LATER = 128, 128, 256
+ARRIVED, DRAWING_NEAR, NEARER = 1e-4, PERIOD_TOLERANCE, 0.5
 
 
 class Solver:
@@ -43,12 +49,16 @@ class Solver:
         friction: float,
         final: State,
         known: tuple[PiecewiseMotion, Orbit] | None = None,
+        march: EventDrivenMarch | None = None,
     ) -> None:
-        """Take the end of a case in closed form, and the stable motion that it was begun on, if any."""
+        """Take the end of a case in closed form, and the stable motion that it was begun on, if any.
+
+        A march of the case that is needed no more may be given, to be started anew.
+        """
         self._case = setup, clearance, friction, final
         self._piecewise: PiecewiseMotion | None = None
         self._found: dict[int, Solution | None] = {}  # by the period asked for
-        self._known = known
+        self._known, self._march = known, march
 
     @property
     def has_begun(self) -> bool:
@@ -61,39 +71,43 @@ class Solver:
             return held
         try:
             if self._piecewise is None:
-                self._piecewise = PiecewiseMotion(*self._case)
+                self._piecewise = PiecewiseMotion(*self._case, self._march)
         except NoClosedForm:
             return None
         self._found[period] = _solution(self._piecewise, period, MOST_ITERATIONS, LEAST_STEP)
         return self._found[period]
 
-    def _patiently(self, piecewise: PiecewiseMotion, period: int) -> Solution | None:
-        """The same with shorter steps, where longer ones found nothing."""
-        return self._found.get(period) or _solution(piecewise, period, PATIENT_ITERATIONS, PATIENT_STEP)
+    def later(self) -> Iterator[tuple[int, Callable[[int], Solution | None]]]:
+        """Where to look for a motion that is not found at the end: a period, and what solves for it.
 
-    def further(self, period: int) -> Iterator[tuple[int, Callable[[int], Solution | None]]]:
-        """Where to look for a motion that was not found, in turn: a period, and what solves for it.
-
-        First this period with shorter steps, then those at which the motion returns 64 and 256 revolutions
-        on. Sections begin at the end of the record.
+        The case goes on for 512 revolutions. Where its last ones return within 1e-4 of the motion's size, and
+        in half the distance of the search before, it may have come to a periodic motion; at the end also
+        where they return within 1 %, nearer than ever and in half the distance of the beginning.
         """
-        if self._piecewise is None:
-            return
-        piecewise = self._piecewise
-        yield period, partial(self._patiently, piecewise)
         setup, clearance, friction, state = self._case
-        n_on = 0
-        for n_revolution in FURTHER:
-            try:
-                march = PiecewiseMotion(setup, clearance, friction, state).march
+        n_on, tried = 0, ARRIVED / NEARER
+        returned: list[float] = []
+        try:
+            march = self._march or closed_form_march(setup)(setup, clearance, friction, state, None)
+            march.keep(None)
+            march.start_again(state)
+            self._piecewise = None  # it may have followed this march
+            for n_revolution in LATER:
                 passed, reason = march.pass_sections(n_revolution, *idle_of(march))
                 if reason is not None:
                     return
-                state, n_on = march.final(), n_on + n_revolution
+                n_on += n_revolution
+                period, apart = _return_of(passed, _energy(setup, passed))
+                returned.append(apart)
+                draws_near = n_on == sum(LATER) and apart <= DRAWING_NEAR and _falls(returned)
+                if apart > NEARER * tried and not draws_near:
+                    continue
+                tried, state = apart, march.final()
                 later = PiecewiseMotion(setup, clearance, friction, state)
-            except NoClosedForm:
-                return
-            yield _return_of(later, passed), partial(_solved_later, later, n_on)
+                yield period, partial(_solved_later, later, n_on)
+                march.start_again(state)
+        except NoClosedForm:
+            return
 
     def _held(self, period: int) -> Solution | None:
         """Return the motion that the case was begun on, if it has that period and still is there."""
@@ -141,12 +155,25 @@ def _solved_later(piecewise: PiecewiseMotion, n_revolution: int, period: int) ->
     return found and found._replace(section=np.roll(found.section, n_revolution, axis=0))
 
 
-def _return_of(piecewise: PiecewiseMotion, passed: Floats) -> int:
-    """Revolutions after which the last motions (k, 2 n) return nearest."""
+def _energy(setup: ModalSetup, passed: Floats) -> Floats:
+    """Twice the energy of unit motions, (2 n,)."""
+    return np.repeat([setup.spin**2, 1.0], passed.shape[1] // 2)
+
+
+def _return_of(passed: Floats, energy: Floats) -> tuple[int, float]:
+    """Revolutions after which the last motions (k, 2 n) return nearest, and how near, over their size."""
     longest = min(MOST_DOUBLED, len(passed) // 2)
-    energy = np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n)
-    back = [((passed[n:] - passed[:-n])[-longest:] ** 2 @ energy).mean() for n in range(1, longest + 1)]
-    return closest_return(np.array(back), piecewise.size(passed[-1]))
+    ends, place = passed[-2 * longest :], np.arange(longest)
+    before = ends[longest + place - place[:, np.newaxis] - 1]
+    back = ((ends[longest:] - before) ** 2 @ energy).mean(axis=1)
+    size = math.sqrt(passed[-1] ** 2 @ energy)
+    period = closest_return(back, size)
+    return period, math.sqrt(back.min()) / size
+
+
+def _falls(apart: list[float]) -> bool:
+    """Whether the last of these distances is the least, and half of the first or less."""
+    return apart[-1] <= NEARER * apart[0] and apart[-1] == min(apart)
 
 
 def _section(piecewise: PiecewiseMotion, orbit: Orbit) -> Floats:

@@ -175,7 +175,7 @@ def closing(period, multiplier, whirl, shift=0.0):
     return lambda asked: Solution(period, multiplier, np.column_stack([section.real, section.imag]))
 
 
-def judged(whirl, solve, *, period=3, growth=None, further=None):
+def judged(whirl, solve, *, period=3, growth=None, later=None):
     verdict = regime(
         whirl.real,
         whirl.imag,
@@ -184,7 +184,7 @@ def judged(whirl, solve, *, period=3, growth=None, further=None):
         is_contact=True,
         growth=unread() if growth is None else growth,
         solve=solve,
-        further=further,
+        later=later,
     )
     return REGIME[verdict.flag], verdict
 
@@ -273,7 +273,7 @@ def test_period_at_which_the_record_returns_is_tried_too(revolutions):
             whirl,
             lambda asked, other=other: locked(asked) if asked == 4 else other(asked),
             period=1,
-            further=lambda period: (),
+            later=lambda: (),
         )
         assert (name, verdict.period, verdict.multiplier) == ("periodic", 4, 0.6)
 
@@ -286,9 +286,33 @@ def test_motion_that_is_found_further_on_proves_the_record():
         name, verdict = judged(
             whirl,
             lambda asked: None,
-            further=lambda n, found=found: [(n, lambda asked: None), (6, lambda asked: found)],
+            later=lambda found=found: [(3, lambda asked: None), (6, lambda asked: found)],
         )
         assert (name, verdict.period, verdict.is_reached) == ("periodic", 6, is_reached)
+
+
+@pytest.mark.parametrize(("rate", "name"), [(0.4, "chaotic"), (0.0, "quasi_periodic"), (-0.2, "periodic")])
+def test_motion_without_a_period_is_what_it_comes_to_later(rate, name):
+    """Chaos that dies out, above all: the exponent remains that of the record."""
+    whirl, orbit = swollen(logistic(3.8)), torus(1 / 3)
+    led_to = closing(3, 0.5, orbit)(3)._replace(is_led_to=True)
+    unstable = led_to._replace(multiplier=1.5)
+    trials = ((led_to, ("periodic", 3, False)), (unstable, (name, 0, True)), (None, (name, 0, True)))
+    for found, expected in trials:
+        judgement, verdict = judged(
+            whirl,
+            lambda asked: None,
+            period=0,
+            growth=repeat(rate),
+            later=lambda found=found: [(5, lambda asked: None), (3, lambda asked: found)],
+        )
+        assert (judgement, verdict.period, verdict.is_reached) == expected
+        assert verdict.exponent == pytest.approx(rate)
+
+
+def test_motion_with_a_period_is_not_followed_later():
+    whirl = torus(1 / 3)
+    assert judged(whirl, closing(3, 0.3, whirl), later=lambda: pytest.fail("needless"))[1].period == 3
 
 
 def test_short_record_with_a_period_and_no_solution_is_what_it_looks_like():

@@ -68,3 +68,19 @@ def test_period_four_beside_a_second_frequency_does_not_pass_for_one(ratio):
     inside = periodic(pump(), speed_ratio=ratio, period=1, initial=record.final, **case)
     assert inside.period == 1
     assert not inside.is_stable
+
+
+@pytest.mark.parametrize("revolutions", [16, 64, 128])
+def test_chaos_that_dies_out_has_not_settled(revolutions):
+    """Whatever the record's length, it is the motion that a long simulation comes to."""
+    stiff = {
+        "speed_ratio": 6.0, "clearance_ratio": 0.85, "friction": 0.5,
+        "overrides": {"stator.youngs_modulus": "30 GPa"}, "samples_per_revolution": 64, "keep": (),
+    }  # fmt: skip
+    record = simulate("mokhtar2017", transient=120, revolutions=revolutions, **stiff)
+    reached = simulate("mokhtar2017", transient=3000, revolutions=12, **stiff)
+    assert (REGIME[reached.regime], reached.period, reached.settled) == ("periodic", 3, 1)
+    assert (REGIME[record.regime], record.period, record.settled) == ("periodic", 3, 0)
+    assert record.largest_multiplier == pytest.approx(reached.largest_multiplier, rel=1e-5)
+    assert record.lyapunov_exponent > 0.05
+    assert record.peak_contact_force[0] > 2.0 * reached.peak_contact_force[0]
