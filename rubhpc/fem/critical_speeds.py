@@ -72,7 +72,8 @@ def find_critical_speeds(
     Returns
     -------
     list of CriticalSpeed
-        Forward, backward and planar ones; of lateral modes that oscillate.
+        Forward, backward and planar ones; of lateral modes that oscillate there, and at a speed of the grid
+        beside it.
     """
     body = model.rotor
     speeds = np.asarray(speeds, dtype=np.float64)
@@ -82,7 +83,9 @@ def find_critical_speeds(
         if track[0].kind != "lateral":
             continue
         excess = np.abs(speeds) - np.array([abs(mode.eigenvalue) for mode in track])
-        for i in np.flatnonzero((excess[:-1] < 0.0) != (excess[1:] < 0.0)):
+        oscillates = np.array([mode.eigenvalue.imag > 0.0 for mode in track])
+        crosses = (excess[:-1] < 0.0) != (excess[1:] < 0.0)
+        for i in np.flatnonzero(crosses & (oscillates[:-1] | oscillates[1:])):
             before = [other[i] for other in tracks]
 
             def beyond(spin: float, before: list[Mode] = before, i_mode: int = i_mode) -> float:

@@ -132,3 +132,10 @@ def test_stiffening_bearing_is_met_more_than_once():
         known += [root.real for root in roots if abs(root.imag) < 1e-9 and a <= root.real <= b]
     assert distinct == pytest.approx(sorted(known), rel=1e-6)
     assert len(known) == 3
+
+
+def test_modes_that_do_not_oscillate_are_not_solved_for(monkeypatch):
+    rig = trial_rig(1)
+    stiff = replace(rig, rotor=replace(rig.rotor, damping=replace(rig.rotor.damping, beta=0.5)))
+    monkeypatch.setattr("rubhpc.fem.critical_speeds.brentq", None)  # some 15 eigenproblems for each of them
+    assert find_critical_speeds(assemble(stiff), np.linspace(0.0, 3000.0, 25)) == []
