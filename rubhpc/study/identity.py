@@ -30,7 +30,7 @@ COULOMB = 6  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 8  # method = "modal" with gaps that are curved
 MANY_STATORS = 4  # more than five, whose sets of closed contacts or states may be more than 256
-BRANCHES = 4  # [branch]: the motion with a weak impact next to a grazing
+BRANCHES = 5  # [branch]: steps are halved until all multipliers that have crossed are accounted for
 MANY_EVENTS = 1  # restitution, or method = "modal" where a case may have 200 000 events
 ALONG_SPEED = 1  # branches along a speed
 PROBED = 1  # method = "modal" with probes, for whose sake modes are kept

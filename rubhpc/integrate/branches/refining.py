@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MOST_HALVINGS = 6  # of a step
+MOST_KNOWN = 20  # where its ends leave no doubt that an event lies between them
 FAR = 1e-3  # of a step: a neighbour that is nearer shows no trend
 TURNED = 0.3  # between the direction of a step and the mean of those around it, of length 1
 ASTRAY = 0.5  # of a step, by which its middle may lie off
@@ -43,7 +44,8 @@ def refined(branching: Branching, track: Track, most: int) -> Track:
     halvings = [0] * len(points)  # of the step behind each point
     k = 0
     while k < len(points) - 1:
-        if halvings[k] >= MOST_HALVINGS or len(points) >= most or not _may_hide(branching, points, k):
+        most_halvings = MOST_HALVINGS if _outside(points[k]) & _outside(points[k + 1]) else MOST_KNOWN
+        if halvings[k] >= most_halvings or len(points) >= most or not _may_hide(branching, points, k):
             k += 1
             continue
         a, b = _aligned(branching, points[k], points[k + 1]), points[k + 1]
@@ -53,12 +55,12 @@ def refined(branching: Branching, track: Track, most: int) -> Track:
         try:
             middle = branching.correct(a, 0.5 * change, change / length, is_free=True)
         except NotConverged:
-            halvings[k] = MOST_HALVINGS
+            halvings[k] = MOST_KNOWN
             continue
         off = np.linalg.norm(branching.difference(a, middle) - 0.5 * change)
         before, behind = passed(branching, a, middle), passed(branching, middle, b)
         if off > ASTRAY * length or before is None or behind is None:
-            halvings[k] = MOST_HALVINGS
+            halvings[k] = MOST_KNOWN
             continue
         found = [*before, (Event.NONE, middle), *behind]
         events[k + 1 : k + 1] = [event for event, _ in found]

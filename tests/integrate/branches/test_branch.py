@@ -172,3 +172,21 @@ def test_bad_arguments_are_refused(arguments, text):
     with pytest.raises(InputError, match=text) as caught:
         rubhpc.branch("mokhtar2017", **CASE | ALONG | arguments)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("step", [0.01, 0.001])
+def test_stretch_far_narrower_than_a_step_is_not_lost(step):
+    """Stable for 7.6e-5: two multipliers come in as a pair, meet on the real axis, and one leaves by -1."""
+    (found,) = rubhpc.branch(
+        "mokhtar2017", along="clearance_ratio", start=0.93, stop=0.95, largest_step=step, period=1,
+        speed_ratio=2.1, friction=0.3, overrides={"stator.youngs_modulus": "30 GPa"}, doublings=0, keep=(),
+    )  # fmt: skip
+    (inwards, entered), (doubling, left) = found.events()
+    assert (inwards, doubling) == ("neimark_sacker", "period_doubling")
+    assert entered == pytest.approx(0.944376651, abs=1e-8)
+    assert left == pytest.approx(0.944452970, abs=1e-8)
+    between = (found.values > entered) & (found.values < left)
+    assert between.any()
+    assert found.is_stable[between].all()
+    outside = (found.values < entered - 1e-6) | (found.values > left + 1e-6)
+    assert not found.is_stable[outside].any()
