@@ -36,7 +36,13 @@ from rubhpc.integrate.reduced_model.mode_library import (
 from rubhpc.integrate.reduced_model.mode_tables import tabulate
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies, reduce_model
-from rubhpc.integrate.reduced_model.truncation import MOST_MODES, kept_modes, modal_error, sufficient_accuracy
+from rubhpc.integrate.reduced_model.truncation import (
+    MOST_MODES,
+    kept_modes,
+    modal_error,
+    sufficient_accuracy,
+    touch_of,
+)
 from rubhpc.integrate.scheme import Scheme, scheme_of
 from rubhpc.kernels.case_progress import Clock
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
@@ -98,7 +104,9 @@ class ModalSetup:
     @cached_property
     def modal_error(self) -> float:
         """Estimated error by the modes left out, as a share of each signal and force."""
-        return modal_error(self.model, self.spin, kept_modes(self.model, self.spin, self.accuracy))
+        touch = touch_of(self.model, self.law, is_updated=self.is_updated)
+        are_kept = kept_modes(self.model, self.spin, self.accuracy, touch)
+        return modal_error(self.model, self.spin, are_kept, touch)
 
     @cached_property
     def modes_missing(self) -> str:
@@ -322,10 +330,12 @@ def prepare(
                 f"speed: {speed:.3g} rad/s is too slow for events timed to 1.5 ns; take {least:.1g} rad/s "
                 "or more"
             )
+        law, is_updated = law_of(contact), contact.normal == "updated"
+        touch = touch_of(model, law, is_updated=is_updated)
         return ModalSetup(
             scheme=scheme,
             model=model,
-            reduced=reduced or reduce_model(model, speed, integrator.accuracy, free_spin),
+            reduced=reduced or reduce_model(model, speed, integrator.accuracy, free_spin, touch=touch),
             is_measured=is_measured,
             free_spin=free_spin,
             spin=speed,
@@ -333,8 +343,8 @@ def prepare(
             contact_step=integrator.contact_step(contact),
             accuracy=integrator.accuracy,
             samples_per_revolution=samples_per_revolution,
-            is_updated=contact.normal == "updated",
-            law=law_of(contact),
+            is_updated=is_updated,
+            law=law,
             displacement_limit=rig.rotor.displacement_limit,
         )
     return prepare_steps(

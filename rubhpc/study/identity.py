@@ -26,9 +26,9 @@ PHYSICS = 19  # version of the physics: raised whenever a study gives other resu
 MODAL = 2  # method = "modal": modes kept for torsional accelerations, and `modal_error` of these
 DIRECT = 4  # transient = "direct"
 CHANGING_SPEED = 10  # run-ups and drives
-COULOMB = 6  # set-valued friction
+COULOMB = 7  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
-CURVED = 8  # method = "modal" with gaps that are curved
+CURVED = 9  # method = "modal" with gaps that are curved
 MANY_STATORS = 4  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 5  # [branch]: steps are halved until all multipliers that have crossed are accounted for
 MANY_EVENTS = 1  # restitution, or method = "modal" where a case may have 200 000 events
@@ -49,7 +49,7 @@ def physics_of(study: Study) -> int:
         + MODAL * (study.integrator.method == "modal")
         + DIRECT * study.recording.is_transient_direct
         + CHANGING_SPEED * bool(study.run_up or study.drive)
-        + COULOMB * ("coulomb" in friction_laws)
+        + COULOMB * (friction_laws != {"sliding"})
         + SOFT_FRICTION * is_soft
         + CURVED * (study.integrator.method == "modal" and _is_curved(study))
         + MANY_STATORS * (len(study.rig.stator) > 5)
@@ -61,10 +61,8 @@ def physics_of(study: Study) -> int:
 
 
 def _is_curved(study: Study) -> bool:
-    """Whether a stator is bent, or any case has a normal that turns under steady sliding."""
-    turns = "updated" in _laws(study, "normal")
-    slides = "sliding" in _laws(study, "friction_law") and "lagrange" in _laws(study, "law")
-    return has_bent_stator(study.rig.stator) or (turns and slides)
+    """Whether a stator is bent, or any case has a normal that turns."""
+    return has_bent_stator(study.rig.stator) or "updated" in _laws(study, "normal")
 
 
 def _has_many_events(study: Study) -> bool:

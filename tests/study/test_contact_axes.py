@@ -80,8 +80,8 @@ def test_each_case_takes_its_own_contact(tmp_path):
         ('"contact.restitution" = [0.0, 0.5]', "", ("MANY_EVENTS",)),
         ("", 'normal = "updated"', ("CURVED",)),
         ('"contact.normal" = ["fixed", "updated"]', "", ("CURVED",)),
-        ("", 'normal = "updated"\nlaw = "penalty"\nstiffness = 1e7', ()),
-        ("", 'friction_law = "stribeck"\nstribeck_speed = 1.0\nstatic_friction_ratio = 1.5', ()),
+        ("", 'normal = "updated"\nlaw = "penalty"\nstiffness = 1e7', ("CURVED",)),
+        ("", 'friction_law = "stribeck"\nstribeck_speed = 1.0\nstatic_friction_ratio = 1.5', ("COULOMB",)),
     ],
 )
 def test_a_version_of_some_laws_is_that_of_the_studies_that_take_them(tmp_path, axes, contact, further):

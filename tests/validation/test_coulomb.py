@@ -152,13 +152,14 @@ def test_dry_whip_diverges_in_steady_sliding_and_settles_under_coulombs_law(ring
 @pytest.mark.parametrize("normal", ["fixed", "updated"])
 def test_ordinary_rub_is_that_of_steady_sliding(normal):
     given = {"speed_ratio": 0.75, "clearance": "100 um", "transient": 2, "revolutions": 2, "normal": normal}
-    for method in ({"method": "central-difference", "step": "2 us"}, {}):
+    # All modes, since Coulomb's law keeps more than steady sliding.
+    for method in ({"method": "central-difference", "step": "2 us"}, {"accuracy": 1e-8}):
         sliding, coulomb = (
             simulate("mokhtar2017", **given, **method, friction_law=law) for law in ("sliding", "coulomb")
         )
         assert sliding.minimum_slip_speed.min() > 0.0
         # Coulomb's law takes curved gaps in short steps, steady sliding by a scheme of order 4.
-        share = 1e-9 if method or normal == "fixed" else 1e-4
+        share = 1e-9 if "method" in method or normal == "fixed" else 1e-4
         for name in ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral"):
             one, other = getattr(sliding, name), getattr(coulomb, name)
             assert other == pytest.approx(one, rel=0, abs=share * abs(one).max()), (name, method)

@@ -12,10 +12,12 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.integrate.marches.met_modes import NoClosedForm
+from rubhpc.integrate.packing import law_of
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
 from rubhpc.integrate.periodic_motions.saltation import by_clearance
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.along_speeds import AlongSpeeds
+from rubhpc.integrate.reduced_model.truncation import touch_of
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import ModalSetup, prepare
 from rubhpc.rig.reading import with_keys
@@ -203,7 +205,9 @@ class Family:
             return None
         if self._speeds is None:
             spins = [self._spin(self._operation.at(self.along, end), model) for end in self._ends]
-            self._speeds = AlongSpeeds(model, spins, self._operation.integrator.accuracy)
+            contact = self._operation.contact
+            touch = touch_of(model, law_of(contact), is_updated=contact.normal == "updated")
+            self._speeds = AlongSpeeds(model, spins, self._operation.integrator.accuracy, touch)
         return self._speeds.at(spin)
 
     def _setup(self, case: Operation, model: Model, spin: float, is_measured: bool) -> ModalSetup:

@@ -11,7 +11,7 @@ import numpy as np
 from rubhpc.integrate.packing import whole_system
 from rubhpc.integrate.reduced_model.reduction import reduce_to
 from rubhpc.integrate.reduced_model.standstill import at_standstill, completed
-from rubhpc.integrate.reduced_model.truncation import kept_modes
+from rubhpc.integrate.reduced_model.truncation import SMOOTH, kept_modes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.truncation import Touch
 
     Floats = NDArray[np.float64]
 
@@ -35,13 +36,14 @@ class AlongSpeeds:
     spins : iterable of float, rad/s
         Speeds of the range, its ends above all.
     accuracy : float
+    touch : Touch
         As of `reduce_model`.
     """
 
-    def __init__(self, model: Model, spins: Iterable[float], accuracy: float) -> None:
+    def __init__(self, model: Model, spins: Iterable[float], accuracy: float, touch: Touch = SMOOTH) -> None:
         """Choose the basis, and project on it."""
         spins = sorted(spins, key=abs)
-        choices = zip(*(kept_modes(model, spin, accuracy) for spin in spins), strict=True)
+        choices = zip(*(kept_modes(model, spin, accuracy, touch) for spin in spins), strict=True)
         parts = at_standstill(model).parts
         are_kept = [
             completed(part, reduce(np.logical_or, of)) for part, of in zip(parts, choices, strict=True)

@@ -11,7 +11,7 @@ import numpy as np
 from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.integrate.reduced_model.standstill import Modes, at_standstill, parted, seen_degrees
-from rubhpc.integrate.reduced_model.truncation import kept_modes
+from rubhpc.integrate.reduced_model.truncation import SMOOTH, kept_modes
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.contact_pairs import N_DEGREE, TORSION, V, W, rim_sense
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.free_spin import FreeSpin
     from rubhpc.fem.model import Model
+    from rubhpc.integrate.reduced_model.truncation import Touch
     from rubhpc.kernels.laws import Law
 
     Floats = NDArray[np.float64]
@@ -80,7 +81,12 @@ class ReducedModel:
 
 
 def reduce_model(
-    model: Model, spin: float, accuracy: float, free_spin: FreeSpin | None = None
+    model: Model,
+    spin: float,
+    accuracy: float,
+    free_spin: FreeSpin | None = None,
+    *,
+    touch: Touch = SMOOTH,
 ) -> ReducedModel:
     """Reduce a model so that contact and outputs are met to the accuracy asked for.
 
@@ -98,6 +104,8 @@ def reduce_model(
         waveforms to about 1e-4.
     free_spin : FreeSpin, optional
         Where a drive turns the rotor: contacts then see rotations about the mean of rotor and drive.
+    touch : Touch
+        What contacts feel of motion along the rim, which needs more modes.
 
     Raises
     ------
@@ -105,7 +113,7 @@ def reduce_model(
         Where nothing holds a body: its constant response, on which the modal form of closed contacts rests,
         does not exist.
     """
-    return reduce_to(model, spin, accuracy, kept_modes(model, spin, accuracy), free_spin)
+    return reduce_to(model, spin, accuracy, kept_modes(model, spin, accuracy, touch), free_spin)
 
 
 def reduce_to(

@@ -15,19 +15,41 @@ from rubhpc.integrate.reduced_model.standstill import (
     cutoff_frequency,
     modes_below,
 )
+from rubhpc.kernels._jit import plain
 from rubhpc.kernels.accumulators import TWIST
+from rubhpc.kernels.laws import is_set_valued
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
+    from rubhpc.kernels.laws import Law
 
     Floats = NDArray[np.float64]
     Bools = NDArray[np.bool_]
 
 MARGIN = 5.0  # estimates without it were up to 5.5 times too small: a case has many contacts, not one
 REBOUNDS = 3.0  # where modes are added, how much closer: a body that rebounds many times multiplies an error
+TURNED = (
+    0.3  # share of motion along the rim that opens a gap whose normal has turned, or whose stator has bent
+)
 MOST_MODES = 400  # kept for the sake of the estimate; `cutoff_frequency` may ask for more
+
+
+class Touch(NamedTuple):
+    """What contacts feel of motion along the rim; under steady sliding along a fixed normal, nothing."""
+
+    may_stick: bool = False  # friction is set-valued
+    is_curved: bool = False  # gaps are: an updated normal, or a bent stator
+
+
+SMOOTH = Touch()
+
+
+def touch_of(model: Model, law: Law, *, is_updated: bool) -> Touch:
+    """What contacts feel under a law, with the updated normal or the fixed one."""
+    is_bent = any(stator.squared_slope is not None for stator in model.stators)
+    return Touch(may_stick=plain(is_set_valued)(law), is_curved=is_updated or is_bent)
 
 
 class Ringing(NamedTuple):
@@ -37,7 +59,7 @@ class Ringing(NamedTuple):
     impact: float  # share of the closing momentum that the heaviest tip's own mass takes up at once
 
 
-def kept_modes(model: Model, spin: float, accuracy: float) -> list[Bools]:
+def kept_modes(model: Model, spin: float, accuracy: float, touch: Touch = SMOOTH) -> list[Bools]:
     """Which modes of each part are kept: those up to `cutoff_frequency`, and those that ring too much.
 
     Where the estimated error (`modal_error`) without the modes above is beyond the accuracy, those with the
@@ -51,9 +73,9 @@ def kept_modes(model: Model, spin: float, accuracy: float) -> list[Bools]:
     is_kept = np.concatenate(are_kept)
     if is_kept.all():
         return are_kept
-    ringing = ringing_of(model, spin)
+    ringing = ringing_of(model, spin, touch)
     is_struck = ringing.impact > accuracy
-    if not is_struck and modal_error(model, spin, are_kept) <= accuracy:
+    if not is_struck and modal_error(model, spin, are_kept, touch) <= accuracy:
         return are_kept
     above = np.flatnonzero(~is_kept)
     above = above[np.argsort(ringing.share[:, above].max(axis=0), kind="stable")]  # the least share first
@@ -64,7 +86,7 @@ def kept_modes(model: Model, spin: float, accuracy: float) -> list[Bools]:
     return [completed(part, these) for part, these in zip(parts, np.split(is_kept, ends), strict=True)]
 
 
-def modal_error(model: Model, spin: float, are_kept: list[Bools]) -> float:
+def modal_error(model: Model, spin: float, are_kept: list[Bools], touch: Touch = SMOOTH) -> float:
     """Estimate the largest error of a signal or a force, as a share of it, by the modes left out.
 
     A contact force is taken for a pulse at the contact frequency `w_c` (`standstill.Standstill`), with the
@@ -72,17 +94,23 @@ def modal_error(model: Model, spin: float, are_kept: list[Bools]) -> float:
     of the closing momentum at once, and the force rises to that of a wave in the stator, b of its later peak.
     A mode of frequency w whose place of contact moves by b, and whose place of a signal by a, rings with the
     displacement `a b G(w) / w` there, and opens and closes the gap with the velocity `b^2 G(w)`; friction, as
-    large as the normal force, is a second force of that kind. A ring
-    counts as long as it lasts, over half a period of `w_c` at most: what is damped at once is followed by the
-    static shapes that stand for it. What it drives through dampers and gyroscopic terms rings with it
-    (`coupled_ringing`). The error is the root of the sum of squares over the modes left out, over
-    that of all modes, times a margin.
+    large as the normal force, is a second force of that kind. Set-valued friction jumps where slip ends or
+    turns, with the spectrum of a step, `w_c / w` besides; it then holds the rim, and a mode that moves the
+    rim along by b starts slip with the velocity `b^2 G(w)`. Where gaps are curved, motion along the rim opens
+    and closes them too, by a share of it (TURNED).
+
+    A ring counts as long as it lasts, over half a period of `w_c` at most: what is damped at once is followed
+    by the static shapes that stand for it. What it drives through dampers and gyroscopic terms rings with it
+    (`coupled_ringing`). The error is the root of the sum of squares over the modes left out, over that of all
+    modes, times a margin.
 
     Parameters
     ----------
     spin : float, rad/s
     are_kept : list of (n,) bool
         Of each part, the modes kept.
+    touch : Touch
+        What contacts feel of motion along the rim.
 
     Returns
     -------
@@ -92,7 +120,7 @@ def modal_error(model: Model, spin: float, are_kept: list[Bools]) -> float:
     is_out = ~np.concatenate(are_kept)
     if not is_out.any():
         return 0.0
-    return MARGIN * float(np.sqrt((ringing_of(model, spin).share @ is_out).max()))
+    return MARGIN * float(np.sqrt((ringing_of(model, spin, touch).share @ is_out).max()))
 
 
 def sufficient_accuracy(model: Model, spin: float) -> float:
@@ -105,7 +133,7 @@ def sufficient_accuracy(model: Model, spin: float) -> float:
 
 
 @lru_cache(maxsize=4)
-def ringing_of(model: Model, spin: float) -> Ringing:
+def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
     """How strongly the modes of a model ring after contacts of any stator."""
     standstill = at_standstill(model)
     frequency = np.concatenate([part.frequency for part in standstill.parts])
@@ -129,12 +157,21 @@ def ringing_of(model: Model, spin: float) -> Ringing:
         across = ey * v + ez * w
         impact = max(impact, impact_share(across, axial, frequency))
         pulse = pulse_spectrum(across, axial, frequency, standstill.contact_frequency)
-        rung = np.array([*signals, axial, lateral]) * pulse / frequency
-        rungs.append(np.vstack([(across**2 + axial**2) * pulse, rung * (axial - across)]))
+        rung, seen = (of * pulse / frequency for of in (np.array([*signals, axial, lateral]), lively))
         along = lateral + ez * v - ey * w - stator.radius * twist
-        rungs.append(np.vstack([np.zeros(frequency.size), rung * along]))
-        seen = lively * pulse / frequency
-        probed.append(np.vstack([seen * (axial - across), seen * along]))
+        still = np.zeros(frequency.size)
+        moved = across**2 + axial**2
+        by_normal, by_friction = [moved * pulse], [still]  # how far gaps and slip ring
+        if touch.is_curved:
+            by_normal.append((moved + (TURNED * along) ** 2) * pulse)
+            by_friction.append(still)
+        if touch.may_stick:
+            jump = np.minimum(1.0, pulse + standstill.contact_frequency / frequency)
+            by_normal.append(still)
+            by_friction.append(along**2 * jump)
+            along = along * jump / pulse
+        rungs.extend([*by_normal, rung * (axial - across), *by_friction, rung * along])
+        probed.extend([seen * (axial - across), seen * along])
     coupled = coupled_ringing(damping, frequency) ** 2
     share, lively_share = (
         shares(np.vstack(those), len(model.stators), coupled, lasting) for those in (rungs, probed)

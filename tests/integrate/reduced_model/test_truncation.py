@@ -13,6 +13,8 @@ from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.reduced_model import truncation
 from rubhpc.integrate.reduced_model.standstill import at_standstill, cutoff_frequency, modes_below
 from rubhpc.integrate.reduced_model.truncation import (
+    SMOOTH,
+    Touch,
     coupled_ringing,
     impact_share,
     kept_modes,
@@ -20,7 +22,9 @@ from rubhpc.integrate.reduced_model.truncation import (
     pulse_spectrum,
     static_inertia,
     sufficient_accuracy,
+    touch_of,
 )
+from rubhpc.kernels.laws import COULOMB, MULTIPLIER
 from rubhpc.recent import forget
 from rubhpc.rig.probes import Probe
 from rubhpc.rig.reading import with_keys
@@ -37,7 +41,7 @@ def lumped(mass, stiffness):
     return replace(PACKAGED, stator=(LumpedStator(node=8, mass=mass, stiffness=stiffness),))
 
 
-def below(model, spin, accuracy=1e-3):
+def below(model, spin, accuracy=1e-3, touch=None):
     cutoff = cutoff_frequency(model, spin, accuracy)
     return [modes_below(part, cutoff) for part in at_standstill(model).parts]
 
@@ -80,6 +84,52 @@ def test_forces_of_a_heavy_stator_are_those_of_all_modes():
     assert record.peak_contact_force == pytest.approx(exact.peak_contact_force, rel=1e-3)
     assert found_error(record, exact) < 1e-3
     assert exact.peak_contact_force[0] > exact.contact_force.max() > 1000.0  # impulses are part of both
+
+
+@pytest.mark.parametrize(
+    ("keys", "case", "before"),
+    [
+        # Friction that sticks to the shaft beside the disc jumps and holds it: the twist rings at once.
+        ({"node": 10, "youngs_modulus": 1e9}, {"friction_law": "coulomb", "speed_ratio": 1.2}, 2e-3),
+        # The gap of a bent stator opens as its tip moves along.
+        (
+            {"node": 3, "youngs_modulus": 6.8e9, "length": 0.06, "geometry": "second_order"},
+            {"normal": "updated", "speed_ratio": 1.2},
+            2e-3,
+        ),
+    ],
+    ids=["sticks", "bent"],
+)
+def test_contacts_that_feel_motion_along_the_rim_need_more_modes(keys, case, before, monkeypatch):
+    rig = replace(PACKAGED, stator=(replace(PACKAGED.stator[0], radius=0.01, **keys),))
+    case = case | {"clearance_ratio": 0.6, "friction": 0.4, "transient": 0, "revolutions": 4}
+    case["overrides"] = {"rotor.damping.alpha": 10.0}
+    exact, record = simulate(rig, **case, accuracy=1e-8), simulate(rig, **case)
+    assert exact.modal_error == 0.0
+    assert found_error(record, exact) < record.modal_error < 1e-3
+    monkeypatch.setattr(
+        "rubhpc.integrate.reduced_model.reduction.kept_modes",
+        lambda model, spin, accuracy, touch: kept_modes(model, spin, accuracy),
+    )
+    forget()
+    assert found_error(simulate(rig, **case), exact) > before
+
+
+def test_estimate_knows_what_contacts_feel_along_the_rim():
+    """Of the modes that suffice for steady sliding along a fixed normal."""
+    model = assemble(at_node_5(radius=0.01, youngs_modulus=3e9))
+    are_kept = kept_modes(model, 220.0, 1e-3)
+    smooth, curved, sticky = (
+        modal_error(model, 220.0, are_kept, touch)
+        for touch in (SMOOTH, Touch(is_curved=True), Touch(may_stick=True))
+    )
+    assert smooth < 1e-3 < min(curved, sticky)
+    for touch in (Touch(is_curved=True), Touch(may_stick=True)):
+        assert modal_error(model, 220.0, kept_modes(model, 220.0, 1e-3, touch), touch) < 1e-3
+    assert touch_of(model, MULTIPLIER, is_updated=False) == SMOOTH
+    assert touch_of(model, MULTIPLIER._replace(friction_law=COULOMB), is_updated=True) == (True, True)
+    bent = assemble(at_node_5(radius=0.01, geometry="second_order"))
+    assert touch_of(bent, MULTIPLIER, is_updated=False) == Touch(is_curved=True)
 
 
 @pytest.mark.parametrize(
