@@ -124,9 +124,11 @@ def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) ->
     predicted steps.
     """
     from rubhpc.running.plan import make_plan
+    from rubhpc.running.progress import one_line
     from rubhpc.study.study import read_study
 
-    found = make_plan(read_study(study, output, trust_rig=trust_rig), part)
+    with one_line() as say:
+        found = make_plan(read_study(study, output, trust_rig=trust_rig), part, say)
     start_up = time.process_time() - found.timing.seconds  # what this process and a run have in common
     click.echo(replace(found, start_up=_WHOLE_START * start_up).text())
     return 0

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Recording
 
 _LONG = 0.25  # s: cases that take longer are shortened where there is no time for the whole of them
-_PATIENCE = 4.0  # times as long as foreseen: a case is cut off
+_PATIENCE = 3.0  # times as long as foreseen: a case is cut off
 _FIRST_STEPS = 50_000  # predicted, of the first run of a case that is shortened
 _LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
 _FIRST_TURNS = 64  # revolutions of a changing speed that are tried first
@@ -132,38 +132,41 @@ class Pilots:
         a_mode = modes / max(_n_solved(setup, case), 1)
         whole += modes
         if done < 1.0:
-            n_later, longer = self._to_come(case, setup, done, max(limit, 2.0 * modes))
+            n_later, longer = self._to_come(case, setup, done, max(limit, modes))
             whole += n_later * a_mode + longer * (whole - modes)
+        known = a_mode * _n_solved(setup, case)  # s, of modes that the whole case finds solved
+        cut_off = _PATIENCE * limit
         try:
-            if done < 1.0 and whole <= limit:
+            if done < 1.0 and whole - known <= limit:
+                whole, done = known + self._run(case, setup, self._study.recording, cut_off), 1.0
                 self.irregular.discard(case.index)
-                setup, done = set_up(self._study, case, setup.model), 1.0
-                whole = self._run(case, setup, self._study.recording, _PATIENCE * limit)
-            if done == 1.0 and (other := self._alike(case)) is not None:
-                met = _n_solved(setup, case)
-                later = self._run(other, setup, self._study.recording, _PATIENCE * limit)
-                shared = min(a_mode * max(2 * met - _n_solved(setup, case), 0), 0.9 * whole)
-                self._taken[other.index] = shared, later
-                return shared, 0.5 * (whole - shared + later), True
         except _Enough:
-            return 0.0, max(whole, _PATIENCE * limit), False
-        return 0.0, whole, done == 1.0
+            return 0.0, max(whole, known + cut_off), False
+        if done < 1.0 or (other := self._alike(case)) is None:
+            return 0.0, whole, done == 1.0
+        met = _n_solved(setup, case)
+        try:
+            later = self._run(other, setup, self._study.recording, cut_off)
+        except _Enough:  # a mean of both, the other's from below
+            return 0.0, 0.5 * (whole + max(whole, cut_off)), False
+        shared = min(a_mode * max(2 * met - _n_solved(setup, case), 0), 0.9 * whole)
+        self._taken[other.index] = shared, later
+        return shared, 0.5 * (whole - shared + later), True
 
     def _to_come(self, case: Case, setup: Setup, done: float, limit: float) -> tuple[float, float]:
         """Contact modes that the rest of a case meets, and revolutions of its tangent over those of the case.
 
         It is followed further, for as long again each time, until `limit` s have gone by. Where it meets
-        hardly any mode that is new, it is taken to come back to them for ever. Elsewhere it is irregular;
-        modes grow by the power of the revolutions that all doublings show, its tangent's included: such
-        motions are calm at times.
+        hardly any mode that is new, it is taken to come back to them for ever. Elsewhere it is irregular, and
+        each doubling of its revolutions, its tangent's included, is taken to meet half as many as the last:
+        the sets of contacts that a whip comes to are many, but not without end.
         """
         recording = self._study.recording
         first = before = met = _n_solved(setup, case)
         if self._final is None or not met:
             return 0.0, 0.0
-        left, n_doubling = limit, 0
+        left = limit
         while True:
-            n_doubling += 1
             left -= self._run(case, setup, shortened(recording, done), initial=self._final)
             before, met, done = met, _n_solved(setup, case), 2.0 * done
             if met - before <= _GROWING * before:
@@ -173,8 +176,8 @@ class Pilots:
         self.irregular.add(case.index)
         n_turn = recording.longest_transient + recording.revolutions
         longer = _NEIGHBOURS / n_turn if recording.revolutions >= LEAST_REVOLUTIONS else 0.0
-        power = min(1.0, math.log2(met / first) / n_doubling)
-        return met * ((1.0 + longer) / done) ** power - first, longer
+        n_doubling = math.log2(max((1.0 + longer) / done, 1.0))
+        return met - first + (met - before) * (1.0 - 0.5**n_doubling), longer
 
     def _alike(self, case: Case) -> Case | None:
         """Another case, far along one axis, that shares the contact modes of this one."""

@@ -17,7 +17,7 @@ from rubhpc.running.pilot_cases import Pace, Pilots
 from rubhpc.running.pilot_estimate import Sample
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from rubhpc.study.cases import Block, CaseGrid
 
 _MOST_PILOTS, _FEW_PILOTS, _FEW_BRANCHED = 64, 6, 2  # cases; timed even if slow, and of a branch study
-_ENOUGH, _MOST = 3.0, 12.0  # processor seconds after which no more are begun: where they agree, and at all
+_ENOUGH, _MOST = 3.0, 15.0  # processor seconds after which no more are begun: where they agree, and at all
 _AGREED = 0.25  # standard error of the mean pace, as a share of it, where cases agree
-_LONGEST = 20.0  # s, in which cases that were shortened are run whole, together
-_LEAST, _SHARE = 10.0, 0.2  # s that all may take, or that share of the time foreseen where it is more
+_LONGEST = 30.0  # s, in which cases that were shortened are run whole, together
+_LEAST, _SHARE = 15.0, 0.25  # s that all may take, or that share of the time foreseen where it is more
 _FEWEST = 3  # cases, timed in any case
 # Positions that spread evenly over a square, however many (R. Kronecker; steps of M. Roberts' R2 sequence).
 _AMONG_BLOCKS, _WITHIN_BLOCK = 0.7548776662466927, 0.5698402909980532
@@ -74,9 +74,13 @@ def seconds_of(pace: Pace, steps: float, n_case: float, n: Preparations, n_block
 
 
 def time_pilots(
-    grid: CaseGrid, manifest: Manifest, blocks: list[Block], missing: NDArray[np.bool_]
+    grid: CaseGrid,
+    manifest: Manifest,
+    blocks: list[Block],
+    missing: NDArray[np.bool_],
+    say: Callable[[str], None] = lambda _: None,
 ) -> Timing:
-    """Time cases of the blocks that are missing, until enough time has gone by.
+    """Time cases of the blocks that are missing, until enough time has gone by; `say` is given their number.
 
     A case is picked with a probability that is half proportional to its predicted steps and half the same
     for all; the cases spread evenly over the blocks and over the cases of a block.
@@ -105,6 +109,7 @@ def time_pilots(
         kept_back = spent() if pilots.shortened else 0.0  # as much is left to run dear cases whole
         if k >= min(few, _FEWEST) and allowed() < kept_back:
             break
+        say(f"timing cases: {len(paces)} so far, {max(spent(), 0.0):.0f} s of processor time")
         try:
             pace = pilots.pace(index, steps, allowed() / max(few - k, _FEWEST))
             paces.append(pace)
@@ -122,6 +127,8 @@ def time_pilots(
         if pilots.was_cut:  # another would take as long
             is_bound = True
             break
+    if pilots.shortened:
+        say(f"timing cases: {len(paces)} so far, the dearest of them to their end")
     is_bound |= _run_whole(pilots, picked, paces, sample, min(_LONGEST, allowed()))
     block = time_block(manifest, pilots.arrays) if pilots.arrays else 0.0
     seconds = time.process_time() - began - pilots.loading

@@ -26,6 +26,7 @@ from rubhpc.study.sampling import CASE
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -37,6 +38,7 @@ _LINE = 400  # bytes of a case in a journal, about, for one stator
 _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the settings
 _AT_EDGES = 1.1  # cases that a refined map computes over all cases, seconds a step, about
 _AGREED = 0.03  # standard error of the time, as a share of it, up to which no range is given
+_FEW = 3  # cases, which may all lack what most of the time is spent on
 _PRIVATE_FILES = 8  # manifests, journals, records of runs
 
 
@@ -110,7 +112,9 @@ class Plan:
         if timing.n_pilot == self.counts[MISSING]:
             note = ", all that are missing"
         elif self._range:
-            note = "; they differ: such a range holds the time of eight to nine plans in ten"
+            few = "few and differ" if timing.n_pilot <= _FEW else "differ"
+            share = "two plans in three" if timing.n_pilot <= _FEW else "eight to nine plans in ten"
+            note = f"; they {few}: such a range holds the time of {share}"
         return [f"timed       {timing.n_pilot} case{'s' * (timing.n_pilot > 1)}{note}"]
 
     @property
@@ -170,10 +174,10 @@ class Plan:
 
 
 @on_one_thread
-def make_plan(study: Study, part: str | None = None) -> Plan:
+def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] = lambda _: None) -> Plan:
     """Count, look into the store if there is one, and time pilot cases; writes nothing.
 
-    With a part, as "3/64", what is left of it is counted and timed.
+    With a part, as "3/64", what is left of it is counted and timed. `say` is given what is done meanwhile.
 
     Raises
     ------
@@ -214,7 +218,7 @@ def make_plan(study: Study, part: str | None = None) -> Plan:
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
     all_steps = sum(block.cost * share for block, share in left)
     steps = left_of_all * all_steps
-    timing = time_pilots(grid, manifest, [block for block, _ in left], missing)
+    timing = time_pilots(grid, manifest, [block for block, _ in left], missing, say)
     seconds = most = 0.0
     if left:
         prepared = count_preparations(grid, missing)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
-from rubhpc.integrate.compilation import seconds_compiling
+from rubhpc.integrate.compilation import announced_by, seconds_compiling, to_stderr
 from rubhpc.storage.duration import duration
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
     from types import TracebackType
 
     from rich.progress import Progress as Bar
@@ -120,3 +123,25 @@ class Progress:
         if sums.diverged:
             texts.append(f"{sums.diverged} diverged")
         return ", ".join(texts)
+
+
+@contextmanager
+def one_line() -> Iterator[Callable[[str], None]]:
+    """Show texts on the error stream, each in place of the last, and none at the end; on a terminal only."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+
+    def say(text: str) -> None:
+        width = shutil.get_terminal_size().columns - 1
+        print(f"\r\x1b[K{text[:width]}", end="", file=sys.stderr, flush=True)
+
+    def announce(text: str) -> None:
+        say("")
+        to_stderr(text)
+
+    try:
+        with announced_by(announce):
+            yield say
+    finally:
+        say("")

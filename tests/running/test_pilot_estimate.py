@@ -91,5 +91,5 @@ def test_range_of_three_cases_begins_where_time_was_taken():
     """Cases of 14, 2 and 40 s out of six do not make a range from zero to an hour."""
     low, high = within(100.0, 70.0, 3, known=56.0)
     assert low == 56.0
-    assert high == pytest.approx(100.0 * np.exp(0.7 * 3.182), rel=1e-3)
+    assert high == pytest.approx(100.0 * np.exp(1.3 * 0.7 * 3.182), rel=1e-3)  # further up than down
     assert within(100.0, 10.0, 3, known=56.0)[0] == pytest.approx(100.0 * np.exp(-0.1 * 3.182), rel=1e-3)

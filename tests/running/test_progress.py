@@ -7,7 +7,7 @@ import pytest
 
 from rubhpc.running import progress
 from rubhpc.running.pool import Totals
-from rubhpc.running.progress import Progress
+from rubhpc.running.progress import Progress, one_line
 from rubhpc.storage.duration import duration
 
 
@@ -103,3 +103,18 @@ def test_a_terminal_gets_a_bar(clock, monkeypatch):
         shown.update(Totals(done=5, cost=500))
     assert "5/20 cases" in terminal.getvalue()
     assert "10 s left" in terminal.getvalue()
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_what_a_plan_does_is_one_line_of_a_terminal_and_nothing_elsewhere(
+    is_terminal: bool, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: is_terminal)
+    monkeypatch.setenv("COLUMNS", "12")
+    with one_line() as say:
+        say("timing cases: 3")
+        say("more")
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    clear = "\r\x1b[K"
+    assert shown.err == (f"{clear}timing case{clear}more{clear}" if is_terminal else "")
