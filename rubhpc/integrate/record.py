@@ -95,6 +95,7 @@ class State:
 
 
 MOST_RESIDUAL = 0.01  # of the energy balance: a larger one is reported
+MOST_LEFT_RESIDUAL = 1e-4  # the same of a case in closed form that was left to short steps
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -174,8 +175,10 @@ class Record(RecordVariables):
         """Why the case diverged, or what is wrong with its result; "" where nothing is."""
         residual = self.measures.get("energy_residual", 0.0)
         texts = [text for text in (self.reason, self.note) if text]
-        if not self.reason and residual > MOST_RESIDUAL:
-            texts.append(f"its energy balance is off by {100 * residual:.2g} %; take a shorter step")
+        has_left = self.measures.get("left_closed_form", 0) > 0
+        if not self.reason and residual > (MOST_LEFT_RESIDUAL if has_left else MOST_RESIDUAL):
+            left = "in the short steps to which it was left, " if has_left else ""
+            texts.append(f"{left}its energy balance is off by {100 * residual:.2g} %; take a shorter step")
         if not self.reason and self.advice:
             texts.append(self.advice)
         return "; ".join(texts)

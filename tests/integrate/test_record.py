@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -72,6 +73,25 @@ def test_types_of_variables_are_those_of_the_schema():
 
 def test_one_line_says_what_it_holds(record):
     assert repr(record) == "<Record: done; vertical, contact_force, spectrum_vertical, section_vertical>"
+
+
+@pytest.mark.parametrize(
+    ("left", "residual", "remark"),
+    [
+        (0, 9e-3, ""),
+        (0, 0.25, "its energy balance is off by 25 %; take a shorter step"),
+        (1, 9e-5, ""),
+        (
+            1,
+            1.1e-3,
+            "in the short steps to which it was left, its energy balance is off by 0.11 %; "
+            "take a shorter step",
+        ),
+    ],
+)
+def test_a_poor_energy_balance_is_remarked_on(record, left, residual, remark):
+    measures = record.measures | {"left_closed_form": left, "energy_residual": residual}
+    assert replace(record, measures=measures).remark == remark
 
 
 def test_dataset_is_laid_out_like_a_store(record):
