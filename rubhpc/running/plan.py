@@ -112,7 +112,7 @@ class Plan:
         if timing.n_pilot == self.counts[MISSING]:
             note = ", all that are missing"
         elif self._range:
-            few = "few and differ" if timing.n_pilot <= _FEW else "differ"
+            few = "are few and differ" if timing.n_pilot <= _FEW else "differ"
             share = "two plans in three" if timing.n_pilot <= _FEW else "eight to nine plans in ten"
             note = f"; they {few}: such a range holds the time of {share}"
         return [f"timed       {timing.n_pilot} case{'s' * (timing.n_pilot > 1)}{note}"]
