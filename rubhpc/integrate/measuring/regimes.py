@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     Solve = Callable[[int], "Solution | None"]
-    Later = Callable[[], Iterable[tuple[int, Solve]]]
+    Later = Callable[[bool], Iterable[tuple[int, Solve]]]
     Within = Callable[[], list[float]]
 
 Floats = NDArray[np.float64]
@@ -94,7 +94,8 @@ def regime(
     within : callable, optional
         Growth of a small displacement within the record, span by span (`lyapunov.Growth.within`).
     later : callable, optional
-        What to try in later revolutions, in turn (`proof.Solver.later`).
+        What to try in later revolutions, in turn, where the record looks periodic or does not
+        (`proof.Solver.later`).
     """
     if not is_contact:
         return Verdict(REGIME.index("no_contact"), period)
@@ -124,7 +125,7 @@ def regime(
         verdict = search.proves(nearest, solve)
         if verdict is not None:
             return verdict._replace(exponent=exponent)
-    if later and looks_like == 0 and (verdict := search.proves_any(later())):
+    if later and looks_like == 0 and (verdict := search.proves_any(later(False))):
         return verdict._replace(exponent=exponent)
     is_settling = solve is None and flag == periodic
     return Verdict(flag, period if is_settling else 0, exponent, is_reached=not (is_settling and period > 0))
@@ -191,7 +192,7 @@ class _Search:
         closest = self._orbit.closest_return
         if closest not in asked and (verdict := self._proved(closest, solve, asked)):
             return verdict
-        return self.proves_any(later())
+        return self.proves_any(later(True))
 
     def proves_any(self, trials: Iterable[tuple[int, Solve]]) -> Verdict | None:
         """Judge by the first of these searches that finds such a motion."""

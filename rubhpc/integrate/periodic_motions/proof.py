@@ -36,6 +36,7 @@ PATIENT_ITERATIONS, PATIENT_STEP = 12, 1 / 8  # with shorter steps, from a motio
 # in all; the distance, of its size, in which the motion then returns if it has come to one, and in which it
 # does if it draws near.
 LATER = 128, 128, 256
+FEW_PAIRS = 2  # of more, whose revolutions take long, a motion that shows no period is looked at once
 ARRIVED, DRAWING_NEAR, NEARER = 1e-4, PERIOD_TOLERANCE, 0.5
 
 
@@ -77,29 +78,32 @@ class Solver:
         self._found[period] = _solution(self._piecewise, period, MOST_ITERATIONS, LEAST_STEP)
         return self._found[period]
 
-    def later(self) -> Iterator[tuple[int, Callable[[int], Solution | None]]]:
+    def later(self, looks_periodic: bool) -> Iterator[tuple[int, Callable[[int], Solution | None]]]:
         """Where to look for a motion that is not found at the end: a period, and what solves for it.
 
-        The case goes on for 512 revolutions. Where its last ones return within 1e-4 of the motion's size, and
-        in half the distance of the search before, it may have come to a periodic motion; at the end also
-        where they return within 1 %, nearer than ever and in half the distance of the beginning.
+        The case goes on for 512 revolutions, of more than two pairs for 128 unless it looks periodic. Where
+        its last ones return within 1e-4 of the motion's size, and in half the distance of the search before,
+        it may have come to a periodic motion; at the end also where they return within 1 %, nearer than ever
+        and in half the distance of the beginning.
         """
         setup, clearance, friction, state = self._case
         n_on, tried = 0, ARRIVED / NEARER
+        is_long = looks_periodic or len(setup.model.stators) <= FEW_PAIRS
+        spans = LATER if is_long else LATER[:1]
         returned: list[float] = []
         try:
             march = self._march or closed_form_march(setup)(setup, clearance, friction, state, None)
             march.keep(None)
             march.start_again(state)
             self._piecewise = None  # it may have followed this march
-            for n_revolution in LATER:
+            for n_revolution in spans:
                 passed, reason = march.pass_sections(n_revolution, *idle_of(march))
                 if reason is not None:
                     return
                 n_on += n_revolution
                 period, apart = _return_of(passed, _energy(setup, passed))
                 returned.append(apart)
-                draws_near = n_on == sum(LATER) and apart <= DRAWING_NEAR and _falls(returned)
+                draws_near = n_on == sum(spans) and apart <= DRAWING_NEAR and _falls(returned)
                 if apart > NEARER * tried and not draws_near:
                     continue
                 tried, state = apart, march.final()

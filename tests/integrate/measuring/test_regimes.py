@@ -273,7 +273,7 @@ def test_period_at_which_the_record_returns_is_tried_too(revolutions):
             whirl,
             lambda asked, other=other: locked(asked) if asked == 4 else other(asked),
             period=1,
-            later=lambda: (),
+            later=lambda _: (),
         )
         assert (name, verdict.period, verdict.multiplier) == ("periodic", 4, 0.6)
 
@@ -286,7 +286,7 @@ def test_motion_that_is_found_further_on_proves_the_record():
         name, verdict = judged(
             whirl,
             lambda asked: None,
-            later=lambda found=found: [(3, lambda asked: None), (6, lambda asked: found)],
+            later=lambda _, found=found: [(3, lambda asked: None), (6, lambda asked: found)],
         )
         assert (name, verdict.period, verdict.is_reached) == ("periodic", 6, is_reached)
 
@@ -304,7 +304,7 @@ def test_motion_without_a_period_is_what_it_comes_to_later(rate, name):
             lambda asked: None,
             period=0,
             growth=repeat(rate),
-            later=lambda found=found: [(5, lambda asked: None), (3, lambda asked: found)],
+            later=lambda _, found=found: [(5, lambda asked: None), (3, lambda asked: found)],
         )
         assert (judgement, verdict.period, verdict.is_reached) == expected
         assert verdict.exponent == pytest.approx(rate)
@@ -312,7 +312,7 @@ def test_motion_without_a_period_is_what_it_comes_to_later(rate, name):
 
 def test_motion_with_a_period_is_not_followed_later():
     whirl = torus(1 / 3)
-    assert judged(whirl, closing(3, 0.3, whirl), later=lambda: pytest.fail("needless"))[1].period == 3
+    assert judged(whirl, closing(3, 0.3, whirl), later=lambda _: pytest.fail("needless"))[1].period == 3
 
 
 def test_short_record_with_a_period_and_no_solution_is_what_it_looks_like():

@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 from overhung_pump import pump
+from trial_rig import trial_rig
 
 from rubhpc import periodic, simulate
 from rubhpc.integrate import case
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.periodic_motions import proof
+from rubhpc.integrate.setup import prepare
 from rubhpc.schema import REGIME
+from rubhpc.study.study import Contact, Integrator
 
 TWICE = {
     "speed_ratio": 3.0, "clearance_ratio": 0.5, "friction": 0.2, "overrides": {"rotor.damping.alpha": 4.0},
@@ -84,3 +88,23 @@ def test_chaos_that_dies_out_has_not_settled(revolutions):
     assert record.largest_multiplier == pytest.approx(reached.largest_multiplier, rel=1e-5)
     assert record.lyapunov_exponent > 0.05
     assert record.peak_contact_force[0] > 2.0 * reached.peak_contact_force[0]
+
+
+@pytest.mark.parametrize(
+    ("count", "looks_periodic", "expected"), [(2, False, 512), (3, False, 128), (3, True, 512)]
+)
+def test_revolutions_of_many_pairs_are_followed_less_far(monkeypatch, count, looks_periodic, expected):
+    given = {"clearance": 80e-6, "friction": 0.2, "samples_per_revolution": 64}
+    record = simulate(trial_rig(count), speed=170.0, transient=2, revolutions=1, keep=(), **given)
+    setup = prepare(
+        trial_rig(count), 170.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
+    )
+    passed, on = [], EventDrivenMarch.pass_sections
+
+    def counted(march, n_revolution, *args):
+        passed.append(n_revolution)
+        return on(march, n_revolution, *args)
+
+    monkeypatch.setattr(EventDrivenMarch, "pass_sections", counted)
+    list(proof.Solver(setup, 80e-6, 0.2, record.final).later(looks_periodic))
+    assert sum(passed) == expected
