@@ -1,4 +1,4 @@
-"""Signals at other instants than those of their samples."""
+"""Signals sampled at even times, at even angles of a shaft whose speed changes."""
 
 from __future__ import annotations
 
@@ -14,25 +14,32 @@ NODES = 4  # of the cubic through the samples around an instant
 
 
 @jit
-def resample(rows: Floats, late: Floats, cuts: Ints) -> None:
-    """Bring signals (r, n) to instants that are later by `late` (n,) intervals of sampling, in place.
+def resample(rows: Floats, swing: Floats, cuts: Ints) -> None:
+    """Bring signals (r, n) to even angles between any of `cuts` (k + 1,) and the next, from 0 to n, in place.
 
-    Samples are evenly spaced between any of `cuts` (k + 1,) and the next, from 0 to n. By Lagrange's cubic
-    through the four samples between them that are nearest, the cuts included; it is exact for cubics.
+    There they are sampled at even times, and the speed changes evenly by `swing` (k,) times the sum of the
+    first and the last: with the swing e, the shaft has come to the share x of the angle at the share y of the
+    time where `x = (1 - e) y + e y^2`. By Lagrange's cubic through the four samples that are nearest, the
+    cuts included; it is exact for cubics of the time.
     """
     n = rows.shape[1]
     if n < NODES:
         return
-    before = np.empty(n)
+    before, late = np.empty(n), np.empty(n)
+    for piece in range(cuts.size - 1):
+        size, e = cuts[piece + 1] - cuts[piece], swing[piece]
+        for i in range(size):
+            x = i / size
+            late[cuts[piece] + i] = 2.0 * i / (1.0 - e + np.sqrt((1.0 - e) ** 2 + 4.0 * e * x)) - i
     for row in range(rows.shape[0]):
         for i in range(n):
             before[i] = rows[row, i]
         for piece in range(cuts.size - 1):
+            if swing[piece] == 0.0:
+                continue
             highest = max(min(cuts[piece + 1], n - 1) - NODES + 1, 0)
             lowest = min(cuts[piece], highest)
             for i in range(cuts[piece], cuts[piece + 1]):
-                if late[i] == 0.0:
-                    continue
                 at = i + late[i]
                 first = min(max(int(np.floor(at)) - 1, lowest), highest)
                 a = at - first

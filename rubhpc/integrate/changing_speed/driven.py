@@ -104,7 +104,7 @@ def integrate_driven(
     if pieces_per_revolution is not None and per_revolution != fixed * pieces_per_revolution:
         problem = f"{pieces_per_revolution} is no divisor of the {per_revolution} samples in a revolution"
         raise InputError(f"pieces_per_revolution: {problem}; choose another number")
-    late, cuts = np.zeros(n * per_revolution), [0]
+    swings, cuts = [], [0]  # as of `bring_to_angles`
     whole = empty_samples(model.n_place, n * per_revolution, model.n_probe).whole
     gathered = Turns(n, model)
     driven_by, braked = np.zeros((2, n))
@@ -125,7 +125,7 @@ def integrate_driven(
         passed = taken.passed
         n_step += passed.n_step
         whole[:, at : at + length] = passed.whole
-        late[at : at + length] = taken.late
+        swings.append(taken.swing)
         cuts.append(at + length)
         turns = max(length // per_revolution, 1)
         for i, accumulator in enumerate(passed.accumulators):
@@ -157,7 +157,8 @@ def integrate_driven(
         )
     lasts = np.diff(begins[: n_done + 1])
     n_sample = n_done * per_revolution
-    bring_to_angles(whole[:, :n_sample], late, np.unique(np.minimum(cuts, n_sample)), model.n_place)
+    ends = np.unique(np.minimum(cuts, n_sample))
+    bring_to_angles(whole[:, :n_sample], np.array(swings[: ends.size - 1]), ends, model.n_place)
     return DrivenRun(
         reason=reason,
         whole=whole[:, :n_sample],

@@ -10,7 +10,6 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.passing import Passed, Passing, energy_of, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
-from rubhpc.integrate.changing_speed.sample_times import late_in_piece
 from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp
 from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import lift_samples, new_accumulator
@@ -48,7 +47,7 @@ class Taken(NamedTuple):
 
     passed: Passed
     lag: float  # rad, as of `speed_law.LAG`
-    late: Floats  # (n_sample,), intervals, as of `sample_times`
+    swing: float  # change of the speed, over the sum of the first and the last one
     times: list[float]  # s, at its beginning and at the ends of the revolutions, or of the part, in it
     drive_work: list[float]  # J, in each of them
     braking: list[float]  # N m s, in each of them
@@ -202,8 +201,8 @@ class Spin:
             braking.append(mean * duration - self._free.inertia * (high - low + missed / n))
         duration = sum(lasts)
         lag = abs(acceleration) * duration**2 / 12.0
-        late = late_in_piece(self.speed, acceleration, n * turned, length)
-        return Taken(passed, lag, late, times, work, braking, energies)
+        swing = (speeds[-1] - speeds[0]) / (speeds[-1] + speeds[0])
+        return Taken(passed, lag, swing, times, work, braking, energies)
 
     def _change(self, given: float, before: float, after: float) -> float:
         """Change of the speed, rad/s, by the energy given to the spin, J; NaN where it would turn back.

@@ -17,7 +17,7 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
-from rubhpc.integrate.changing_speed.sample_times import bring_to_angles, late_under
+from rubhpc.integrate.changing_speed.sample_times import bring_to_angles
 from rubhpc.integrate.changing_speed.turns import Turns
 from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_accumulator
 from rubhpc.integrate.record import State
@@ -155,7 +155,9 @@ def integrate_run_up(
     lift_samples(whole[:, begun : n_done * per_revolution], sagging)
     n_sample = n_done * per_revolution
     taken = np.unique(np.minimum(cuts, n_sample))
-    bring_to_angles(whole[:, :n_sample], late_under(law, cuts, per_revolution), taken, model.n_place)
+    _, at_cuts, _ = law.at_angle(2.0 * np.pi / per_revolution * taken)
+    swing = np.diff(at_cuts) / (at_cuts[1:] + at_cuts[:-1])
+    bring_to_angles(whole[:, :n_sample], swing, taken, model.n_place)
     gathered.sum_up()
     assert reached is not None  # a law has a whole revolution at least
     turns = np.diff(begins)[:n_done]
