@@ -49,7 +49,7 @@ def draw() -> None:
                     forward.plot(1e6 * record.horizontal, 1e6 * record.vertical, label=f"{count} stators")
                 print(count, name, f"{known.radius:.6g} m, off by {error[-1]:.2g}")
             errors.loglog(COUNTS[modulus], error, marker=marker, label=f"{name} in all")
-        errors.set(xlabel="stators in the ring", ylabel="error of the orbit's radius")
+        errors.set(xlabel="Stators in the ring", ylabel="Relative error of the orbit's radius")
         errors.set_xticks(COUNTS[12e9], [str(count) for count in COUNTS[12e9]])
         errors.minorticks_off()
         errors.legend()
@@ -70,13 +70,13 @@ def draw() -> None:
         circle(backward, dry.clearance, color="0.6", lw=0.8)
         backward.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
         for ax, title in (
-            (errors, "a  error of rings"),
-            (forward, "b  friction 0.05"),
-            (backward, "c  friction 0.3, 8 stators"),
+            (errors, "(a)"),
+            (forward, "(b) friction 0.05"),
+            (backward, "(c) friction 0.3, 8 stators"),
         ):
             ax.set_title(title, loc="left")
             if ax is not errors:
-                ax.set(xlabel="horizontal (µm)", ylabel="vertical (µm)", aspect="equal")
+                ax.set(xlabel="Horizontal (µm)", ylabel="Vertical (µm)", aspect="equal")
         save(figure, Path(__file__).with_name("annular.png"))
 
 

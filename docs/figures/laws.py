@@ -32,8 +32,8 @@ def distances(ax: Axes, known: rubhpc.Record, found: dict[float, rubhpc.Record])
         ]
         ax.loglog(STIFFNESS, apart, marker="o", ms=3, label=label)
         print(name, dict(zip(STIFFNESS, np.round(apart, 6), strict=True)))
-    ax.loglog(STIFFNESS, 2e6 / np.array(STIFFNESS), color="0.6", ls=":", label="1/k")
-    ax.set(xlabel="contact stiffness k, N/m", ylabel="distance from the multiplier's")
+    ax.loglog(STIFFNESS, 2e6 / np.array(STIFFNESS), color="0.6", ls=":", label="$1/k$")
+    ax.set(xlabel="Contact stiffness $k$ (N/m)", ylabel="Distance from the multiplier's")
     ax.legend()
     return ax
 
@@ -45,10 +45,10 @@ def forces(ax: Axes, known: rubhpc.Record, found: dict[float, rubhpc.Record]) ->
     window = slice(middle - per_revolution // 8, middle + per_revolution // 8)
     turn = 360 * (np.arange(2 * per_revolution) / per_revolution - 1)
     for stiffness in SHOWN:
-        label = f"k = $10^{{{np.log10(stiffness):.0f}}}$ N/m"
+        label = f"$k$ = $10^{{{np.log10(stiffness):.0f}}}$ N/m"
         ax.plot(turn[window], found[stiffness].contact_force[0, window], label=label)
     ax.plot(turn[window], known.contact_force[0, window], color="k", ls="--", lw=0.8, label="multiplier")
-    ax.set(xlabel="angle of the shaft, deg", ylabel="contact force, N", xlim=(-40, 115))
+    ax.set(xlabel="Angle of the shaft (°)", ylabel="Contact force (N)", xlim=(-40, 115))
     ax.legend()
     return ax
 
@@ -76,12 +76,12 @@ def whip(ax: Axes) -> Axes:
     print("whirl under Coulomb's law:", radius[-4:], "slip down to", coulomb.minimum_slip_speed)
     revolution, deflection = np.arange(1, len(sliding) + 1), 1e3 * np.array(sliding)
     ax.semilogy(revolution, deflection, marker="s", ms=3, label="steady sliding")
-    ax.annotate(
-        "diverges", (revolution[-1], deflection[-1]), (1.5, 1.2), arrowprops={"arrowstyle": "->", "lw": 0.6}
-    )
+    last = int(np.flatnonzero(deflection < 2.0)[-1])  # of those shown
+    arrow = {"arrowstyle": "->", "lw": 0.6}
+    ax.annotate("diverges", (revolution[last], deflection[last]), (1.5, 1.2), arrowprops=arrow)
     ax.set_ylim(0.07, 2.5)
     ax.semilogy(np.arange(1, 25), 1e3 * radius, marker="o", ms=3, label="Coulomb")
-    ax.set(xlabel="revolution", ylabel="largest deflection, mm")
+    ax.set(xlabel="Revolution", ylabel="Largest deflection (mm)")
     ax.legend()
     return ax
 
