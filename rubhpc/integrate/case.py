@@ -228,6 +228,7 @@ def _integrate(
                 within=growth.within,
                 solve=solver,
                 later=solver.later if solver is not None else None,
+                n_event=trail.n_event[0] / recording.revolutions if trail is not None else 0.0,
             )
             | {"carrier_displacement": carrier_displacement(samples, setup.model)}
             | probe_extents(signals),

@@ -51,6 +51,7 @@ def measures_of(
     within: Within | None,
     solve: Callable[[int], Solution | None] | None,
     later: Later | None,
+    n_event: float,
 ) -> dict[str, Any]:
     """Measures of a finished case; those of a contact that never happened are zero, or NaN where undefined.
 
@@ -71,6 +72,8 @@ def measures_of(
         Finds periodic motions (`proof.Solver`).
     later : callable, optional
         Finds them in later revolutions, where that does not (`proof.Solver.later`).
+    n_event : float
+        Events in a revolution, where they are known; else 0.
     """
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution
@@ -87,6 +90,7 @@ def measures_of(
         solve=solve,
         within=within,
         later=later,
+        n_event=n_event,
     )
     multiplier = verdict.multiplier
     rim = stators[0].radius * signals["torsion"]  # m, as the orbit

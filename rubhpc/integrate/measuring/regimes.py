@@ -24,6 +24,7 @@ Floats = NDArray[np.float64]
 
 MOST_DOUBLED = 2 * LONGEST_PERIOD  # revolutions, to which period doublings are followed
 STEEPEST = -2.0  # multiplier of a motion beside a stable one of twice the period; -1.60 where doublings end
+MOST_EVENTS = 160  # in a period that is solved for; the time that a proof takes goes with them
 MOST_DISTANT = 0.1  # of the orbit's size: a record that is farther from a motion does not settle on it
 LEAST_REVOLUTIONS = LONGEST_PERIOD  # of a record without a period that is worth following further
 TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may show a torus, or a longer period, by itself
@@ -70,6 +71,7 @@ def regime(
     solve: Solve | None = None,
     within: Within | None = None,
     later: Later | None = None,
+    n_event: float = 0.0,
 ) -> Verdict:
     """Judge a record.
 
@@ -80,7 +82,8 @@ def regime(
     A record shorter than 16 revolutions without a period leaves the motion undecided: it is too short for
     some periods. From 16 to 31 the growth alone decides, for it is measured beyond the record; a longer
     record may show a torus, or a period beyond 16, by itself. A motion that shows no period, but comes to a
-    periodic motion in later revolutions, is that and has not settled.
+    periodic motion in later revolutions, is that and has not settled. Of a torus with so many events that
+    no motion of a longer period than 1 could be solved for, none is sought there.
 
     Parameters
     ----------
@@ -96,6 +99,8 @@ def regime(
     later : callable, optional
         What to try in later revolutions, in turn, where the record looks periodic or does not
         (`proof.Solver.later`).
+    n_event : float
+        Events in a revolution, where they are known.
     """
     if not is_contact:
         return Verdict(REGIME.index("no_contact"), period)
@@ -117,7 +122,8 @@ def regime(
     repeats = is_open and orbit.repeats(orbit.closest_return)
     if orbit.n_revolution < LEAST_REVOLUTIONS:
         return Verdict(periodic, orbit.closest_return) if repeats else Verdict(REGIME.index("undecided"), 0)
-    flag, exponent = by_growth(growth, distances, within)
+    is_closed = distances is not None and is_torus(distances)  # the curve on which the cycles lie
+    flag, exponent = by_growth(growth, within, is_closed=is_closed)
     if repeats and flag != REGIME.index("chaotic"):
         return Verdict(periodic, orbit.closest_return, exponent)
     is_regular = flag in (periodic, REGIME.index("quasi_periodic"))
@@ -125,7 +131,9 @@ def regime(
         verdict = search.proves(nearest, solve)
         if verdict is not None:
             return verdict._replace(exponent=exponent)
-    if later and looks_like == 0 and (verdict := search.proves_any(later(False))):
+    is_torus_shown = is_closed and flag == REGIME.index("quasi_periodic")
+    is_worth_it = not (is_torus_shown and 2 * n_event > MOST_EVENTS)
+    if later and looks_like == 0 and is_worth_it and (verdict := search.proves_any(later(False))):
         return verdict._replace(exponent=exponent)
     is_settling = solve is None and flag == periodic
     return Verdict(flag, period if is_settling else 0, exponent, is_reached=not (is_settling and period > 0))
@@ -228,10 +236,12 @@ class _Search:
 
 
 def by_growth(
-    growth: Iterable[float], distances: Floats | None, within: Within | None = None
+    growth: Iterable[float], within: Within | None = None, *, is_closed: bool = False
 ) -> tuple[int, float]:
-    """Judge by how neighbours part: flag of `schema.REGIME`, and the largest Lyapunov exponent or NaN."""
-    is_closed = distances is not None and is_torus(distances)  # the curve on which the cycles lie
+    """Judge by how neighbours part: flag of `schema.REGIME`, and the largest Lyapunov exponent or NaN.
+
+    `is_closed` states that the cycles lie on a closed curve (`is_torus`).
+    """
     if is_closed and within is not None and (grown := within()) and abs(np.mean(grown)) < CLEAR:
         return REGIME.index("quasi_periodic"), float(np.mean(grown))
     spans = iter(growth)

@@ -11,7 +11,7 @@ import numpy as np
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.orbit_measures import PERIOD_TOLERANCE
-from rubhpc.integrate.measuring.regimes import MOST_DOUBLED, Solution, closest_return
+from rubhpc.integrate.measuring.regimes import MOST_DOUBLED, MOST_EVENTS, Solution, closest_return
 from rubhpc.integrate.packing import output_degrees
 from rubhpc.integrate.periodic_motions.known_motions import nothing
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MOST_ITERATIONS, LEAST_STEP = 6, 1.0  # a record that looks periodic is near the solution
-MOST_EVENTS = 160  # in a period; the time that a proof takes goes with them
 PATIENT_ITERATIONS, PATIENT_STEP = 12, 1 / 8  # with shorter steps, from a motion that has come to it
 # Where that finds no stable motion that the record agrees with: revolutions after which it is looked at, 512
 # in all; the distance, of its size, in which the motion then returns if it has come to one, and in which it

@@ -175,7 +175,7 @@ def closing(period, multiplier, whirl, shift=0.0):
     return lambda asked: Solution(period, multiplier, np.column_stack([section.real, section.imag]))
 
 
-def judged(whirl, solve, *, period=3, growth=None, later=None):
+def judged(whirl, solve, *, period=3, growth=None, later=None, n_event=0.0):
     verdict = regime(
         whirl.real,
         whirl.imag,
@@ -185,6 +185,7 @@ def judged(whirl, solve, *, period=3, growth=None, later=None):
         growth=unread() if growth is None else growth,
         solve=solve,
         later=later,
+        n_event=n_event,
     )
     return REGIME[verdict.flag], verdict
 
@@ -308,6 +309,17 @@ def test_motion_without_a_period_is_what_it_comes_to_later(rate, name):
         )
         assert (judgement, verdict.period, verdict.is_reached) == expected
         assert verdict.exponent == pytest.approx(rate)
+
+
+@pytest.mark.parametrize(("n_event", "expected"), [(80.0, "periodic"), (80.1, "quasi_periodic")])
+def test_torus_is_followed_later_while_a_period_of_two_can_be_solved_for(n_event, expected):
+    """A period is solved for with up to 160 events; chaos is followed with more of them, too."""
+    orbit = torus(1 / 3)
+    led_to = closing(3, 0.5, orbit)(3)._replace(is_led_to=True)
+    keys = {"period": 0, "growth": repeat(0.0), "later": lambda looks_periodic: [(3, lambda asked: led_to)]}
+    assert judged(torus(GOLDEN), lambda asked: None, n_event=n_event, **keys)[0] == expected
+    chaotic = keys | {"growth": repeat(0.4)}
+    assert judged(swollen(logistic(3.8)), lambda asked: None, n_event=n_event, **chaotic)[0] == "periodic"
 
 
 def test_motion_with_a_period_is_not_followed_later():
