@@ -114,6 +114,7 @@ def computed(lazy: xr.Dataset, *, show_progress: bool = True) -> xr.Dataset:
         lazy = lazy.persist()
         if show_progress:
             sys.modules["distributed"].progress(lazy, notebook=False)
+            print()  # its bar ends within a line
     elif show_progress and sys.stdout.isatty():
         from dask.diagnostics.progress import ProgressBar
 

@@ -95,7 +95,7 @@ def reduce(
     choice = dict(pairs(selection, "--select"))
     with on_workers(on, workers, **job):
         found = reduce_store(store, what, chosen, over, choice, levels=levels, bins=bins)
-    click.echo(f"\n{write_data(found, data_path)}")
+    click.echo(str(write_data(found, data_path)))
     if of_spectra(what) and found[f"spectrum_{chosen}"].squeeze().ndim == 1:
         _draw(found, what, chosen, figure_path)
         click.echo(str(figure_path))

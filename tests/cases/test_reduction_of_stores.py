@@ -226,7 +226,9 @@ def test_command_reduces_and_draws(
         timeout=120,
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[-2:] == ["few_envelope.nc", "few_envelope.png"]
+    said = done.stdout.splitlines()
+    assert said[-2:] == ["few_envelope.nc", "few_envelope.png"]
+    assert on != "threads" or len(said) == 2
     with xr.open_dataset(tmp_path / "few_envelope.nc") as found:
         expected = loaded[SPECTRUM].isel(friction=0).max(["speed_ratio", "clearance_ratio"])
         np.testing.assert_array_equal(found[SPECTRUM], expected)
