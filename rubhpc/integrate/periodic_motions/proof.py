@@ -35,7 +35,7 @@ PATIENT_ITERATIONS, PATIENT_STEP = 12, 1 / 8  # with shorter steps, from a motio
 # in all; the distance, of its size, in which the motion then returns if it has come to one, and in which it
 # does if it draws near.
 LATER = 128, 128, 256
-FEW_PAIRS = 2  # of more, whose revolutions take long, a motion that shows no period is looked at once
+FEW_PAIRS, MANY_PAIRS = 2, 6  # of more a motion that shows no period is looked at once, of many never
 ARRIVED, DRAWING_NEAR, NEARER = 1e-4, PERIOD_TOLERANCE, 0.5
 
 
@@ -57,7 +57,6 @@ class Solver:
         """
         self._case = setup, clearance, friction, final
         self._piecewise: PiecewiseMotion | None = None
-        self._found: dict[int, Solution | None] = {}  # by the period asked for
         self._known, self._march = known, march
 
     @property
@@ -74,21 +73,22 @@ class Solver:
                 self._piecewise = PiecewiseMotion(*self._case, self._march)
         except NoClosedForm:
             return None
-        self._found[period] = _solution(self._piecewise, period, MOST_ITERATIONS, LEAST_STEP)
-        return self._found[period]
+        return _solution(self._piecewise, period, MOST_ITERATIONS, LEAST_STEP)
 
     def later(self, looks_periodic: bool) -> Iterator[tuple[int, Callable[[int], Solution | None]]]:
         """Where to look for a motion that is not found at the end: a period, and what solves for it.
 
-        The case goes on for 512 revolutions, of more than two pairs for 128 unless it looks periodic. Where
-        its last ones return within 1e-4 of the motion's size, and in half the distance of the search before,
-        it may have come to a periodic motion; at the end also where they return within 1 %, nearer than ever
-        and in half the distance of the beginning.
+        The case goes on for 512 revolutions; unless it looks periodic, of three to five pairs for 128, and of
+        more not at all, for the time that it takes. Where its last ones return within 1e-4 of the motion's
+        size, and in half the distance of the search before, it may have come to a periodic motion; at the end
+        also where they return within 1 %, nearer than ever and in half the distance of the beginning.
         """
         setup, clearance, friction, state = self._case
         n_on, tried = 0, ARRIVED / NEARER
-        is_long = looks_periodic or len(setup.model.stators) <= FEW_PAIRS
-        spans = LATER if is_long else LATER[:1]
+        n_pair = len(setup.model.stators)
+        if n_pair >= MANY_PAIRS and not looks_periodic:
+            return  # what is not recorded may need contact modes of its own
+        spans = LATER if looks_periodic or n_pair <= FEW_PAIRS else LATER[:1]
         returned: list[float] = []
         try:
             march = self._march or closed_form_march(setup)(setup, clearance, friction, state, None)

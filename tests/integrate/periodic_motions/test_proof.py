@@ -91,9 +91,10 @@ def test_chaos_that_dies_out_has_not_settled(revolutions):
 
 
 @pytest.mark.parametrize(
-    ("count", "looks_periodic", "expected"), [(2, False, 512), (3, False, 128), (3, True, 512)]
+    ("count", "many", "looks_periodic", "expected"),
+    [(2, 6, False, 512), (3, 6, False, 128), (3, 3, False, 0), (3, 3, True, 512)],
 )
-def test_revolutions_of_many_pairs_are_followed_less_far(monkeypatch, count, looks_periodic, expected):
+def test_revolutions_of_many_pairs_are_followed_less_far(monkeypatch, count, many, looks_periodic, expected):
     given = {"clearance": 80e-6, "friction": 0.2, "samples_per_revolution": 64}
     record = simulate(trial_rig(count), speed=170.0, transient=2, revolutions=1, keep=(), **given)
     setup = prepare(
@@ -106,5 +107,6 @@ def test_revolutions_of_many_pairs_are_followed_less_far(monkeypatch, count, loo
         return on(march, n_revolution, *args)
 
     monkeypatch.setattr(EventDrivenMarch, "pass_sections", counted)
+    monkeypatch.setattr(proof, "MANY_PAIRS", many)
     list(proof.Solver(setup, 80e-6, 0.2, record.final).later(looks_periodic))
     assert sum(passed) == expected
