@@ -76,21 +76,26 @@ def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> x
 def mean_positions(store: xr.Dataset, signals: Sequence[str]) -> xr.Dataset:
     """Return the mean position during a run-up, with its `speed` (rad/s), loaded.
 
-    It is the mean over six revolutions of means over six: parts of 1/2X and 1/3X leave nothing of themselves
-    in it, and those of a whirl at any other order little.
+    It is the mean over six revolutions of means over six, one for each revolution: parts of 1/2X and 1/3X
+    leave nothing of themselves in it, and those of a whirl at any other order little.
     """
     data, per_revolution, n = _case(store, signals)
-    half = min(MEANS, (n + 1) // 2)
-    weight = np.convolve(np.ones(half), np.ones(half)) / half**2
+    half = max(min(MEANS, n // 2), 1)
+    width = min(half, n) * per_revolution
+    count = n - 2 * half + 1 if n > 1 else 1
 
     def smooth(values: Floats) -> Floats:
-        return np.convolve(values, weight, mode="valid")
+        for _ in range(2 if n > 1 else 1):
+            total = np.concatenate([[0.0], np.cumsum(values)])
+            values = (total[width:] - total[:-width]) / width
+        return values[::per_revolution][:count]
 
     means = {}
     for name in signals:
-        turns = data[name].values.astype(float)[: n * per_revolution].reshape(n, -1)
-        means[name] = "revolution", smooth(turns.mean(axis=1)), data[name].attrs
-    means["speed"] = "revolution", smooth(data["speed"].values[:n]), data["speed"].attrs
+        rows = data[name].values.astype(float)[: n * per_revolution]
+        means[name] = "revolution", smooth(rows - rows.mean()) + rows.mean(), data[name].attrs
+    speed = data["speed"].values[:n]
+    means["speed"] = "revolution", smooth(np.repeat(speed, per_revolution)), data["speed"].attrs
     return xr.Dataset(means, coords={name: at for name, at in data.coords.items() if at.ndim == 0})
 
 
