@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 PHYSICS = 21  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
-MODAL = 2  # method = "modal": modes kept for torsional accelerations, and `modal_error` of these
+MODAL = 3  # method = "modal": modes kept, and `modal_error`
 DIRECT = 4  # transient = "direct"
 CHANGING_SPEED = 10  # run-ups and drives
 COULOMB = 7  # set-valued friction

@@ -30,9 +30,8 @@ if TYPE_CHECKING:
 
 MARGIN = 5.0  # estimates without it were up to 5.5 times too small: a case has many contacts, not one
 REBOUNDS = 3.0  # where modes are added, how much closer: a body that rebounds many times multiplies an error
-TURNED = (
-    0.3  # share of motion along the rim that opens a gap whose normal has turned, or whose stator has bent
-)
+TURNED = 0.3  # share of motion along the rim that opens a curved gap: its normal turned, its stator bent
+COMPACT = 1e-6  # by how much more a body's static inertia is than its tip's mass, up to which it is a mass
 MOST_MODES = 400  # kept for the sake of the estimate; `cutoff_frequency` may ask for more
 
 
@@ -64,8 +63,8 @@ def kept_modes(model: Model, spin: float, accuracy: float, touch: Touch = SMOOTH
 
     Where the estimated error (`modal_error`) without the modes above is beyond the accuracy, those with the
     largest share in any signal or force are kept too, until it is within a third of the accuracy. All modes
-    are kept where a tip's own mass takes up more than the accuracy of the closing momentum: its impacts
-    excite modes of any frequency. At most MOST_MODES are kept for these reasons.
+    are kept where a tip's own mass takes up more than the accuracy of the closing momentum (`struck_share`):
+    its impacts excite modes of any frequency. At most MOST_MODES are kept for these reasons.
     """
     parts = at_standstill(model).parts
     cutoff = cutoff_frequency(model, spin, accuracy)
@@ -155,7 +154,7 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
         v, w, twist, axial, lateral = (mode[row] if row >= 0 else np.zeros(frequency.size) for row in degree)
         ey, ez = np.cos(stator.angle), np.sin(stator.angle)
         across = ey * v + ez * w
-        impact = max(impact, impact_share(across, axial, frequency))
+        impact = max(impact, struck_share(across, axial, frequency))
         pulse = pulse_spectrum(across, axial, frequency, standstill.contact_frequency)
         rung, seen = (of * pulse / frequency for of in (np.array([*signals, axial, lateral]), lively))
         along = lateral + ez * v - ey * w - stator.radius * twist
@@ -240,6 +239,17 @@ def pulse_spectrum(across: Floats, axial: Floats, frequency: Floats, contact_fre
 def impact_share(across: Floats, axial: Floats, frequency: Floats) -> float:
     """Share of the closing momentum that the tip's own mass takes up at once, by its modes (n,)."""
     return float(1.0 / (1.0 + static_inertia(across, frequency) * (axial @ axial)))
+
+
+def struck_share(across: Floats, axial: Floats, frequency: Floats) -> float:
+    """The same where modes are kept by it: a mass meets the rotor's place of contact alone at first.
+
+    A beam's wave takes part of the momentum before that: `pulse_spectrum` has it.
+    """
+    lightness = float(axial @ axial)  # 1/kg
+    if not np.any(across) or static_inertia(axial, frequency) * lightness > 1.0 + COMPACT:
+        return impact_share(across, axial, frequency)
+    return 1.0 / (1.0 + lightness / float(across @ across))
 
 
 def static_inertia(moved: Floats, frequency: Floats) -> float:

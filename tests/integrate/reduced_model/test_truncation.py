@@ -21,6 +21,7 @@ from rubhpc.integrate.reduced_model.truncation import (
     modal_error,
     pulse_spectrum,
     static_inertia,
+    struck_share,
     sufficient_accuracy,
     touch_of,
 )
@@ -35,6 +36,10 @@ ALL_MODES = 1e-15  # accuracy
 
 def at_node_5(**keys):
     return replace(PACKAGED, stator=(replace(PACKAGED.stator[0], node=5, **keys),))
+
+
+def at_shaft(mass):
+    return replace(PACKAGED, stator=(LumpedStator(node=5, radius=0.01, mass=mass, stiffness=1e5),))
 
 
 def lumped(mass, stiffness):
@@ -241,6 +246,19 @@ def test_impact_is_shared_by_the_masses():
     frequency = np.array([10.0, 50.0])
     assert impact_share(rotor, tip, frequency) == pytest.approx(0.25)
     assert pulse_spectrum(rotor, tip, frequency, 1e-6) == pytest.approx([0.25, 0.25])
+
+
+def test_mass_meets_the_place_of_contact_alone_at_first():
+    """A gram on a shaft of 0.1 kg there and 3 kg as a whole; a bar's wave is another matter."""
+    frequency, rotor = np.array([10.0, 500.0, 50.0]), np.array([1 / math.sqrt(3.0), math.sqrt(10.0), 0.0])
+    mass = np.array([0.0, 0.0, math.sqrt(1e3)])
+    local = 1.0 / (1 / 3.0 + 10.0)
+    assert struck_share(rotor, mass, frequency) == pytest.approx(1e-3 / (1e-3 + local))
+    assert impact_share(rotor, mass, frequency) == pytest.approx(1e-3 / 3.0, rel=0.03)
+    bar = np.array([0.0, math.sqrt(10.0), math.sqrt(1e3)])
+    assert struck_share(rotor, bar, frequency) == impact_share(rotor, bar, frequency)
+    assert all(part.all() for part in kept_modes(assemble(at_shaft(1e-3)), 220.0, 1e-3))
+    assert not all(part.all() for part in kept_modes(assemble(lumped(1e-3, 1e5)), 220.0, 1e-3))
 
 
 def test_bar_answers_an_impact_with_its_wave():
