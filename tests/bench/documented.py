@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 from collections import Counter
 from dataclasses import replace
 from itertools import product
@@ -19,11 +20,19 @@ import numpy as np
 from postproc.signals import contacts
 from postproc.signals.hilbert_huang import hilbert_huang, median_frequency
 from rubhpc import LumpedStator, read_rig, simulate
+from rubhpc.integrate import tangent_motion
+from rubhpc.integrate.case import run_case
+from rubhpc.integrate.marches import friction as friction_march
 from rubhpc.integrate.periodic_motions.proof import Solver
+from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import REGIME
+from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rubhpc import Rig
 
 PACKAGED = read_rig("mokhtar2017")
@@ -231,8 +240,57 @@ def signals() -> None:
             )
 
 
+@on_one_thread
+def whip() -> None:
+    """Where the time of the dry whip of three stators goes (guide, performance): least of ten, ms."""
+    whipping = ring(STIFF.stator[0], 3)
+    coulomb, law = Contact(**COULOMB), {"clearance": 20e-6, "friction": 0.3}
+    setup = prepare(
+        whipping,
+        0.98 * 2.0 * math.pi * 31.5596,
+        contact=coulomb,
+        integrator=Integrator(),
+        samples_per_revolution=256,
+    )
+    recording = Recording(transient=60, revolutions=33, samples_per_revolution=256, keep=())
+    spent: Counter[str] = Counter()
+
+    def timed(module: Any, name: str, part_of: Callable[[tuple[Any, ...]], str]) -> None:
+        kernel = getattr(module, name)
+
+        def call(*given: Any) -> Any:
+            began = time.process_time()
+            found = kernel(*given)
+            spent[part_of(given)] += time.process_time() - began
+            return found
+
+        setattr(module, name, call)
+
+    timed(friction_march, "advance_with_friction", lambda given: "recorded" if given[5] else "transient")
+    timed(tangent_motion, "carry_along", lambda given: "tangent")
+    rounds = []
+    for _ in range(11):
+        spent.clear()
+        began = time.process_time()
+        run_case(setup, **law, recording=recording)
+        rounds.append({**spent, "all": time.process_time() - began})
+    least = {part: min(one[part] for one in rounds[1:]) for part in rounds[0]}
+    print(", ".join(f"{part} {1e3 * seconds:.0f}" for part, seconds in least.items()))
+
+
 if __name__ == "__main__":
-    known = [closed_form, bounces, peaks, rigid, rounding, short_records, settling, default_accuracy, signals]
+    known = [
+        closed_form,
+        bounces,
+        peaks,
+        rigid,
+        rounding,
+        short_records,
+        settling,
+        default_accuracy,
+        signals,
+        whip,
+    ]
     for function in known:
         if len(sys.argv) == 1 or function.__name__ in sys.argv[1:]:
             function()
