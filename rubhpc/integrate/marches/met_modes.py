@@ -71,7 +71,7 @@ class MetModes:
     def _add(self, mask: int) -> None:
         """See that the library holds a set of contacts."""
         self.met.add(mask)
-        if len(self.met) > MOST_REFILLS * self._measured.followed.n_most:
+        if len(self.met) > MOST_REFILLS * self._measured.followed.n_usual:
             raise NoClosedForm
         if mask not in self.library.masks:
             if self.library.is_full:

@@ -116,6 +116,7 @@ class ModeLibrary:
             self._other = made = copy(self)
             made._other = self
             made._is_measured = made._is_large = False
+            made._is_roomy = True
             made._n_solved = 0
             made._n_level = self._n_level_followed
             made._tables = TableStack(1 + len(self.gap_jacobian), 2 * self._most_modes, 2 * MOST_BYTES)
@@ -128,6 +129,14 @@ class ModeLibrary:
     def n_most(self) -> int:
         """Contact modes that there is room for."""
         return self._tables.n_most
+
+    @property
+    def n_usual(self) -> int:
+        """Contact modes by which it is judged whether a case meets too many; `n_most`, or fewer."""
+        if not self._is_roomy:
+            return self.n_most
+        least, usual = 1 + len(self.gap_jacobian), (MOST_BYTES + MOST_BYTES // 2)
+        return max(least, min(self._most_modes, usual // self._tables.n_byte_of_one))
 
     @property
     def n_byte(self) -> int:
@@ -208,6 +217,7 @@ class ModeLibrary:
     _n_solved = 0
     _other: ModeLibrary | None = None  # of a large one's: that which is followed, or which is measured
     _is_large = False  # so that memory does not hold as many as may be wanted
+    _is_roomy = False  # whether it holds more than those of a case that goes on in closed form
     _is_parted = True  # whether large ones are followed with other tables than they are measured with
     _n_ahead = SAMPLES_AT_ONCE
     _chance: np.random.Generator | None = None

@@ -338,3 +338,17 @@ def test_modes_that_were_given_up_are_counted_again():
     library.add(2)
     assert len(library.masks) == 2
     assert setup.n_solved(0.2) == 3
+
+
+def test_more_room_keeps_no_motion_in_closed_form_for_longer(monkeypatch):
+    """Tables with which a motion is followed hold a third more modes than it is judged by."""
+    monkeypatch.setattr(mode_library, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(mode_library, "FEW_PAIRS", 2)
+    setup = prepare(
+        trial_rig(3), 180.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
+    )
+    both = setup.library(0.2)
+    n_byte = both.followed._tables.n_byte_of_one
+    assert both.followed.n_most == 2 * 2**20 // n_byte > 4
+    assert both.followed.n_usual == 3 * 2**19 // n_byte
+    assert both.n_usual == both.n_most
