@@ -256,6 +256,8 @@ class ModalSetup:
         self._open_tables.pop(friction, None)
         for held in self._all_libraries:
             held.pop(friction, None)
+        if not any(self._all_libraries):  # nor the parts that they share, but those with every pair open
+            vars(self).pop("_known", None)
 
     def penalty_library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction under a penalty, shared by its cases."""
