@@ -293,13 +293,8 @@ def jit_inline(function: F) -> F:
     return _inlined(function, _FLAGS)
 
 
-def jit_sum(function: F) -> F:
-    """Compile a kernel whose sums may be taken in any (fixed) order."""
-    return _compiled(function, _SUM_FLAGS)
-
-
 def jit_inline_sum(function: F) -> F:
-    """Compile such a kernel into its callers."""
+    """Compile a kernel whose sums may be taken in any (fixed) order into its callers."""
     return _inlined(function, _SUM_FLAGS)
 
 

@@ -26,7 +26,7 @@ from rubhpc.kernels.event_steps import end_mode, record_event, record_touch
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.measuring import Recorder
+    from rubhpc.kernels.sampling import Recorder
 
 Floats = NDArray[np.float64]
 

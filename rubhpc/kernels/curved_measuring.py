@@ -43,8 +43,8 @@ from rubhpc.kernels.curved_contact import (
     is_closed,
 )
 from rubhpc.kernels.curved_response import move_coordinates, respond
-from rubhpc.kernels.measuring import Recorder, widen_extrema
 from rubhpc.kernels.mode_change import product
+from rubhpc.kernels.sampling import Recorder, widen_extrema
 
 Floats = NDArray[np.float64]
 # 1e-4 of 5! over 0.0029, by which the polynomial through the nodes misses a fifth derivative within a step.

@@ -52,15 +52,10 @@ from rubhpc.kernels.event_steps import (
     record_touch,
     sample_step,
 )
-from rubhpc.kernels.measuring import (
-    Recorder,
-    begin_contact,
-    begin_span,
-    observe_step,
-    resolved_contact,
-)
+from rubhpc.kernels.measuring import begin_contact, begin_span, observe_step, resolved_contact
 from rubhpc.kernels.mode_change import change_contacts
 from rubhpc.kernels.penalty_events import change_pressed
+from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import Trail, no_trail, note_after, note_before, note_piece
 
 if TYPE_CHECKING:

@@ -21,7 +21,8 @@ from rubhpc.kernels.contact_modes import (
     floor_log2,
     is_beyond,
 )
-from rubhpc.kernels.measuring import Recorder, end_span, take_samples
+from rubhpc.kernels.measuring import end_span
+from rubhpc.kernels.sampling import Recorder, take_samples
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples

@@ -13,7 +13,7 @@ from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import DAMPING_LOSS, UNBALANCE_WORK, Accumulator
 from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import ModeTables, add_rows, dot, find_mode
-from rubhpc.kernels.measuring import Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 
 Floats = NDArray[np.float64]
 

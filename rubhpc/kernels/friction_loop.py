@@ -56,7 +56,7 @@ from rubhpc.kernels.friction_coordinates import (
 from rubhpc.kernels.friction_events import FrictionWork, observe_states
 from rubhpc.kernels.friction_measuring import begin_friction, observe_friction, resolved_friction
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
-from rubhpc.kernels.measuring import Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import note_after, note_before, note_piece
 
 if TYPE_CHECKING:

@@ -13,15 +13,8 @@ from rubhpc.kernels.contact_modes import DYING, RESOLVED, ModeTables
 from rubhpc.kernels.cubics import turning_value
 from rubhpc.kernels.force_average import AVERAGING_TIME
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
-from rubhpc.kernels.measuring import (
-    FORCE,
-    FORCE_RATE,
-    SLIP,
-    SLIP_RATE,
-    Recorder,
-    force_in_step,
-    leave_out_dying,
-)
+from rubhpc.kernels.measuring import FORCE, FORCE_RATE, SLIP, SLIP_RATE, force_in_step, leave_out_dying
+from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples

@@ -52,7 +52,7 @@ from rubhpc.kernels.pieces import (
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.measuring import Recorder
+    from rubhpc.kernels.sampling import Recorder
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, enter, find_m
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Samples
-    from rubhpc.kernels.measuring import Recorder
+    from rubhpc.kernels.sampling import Recorder
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

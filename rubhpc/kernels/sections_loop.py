@@ -14,7 +14,7 @@ from rubhpc.kernels.event_loop import EventWork, advance
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.measuring import Recorder
+    from rubhpc.kernels.sampling import Recorder
 
 Floats = NDArray[np.float64]
 

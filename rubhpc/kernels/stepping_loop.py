@@ -31,7 +31,8 @@ from rubhpc.kernels.contact_forces import solve_contact
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, event_free_interval, floor_log2, propagate
 from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_start, is_any_closed
 from rubhpc.kernels.laws import is_bouncing, is_penalty, is_plain
-from rubhpc.kernels.measuring import Recorder, begin_span, end_span, take_samples
+from rubhpc.kernels.measuring import begin_span, end_span
+from rubhpc.kernels.sampling import Recorder, take_samples
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

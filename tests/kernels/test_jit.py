@@ -169,7 +169,7 @@ def is_finite(x):
     return math.isfinite(x)
 
 
-@_jit.jit_sum
+@_jit.jit_lean_sum
 def is_finite_sum(x):
     return math.isfinite(x)
 

@@ -18,9 +18,9 @@ from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_witho
 from rubhpc.integrate.reduced_model.mode_tables import TableStack
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
-from rubhpc.kernels.measuring import LANES
 from rubhpc.kernels.retuning import HeldMode, Speeds, retune
 from rubhpc.kernels.retuning_laws import Springs
+from rubhpc.kernels.sampling import LANES
 
 NOT_TUNED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
 AT_ONCE = 8  # pieces to whose speeds a contact mode is tuned at once

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Clock
-    from rubhpc.kernels.measuring import Recorder
+    from rubhpc.kernels.sampling import Recorder
 
     Floats = NDArray[np.float64]
 

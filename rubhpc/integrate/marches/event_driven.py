@@ -282,10 +282,6 @@ class EventDrivenMarch(ModalMarch):
         """Where the case stands, and its modal coordinates (2, m)."""
         return self.progress, self._z
 
-    def has_met(self, masks: list[int]) -> bool:
-        """Whether this case has met these sets of contacts."""
-        return self.met.issuperset(masks)
-
     def find(self, mask: int) -> None:
         """See that the tables hold a set of contacts."""
         self._use(self._modes.tables_with(mask))

@@ -22,7 +22,7 @@ from rubhpc.kernels.case_progress import (
     restart_clock,
 )
 from rubhpc.kernels.contact_modes import enter, is_within
-from rubhpc.kernels.measuring import recorder
+from rubhpc.kernels.sampling import recorder
 
 if TYPE_CHECKING:
     from collections.abc import Callable

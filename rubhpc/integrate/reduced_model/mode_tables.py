@@ -10,7 +10,7 @@ from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 from rubhpc.kernels import contact_modes as kernel
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
-from rubhpc.kernels.measuring import LANES
+from rubhpc.kernels.sampling import LANES
 
 if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode

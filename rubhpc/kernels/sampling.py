@@ -1,0 +1,179 @@
+"""Samples of a record in the exact modal schemes, read from modal coordinates, and their extrema."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels.accumulators import (
+    HORIZONTAL,
+    TWIST,
+    TWIST_ACCELERATION,
+    VERTICAL,
+    Accumulator,
+    Samples,
+)
+from rubhpc.kernels.contact_modes import (
+    LATERAL_RATE,
+    LATERAL_ROW,
+    N_ROTOR_ROW,
+    SAMPLES_AT_ONCE,
+    TWIST_ACCELERATION_ROW,
+    ModeTables,
+)
+from rubhpc.kernels.cubics import turning_value
+
+Floats = NDArray[np.float64]
+
+LANES = 8  # outputs are read in whole vectors
+
+
+class Recorder(NamedTuple):
+    """Work space of a case's measures, o output rows and q pairs; make one with `recorder`."""
+
+    value: Floats  # (SAMPLES_AT_ONCE o,), outputs sample by sample
+    last: Floats  # (2, 3 + q), watched signals and their rates at the last sample; NaN before the first
+    node: Floats  # (4, q), force, slip speed (N, m/s) and their rates of closed pairs at the last step
+    entry: Floats  # (2,), J, forms of damping loss and unbalance work where the span began
+
+
+def recorder(q: int, n_probe: int = 0) -> Recorder:
+    """Work space for q pairs and the probes, before the first sample."""
+    n_row = N_ROTOR_ROW + 3 * q + n_probe
+    return Recorder(
+        value=np.zeros(SAMPLES_AT_ONCE * n_row),
+        last=np.full((2, 3 + q), np.nan),
+        node=np.zeros((4, q)),
+        entry=np.zeros(2),
+    )
+
+
+@jit_inline_sum
+def read_outputs(output: Floats, mode: int, z_re: Floats, z_im: Floats, n_value: int, value: Floats) -> None:
+    """Fill the first `n_value` outputs from the modal coordinates, whose number is a multiple of four."""
+    m = z_re.size
+    for r in range(n_value):
+        value[r] = 0.0
+    for part in range(2):
+        z = z_re if part == 0 else z_im
+        for k in range(0, m, 4):
+            a, b, c, d = z[k], z[k + 1], z[k + 2], z[k + 3]
+            j = part * m + k
+            for r in range(n_value):
+                value[r] += (
+                    output[mode, j, r] * a
+                    + output[mode, j + 1, r] * b
+                    + output[mode, j + 2, r] * c
+                    + output[mode, j + 3, r] * d
+                )
+
+
+@jit_inline_sum
+def take_samples(
+    tables: ModeTables,
+    mode: int,
+    z_re: Floats,
+    z_im: Floats,
+    first: int,
+    count: int,
+    interval: float,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> None:
+    """Record `count` samples from `first` on in one mode; the one past the record counts for extrema.
+
+    `interval` (s) is that between samples, `z` the coordinates at the first of them.
+    """
+    read_samples(
+        tables.output,
+        mode,
+        z_re,
+        z_im,
+        first,
+        count,
+        recorder.value,
+        samples.rotor,
+        samples.axial,
+        samples.lateral,
+        samples.probe,
+    )
+    widen_extrema(
+        recorder.value,
+        count,
+        interval,
+        recorder.last,
+        accumulator.lowest,
+        accumulator.highest,
+        accumulator.peak_lateral,
+    )
+
+
+@jit_lean_sum
+def read_samples(
+    output: Floats,
+    mode: int,
+    z_re: Floats,
+    z_im: Floats,
+    first: int,
+    count: int,
+    value: Floats,
+    rotor: Floats,
+    axial: Floats,
+    lateral: Floats,
+    probe: Floats,
+) -> None:
+    """Fill `value` with the outputs of `count` samples, and those of the record with the samples."""
+    q = axial.shape[0]
+    n_row, n_sample = value.size // SAMPLES_AT_ONCE, rotor.shape[1]
+    first_probe = N_ROTOR_ROW + 3 * q
+    read_outputs(output, mode, z_re, z_im, -(-count * n_row // LANES) * LANES, value)
+    for j in range(min(count, n_sample - first)):
+        start = j * n_row
+        rotor[VERTICAL, first + j] = value[start + VERTICAL]
+        rotor[HORIZONTAL, first + j] = value[start + HORIZONTAL]
+        rotor[TWIST, first + j] = value[start + TWIST]
+        rotor[TWIST_ACCELERATION, first + j] = value[start + TWIST_ACCELERATION_ROW]
+        for i in range(q):
+            tip = start + N_ROTOR_ROW + 3 * i
+            axial[i, first + j] = value[tip]
+            lateral[i, first + j] = value[tip + LATERAL_ROW]
+        for i in range(probe.shape[0]):
+            probe[i, first + j] = value[start + first_probe + i]
+
+
+@jit_lean_sum
+def widen_extrema(
+    value: Floats,
+    count: int,
+    interval: float,
+    last: Floats,
+    lowest: Floats,
+    highest: Floats,
+    peak_lateral: Floats,
+) -> None:
+    """Widen the extrema of the watched signals by `count` samples, an `interval` (s) apart."""
+    q = peak_lateral.size
+    n_row = value.size // SAMPLES_AT_ONCE
+    for k in range(3 + q):
+        tip = N_ROTOR_ROW + 3 * (k - 3)
+        row, rate_row = (k, 3 + k) if k < 3 else (tip + LATERAL_ROW, tip + LATERAL_RATE)
+        before, rate_before = last[0, k], last[1, k]
+        low, high = np.inf, -np.inf
+        for j in range(count):
+            now, rate = value[j * n_row + row], value[j * n_row + rate_row]
+            if rate_before * rate < 0.0:
+                turning = turning_value(before, rate_before, now, rate, interval)
+                low = turning if turning < low else low
+                high = turning if turning > high else high
+            low = now if now < low else low
+            high = now if now > high else high
+            before, rate_before = now, rate
+        last[0, k], last[1, k] = before, rate_before
+        if k < 3:
+            lowest[k], highest[k] = min(lowest[k], low), max(highest[k], high)
+        else:
+            peak_lateral[k - 3] = max(peak_lateral[k - 3], high, -low)
