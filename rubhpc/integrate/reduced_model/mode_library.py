@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from copy import copy
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
@@ -114,7 +115,7 @@ class ModeLibrary:
             return self
         if self._other is None:
             self._other = made = copy(self)
-            made._other = self
+            made._other = weakref.proxy(self)  # each holding the other, both would be freed late
             made._is_measured = made._is_large = False
             made._is_roomy = True
             made._n_solved = 0

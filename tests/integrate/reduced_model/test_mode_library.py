@@ -1,5 +1,7 @@
 """Closed-form motion with contacts held closed, against the equations of motion and matrix exponentials."""
 
+import gc
+import weakref
 from types import SimpleNamespace
 
 import numpy as np
@@ -324,6 +326,22 @@ def test_large_modes_are_solved_once_for_both_tables(monkeypatch, law):
         assert taken.tobytes() == solved.tobytes(), name
     assert both.tables().output.shape[2] < SAMPLES_AT_ONCE * (N_ROTOR_ROW + 9)
     assert both.followed.tables().slip_re.shape[1] == 0
+
+
+def test_large_modes_are_freed_as_soon_as_they_are_forgotten(monkeypatch):
+    """Both tables, gigabytes of a ring of 32, without a search for objects that hold each other."""
+    monkeypatch.setattr(mode_library, "MOST_BYTES", 2**20)
+    setup = prepare(
+        trial_rig(3), 180.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
+    )
+    held = [weakref.ref(setup.library(0.2)), weakref.ref(setup.library(0.2).followed)]
+    assert held[0]() is not held[1]()
+    gc.disable()
+    try:
+        setup.forget(0.2)
+        assert [library() for library in held] == [None, None]
+    finally:
+        gc.enable()
 
 
 def test_modes_that_were_given_up_are_counted_again():
