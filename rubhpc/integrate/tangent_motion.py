@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-N_AT_ONCE = 4  # spans passed together beyond the record
+N_AT_ONCE = 4 * SPAN  # revolutions passed together beyond the record, where a trail has room for their events
 
 
 class TangentMotion:
@@ -49,7 +49,7 @@ class TangentMotion:
         self._start, self._recording, self._setup = start, recording, setup
         self._state = state
         self._march = march = start(state)
-        self._spare = march.new_trail()
+        self._spare, self._n_at_once = march.new_trail(), N_AT_ONCE
         n = march.bodies.stiffness.shape[0]
         self._motion = np.cos(np.arange(2.0 * n))  # in no direction of its own
         self._beside: Marches | None = None
@@ -76,11 +76,12 @@ class TangentMotion:
         return float(sum(grown))
 
     def _pass_on(self) -> bool:
-        """Pass some more revolutions; returns whether the motion can go on."""
-        n_revolution = N_AT_ONCE * SPAN
+        """Pass some more revolutions, or find them too many; returns whether the motion can go on."""
+        n_revolution = self._n_at_once
         march, trail = self._march, self._spare
         march.start_again(self._state)
         march.keep(trail)
+        n_left = march.n_left
         reason = pass_revolutions(march, self._recording, n_revolution)
         march.keep(None)
         if reason is not None:
@@ -88,7 +89,11 @@ class TangentMotion:
         clock = march.clock
         first = -n_revolution * clock.samples_per_revolution << clock.sample_level
         before, self._state = self._state, march.final()
-        if not self._carry(trail, first, n_revolution):
+        if self._carry(trail, first, n_revolution):
+            return True
+        if march.n_left == n_left and n_revolution > 1:  # no room for their events
+            self._n_at_once, self._state = n_revolution // 2, before
+        else:
             self._beside = Marches(self._start, before, self._setup, self._recording)
             for _ in range(self._beside.n_aligning):
                 self._beside.part(SPAN)

@@ -29,9 +29,9 @@ CHANGING_SPEED = 10  # run-ups and drives
 COULOMB = 7  # set-valued friction
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 9  # method = "modal" with gaps that are curved
-MANY_STATORS = 5  # more than five, whose sets of closed contacts or states may be more than 256
+MANY_STATORS = 6  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 5  # [branch]: steps are halved until all multipliers that have crossed are accounted for
-MANY_EVENTS = 1  # restitution, or method = "modal" where a case may have 200 000 events
+MANY_EVENTS = 2  # restitution, or method = "modal" where a case may have 200 000 events
 ALONG_SPEED = 1  # branches along a speed
 PROBED = 1  # method = "modal" with probes, for whose sake modes are kept
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"

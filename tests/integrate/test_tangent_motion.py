@@ -8,6 +8,7 @@ import pytest
 from trial_rig import trial_rig
 
 from rubhpc import simulate
+from rubhpc.integrate import tangent_motion
 from rubhpc.integrate.case import march_of
 from rubhpc.integrate.marches import met_modes
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
@@ -18,6 +19,7 @@ from rubhpc.integrate.periodic_motions.shooting import shoot
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.tangent_motion import TangentMotion, _ModesOfTrail
+from rubhpc.kernels import trail
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
 from rubhpc.study.study import Contact, Integrator, Recording
 
@@ -110,6 +112,27 @@ def test_contact_modes_without_room_are_read_once(monkeypatch):
     assert tangent().part(N_REVOLUTION) == expected
     assert len(n_asked) > 2 * len(trails)
     assert len(read) <= sum(trails)
+
+
+@pytest.mark.parametrize("law", [LAWS[0], LAWS[2]], ids=["sliding", "coulomb"])
+def test_a_trail_without_room_for_the_events_is_passed_in_parts(monkeypatch, law):
+    """Fewer revolutions at once, and the same tangent; in none is a second motion followed."""
+    rig = trial_rig(3)
+    final = ended(rig, SPEED, 5, law)
+
+    def tangent():
+        setup, start = prepared(rig, SPEED, law)
+        return TangentMotion(start, final, setup, Recording(samples_per_revolution=64))
+
+    at_once = tangent()
+    expected = [at_once.part(1) for _ in range(N_REVOLUTION)]
+    most = int(at_once._spare.n_event[0]) // 2
+    monkeypatch.setattr(trail, "MOST_EVENTS", most)
+    in_parts = tangent()
+    assert [in_parts.part(1) for _ in range(N_REVOLUTION)] == pytest.approx(expected, abs=1e-6)
+    assert in_parts._spare.tick.size == most
+    assert in_parts._n_at_once < tangent_motion.N_AT_ONCE
+    assert in_parts._beside is None
 
 
 def solved(setup, final):
