@@ -114,10 +114,10 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
     Returns
     -------
     Dataset over (*facets, y, x), or (*facets, case)
-        The value, `status`, `settled` where the store has it (0: the motion still changed in the record), and
-        `validity`: 0 within the model's range, else the sum of 1 (slip reverses, so
-        that steady sliding is wrong), 2 (force over the stator's Euler load) and 4 (bending, of which the gap
-        knows too little, or by over a tenth of the length).
+        The value, `status`, `settled` where the store has it (0: the record shows a transient), and
+        `validity`: 0 within the model's range, else the sum of 1 (slip reverses, so that steady sliding is
+        wrong), 2 (force over the stator's Euler load) and 4 (bending, of which the gap knows too little, or
+        by over a tenth of the length).
     """
     if not is_mappable(value):
         require_variables(store, [value])

@@ -174,7 +174,7 @@ def settling() -> None:
         return found
 
     follow, truth = Solver.later, judged(3000)
-    for name, later in (("not followed", lambda solver: iter(())), ("followed", follow)):
+    for name, later in (("not followed", lambda solver, looks_periodic: iter(())), ("followed", follow)):
         Solver.later = later  # type: ignore[method-assign]
         pairs = list(zip(judged(120), truth, strict=True))
         regimes = Counter((REGIME[a[0]], REGIME[b[0]]) for a, b in pairs if a[0] != b[0])

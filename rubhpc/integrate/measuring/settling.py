@@ -40,7 +40,7 @@ def settled(
     impulse : (n_stator, n_revolution)
         Of the contact force in each revolution, in any unit.
     period : int
-        Revolutions, or 0 where there is none up to 16.
+        Revolutions, or 0 where none was found.
     """
     n_revolution = motion.shape[1] // samples_per_revolution
     cycles = motion.reshape(len(motion), n_revolution, samples_per_revolution).swapaxes(0, 1)

@@ -35,7 +35,7 @@ PATIENT_ITERATIONS, PATIENT_STEP = 12, 1 / 8  # with shorter steps, from a motio
 # in all; the distance, of its size, in which the motion then returns if it has come to one, and in which it
 # does if it draws near.
 LATER = 128, 128, 256
-FEW_PAIRS, MANY_PAIRS = 2, 6  # of more a motion that shows no period is looked at once, of many never
+FEW_PAIRS, MANY_PAIRS = 2, 6  # of more, what shows no period is looked at after 128 only; of many never
 ARRIVED, DRAWING_NEAR, NEARER = 1e-4, PERIOD_TOLERANCE, 0.5
 
 
@@ -78,10 +78,11 @@ class Solver:
     def later(self, looks_periodic: bool) -> Iterator[tuple[int, Callable[[int], Solution | None]]]:
         """Where to look for a motion that is not found at the end: a period, and what solves for it.
 
-        The case goes on for 512 revolutions; unless it looks periodic, of three to five pairs for 128, and of
-        more not at all, for the time that it takes. Where its last ones return within 1e-4 of the motion's
-        size, and in half the distance of the search before, it may have come to a periodic motion; at the end
-        also where they return within 1 %, nearer than ever and in half the distance of the beginning.
+        A case that looks periodic goes on for 512 revolutions, as does one of one or two pairs. Else one of
+        three to five pairs goes on for 128 and one of more not at all, for the time that it takes. Where its
+        last revolutions return within 1e-4 of the motion's size, and in half the distance of the search
+        before, it may have come to a periodic motion; at the end also where they return within 1 %, nearer
+        than ever and in half the distance of the beginning.
         """
         setup, clearance, friction, state = self._case
         n_on, tried = 0, ARRIVED / NEARER
