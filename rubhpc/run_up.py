@@ -35,6 +35,7 @@ from rubhpc.study.drive_keys import DriveKeys
 from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.initial import CONTACT_FREE
 from rubhpc.study.speed_law import SpeedLaw
+from rubhpc.study.tables import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
@@ -123,6 +124,7 @@ def run_up(
             fix = "give clearance" if name == "clearance_ratio" else "give start, stop and time"
             raise InputError(f"run_up: {name}: the speed changes; {fix}")
     measured = read_probes("run_up", probes)
+    Recording(samples_per_revolution=samples_per_revolution)  # refused as in a study
     case["speed"] = _highest(law, rig, case.get("overrides"))
     one = case_of(
         "run_up",

@@ -60,6 +60,8 @@ def track_orders(signal: Floats, per_revolution: int, orders: Sequence[float], w
     (n_revolution, n_order)
     """
     n = signal.size // per_revolution
+    if n == 0:
+        return np.zeros((0, len(orders)), dtype=np.complex128)
     window = min(window, n)
     turned = 2.0 * np.pi * np.asarray(orders, dtype=np.float64)
     angle = turned / per_revolution * np.arange(per_revolution)[:, np.newaxis]

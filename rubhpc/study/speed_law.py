@@ -88,6 +88,21 @@ class SpeedLaw:
         return np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(self.time))])
 
 
+def piece_length(per_revolution: int, pieces_per_revolution: int) -> int:
+    """Return the samples of a piece where a revolution is cut into so many equal ones.
+
+    Raises
+    ------
+    InputError
+        It is no divisor of the samples in a revolution.
+    """
+    is_count = isinstance(pieces_per_revolution, int) and pieces_per_revolution >= 1
+    if not is_count or per_revolution % pieces_per_revolution:
+        problem = f"{pieces_per_revolution} is no divisor of the {per_revolution} samples in a revolution"
+        raise InputError(f"pieces_per_revolution: {problem}; choose another number")
+    return per_revolution // pieces_per_revolution
+
+
 def cut(law: SpeedLaw, per_revolution: int, pieces_per_revolution: int | None = None) -> Ints:
     """Cut a law into pieces, each of which is taken at its mean speed.
 
@@ -114,10 +129,8 @@ def cut(law: SpeedLaw, per_revolution: int, pieces_per_revolution: int | None = 
     """
     n = law.n_revolution
     if pieces_per_revolution is not None:
-        if pieces_per_revolution < 1 or per_revolution % pieces_per_revolution:
-            problem = f"{pieces_per_revolution} is no divisor of the {per_revolution} samples in a revolution"
-            raise InputError(f"pieces_per_revolution: {problem}; choose another number")
-        return np.arange(n * pieces_per_revolution + 1) * (per_revolution // pieces_per_revolution)
+        length = piece_length(per_revolution, pieces_per_revolution)
+        return np.arange(n * pieces_per_revolution + 1) * length
     time, _, rate = law.at_angle(2.0 * np.pi * np.arange(n + 1))
     bent = np.concatenate([[0], np.cumsum(np.diff(rate) != 0.0)])  # bends of the law before each revolution
     cuts, turn = [0], 0

@@ -28,7 +28,7 @@ from rubhpc.integrate.changing_speed.sample_times import bring_to_angles
 from rubhpc.integrate.changing_speed.turns import Turns
 from rubhpc.integrate.measuring.measures import LEAST_EXCHANGE
 from rubhpc.integrate.measuring.samples import empty_samples
-from rubhpc.study.speed_law import LONGEST_PIECE
+from rubhpc.study.speed_law import LONGEST_PIECE, piece_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -100,17 +100,16 @@ def integrate_driven(
     """
     model, per_revolution = fastest.model, fastest.samples_per_revolution
     n = drive.n_revolution
-    fixed = per_revolution // (pieces_per_revolution or 1)
-    if pieces_per_revolution is not None and per_revolution != fixed * pieces_per_revolution:
-        problem = f"{pieces_per_revolution} is no divisor of the {per_revolution} samples in a revolution"
-        raise InputError(f"pieces_per_revolution: {problem}; choose another number")
+    length = per_revolution
+    if pieces_per_revolution is not None:
+        length = piece_length(per_revolution, pieces_per_revolution)
     swings, cuts = [], [0]  # as of `bring_to_angles`
     whole = empty_samples(model.n_place, n * per_revolution, model.n_probe).whole
     gathered = Turns(n, model)
     driven_by, braked = np.zeros((2, n))
     begins = np.zeros(n + 1)
     spin = Spin(fastest, drive, clearance, friction, initial, check)
-    n_step, reason, n_done, end, length, at = 0, "", 0, ALL_TURNED, fixed, 0
+    n_step, reason, n_done, end, at = 0, "", 0, ALL_TURNED, 0
     energies = np.zeros(6)
     while at < n * per_revolution:
         if pieces_per_revolution is None:

@@ -234,6 +234,7 @@ def test_a_law_of_constant_speed_is_a_simulation():
     assert mean.friction_work.values == pytest.approx(steady.friction_work, rel=1e-4)
 
 
+DRIVEN = {"drive": {"start": 100.0, "torque": 1.0, "revolutions": 9}}
 SPRINGS, STICK = {"law": "penalty", "stiffness": 1e6}, {"friction_law": "coulomb"}
 
 
@@ -311,6 +312,27 @@ def test_orders_are_followed():
     assert np.angle(third[6:-6]) == pytest.approx(-math.pi / 2, abs=5e-3)
 
 
+@pytest.mark.parametrize(
+    "law",
+    [
+        {"start": 100.0, "stop": 120.0, "time": 1.0},
+        DRIVEN,
+    ],
+)
+def test_a_case_that_ends_in_its_first_revolution_says_why(law):
+    found = run_up(
+        "mokhtar2017",
+        clearance="100 um",
+        friction=0.0,
+        samples_per_revolution=32,
+        initial={"vertical": 1.0},
+        **law,
+    )
+    assert "passed 0.08 m in revolution 1" in found.reason
+    assert found.sizes["revolution"] == found.sizes["sample"] == 0
+    assert found.amplitude_vertical.shape == (0, found.sizes["order"])
+
+
 def test_a_law_of_several_points_is_run_through_in_turn():
     law = SpeedLaw(time=(0.0, 1.0, 3.0), speed=(10.0, 30.0, 20.0))
     time, speed, rate = law.at_angle([0.0, 20.0, 47.5])
@@ -378,6 +400,11 @@ def test_earlier_cases_of_a_set_up_change_nothing(contact, monkeypatch):
             {"start": 90.0, "stop": 99.0, "time": 1.0, "pieces_per_revolution": 3},
             "3 is no divisor of the 256",
         ),
+        ({"start": 90.0, "stop": 99.0, "time": 1.0, "pieces_per_revolution": 2.0}, "2.0 is no divisor"),
+        (DRIVEN | {"pieces_per_revolution": -2}, "-2 is no divisor of the 256"),
+        (DRIVEN | {"pieces_per_revolution": 0}, "0 is no divisor of the 256"),
+        (DRIVEN | {"samples_per_revolution": 8}, "8 is out of range; it must be at least 16"),
+        ({"start": 90.0, "stop": 99.0, "time": 1.0, "samples_per_revolution": 33}, "33 is odd"),
     ],
 )
 def test_what_is_no_run_up_is_refused(keys, says):
