@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-def start_of(initial: Initial, setup: Setup, clearance: float) -> State:
+def start_of(initial: Initial, setup: Setup, clearance: float, spin: float | None = None) -> State:
     """Return the state in which a case starts, the unbalance at its phase 0.
 
     Parameters
@@ -37,6 +36,8 @@ def start_of(initial: Initial, setup: Setup, clearance: float) -> State:
     clearance : float, m
         Radial clearance at rest; a stator's `clearance_offset` is added. What overlaps it is pushed apart
         (`initial_state.fit_to_gaps`).
+    spin : float, rad/s, optional
+        Of the contact-free motion, by default the set-up's; where the speed changes, the first one.
 
     Raises
     ------
@@ -45,7 +46,7 @@ def start_of(initial: Initial, setup: Setup, clearance: float) -> State:
         in a direction given, or the node of the impulse does not move sideways.
     """
     if initial.from_ == CONTACT_FREE:
-        state = _shared(setup).contact_free
+        state = _contact_free(setup, setup.spin if spin is None else spin)
     elif initial.state is not None:
         initial.state.check_fit(setup.model)
         state = State.unpacked(initial.state.packed, setup.model)
@@ -60,23 +61,10 @@ def start_of(initial: Initial, setup: Setup, clearance: float) -> State:
 
 @dataclass(eq=False)
 class _Shared:
-    """What the starts of one rig and speed share, found when it is first needed."""
+    """What the starts of a set-up share, found when it is first needed."""
 
-    model: Model
-    spin: float
     shapes: dict[tuple[int, ...], Floats] = field(default_factory=dict)
-
-    @cached_property
-    def contact_free(self) -> State:
-        """The steady unbalance response about the sagged shaft; no stator touches."""
-        if problem := instability_message(self.model, self.spin):
-            raise InputError(f'[initial] from: {problem}; take from = "rest"')
-        response = steady_response(self.model, self.spin)
-        return replace(
-            State.at_rest(self.model),
-            rotor_displacement=self.model.sag + response.real,
-            rotor_velocity=(1j * self.spin * response).real,
-        )
+    contact_free: dict[float, State] = field(default_factory=dict)  # by speed, rad/s
 
 
 _SHARED: WeakKeyDictionary[Setup, _Shared] = WeakKeyDictionary()
@@ -85,8 +73,23 @@ _SHARED: WeakKeyDictionary[Setup, _Shared] = WeakKeyDictionary()
 def _shared(setup: Setup) -> _Shared:
     """What the starts of a set-up share, as long as that is kept."""
     if setup not in _SHARED:
-        _SHARED[setup] = _Shared(setup.model, setup.spin)
+        _SHARED[setup] = _Shared()
     return _SHARED[setup]
+
+
+def _contact_free(setup: Setup, spin: float) -> State:
+    """The steady unbalance response about the sagged shaft at a speed, rad/s; no stator touches."""
+    known, model = _shared(setup).contact_free, setup.model
+    if spin not in known:
+        if problem := instability_message(model, spin):
+            raise InputError(f'[initial] from: {problem}; take from = "rest"')
+        response = steady_response(model, spin)
+        known[spin] = replace(
+            State.at_rest(model),
+            rotor_displacement=model.sag + response.real,
+            rotor_velocity=(1j * spin * response).real,
+        )
+    return known[spin]
 
 
 def _disturbed(state: State, initial: Initial, setup: Setup) -> State:

@@ -117,7 +117,8 @@ class Spin:
             if self._begun is None:
                 start = self._initial
                 if isinstance(start, Initial):
-                    self._begun = ramp.of_rotor(start_of(start, setup, self._clearance), setup)
+                    state = start_of(start, setup, self._clearance, self.speed)
+                    self._begun = ramp.of_rotor(state, setup)
                 else:
                     self._begun = start
             reached = ramp.about_middle(self._begun, setup)

@@ -128,7 +128,8 @@ def integrate_run_up(
         while not reason and (place := piece - block) < len(setups):
             first = int(cuts[piece])
             if reached is None:
-                reached = start_of(initial, setup, clearance) if isinstance(initial, Initial) else initial
+                assert isinstance(initial, Initial)
+                reached = start_of(initial, setup, clearance, law.speed[0])
             stretch = passing.take_several(setups, place, size, reached, (earlier, before[piece]))
             if stretch is not None:
                 part = min(size, per_revolution)

@@ -84,7 +84,7 @@ LONG = (
     {"count": 8},
     {"count": 16},
     {"count": 8, "carrier": CASING},
-    {"count": 3, "table": TABLE},  # touches so lightly that overlaps err 25 times as much as motions
+    {"count": 3, "table": TABLE},  # touches so lightly that overlaps err up to 40 times as much as motions
     {"count": 3, "table": TABLE, "gravity": 9.81},
     {"count": 8, "carrier": CASING, "table": TABLE, "gravity": 9.81},
 )
@@ -110,9 +110,10 @@ def test_a_machine_meets_full_order_stepping(n, keys):
         samples_per_revolution=PER_REVOLUTION,
         pieces_per_revolution=4,
         initial={"from": "rest"},
+        accuracy=1e-4 if "table" in keys else 1e-3,  # with which bearings are held
         **CONTACT,
     )
-    allowed = 3e-3 if "table" in keys else 1e-3  # bearings are held while the response errs by 0.1 %
+    allowed = 1e-3
     assert found.contact_fraction.max() > 0.02
     lateral = np.array([found.vertical, found.horizontal])
     assert np.linalg.norm(lateral - rows[:2]) < allowed * np.linalg.norm(rows[:2])
