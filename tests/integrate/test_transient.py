@@ -121,6 +121,14 @@ def test_direct_way_leads_where_a_long_simulation_does(speed_ratio, clearance_ra
     assert min(away) < 2e-7 * np.abs(expected).max()
 
 
+def test_direct_way_meets_a_motion_that_is_reached_exactly():
+    """Without contact; the linear theory leaves a distance of 0 to the last bit."""
+    case = {"speed": 70.5, "clearance": "100 um", "samples_per_revolution": 1024, "revolutions": 1}
+    found, settled = (simulate("mokhtar2017", transient=n, **case) for n in ("direct", 100))
+    assert found.transient_revolutions == direct.FIRST
+    assert found.section_vertical == pytest.approx(settled.section_vertical, rel=1e-9)
+
+
 def test_direct_way_goes_on_to_the_limit_where_nothing_is_periodic():
     found = simulate(
         "mokhtar2017", transient="direct", transient_limit=70, clearance_ratio=0.696, speed_ratio=0.75,

@@ -134,7 +134,7 @@ def draws_near(walk: Walk, piecewise: PiecewiseMotion, orbit: Orbit, until: int)
             if stray > LINEAR**2 * was or last >= was:
                 looks = []
             else:
-                looks.append((stray / was, 0.5 * math.log(was / less), 0.5 * math.log(was / last)))
+                looks.append((stray / was, _fall(was, less), _fall(was, last)))
         apart, last = seen[-1], square[-1]
         if piecewise.size(apart) <= there:
             return True, None
@@ -153,6 +153,11 @@ def draws_near(walk: Walk, piecewise: PiecewiseMotion, orbit: Orbit, until: int)
         if (reason := walk.on(n_look * span)) is not None:
             return False, reason
         seen = walk.passed[::-1][::span][: n_look + 1][::-1] - orbit.motion
+
+
+def _fall(before: float, after: float) -> float:
+    """Logarithm of a distance over a later one, from their squares; infinite where nothing is left."""
+    return 0.5 * math.log(before / after) if after > 0.0 else math.inf
 
 
 def _agree(looks: list[tuple[float, float, float]], least: int) -> bool:
