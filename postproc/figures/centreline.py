@@ -23,7 +23,9 @@ RING = 3  # stators around the disc at least
 
 
 def centreline(cases: xr.Dataset, *, probes: tuple[str, str] | None = None) -> Drawing:
-    """Shaft centreline of a run-up: the mean position over the speed, and the clearance where a ring has one.
+    """Shaft centreline of a run-up: the mean position over the speed.
+
+    Of a disc in a ring it is drawn in the ring's clearance.
 
     Parameters
     ----------
