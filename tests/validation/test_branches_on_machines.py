@@ -69,8 +69,8 @@ def check_fold(rig, branch, number, n_revolution, **case):
 
 @pytest.mark.long
 def test_ring_of_eight_jumps_where_its_branch_folds():
-    case = {"clearance": "240 um", "friction": 0.05}
-    branch = followed(RING, 1.3, 1.38, most_points=60, **case)
+    case = {"clearance": "240 um", "friction": 0.05, "accuracy": 1e-5}  # at 1e-3 simulations keep other modes
+    branch = followed(RING, 1.3, 1.38, most_points=120, **case)
     assert branch.points[0].touches == 8
     assert all(closes(RING, point, **case) < 1e-6 for point in branch.points[:20:5])
     assert check_fold(RING, branch, 0, 3000, **case) < 0.0
