@@ -55,6 +55,30 @@ def with_probes(model: Model, rig: Rig, probes: Sequence[Probe], spin: float) ->
     return replace(model, probe=ProbeRows(probes=probes, rows=rows, constant=constant))
 
 
+def probes_at(model: Model, spin: float, before: float) -> Model:
+    """Return a model whose probes see its bearings at a spin (rad/s), from one with them at another one."""
+    by_speed = model.rotor.by_speed
+    if model.probe is None or by_speed is None:
+        return model
+    rows = model.probe.rows.copy()
+    for i, probe in enumerate(model.probe.probes):
+        if probe.quantity != "bearing_force":
+            continue
+        direction = np.array([math.cos(probe.angle), math.sin(probe.angle)])
+        for support in by_speed.supports:
+            if support.table.node == probe.node:
+                now, then = (support.table.at(speed, support.name) for speed in (spin, before))
+                stiffness, damping = now[0] - then[0], now[1] - then[1]
+                for k, row in enumerate(support.rows):
+                    if row >= 0:
+                        rows[DISPLACEMENT, i, row] += (direction @ stiffness)[k]
+                        rows[VELOCITY, i, row] += (direction @ (damping + by_speed.proportional * stiffness))[
+                            k
+                        ]
+    constant = rows[DISPLACEMENT][:, : model.rotor.n_dof] @ model.sag
+    return replace(model, probe=replace(model.probe, rows=rows, constant=constant))
+
+
 def _fill(rows: Floats, probe: Probe, model: Model, rig: Rig, spin: float) -> None:
     """Fill the factors (3, n_all) of a probe."""
     if probe.quantity == "bearing_force":

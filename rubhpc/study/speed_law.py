@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 LAG = 0.003  # rad, by which the shaft may depart from its angle within a piece
 LONGEST_PIECE = 16  # revolutions
+SAME_SAMPLE = 1e-6  # intervals of samples, within which a bend of the speed is at a sample
 MOST_REVOLUTIONS = 100_000  # of a case whose speed changes
 
 
@@ -81,6 +82,18 @@ class SpeedLaw:
         # The root of the parabola that does not cancel.
         return np.array(self.time)[place] + 2.0 * ahead / (begin + speed), speed, rate
 
+    def bends(self, per_revolution: int) -> Floats:
+        """Where the acceleration changes, in samples of which a revolution has so many, rising."""
+        at: Floats = self._angle[1:-1][np.diff(self.acceleration) != 0.0] * per_revolution / (2.0 * math.pi)
+        near = np.round(at)
+        snapped: Floats = np.where(np.abs(at - near) < SAME_SAMPLE, near, at)
+        return snapped
+
+    def between(self, begin: float, end: float) -> slice:
+        """The straight lines of the law from one time to another, s, that is later."""
+        first = np.searchsorted(self.time[1:-1], begin, side="right")
+        return slice(int(first), int(np.searchsorted(self.time[1:-1], end, side="left")) + 1)
+
     @cached_property
     def _angle(self) -> Floats:
         """Angle at the points, (n_point,), rad."""
@@ -108,7 +121,7 @@ def cut(law: SpeedLaw, per_revolution: int, pieces_per_revolution: int | None = 
 
     Under the acceleration a the shaft's angle departs from that of a steady spin by `a T^2 / 12` over a piece
     of the duration T, which is to be within `LAG`: pieces are of 1, 2, 4 ... revolutions or of halves,
-    quarters ... of one.
+    quarters ... of one. A bend of the speed lies between two samples, which are a piece by themselves.
 
     Parameters
     ----------
@@ -130,23 +143,29 @@ def cut(law: SpeedLaw, per_revolution: int, pieces_per_revolution: int | None = 
     n = law.n_revolution
     if pieces_per_revolution is not None:
         length = piece_length(per_revolution, pieces_per_revolution)
-        return np.arange(n * pieces_per_revolution + 1) * length
+        return _around(law.bends(per_revolution), np.arange(n * pieces_per_revolution + 1) * length)
     time, _, rate = law.at_angle(2.0 * np.pi * np.arange(n + 1))
-    bent = np.concatenate([[0], np.cumsum(np.diff(rate) != 0.0)])  # bends of the law before each revolution
+    bends = law.bends(per_revolution)
     cuts, turn = [0], 0
     while turn < n:
         count = LONGEST_PIECE
         while count > 1 and (
             turn + count > n
-            or bent[turn + count - 1] > bent[turn]
+            or np.any((bends > turn * per_revolution) & (bends < (turn + count) * per_revolution))
             or abs(rate[turn]) * (time[turn + count] - time[turn]) ** 2 > 12.0 * LAG
         ):
             count //= 2
-        steepest = max(abs(rate[turn]), abs(rate[turn + 1]))
-        parts, lag = 1, steepest * (time[turn + 1] - time[turn]) ** 2 / 12.0
+        within = law.acceleration[law.between(time[turn], time[turn + 1])]
+        parts, lag = 1, np.abs(within).max() * (time[turn + 1] - time[turn]) ** 2 / 12.0
         while count == 1 and lag > LAG * parts**2 and per_revolution % (2 * parts) == 0:
             parts *= 2
         stride = per_revolution * count // parts
         cuts += range(cuts[-1] + stride, cuts[-1] + per_revolution * count + 1, stride)
         turn += count
-    return np.array(cuts)
+    return _around(bends, np.array(cuts))
+
+
+def _around(bends: Floats, cuts: Ints) -> Ints:
+    """Cut also at the samples before and after each bend, as far as the cuts go."""
+    near = np.concatenate([np.floor(bends), np.ceil(bends)]).astype(np.int64)
+    return np.union1d(cuts, near[near < cuts[-1]])

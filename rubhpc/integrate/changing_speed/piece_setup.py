@@ -65,6 +65,7 @@ class HeldMatrices:
         self._slope = slope  # N m s, of a drive's torque over the speed
         self._libraries: dict[tuple[str, float], RetunedLibrary] = {}
         self._pairs: dict[float, FrictionPairs] = {}
+        self._latest: tuple[tuple[float, float], Model] | None = None  # by what was asked
         self.first: tuple[tuple[float, ...], list[PieceSetup]] | None = None  # of a case, by what was asked
 
     @property
@@ -78,10 +79,13 @@ class HeldMatrices:
         is_near = abs(speed - self.reduced.spin) <= far and abs(acceleration - self._acceleration) <= changed
         return is_near and slope == self._slope
 
-    def driven(self, torque: float, acceleration: float) -> Model:
+    def sagging(self, torque: float, acceleration: float) -> Model:
         """The model with the sag under a drive's torque, N m, at an acceleration, rad/s^2."""
-        moved = torque * self.twist + acceleration * self.lean
-        return sagging(self.model, self.model.sag + moved)
+        asked = torque, acceleration
+        if self._latest is None or self._latest[0] != asked:
+            moved = torque * self.twist + acceleration * self.lean
+            self._latest = asked, sagging(self.model, self.model.sag + moved)
+        return self._latest[1]
 
     def tuned(
         self, kind: type[R], piece: PieceSetup, friction: float, make: Callable[[], dict[str, Any]]

@@ -11,6 +11,7 @@ import numpy as np
 
 from rubhpc.fem.assemble import model_at
 from rubhpc.fem.free_spin import unit_rotation
+from rubhpc.fem.probes import probes_at
 from rubhpc.fem.statics import sag_under
 from rubhpc.integrate.changing_speed.held_matrices import WIDEST, WIDEST_TABULATED, held_range
 from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, sagging, with_values
@@ -91,14 +92,13 @@ class Pieces:
         `torque` (N m) is that of the drive of a free spin, `slope` (N m s) its change with the speed.
         """
         held = self._find(speed, acceleration, slope)
-        model = held.model if self._fastest.free_spin is None else held.driven(torque, acceleration)
         columns = np.array([[speed], [acceleration], [angle], [duration]])
-        return self._in_held(held, model, columns, torque)[0]
+        return self._in_held(held, columns, torque)[0]
 
     def blocks(
         self, speed: Floats, acceleration: Floats, angle: Floats, duration: Floats, n_sample: Ints
     ) -> Iterator[list[PieceSetup]]:
-        """The set-ups of the pieces of a prescribed run-up, together where they share matrices.
+        """The set-ups of the pieces of a prescribed run-up, together where they share matrices and sag.
 
         As `setup`, (n_piece,) each; `n_sample` are the samples in each piece, the same in those together.
         """
@@ -108,21 +108,24 @@ class Pieces:
             while (
                 last < min(speed.size, first + AT_ONCE)
                 and n_sample[last] == n_sample[first]
+                and acceleration[last] == acceleration[first]
                 and held.serve(speed[last], acceleration[last])
             ):
                 last += 1
             columns = np.stack([speed, acceleration, angle, duration])[:, first:last]
-            yield self._in_held(held, held.model, columns)
+            yield self._in_held(held, columns)
             first = last
 
-    def _in_held(
-        self, held: HeldMatrices, model: Model, columns: Floats, torque: float = 0.0
-    ) -> list[PieceSetup]:
-        """The set-ups of pieces that all have the same matrices; columns as the arguments of `setup`."""
+    def _in_held(self, held: HeldMatrices, columns: Floats, torque: float = 0.0) -> list[PieceSetup]:
+        """The set-ups of pieces that all have the same matrices; columns as the arguments of `setup`.
+
+        Their sag is that of the first acceleration.
+        """
         speed, acceleration, angle, duration = columns
         asked = (torque, *columns.ravel().tolist())
         if angle[0] == 0.0 and held.first is not None and held.first[0] == asked:
             return held.first[1]
+        model = held.sagging(torque, float(acceleration[0]))
         lag = acceleration * duration**2 / 12.0
         growth = growth_of(speed, acceleration, duration)
         begins = np.exp(1j * (angle - lag) - 0.5 * growth * duration)
@@ -200,9 +203,7 @@ class Pieces:
                 reach = min(reach, LONGEST_FALL * speed)
             speed += np.sign(acceleration) * reach
             model, damping, stiffness = self._matrices(speed, acceleration, slope)
-            model = sagging(model, sag_under(model.rotor, model.load - acceleration * self._inertia))
-        else:
-            model = sagging(model, sag_under(model.rotor, model.load))
+        model = sagging(model, sag_under(model.rotor, model.load))
         phasor = self._phasor * speed**2
         reduced = replace(
             fastest.reduced,
@@ -210,6 +211,7 @@ class Pieces:
             stiffness=stiffness,
             damping=damping,
             force=np.stack([phasor.real, -phasor.imag]),
+            probe=model.probe_rows @ self._basis,
         )
         for name in ("translations", "project"):  # which need no computing anew
             reduced.__dict__[name] = getattr(fastest.reduced, name)
@@ -238,9 +240,12 @@ class Pieces:
         )
         for name in ("energy_limit", "sample_level", "clock"):  # for `with_values`, which takes them along
             getattr(held.template, name)
+        tilted = model.rotor.gyroscopic @ model.sag
         if free is not None:
             held.twist = sag_under(model.rotor, -free.share)
-            held.lean = sag_under(model.rotor, -0.5 * model.rotor.gyroscopic @ model.sag)
+            held.lean = sag_under(model.rotor, -0.5 * tilted)
+        else:
+            held.lean = sag_under(model.rotor, -self._inertia - tilted)
         return held
 
     def _matrices(self, speed: float, acceleration: float, slope: float) -> tuple[Model, Floats, Floats]:
@@ -250,7 +255,8 @@ class Pieces:
         """
         model = self._fastest.model
         if speeds := model.rotor.tabulated_speeds:
-            model = model_at(model, float(np.clip(speed, speeds[0], speeds[-1])))
+            known = float(np.clip(speed, speeds[0], speeds[-1]))
+            model = probes_at(model_at(model, known), known, self._fastest.spin)
         _, damping, stiffness, _ = whole_system(model, speed)
         damping = self._basis.T @ damping @ self._basis - slope * np.outer(self._turning, self._turning)
         stiffness = self._basis.T @ stiffness @ self._basis + acceleration * self._momentum

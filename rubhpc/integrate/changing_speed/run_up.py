@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.sample_times import bring_to_angles
 from rubhpc.integrate.changing_speed.turns import Turns
+from rubhpc.integrate.changing_speed.twist_ramp import moved
 from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_accumulator
 from rubhpc.integrate.record import State
 from rubhpc.integrate.start import start_of
@@ -101,7 +103,7 @@ def integrate_run_up(
     cuts = cut(law, per_revolution, pieces_per_revolution)
     n_stator, n = len(model.stators), law.n_revolution
     angles = 2.0 * np.pi / per_revolution * cuts.astype(np.float64)
-    times, _, _ = law.at_angle(angles)
+    times, at_cuts, _ = law.at_angle(angles)
     _, _, accelerations = law.at_angle(0.5 * (angles[1:] + angles[:-1]))
     begins, _, _ = law.at_angle(2.0 * np.pi * np.arange(n + 1))
     whole = empty_samples(model.n_place, n * per_revolution, model.n_probe).whole
@@ -114,6 +116,14 @@ def integrate_run_up(
     durations, sizes = np.diff(times), np.diff(cuts)
     before = np.concatenate([[0.0], durations[:-1]])
     speeds: Floats = np.diff(angles) / durations
+    # A piece in which the law bends has a mean acceleration, which leaves the shaft behind by `late`, rad.
+    within = np.floor(bends := law.bends(per_revolution))
+    bent = np.searchsorted(cuts[:-1], within[(within < bends) & (within < cuts[-1])])
+    accelerations[bent] = np.diff(at_cuts)[bent] / durations[bent]
+    late, sudden = np.zeros((2, speeds.size))
+    sudden[bent] = accelerations[bent] - law.at_angle(angles[bent])[2]  # past its first sample
+    late[bent] = ((speeds - 0.5 * (at_cuts[1:] + at_cuts[:-1])) * durations)[bent]
+    unit, none = unit_rotation(model.rotor), np.zeros(model.rotor.n_dof)
     piece, held_from = 0, times[0]  # since when the matrices are held
     last: tuple[PieceSetup, int] | None = None  # piece of the matrices before, and its samples
     for setups in pieces.blocks(speeds, accelerations, angles[:-1], durations, sizes):
@@ -123,14 +133,20 @@ def integrate_run_up(
             sagging, begun = setup.model, cuts[piece]
         if last is not None and reached is not None and last[0].held is not setup.held:
             ended = passing.standing(last[0], reached, last[1])
+            # What an acceleration that jumps leaves to ring is no work of the matrices.
+            jump = (accelerations[piece] - accelerations[piece - 1]) * setup.held.lean
+            reached = moved(reached, setup, jump, none)
             reached = passing.continued(setup, reached, ended, times[piece] - held_from)
+            reached = moved(reached, setup, -jump, none)
             held_from = times[piece]
         while not reason and (place := piece - block) < len(setups):
             first = int(cuts[piece])
             if reached is None:
                 assert isinstance(initial, Initial)
                 reached = start_of(initial, setup, clearance, law.speed[0])
-            stretch = passing.take_several(setups, place, size, reached, (earlier, before[piece]))
+            stretch = None
+            if not late[piece]:
+                stretch = passing.take_several(setups, place, size, reached, (earlier, before[piece]))
             if stretch is not None:
                 part = min(size, per_revolution)
                 parts = np.arange(first, first + stretch.n_piece * size, part)
@@ -142,6 +158,10 @@ def integrate_run_up(
                 continue
             passed = passing.take(setups[place], size, reached, (earlier, before[piece]))
             reached, earlier = passed.end, passed.accumulators[-1]
+            if late[piece]:  # the inertia of the twist does not follow at once
+                seen = model.probe_rows[2, :, : unit.size] @ unit
+                passed.whole[4 + 3 * model.n_place :, 0] += sudden[piece] * seen
+                reached = moved(reached, setups[place], -late[piece] * unit, none)
             n_step += passed.n_step
             whole[:, first : first + size] = passed.whole
             for i, accumulator in enumerate(passed.accumulators):

@@ -29,15 +29,15 @@ class TwistRamp(NamedTuple):
 
     def about_middle(self, begun: State | Place, setup: PieceSetup) -> State | Place:
         """The motion with which a piece begins, about the sag of its middle, from that of the rotor."""
-        return _moved(begun, setup, self.half, -self.rate)
+        return moved(begun, setup, self.half, -self.rate)
 
     def of_rotor(self, begun: State | Place, setup: PieceSetup) -> State | Place:
         """The motion of the rotor, from one about the sag at the beginning of the piece."""
-        return _moved(begun, setup, -self.half, self.rate)
+        return moved(begun, setup, -self.half, self.rate)
 
     def after(self, end: Place, setup: PieceSetup) -> Place:
         """The motion of the rotor where a piece ends, from that about the sag of its middle."""
-        reached = _moved(end, setup, self.half, self.rate)
+        reached = moved(end, setup, self.half, self.rate)
         assert isinstance(reached, Place)
         return reached
 
@@ -51,7 +51,7 @@ class TwistRamp(NamedTuple):
         whole[first_probe:] += np.outer(positions @ self.half, share) + (rates @ self.rate)[:, np.newaxis]
 
 
-def _moved(motion: State | Place, setup: PieceSetup, displacement: Floats, velocity: Floats) -> State | Place:
+def moved(motion: State | Place, setup: PieceSetup, displacement: Floats, velocity: Floats) -> State | Place:
     """The same with other displacements and velocities of the rotor, (n_rotor_dof,) more."""
     if isinstance(motion, State):
         return replace(
