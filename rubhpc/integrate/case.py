@@ -334,7 +334,7 @@ def _neighbours(
     """A motion beside that from where a march has ended."""
     if isinstance(march, EventDrivenMarch) and march.has_closed_form:
         return TangentMotion(
-            cast("Callable[[State], EventDrivenMarch]", start), final, setup, recording, trail
+            cast("Callable[[State], EventDrivenMarch]", start), final, setup, recording, trail, march
         )
     return Marches(start, final, setup, recording)
 

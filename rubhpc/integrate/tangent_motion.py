@@ -8,7 +8,7 @@ import numpy as np
 
 from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN, Marches
 from rubhpc.integrate.marches.friction import FrictionMarch
-from rubhpc.integrate.measuring.regimes import N_MOST
+from rubhpc.integrate.measuring.regimes import N_ALL, N_FIRST, N_MOST
 from rubhpc.integrate.transient import pass_revolutions
 from rubhpc.kernels.tangent import ALL_CARRIED, TrailModes, carry_along, new_tangent
 from rubhpc.kernels.trail import BROKEN
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-N_AT_ONCE = 4 * SPAN  # revolutions passed together beyond the record, where a trail has room for their events
+MOST_AT_ONCE = 16 * SPAN  # revolutions passed together beyond the record
+GOALS = N_FIRST, N_ALL, N_MOST  # spans that are asked for together (`regimes.by_growth`)
 
 
 class TangentMotion:
@@ -42,14 +43,18 @@ class TangentMotion:
         setup: Setup,
         recording: Recording,
         trail: Trail | None = None,
+        march: EventDrivenMarch | None = None,
     ) -> None:
-        """Take where a record has ended, and the trail of its revolutions, if it was kept."""
+        """Take where a record has ended, and the trail of its revolutions, if it was kept.
+
+        A march of the case that is needed no more may be given, to be started anew; and so is the trail.
+        """
         self.n_aligning, self.most_spans = N_ALIGNING, N_ALIGNING + N_MOST
         self.within: list[float] = []
         self._start, self._recording, self._setup = start, recording, setup
         self._state = state
-        self._march = march = start(state)
-        self._spare, self._n_at_once = march.new_trail(), N_AT_ONCE
+        self._march = march = start(state) if march is None else march
+        self._n_passed, self._most_at_once = 0, MOST_AT_ONCE
         n = march.bodies.stiffness.shape[0]
         self._motion = np.cos(np.arange(2.0 * n))  # in no direction of its own
         self._beside: Marches | None = None
@@ -58,6 +63,10 @@ class TangentMotion:
             grown, self._grown = np.array(self._grown[N_ALIGNING * SPAN :]), []
             whole = grown.size - grown.size % SPAN
             self.within = (grown[grown.size - whole :].reshape(-1, SPAN).sum(axis=1) / SPAN).tolist()
+            if recording.revolutions >= N_ALIGNING * SPAN:
+                self.n_aligning = 0
+            self._leave_room(trail, recording.revolutions)
+        self._spare = march.new_trail() if trail is None else trail
 
     def part(self, n_revolution: int) -> float | None:
         """Go on; see `lyapunov.Neighbours`.
@@ -77,7 +86,7 @@ class TangentMotion:
 
     def _pass_on(self) -> bool:
         """Pass some more revolutions, or find them too many; returns whether the motion can go on."""
-        n_revolution = self._n_at_once
+        n_revolution = self._next_revolutions()
         march, trail = self._march, self._spare
         march.start_again(self._state)
         march.keep(trail)
@@ -90,14 +99,27 @@ class TangentMotion:
         first = -n_revolution * clock.samples_per_revolution << clock.sample_level
         before, self._state = self._state, march.final()
         if self._carry(trail, first, n_revolution):
+            self._n_passed += n_revolution
+            self._leave_room(trail, n_revolution)
             return True
         if march.n_left == n_left and n_revolution > 1:  # no room for their events
-            self._n_at_once, self._state = n_revolution // 2, before
+            self._most_at_once, self._state = n_revolution // 2, before
         else:
             self._beside = Marches(self._start, before, self._setup, self._recording)
             for _ in range(self._beside.n_aligning):
                 self._beside.part(SPAN)
         return True
+
+    def _next_revolutions(self) -> int:
+        """Revolutions until as many spans are there as are asked for together next, or a part of them."""
+        ends = (SPAN * (self.n_aligning + goal - len(self.within)) for goal in GOALS)
+        left = next((end - self._n_passed for end in ends if end > self._n_passed), SPAN)
+        return min(left, self._most_at_once)
+
+    def _leave_room(self, trail: Trail, n_revolution: int) -> None:
+        """Pass no more revolutions at once than a trail has room for, if they have twice as many events."""
+        n_event = max(1, 2 * int(trail.n_event[0]))
+        self._most_at_once = min(self._most_at_once, max(1, trail.tick.size * n_revolution // n_event))
 
     def _carry(self, trail: Trail, first: int, n_revolution: int) -> bool:
         """Carry the displacement along a trail that begins at tick `first`; False where that is broken."""

@@ -40,7 +40,6 @@ _FIRST_STEPS = 50_000  # predicted, of the first run of a case that is shortened
 _LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
 _FIRST_TURNS = 64  # revolutions of a changing speed that are tried first
 _WHOLE_TURNS = 3.0  # s: such cases are run whole if that takes no longer
-_NEIGHBOURS = SPAN * (N_ALIGNING + N_FIRST)  # revolutions for which an irregular motion's tangent is carried
 _GROWING = 0.01  # new contact modes over those of all revolutions before: beyond, a motion is irregular
 _LATE = 0.25  # least pace of what is left of a shortened case, over that of what was timed
 
@@ -175,7 +174,7 @@ class Pilots:
                 break
         self.irregular.add(case.index)
         n_turn = recording.longest_transient + recording.revolutions
-        longer = _NEIGHBOURS / n_turn if recording.revolutions >= LEAST_REVOLUTIONS else 0.0
+        longer = _beyond(recording.revolutions) / n_turn
         n_doubling = math.log2(max((1.0 + longer) / done, 1.0))
         return met - first + (met - before) * (1.0 - 0.5**n_doubling), longer
 
@@ -362,3 +361,9 @@ def _limited(seconds: float) -> Callable[[], None]:
             raise _Enough
 
     return check
+
+
+def _beyond(n_recorded: int) -> int:
+    """Revolutions behind a record for which an irregular motion's tangent is carried at least."""
+    counted = n_recorded // SPAN - N_ALIGNING  # spans of the record
+    return SPAN * max(N_FIRST - counted, 0) if n_recorded >= LEAST_REVOLUTIONS else 0

@@ -131,7 +131,7 @@ def test_a_trail_without_room_for_the_events_is_passed_in_parts(monkeypatch, law
     in_parts = tangent()
     assert [in_parts.part(1) for _ in range(N_REVOLUTION)] == pytest.approx(expected, abs=1e-6)
     assert in_parts._spare.tick.size == most
-    assert in_parts._n_at_once < tangent_motion.N_AT_ONCE
+    assert in_parts._most_at_once < tangent_motion.MOST_AT_ONCE
     assert in_parts._beside is None
 
 

@@ -115,11 +115,21 @@ def test_dearest_case_is_run_whole(monkeypatch, n_case, left):
         (16, 0.5, (75, 106), (31 + 31 * (1 - 6 / (56 + 80)), 80 / 56)),
         (16, 1.5, (75, 106, 130), (55 + 24 * (1 - 12 / (56 + 80)), 80 / 56)),
         (16, 1.5, (75, 106, 107), (32.0, 0.0)),
-        (16, 99.0, (75, 95, 120, 150, 190), (115 + 40 * (1 - 48 / (56 + 80)), 80 / 56)),
+        (16, 99.0, (75, 95, 120, 150, 190), (115 + 40 * (1 - 48 / (56 + 64)), 64 / 56)),
         (16, 0.5, (200, 202), (2.0, 0.0)),  # it comes back to what it has met
         (8, 0.5, (75, 150), (75 + 75 * (1 - 6 / 48), 0.0)),  # too short for its tangent to be carried on
+        (64, 0.5, (75, 150), (75 + 75 * (1 - 6 / (104 + 16)), 16 / 104)),  # 12 of 16 spans are in the record
     ],
-    ids=["irregular", "less and less", "followed on", "at last regular", "nearly whole", "regular", "short"],
+    ids=[
+        "irregular",
+        "less and less",
+        "followed on",
+        "at last regular",
+        "nearly whole",
+        "regular",
+        "short",
+        "long",
+    ],
 )
 def test_each_doubling_of_an_irregular_motion_meets_half_as_many_new_modes(
     revolutions, limit, met, expected, monkeypatch

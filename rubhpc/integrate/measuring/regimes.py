@@ -82,8 +82,9 @@ def regime(
     A record shorter than 16 revolutions without a period leaves the motion undecided: it is too short for
     some periods. From 16 to 31 the growth alone decides, for it is measured beyond the record; a longer
     record may show a torus, or a period beyond 16, by itself. A motion that shows no period, but comes to a
-    periodic motion in later revolutions, is that and has not settled. Of a torus with so many events that
-    no motion of a longer period than 1 could be solved for, none is sought there.
+    periodic motion in later revolutions, is that and has not settled. Next to the end of a torus that the
+    record shows none is sought, and of one with so many events that no motion of a longer period than 1 could
+    be solved for, none later.
 
     Parameters
     ----------
@@ -106,13 +107,10 @@ def regime(
         return Verdict(REGIME.index("no_contact"), period)
     orbit = _Orbit(vertical, horizontal, samples_per_revolution)
     periodic = REGIME.index("periodic")
-    distances, nearest, looks_like = None, 0, period
-    if orbit.n_revolution >= TORUS_REVOLUTIONS:
-        distances = cycle_distances(vertical, horizontal, samples_per_revolution)
-        square = returns(distances)
-        nearest = int(square.argmin()) + 1
-        if period == 0 and square.min() <= PERIOD_TOLERANCE**2 * orbit.size**2:
-            looks_like = nearest
+    looks_like = period
+    is_long = orbit.n_revolution >= TORUS_REVOLUTIONS
+    if is_long and period == 0 and orbit.returns.min() <= PERIOD_TOLERANCE**2 * orbit.size**2:
+        looks_like = orbit.nearest_return
     if solve is None and looks_like > 0 and orbit.has_equal_ends(looks_like):
         return Verdict(periodic, period)
     search = _Search(orbit)
@@ -122,19 +120,21 @@ def regime(
     repeats = is_open and orbit.repeats(orbit.closest_return)
     if orbit.n_revolution < LEAST_REVOLUTIONS:
         return Verdict(periodic, orbit.closest_return) if repeats else Verdict(REGIME.index("undecided"), 0)
-    is_closed = distances is not None and is_torus(distances)  # the curve on which the cycles lie
+    is_closed = is_long and is_torus(orbit.distances)  # the curve on which the cycles lie
     flag, exponent = by_growth(growth, within, is_closed=is_closed)
     if repeats and flag != REGIME.index("chaotic"):
         return Verdict(periodic, orbit.closest_return, exponent)
     is_regular = flag in (periodic, REGIME.index("quasi_periodic"))
-    if solve and is_regular and looks_like == 0 and nearest > LONGEST_PERIOD // 2:
-        verdict = search.proves(nearest, solve)
+    is_torus_shown = is_closed and flag == REGIME.index("quasi_periodic")
+    may_be_long = is_long and is_regular and not is_torus_shown and looks_like == 0
+    if solve and may_be_long and orbit.nearest_return > LONGEST_PERIOD // 2:
+        verdict = search.proves(orbit.nearest_return, solve)
         if verdict is not None:
             return verdict._replace(exponent=exponent)
-    is_torus_shown = is_closed and flag == REGIME.index("quasi_periodic")
-    is_worth_it = not (is_torus_shown and 2 * n_event > MOST_EVENTS)
-    if later and looks_like == 0 and is_worth_it and (verdict := search.proves_any(later(False))):
-        return verdict._replace(exponent=exponent)
+    if later and looks_like == 0 and not (is_torus_shown and 2 * n_event > MOST_EVENTS):
+        verdict = search.proves_any(later(False))
+        if verdict is not None:
+            return verdict._replace(exponent=exponent)
     is_settling = solve is None and flag == periodic
     return Verdict(flag, period if is_settling else 0, exponent, is_reached=not (is_settling and period > 0))
 
@@ -149,7 +149,23 @@ class _Orbit:
         self.section = self.signals[:, ::samples_per_revolution].T
         self.cycles = self.signals.reshape(2, self.n_revolution, -1).swapaxes(0, 1)
 
-    def distances(self, solution: Solution) -> Floats:
+    @cached_property
+    def distances(self) -> Floats:
+        """Mean square distance between all whole cycles, (n_revolution, n_revolution), m2."""
+        vertical, horizontal = self.signals
+        return cycle_distances(vertical, horizontal, vertical.size // self.n_revolution)
+
+    @cached_property
+    def returns(self) -> Floats:
+        """Mean square distance of cycles 1, 2, ... revolutions apart, up to a third of the record, m2."""
+        return returns(self.distances)
+
+    @property
+    def nearest_return(self) -> int:
+        """Revolutions after which that is least."""
+        return int(self.returns.argmin()) + 1
+
+    def distances_from(self, solution: Solution) -> Floats:
         """Distance of each section point from that of a solution, over the size of the orbit."""
         place = (np.arange(self.n_revolution) - self.n_revolution) % solution.period
         apart = np.linalg.norm(self.section - solution.section[place], axis=1)
@@ -225,7 +241,7 @@ class _Search:
         self.finds_nothing = False
         if abs(found.multiplier) >= 1.0:
             return None
-        apart = self._orbit.distances(found)
+        apart = self._orbit.distances_from(found)
         first, last = apart[: found.period].max(), apart[-found.period :].max()
         draws_near = found.is_led_to or (last <= MOST_DISTANT and last <= first)
         if last > PERIOD_TOLERANCE and not draws_near:
@@ -242,21 +258,29 @@ def by_growth(
 
     `is_closed` states that the cycles lie on a closed curve (`is_torus`).
     """
-    if is_closed and within is not None and (grown := within()) and abs(np.mean(grown)) < CLEAR:
+    grown = [] if within is None else list(within())
+    if is_closed and grown and abs(np.mean(grown)) < CLEAR:
         return REGIME.index("quasi_periodic"), float(np.mean(grown))
     spans = iter(growth)
-    grown = list(islice(spans, N_FIRST))
-    if len(grown) == N_FIRST and abs(np.mean(grown)) < CLEAR:
+
+    def reaches(n_span: int) -> bool:
+        """Whether so many spans are there, or can be read."""
+        grown.extend(islice(spans, max(0, n_span - len(grown))))
+        return len(grown) >= n_span
+
+    if not reaches(N_FIRST):
+        return REGIME.index("undecided"), math.nan  # the motion next to it cannot go on
+    if abs(np.mean(grown)) < CLEAR:
         if is_closed:
             return REGIME.index("quasi_periodic"), float(np.mean(grown))
-        grown += islice(spans, N_ALL - N_FIRST)
-        if len(grown) == N_ALL and ZERO < abs(np.mean(grown)) < SURE * standard_error(grown):
-            grown += islice(spans, N_MOST - N_ALL)
-    if len(grown) < N_FIRST or N_FIRST < len(grown) < N_ALL:
-        return REGIME.index("undecided"), math.nan  # the motion next to it cannot go on
+        if not reaches(N_ALL):
+            return REGIME.index("undecided"), math.nan
+        if ZERO < abs(np.mean(grown)) < SURE * standard_error(grown):
+            reaches(N_MOST)
+        exponent = float(np.mean(grown))
+        if abs(exponent) <= max(ZERO, SURE * standard_error(grown)):
+            return REGIME.index("quasi_periodic"), exponent
     exponent = float(np.mean(grown))
-    if len(grown) > N_FIRST and abs(exponent) <= max(ZERO, SURE * standard_error(grown)):
-        return REGIME.index("quasi_periodic"), exponent
     return REGIME.index("chaotic" if exponent > 0.0 else "periodic"), exponent
 
 

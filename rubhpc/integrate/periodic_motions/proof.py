@@ -34,9 +34,11 @@ PATIENT_ITERATIONS, PATIENT_STEP = 12, 1 / 8  # with shorter steps, from a motio
 # Where that finds no stable motion that the record agrees with: revolutions after which it is looked at, 512
 # in all; the distance, of its size, in which the motion then returns if it has come to one, and in which it
 # does if it draws near.
-LATER = 128, 128, 256
-FEW_PAIRS, MANY_PAIRS = 2, 6  # of more, what shows no period is looked at after 128 only; of many never
+LATER = 64, 64, 128, 256
+# Of more pairs than a few, what shows no period is looked at that often only; of many never.
+FEW_PAIRS, N_SHORT, MANY_PAIRS = 2, 2, 6
 ARRIVED, DRAWING_NEAR, NEARER = 1e-4, PERIOD_TOLERANCE, 0.5
+NEAR_ENOUGH = 2.0 * DRAWING_NEAR  # of its size: what returns within that is looked at closely
 
 
 class Solver:
@@ -89,7 +91,7 @@ class Solver:
         n_pair = len(setup.model.stators)
         if n_pair >= MANY_PAIRS and not looks_periodic:
             return  # what is not recorded may need contact modes of its own
-        spans = LATER if looks_periodic or n_pair <= FEW_PAIRS else LATER[:1]
+        spans = LATER if looks_periodic or n_pair <= FEW_PAIRS else LATER[:N_SHORT]
         returned: list[float] = []
         try:
             march = self._march or closed_form_march(setup)(setup, clearance, friction, state, None)
@@ -168,11 +170,15 @@ def _return_of(passed: Floats, energy: Floats) -> tuple[int, float]:
     """Revolutions after which the last motions (k, 2 n) return nearest, and how near, over their size."""
     longest = min(MOST_DOUBLED, len(passed) // 2)
     ends, place = passed[-2 * longest :], np.arange(longest)
-    before = ends[longest + place - place[:, np.newaxis] - 1]
-    back = ((ends[longest:] - before) ** 2 @ energy).mean(axis=1)
     size = math.sqrt(passed[-1] ** 2 @ energy)
-    period = closest_return(back, size)
-    return period, math.sqrt(back.min()) / size
+    weighed = ends * energy  # products find what does not return, and nothing nearer than 1e-8
+    square = np.einsum("ij,ij->i", weighed, ends)
+    before = longest + place - place[:, np.newaxis] - 1
+    product = weighed[longest:] @ ends.T
+    back = (square[longest:] + square[before] - 2.0 * product[place, before]).mean(axis=1)
+    if back.min() <= NEAR_ENOUGH**2 * size**2:
+        back = ((ends[longest:] - ends[before]) ** 2 @ energy).mean(axis=1)
+    return closest_return(back, size), math.sqrt(max(back.min(), 0.0)) / size
 
 
 def _falls(apart: list[float]) -> bool:

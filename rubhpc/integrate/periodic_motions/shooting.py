@@ -141,9 +141,11 @@ def shoot(
     if not trial.residual <= most_residual:
         raise NotConverged(f"the beginning is far from closing, residual {trial.residual:.2g}")
     derivative, is_fresh = None, False
-    for iteration in range(most_iterations):
+    for iteration in range(most_iterations + 1):
         if trial.end_states == trial.states and trial.residual <= CONVERGED:
             return _settled(piecewise, trial, derivative if is_fresh else None, iteration)
+        if iteration == most_iterations:
+            break
         if derivative is None:
             derivative, is_fresh = monodromy(piecewise, trial.revolutions), True
         step = _solved(identity - derivative, trial.defect)

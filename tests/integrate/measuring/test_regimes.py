@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rubhpc.integrate.measuring.orbit_measures import period as period_of
-from rubhpc.integrate.measuring.regimes import Solution, cycle_distances, is_torus, regime
+from rubhpc.integrate.measuring.regimes import Solution, by_growth, cycle_distances, is_torus, regime
 from rubhpc.schema import REGIME
 
 SAMPLES, REVOLUTIONS = 64, 64
@@ -331,3 +331,13 @@ def test_short_record_with_a_period_and_no_solution_is_what_it_looks_like():
     whirl = torus(1 / 3)[: 8 * SAMPLES]
     name, verdict = judged(whirl, lambda asked: None)
     assert (name, verdict.period) == ("periodic", 3)
+
+
+@pytest.mark.parametrize(("n_within", "n_read"), [(0, 16), (12, 4), (20, 0)])
+def test_spans_of_the_record_count(n_within, n_read):
+    """What is missing of 16 is read behind the record, and nothing if none is."""
+    behind = iter([0.5] * 16)
+    flag, exponent = by_growth(behind, lambda: [0.3] * n_within)
+    assert REGIME[flag] == "chaotic"
+    assert exponent == pytest.approx((0.3 * n_within + 0.5 * n_read) / max(n_within, 16))
+    assert len(list(behind)) == 16 - n_read

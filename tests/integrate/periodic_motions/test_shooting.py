@@ -31,6 +31,19 @@ def test_limit_that_is_reached_is_named(monkeypatch, limit, text):
         rubhpc.periodic("mokhtar2017", **CASE)
 
 
+def test_motion_that_the_last_step_closes_is_found(monkeypatch):
+    needed = rubhpc.periodic("mokhtar2017", **CASE).iterations
+    assert needed > 1
+    monkeypatch.setattr(periodic_motion, "SPANS", ())
+    for allowed in (needed, needed - 1):
+        monkeypatch.setattr(periodic_motion, "shoot", partial(shoot, most_iterations=allowed))
+        if allowed < needed:
+            with pytest.raises(NoPeriodicMotion, match="no convergence"):
+                rubhpc.periodic("mokhtar2017", **CASE)
+        else:
+            assert rubhpc.periodic("mokhtar2017", **CASE).iterations == needed
+
+
 def test_contact_that_grazes_is_named():
     """A touch that is slow beside spin times clearance, not one from beyond a wall."""
 
