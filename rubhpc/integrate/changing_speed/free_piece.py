@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 DRIVEN_LAG = 0.25 * LAG  # rad, by which the shaft may depart from its angle: the twist feels its speed too
-GUESSED = 0.02 * LAG  # rad, by which the shaft's angle may depart from that of the acceleration guessed
+GUESSED = 0.005 * LAG  # rad, by which the shaft's angle may depart from that of the acceleration guessed
 MOST_TRIES = 4  # of a piece, after which it is halved
 
 
@@ -75,6 +75,8 @@ class Spin:
         self._phasor = model.unbalance_cosine - 1j * model.unbalance_sine
         self.speed, self.time = drive.start, 0.0
         self._brake = 0.0  # N m, mean of the last piece
+        # N m, by which the drive twists the shaft: at the speed that was guessed, so that it does not jump.
+        self._twisting = drive.at(drive.start)
         self._begun: State | Place | None = None
         self._setup: PieceSetup | None = None  # of the last piece
         self._standing: Standing | None = None  # where it has ended
@@ -108,7 +110,7 @@ class Spin:
             if not is_fixed and abs(acceleration) * duration**2 > 12.0 * DRIVEN_LAG and length > 1:
                 return None
             torque = self._mean_torque(end_speed)
-            low, high = drive.at(self.speed), drive.at(end_speed)
+            low, high = self._twisting, drive.at(end_speed)
             middle = 0.5 * (low + high)
             slope = drive.slope(mean)
             setup = self._setup = self._pieces.setup(mean, acceleration, first, duration, middle, slope)
@@ -170,6 +172,7 @@ class Spin:
         self._standing = self._passing.standing(setup, passed.end, length)
         self.time += duration
         self._brake = torque - inertia * change / duration
+        self._twisting = high
         self._begun = ramp.after(passed.end, setup)
         self._earlier = passed.accumulators[-1], duration
         return found
