@@ -38,6 +38,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 DRIVEN_LAG = 0.25 * LAG  # rad, by which the shaft may depart from its angle: the twist feels its speed too
+# Rub comes in touches, between which the speed is not on its mean line: its share of the torques counts so
+# many times.
+UNEVEN = 25.0
 GUESSED = 0.005 * LAG  # rad, by which the shaft's angle may depart from that of the acceleration guessed
 MOST_TRIES = 4  # of a piece, after which it is halved
 
@@ -94,7 +97,8 @@ class Spin:
     def take(self, at: int, length: int, per_revolution: int, *, is_fixed: bool) -> Taken | None:
         """Take a piece from sample `at`; None where it is too long, or the spin does not get so far.
 
-        `is_fixed`: it may not be shortened for the sake of accuracy.
+        `is_fixed`: it may not be shortened for the sake of accuracy. Nor is one of an odd number of samples,
+        which cannot be halved.
         """
         drive, inertia = self._drive, self._free.inertia
         turned = 2.0 * math.pi * length / per_revolution
@@ -107,7 +111,7 @@ class Spin:
                 return None
             mean = 0.5 * (self.speed + end_speed)
             duration = turned / mean
-            if not is_fixed and abs(acceleration) * duration**2 > 12.0 * DRIVEN_LAG and length > 1:
+            if not is_fixed and abs(acceleration) * duration**2 > 12.0 * DRIVEN_LAG and length % 2 == 0:
                 return None
             torque = self._mean_torque(end_speed)
             low, high = self._twisting, drive.at(end_speed)
@@ -133,8 +137,13 @@ class Spin:
             ramp.lift(passed.whole, setup)
             if passed.reason:
                 guessed = end_speed - self.speed
-                return self._taken(passed, acceleration, guessed, length, per_revolution, torque, np.zeros(6))
+                return self._taken(
+                    passed, acceleration, guessed, length, per_revolution, torque, np.zeros(6), 0.0
+                )
             flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)
+            rubbed = UNEVEN * abs(flows[FRICTION_LOSS]) / (turned * inertia)  # rad/s^2
+            if not is_fixed and rubbed * duration**2 > 12.0 * DRIVEN_LAG and length % 2 == 0:
+                return None
             before = self._momentum(state_at(reached, setup), first)
             after = self._momentum(state_at(passed.end, setup), last)
             turning = acceleration * 0.5 * duration * (before[1] + after[1])
@@ -163,7 +172,7 @@ class Spin:
                 flows[IMPACT_LOSS],
             ]
         )
-        found = self._taken(passed, acceleration, change, length, per_revolution, torque, energies)
+        found = self._taken(passed, acceleration, change, length, per_revolution, torque, energies, rubbed)
         self.speed += change
         if not self.speed > 0.0:
             return None
@@ -186,6 +195,7 @@ class Spin:
         per_revolution: int,
         torque: float,
         energies: Floats,
+        rubbed: float,
     ) -> Taken:
         """What a piece has yielded, revolution by revolution.
 
@@ -204,7 +214,7 @@ class Spin:
             work.append(mean * turned)
             braking.append(mean * duration - self._free.inertia * (high - low + missed / n))
         duration = sum(lasts)
-        lag = abs(acceleration) * duration**2 / 12.0
+        lag = max(abs(acceleration), rubbed) * duration**2 / 12.0
         swing = (speeds[-1] - speeds[0]) / (speeds[-1] + speeds[0])
         return Taken(passed, lag, swing, times, work, braking, energies)
 
