@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.case_progress import FINISHED, Clock, Progress
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, is_within
 from rubhpc.kernels.event_loop import EventWork, advance
@@ -71,17 +71,34 @@ def advance_sections(
         )
         if outcome != FINISHED:
             return outcome
-        section = sections[k]
-        for row in range(section.size):
-            section[row] = dot(motion_re[progress.mode, row], motion_im[progress.mode, row], z[0], z[1])
-        if not is_within(
-            section,
-            reduced.translations,
-            reduced.stiffness,
-            accumulator.highest,
-            accumulator.lowest,
-            limit,
-            energy_limit,
+        if not note_section(
+            motion_re, motion_im, reduced, limit, energy_limit, progress, z, accumulator, sections[k]
         ):
             break
     return FINISHED
+
+
+@jit_inline_sum
+def note_section(
+    motion_re: Floats,
+    motion_im: Floats,
+    reduced: Reduced,
+    limit: float,
+    energy_limit: float,
+    progress: Progress,
+    z: Floats,
+    accumulator: Accumulator,
+    section: Floats,
+) -> bool:
+    """Fill in the motion (2 n,) at coordinates (2, m); returns whether it is within the limits."""
+    for row in range(section.size):
+        section[row] = dot(motion_re[progress.mode, row], motion_im[progress.mode, row], z[0], z[1])
+    return is_within(
+        section,
+        reduced.translations,
+        reduced.stiffness,
+        accumulator.highest,
+        accumulator.lowest,
+        limit,
+        energy_limit,
+    )

@@ -167,6 +167,7 @@ class EventDrivenMarch(ModalMarch):
         level, first = self.clock.sample_level, -n_revolution * self.clock.samples_per_revolution
         restart_clock(self._bare_progress, first << level, first, is_recorded=False)
         self.sample, self._ended = first, None
+        self._take_library(self._modes.library_for(is_recorded=False))
         while self.sample < 0:
             outcome = self._advance_sections(samples, accumulator, sections)
             if outcome == MODE_WANTED:

@@ -17,6 +17,7 @@ from rubhpc.integrate.reduced_model.friction_mode import mask_of, states_of
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     FINISHED,
+    PAUSED,
     ask_for,
     follow,
     shaft_angle,
@@ -26,6 +27,7 @@ from rubhpc.kernels.friction_change import change_states
 from rubhpc.kernels.friction_events import friction_work
 from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.friction_pieces import AT_REST, LEAST_FORCE, advance_friction_pieces
+from rubhpc.kernels.friction_sections import advance_friction_sections
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, MOST_PAIRS, OPEN, STUCK, FrictionBodies
 from rubhpc.kernels.trail import BROKEN
 
@@ -180,19 +182,42 @@ class FrictionMarch(EventDrivenMarch):
             )
         )
 
-    def pass_sections(
-        self, n_revolution: int, samples: Samples, accumulator: Accumulator
-    ) -> tuple[Floats, str | None]:
-        """Go on by some revolutions without a record, one by one: the motion at the end of each."""
-        sections = np.empty((n_revolution, self._motion.size))
-        for section in sections:
-            reason = self.advance(
-                -self.clock.samples_per_revolution, 0, samples, accumulator, is_recorded=False
-            )
-            if reason is not None:
-                return sections, reason
-            section[:] = self.motion()
-        return sections, None
+    def _advance_sections(self, samples: Samples, accumulator: Accumulator, sections: Floats) -> int:
+        if self._n_short:  # some short steps before events are followed again
+            clock = self.clock
+            per_revolution = clock.samples_per_revolution << clock.sample_level
+            k = len(sections) + int(self.progress.tick) // per_revolution
+            outcome = self._kernel((k + 1 - len(sections)) * per_revolution, samples, accumulator, False)
+            if outcome == FINISHED:
+                sections[k] = self.motion()
+            return outcome
+        outcome = self._advance_sections_in_closed_form(samples, accumulator, sections)
+        if outcome == CONTACT_UNSOLVED:
+            self._hand_over()
+            return PAUSED
+        return outcome
+
+    def _advance_sections_in_closed_form(
+        self, samples: Samples, accumulator: Accumulator, sections: Floats
+    ) -> int:
+        return advance_friction_sections(
+            self.tables,
+            self.bodies,
+            self._friction,
+            self.clock,
+            self._setup.displacement_limit,
+            self._setup.energy_limit,
+            self._bare_progress,
+            self._z,
+            self._z_next,
+            self._z_kept,
+            self._motion,
+            self._work,
+            self._recorder,
+            samples,
+            accumulator,
+            sections,
+        )
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
         while True:

@@ -7,8 +7,10 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import first_lateral_frequency
 from rubhpc.integrate.initial_state import at_rest
 from rubhpc.integrate.marches.closed_form import closed_form_march
+from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.transient import idle_of, pass_revolutions
+from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
 from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import Contact, Integrator, Recording
 
@@ -67,3 +69,22 @@ def test_case_that_diverges_ends_in_the_same_revolution():
     _, reason = together.pass_sections(N, *idle)
     assert reason == expected
     assert together.sample == (n + 1 - N) * RECORDING.samples_per_revolution
+
+
+def test_revolution_in_short_steps_stands_among_the_others(monkeypatch):
+    """A case that leaves closed form for a revolution in the first one goes on to the same number of them."""
+    exact, left = march_of({"friction_law": "coulomb"}), march_of({"friction_law": "coulomb"})
+    idle = idle_of(exact)
+    expected, _ = exact.pass_sections(N, *idle)
+    follow, n_call = FrictionMarch._advance_sections_in_closed_form, []
+
+    def unsolved_at_first(march, *args):
+        n_call.append(1)
+        return CONTACT_UNSOLVED if len(n_call) == 1 else follow(march, *args)
+
+    monkeypatch.setattr(FrictionMarch, "_advance_sections_in_closed_form", unsolved_at_first)
+    sections, reason = left.pass_sections(N, *idle)
+    assert (reason, left.n_left, left.sample) == (None, 1, 0)
+    n = expected.shape[1] // 2
+    apart = np.linalg.norm((sections - expected)[:, :n], axis=1) / np.linalg.norm(expected[:, :n], axis=1)
+    assert 0.0 < apart.max() < 1e-3
