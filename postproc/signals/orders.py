@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 WHOLE = 0.02  # of a revolution: by how much an order may miss a whole number of periods of a record
 NEAR = 1e-3  # of an order, within which a run-up follows it
 JUMP = 0.25 * np.pi  # rad a revolution, faster than the phase of an order of a window of six goes
+WINDOW = 6  # revolutions over which orders of a run-up are taken (`spectra.track_orders`)
 AROUND = 4  # revolutions on either side of a jump in which there is no phase
 _FIRST_LAG = 120.0  # degrees
 
@@ -48,7 +49,7 @@ def order_over_speed(
         `amplitude_NAME` in the unit of the signal and `phase_NAME`, rad, by which it leads the order of the
         shaft's angle, unwrapped, over `speed` (rad/s), rising, and `over`; of run-ups over `revolution`, with
         `speed` as a variable. Where the phase of a run-up jumps, the order is lost in other motion, and the
-        phase is NaN.
+        phase is NaN; so are both at its ends, in revolutions that have the window of a later or earlier one.
 
     Raises
     ------
@@ -135,7 +136,11 @@ def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float, over: st
     if "status" in store:
         store = narrow(store, [*names, "speed"], [find_axis(store, over)] if over else [])
     rows = store[[*names, "speed"]].isel(order=int(near[0]))
-    return rows.drop_vars(["order", "stator"], errors="ignore").load()
+    rows = rows.drop_vars(["order", "stator"], errors="ignore").load()
+    turn, last = np.arange(rows.sizes["revolution"]), rows["speed"].notnull().sum("revolution")
+    within = xr.DataArray(turn, dims="revolution")
+    is_own = (within >= WINDOW // 2) & (within <= last - (WINDOW - WINDOW // 2))
+    return rows.assign({name: rows[name].where(is_own | (last <= WINDOW)) for name in names})
 
 
 def _of_cases(store: xr.Dataset, signals: Sequence[str], order: float, over: str | None) -> xr.Dataset:

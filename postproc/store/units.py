@@ -138,7 +138,7 @@ def written_value(coordinate: xr.DataArray) -> str:
     if name.endswith("angle") and unit == "rad":
         return f"{name.replace('_', ' ')} = {math.degrees(value):.4g}°"
     scale = RPM if name in _SPEEDS else scale_for(unit, abs(value))
-    symbol = f"${_SYMBOLS[name]}$" if name in _SYMBOLS else name.replace("_", " ")
+    symbol = f"${_SYMBOLS[name]}$" if name in _SYMBOLS else name.replace("run_up", "run-up").replace("_", " ")
     text = f"{symbol} = {value * scale.factor:.4g} {scale.unit}".rstrip()
     return f"{text} ({of_stators})" if (of_stators := coordinate.attrs.get("of_stators")) else text
 
