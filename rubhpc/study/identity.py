@@ -27,6 +27,7 @@ MODAL = 3  # method = "modal": modes kept, and `modal_error`
 DIRECT = 4  # transient = "direct"
 CHANGING_SPEED = 13  # run-ups and drives
 COULOMB = 7  # set-valued friction
+PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 9  # method = "modal" with gaps that are curved
 MANY_STATORS = 6  # more than five, whose sets of closed contacts or states may be more than 256
@@ -43,14 +44,15 @@ _AXIS = "axis"  # in place of a value that every case sets
 def physics_of(study: Study) -> int:
     """Return the version of the physics that a study takes: no other gives the same results."""
     friction_laws = _laws(study, "friction_law")
-    is_soft = "penalty" in _laws(study, "law") and friction_laws != {"sliding"}
+    is_soft = "penalty" in _laws(study, "law")
     return (
         PHYSICS
         + MODAL * (study.integrator.method == "modal")
         + DIRECT * study.recording.is_transient_direct
         + CHANGING_SPEED * bool(study.run_up or study.drive)
         + COULOMB * (friction_laws != {"sliding"})
-        + SOFT_FRICTION * is_soft
+        + PENALTY * (study.integrator.method == "modal" and is_soft)
+        + SOFT_FRICTION * (is_soft and friction_laws != {"sliding"})
         + CURVED * (study.integrator.method == "modal" and _is_curved(study))
         + MANY_STATORS * (len(study.rig.stator) > 5)
         + BRANCHES * (study.branch is not None)

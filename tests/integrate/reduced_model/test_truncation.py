@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_machines import random_machine
 from random_rigs import PACKAGED, found_error, random_rig
 
 from rubhpc import simulate
@@ -15,6 +16,7 @@ from rubhpc.integrate.reduced_model.standstill import at_standstill, cutoff_freq
 from rubhpc.integrate.reduced_model.truncation import (
     SMOOTH,
     Touch,
+    bounce_spectrum,
     coupled_ringing,
     impact_share,
     kept_modes,
@@ -120,6 +122,39 @@ def test_contacts_that_feel_motion_along_the_rim_need_more_modes(keys, case, bef
     assert found_error(simulate(rig, **case), exact) > before
 
 
+def test_tip_that_bounces_on_a_penalty_needs_the_modes_that_it_rings_with(monkeypatch):
+    """A gram that rings with 1.8e5 rad/s on a disc, whose twist at node 11 has modes of that frequency."""
+    rig, case = random_machine(113)
+    case |= {"clearance_ratio": 0.7, "transient": 0, "revolutions": 4, "keep": ("waveform",)}
+
+    def error(record):
+        known, found = (of.signals["probe_acceleration_twist"] for of in (exact, record))
+        return float(np.std(found - known) / np.std(known))
+
+    exact, record = simulate(rig, **case, accuracy=1e-8), simulate(rig, **case)
+    assert error(record) < record.modal_error < 1e-3
+    monkeypatch.setattr(
+        "rubhpc.integrate.reduced_model.reduction.kept_modes",
+        lambda model, spin, accuracy, touch: kept_modes(model, spin, accuracy),
+    )
+    forget()
+    assert error(simulate(rig, **case)) > 2e-3
+
+
+@pytest.mark.parametrize("damper", [0.0, 2.0])
+def test_bounce_is_the_response_of_a_mass_on_the_penaltys_spring_and_damper(damper):
+    """Of 0.01 kg, beside 4 kg, on 1e6 N/m: above 1e4 rad/s as a complex stiffness says, below as its peak."""
+    rotor, tip, frequency = np.array([0.5, 0.0, 0.0]), np.array([0.0, 8.0, 6.0]), np.array([2e4, 1e2, 5e5])
+    touch = Touch(spring=1e6, damper=damper)
+    found = bounce_spectrum(rotor, tip, frequency, np.array([0.0, 3.0, 3.0]), 100.0, touch)
+    reduced, decay = 1.0 / 100.25, 3.0 * 100.0 / 100.25 + 100.0 / math.pi
+    for w, of in ((2e4, found[0]), (5e5, found[2]), (math.sqrt(1e6 / reduced), found[1])):
+        force = 1e6 + 1j * w * damper
+        assert of == pytest.approx(abs(force / (force - reduced * w**2 + 2j * w * reduced * decay)))
+    assert found[1] > 5.0
+    assert np.all(bounce_spectrum(rotor, tip, frequency, np.zeros(3), 100.0, SMOOTH) == 1.0)
+
+
 def test_estimate_knows_what_contacts_feel_along_the_rim():
     """Of the modes that suffice for steady sliding along a fixed normal."""
     model = assemble(at_node_5(radius=0.01, youngs_modulus=3e9))
@@ -132,9 +167,11 @@ def test_estimate_knows_what_contacts_feel_along_the_rim():
     for touch in (Touch(is_curved=True), Touch(may_stick=True)):
         assert modal_error(model, 220.0, kept_modes(model, 220.0, 1e-3, touch), touch) < 1e-3
     assert touch_of(model, MULTIPLIER, is_updated=False) == SMOOTH
-    assert touch_of(model, MULTIPLIER._replace(friction_law=COULOMB), is_updated=True) == (True, True)
+    assert touch_of(model, MULTIPLIER._replace(friction_law=COULOMB), is_updated=True) == Touch(True, True)
     bent = assemble(at_node_5(radius=0.01, geometry="second_order"))
     assert touch_of(bent, MULTIPLIER, is_updated=False) == Touch(is_curved=True)
+    soft = MULTIPLIER._replace(stiffness=1e7, damping=3.0)
+    assert touch_of(model, soft, is_updated=False) == Touch(spring=1e7, damper=3.0)
 
 
 @pytest.mark.parametrize(
