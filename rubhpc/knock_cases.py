@@ -7,7 +7,10 @@ import hashlib
 import json
 import math
 import multiprocessing
+import signal
+import threading
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -157,16 +160,37 @@ def search_cases(
             yield index, search.of_case(index)
         return
     search.compile()
+    others = set(multiprocessing.active_children())
     spawn = multiprocessing.get_context("spawn")
     sent = replace(search)  # without its grid, which every process makes for itself
-    with ProcessPoolExecutor(min(workers, len(indices)), spawn, _take, (sent,)) as pool:
+    with _exit_on_sigterm(), ProcessPoolExecutor(min(workers, len(indices)), spawn, _take, (sent,)) as pool:
         try:
             under_way = {pool.submit(_of_case, index): index for index in indices}
             for ended in as_completed(under_way):
                 yield under_way[ended], ended.result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            for process in set(multiprocessing.active_children()) - others:
+                process.terminate()
             raise
+
+
+@contextmanager
+def _exit_on_sigterm() -> Iterator[None]:
+    """Have SIGTERM raise `SystemExit`, so that the worker processes end and what they share is freed."""
+    is_default = signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    if not is_default or threading.current_thread() is not threading.main_thread():
+        yield  # threads set no handlers, and those of others stay
+        return
+
+    def end(*_: object) -> None:
+        raise SystemExit(128 + signal.SIGTERM)
+
+    signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 _taken: list[Search] = []  # of a worker process

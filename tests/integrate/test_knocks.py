@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import signal
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from running import write_knocks
+from running import environment, write_knocks
 
 from postproc.figures.resilience_curve import resilience
 from rubhpc.errors import InputError
@@ -157,6 +160,34 @@ def test_processes_change_nothing(tmp_path):
     alone = least_knock(study, angles=1)
     assert least_knock(study, angles=1, workers=2, progress=tmp_path / "kept").identical(alone)
     assert len(Progress(tmp_path / "kept").found) == 2
+
+
+SEARCH = """
+import sys
+from pathlib import Path
+from rubhpc.knocks import least_knock
+from rubhpc.study.study import read_study
+
+if __name__ == "__main__":
+    study = read_study(Path(sys.argv[1]))
+    least_knock(study, angles=1, workers=2, report=lambda n, _: print(n, flush=True))
+"""
+
+
+def test_sigterm_ends_all_processes_without_a_word_of_theirs(tmp_path):
+    """The resource tracker warned of semaphores that the killed search had left."""
+    study = write_knocks(tmp_path, "{ start = 1.05, stop = 1.25, num = 30 }")
+    (tmp_path / "search.py").write_text(SEARCH)
+    asked = [sys.executable, str(tmp_path / "search.py"), str(study)]
+    with subprocess.Popen(
+        asked, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        while int(process.stdout.readline()) < 1:
+            pass
+        process.terminate()
+        _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (128 + signal.SIGTERM, "")
 
 
 def test_what_cannot_be_is_refused(tmp_path):
