@@ -80,7 +80,8 @@ def run_up(
         In place of all of them, the keys of the table [drive] of a study: what turns a rotor whose speed is
         free, as `{"torque": "2 N m", "start": "1200 rpm", "revolutions": 200}`. The result then has
         `drive_work` (J) and `braking_torque` (N m) of each revolution, and the attributes `record_end` (why
-        it ends), `last_speed` (rad/s) and `energy_residual`.
+        it ends; "ended_early" where it cannot go on, for the `reason`), `last_speed` (rad/s) and
+        `energy_residual`.
     pieces_per_revolution : int, optional
         Pieces of constant speed into which every revolution is cut; the error of the changing speed falls
         with the square of their number. By default as few as the acceleration allows: the shaft departs from
@@ -171,7 +172,7 @@ def run_up(
     }
     if isinstance(found, DrivenRun):
         attributes |= {
-            "record_end": RECORD_END[found.end],
+            "record_end": "ended_early" if found.reason else RECORD_END[found.end],
             "last_speed": found.last_speed,
             "energy_residual": found.energy_residual,
         }

@@ -123,6 +123,11 @@ def _print_peaks(design: xr.Dataset) -> None:
             verdict = "separated" if bool(one["is_separated"]) else "too close"
             line += f" {margins[0]:9.2f} {margins[1]:9.2f}  {verdict}"
         click.echo(line)
+    if any(math.isnan(factor) for factor in design["amplification_factor"].values):
+        click.echo(
+            "AF nan: beside that peak the amplitude does not fall to 0.707 of it within the range, "
+            "or rises above it before"
+        )
 
 
 def _print_sag(design: xr.Dataset) -> None:

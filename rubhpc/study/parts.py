@@ -44,7 +44,7 @@ class Part(NamedTuple):
         InputError
             It names none.
         """
-        found = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text.strip(), re.ASCII)
+        found = re.fullmatch(r"(\d{1,99})/(\d{1,99})", text.strip(), re.ASCII)
         if found is None:
             raise InputError(f'part "{text}": is not of the form K/N; give for example 3/64')
         part = cls(int(found[1]), int(found[2]))

@@ -187,3 +187,11 @@ def test_an_unstable_rotor_is_warned_of(tmp_path):
     assert len(warnings) == 1
     assert "the rotor is unstable at 3819.72 rpm: its forward mode of 3" in warnings[0]
     assert "unstable from" in run(str(path), "--range", "0", "400", "--count", "1")
+
+
+def test_an_amplification_factor_that_is_not_known_is_explained():
+    """The range ends before the amplitude has fallen to 0.707 of the peak."""
+    assert "AF nan" not in run("mokhtar2017", *RANGE, "--response", "8")
+    assert "AF nan: beside that peak" in run(
+        "mokhtar2017", "--range", "1700 rpm", "1930 rpm", "--response", "8"
+    )

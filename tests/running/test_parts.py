@@ -152,6 +152,11 @@ def test_a_part_that_is_none_is_refused_in_a_line_and_nothing_is_written(tmp_pat
     assert not study.output.exists()
 
 
+def test_a_number_of_parts_that_is_too_large_is_said_to_be_so(tmp_path):
+    with pytest.raises(InputError, match="a study has from 1 to 100000 parts"):
+        compute(make_study(tmp_path), "1/99999999999")
+
+
 def test_what_cannot_go_on_beside_a_part_is_refused(physics, tmp_path):
     study = make_study(tmp_path)
     compute(study, "1/3")

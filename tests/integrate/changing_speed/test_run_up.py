@@ -349,6 +349,7 @@ def test_a_case_that_ends_in_its_first_revolution_says_why(law):
         **law,
     )
     assert "passed 0.08 m in revolution 1" in found.reason
+    assert found.attrs.get("record_end") == ("ended_early" if "drive" in law else None)
     assert found.sizes["revolution"] == found.sizes["sample"] == 0
     assert found.amplitude_vertical.shape == (0, found.sizes["order"])
 
