@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from rubhpc.integrate.following import count_followed
 from rubhpc.integrate.measuring.regimes import N_ALL
 from rubhpc.integrate.transient import pass_revolutions
 
@@ -120,6 +121,7 @@ class Marches:
             march = self._started(k, state)
             if pass_revolutions(march, self._recording, n_revolution) is not None:
                 return None
+            count_followed(n_revolution)
             ends.append(march.final())
         self._state, self._other = ends
         ratio = self._distance(self._state, self._other) / self._size

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.integrate.following import count_followed
 from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN, Marches
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.regimes import N_ALL, N_FIRST, N_MOST
@@ -95,6 +96,7 @@ class TangentMotion:
         march.keep(None)
         if reason is not None:
             return False
+        count_followed(n_revolution)
         clock = march.clock
         first = -n_revolution * clock.samples_per_revolution << clock.sample_level
         before, self._state = self._state, march.final()

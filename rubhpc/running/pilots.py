@@ -28,8 +28,10 @@ if TYPE_CHECKING:
 _MOST_PILOTS, _FEW_PILOTS, _FEW_BRANCHED = 64, 6, 2  # cases; timed even if slow, and of a branch study
 _ENOUGH, _MOST = 3.0, 15.0  # processor seconds after which no more are begun: where they agree, and at all
 _AGREED = 0.25  # standard error of the mean pace, as a share of it, where cases agree
-_LONGEST = 30.0  # s, in which cases that were shortened are run whole, together
-_LEAST, _SHARE = 15.0, 0.25  # s that all may take, or that share of the time foreseen where it is more
+_LONGEST = 75.0  # s, in which cases that were shortened are run whole, together
+_LEAST, _SHARE = 15.0, 0.5  # s that all may take, or that share of the time foreseen where it is more
+_LEAST_EACH = 1.0  # s, for each case
+_PATIENCE = 2.0  # times as long as foreseen, for a case that is finished
 _FEWEST = 3  # cases, timed in any case
 # Positions that spread evenly over a square, however many (R. Kronecker; steps of M. Roberts' R2 sequence).
 _AMONG_BLOCKS, _WITHIN_BLOCK = 0.7548776662466927, 0.5698402909980532
@@ -86,7 +88,7 @@ def time_pilots(
     for all; the cases spread evenly over the blocks and over the cases of a block.
     """
     paces: list[Pace] = []
-    picked: list[tuple[tuple[int, ...], float]] = []
+    picked: list[tuple[int, ...]] = []
     failures: list[str] = []
     is_bound = False
     began = time.process_time()
@@ -106,21 +108,27 @@ def time_pilots(
     for k, (index, steps, probability) in enumerate(_picked(blocks, missing)):
         if k >= few and spent() > (_ENOUGH if _spread(sample) <= _AGREED else _MOST):
             break  # a few rubs among many free motions take most of the time of some studies
-        kept_back = spent() if pilots.shortened else 0.0  # as much is left to run dear cases whole
-        if k >= min(few, _FEWEST) and allowed() < kept_back:
+        if k >= min(few, _FEWEST) and allowed() <= 0.0:
             break
         say(f"timing cases: {len(paces)} so far, {max(spent(), 0.0):.0f} s of processor time")
+        if index in picked:
+            continue
         try:
-            pace = pilots.pace(index, steps, allowed() / max(few - k, _FEWEST))
-            paces.append(pace)
-            picked.append((index, steps))
-            sample.add(
-                steps,
-                probability,
-                pace.step * steps,
-                is_whole=index not in pilots.shortened,
-                is_irregular=index in pilots.irregular,
-            )
+            limit = max(allowed() / max(few - k, _FEWEST), _LEAST_EACH)
+            pace = pilots.pace(index, steps, limit)
+            also = pilots.alike.get(index)
+            for one in (index,) if also is None or not missing[also] else (index, also):
+                if one != index:
+                    pace = pilots.pace(one, steps, math.inf)
+                paces.append(pace)
+                picked.append(one)
+                sample.add(
+                    steps,
+                    probability,
+                    pace.step * steps,
+                    is_whole=one not in pilots.shortened,
+                    is_irregular=one in pilots.irregular,
+                )
         except Exception as error:  # whatever is wrong with the case: the others are timed all the same
             where = manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))
             failures.append(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}")
@@ -129,7 +137,7 @@ def time_pilots(
             break
     if pilots.shortened:
         say(f"timing cases: {len(paces)} so far, the dearest of them to their end")
-    is_bound |= _run_whole(pilots, picked, paces, sample, min(_LONGEST, allowed()))
+    _finish(pilots, picked, sample, min(_LONGEST, allowed()))
     block = time_block(manifest, pilots.arrays) if pilots.arrays else 0.0
     seconds = time.process_time() - began - pilots.loading
     if not paces:
@@ -147,33 +155,30 @@ def time_pilots(
     )
 
 
-def _run_whole(
-    pilots: Pilots,
-    picked: list[tuple[tuple[int, ...], float]],
-    paces: list[Pace],
-    sample: Sample,
-    left: float,
-) -> bool:
-    """Run cases whole that were shortened, the dearest first; whether one was cut off.
+def _finish(pilots: Pilots, picked: list[tuple[int, ...]], sample: Sample, left: float) -> None:
+    """Finish cases that were shortened, the dearest first.
 
-    All of them take `left` seconds at most.
+    All of them take some `left` seconds.
 
-    What such a case comes to is hardly known from its beginning: more and more sets of contacts, neighbours
-    of a motion without a period. The others are corrected by what it came to.
+    What such a case comes to is hardly known from its beginning: more and more sets of contacts, a tangent
+    that is carried on and on. The others are foreseen anew, and corrected by what it came to.
     """
-    foreseen = list(sample.seconds)
-    for k in sorted(range(len(paces)), key=lambda k: -foreseen[k]):
-        index, steps = picked[k]
-        if index not in pilots.shortened or left <= foreseen[k]:
+    shortened = [k for k, index in enumerate(picked) if index in pilots.shortened]
+    for k in sorted(shortened, key=lambda k: -sample.seconds[k]):
+        if left <= pilots.left(picked[k]):
             continue
         began = time.process_time()
-        paces[k] = pilots.whole(index, steps, paces[k], left)
+        seconds = pilots.finish(picked[k], max(left, _PATIENCE * pilots.left(picked[k])))
         left -= time.process_time() - began
-        sample.seconds[k], sample.is_whole[k] = paces[k].step * steps, True
-        sample.checked.append((foreseen[k], sample.seconds[k]))
-        if pilots.was_cut:
-            return True
-    return False
+        if seconds is None:
+            break
+        sample.seconds[k], sample.is_whole[k] = seconds, True
+    for k in shortened:
+        foreseen = pilots.foreseen(picked[k])
+        if sample.is_whole[k]:
+            sample.checked.append((foreseen, sample.seconds[k]))
+        else:
+            sample.seconds[k] = foreseen
 
 
 def _spread(sample: Sample) -> float:

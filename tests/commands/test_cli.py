@@ -4,6 +4,7 @@ import math
 import re
 import subprocess
 import sys
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import click
@@ -210,20 +211,25 @@ def test_the_python_face(tmp_path: Path):
 
 def test_plan_extrapolates_cases_that_take_long_from_where_they_rub(tmp_path, monkeypatch):
     """Of a case that is shortened, the revolutions before its first contact are the cheapest."""
-    from rubhpc.running import pilot_cases
+    from rubhpc.running.followed_case import FollowedCase
     from rubhpc.running.plan import make_plan
     from rubhpc.study.study import read_study
 
-    def seconds(_pilots, _case, _setup, recording, _most=math.inf):
-        return 0.01 * max(0, recording.longest_transient + recording.revolutions - 5)
+    def timed(followed, recording, most):
+        first = followed._state or 0
+        n = first + recording.longest_transient + recording.revolutions
+        return 0.1 * (max(0, n - 5) - max(0, first - 5)), SimpleNamespace(
+            final=n, signals={}, spectra={}, sections={}
+        )
 
-    monkeypatch.setattr(pilot_cases.Pilots, "_run", seconds)
-    study = read_study(write_study(tmp_path, transient=60, revolutions=64))
+    monkeypatch.setattr(FollowedCase, "_timed", timed)
+    monkeypatch.setattr("rubhpc.running.pilot_cases.arrays_of", lambda _: {})
+    study = read_study(write_study(tmp_path, transient=60, revolutions=15))
     found = make_plan(study)
     assert found.timing.pace.friction == 0.0
     pace = found.timing.pace
     steps = pace.step * found.steps + pace.case * found.counts[0]
-    assert steps == pytest.approx(found.counts[0] * 0.01 * (60 + 64 - 5), rel=0.2)  # speeds differ in steps
+    assert steps == pytest.approx(found.counts[0] * 0.1 * (60 + 15 - 5), rel=0.2)  # speeds differ in steps
 
 
 def test_plan_names_the_start_of_a_process(tmp_path, capsys):

@@ -1,4 +1,4 @@
-"""How many cases `rubhpc plan` times."""
+"""How many cases `rubhpc plan` times, and which of them it finishes."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -6,12 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rubhpc.running import pilot_cases, pilots
+from rubhpc.running import pilots
 from rubhpc.running.plan import Plan
-from rubhpc.running.shorter_cases import parts
+from rubhpc.running.timed_run_ups import parts
 from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.speed_law import SpeedLaw
-from rubhpc.study.study import Recording
 
 
 @pytest.mark.parametrize(
@@ -28,7 +27,7 @@ def test_more_cases_are_timed_where_they_differ(costs, n_pilot, monkeypatch):
 
     class Pilots:
         loading = compiling = 0.0
-        was_cut, arrays, shortened = False, {}, frozenset()
+        was_cut, arrays, alike, shortened = False, {}, {}, {}
         irregular = frozenset()
 
         def __init__(self, grid):
@@ -67,31 +66,36 @@ def test_part_of_a_drive_is_its_beginning():
 
 
 @pytest.mark.parametrize(
-    ("n_case", "left"), [(6, pilots._LEAST - 6 * 0.5), (180, 0.25 * 180 * 3.6 / 6 - 3.0), (10**5, 30.0)]
+    ("n_case", "left"), [(6, pilots._LEAST - 6 * 0.5), (180, 0.5 * 180 * 3.6 / 6 - 3.0), (10**5, 75.0)]
 )
-def test_dearest_case_is_run_whole(monkeypatch, n_case, left):
-    """What a shortened one comes to is not known from its beginning: it is run whole, and then the others.
+def test_dearest_case_is_finished(monkeypatch, n_case, left):
+    """What a shortened one comes to is not known from its beginning: it goes on, and then the others do.
 
-    All takes 15 s at most, or a quarter of the time foreseen; another that is left takes what these say.
+    All takes 15 s at most, or half of the time foreseen; another that is left takes what these say.
     """
     now, asked = [0.0], []
 
     class Pilots:
         loading = compiling = 0.0
-        was_cut, arrays, shortened = False, {}, {(0,), (1,), (2,)}
+        was_cut, arrays, alike = False, {}, {}
         irregular = frozenset()
 
         def __init__(self, grid):
-            pass
+            self.shortened = {(0,): 3.0, (1,): 0.2, (2,): 0.1}
 
         def pace(self, index, steps, limit):
             now[0] += 0.5
-            return pilots.Pace(([3.0, 0.2] + 4 * [0.1])[index[0]] / steps, 0.0, 0.0, 0.0)
+            return pilots.Pace(self.shortened.get(index, 0.1) / steps, 0.0, 0.0, 0.0)
 
-        def whole(self, index, steps, guessed, limit):
+        def foreseen(self, index):
+            return self.shortened[index]
+
+        left = foreseen
+
+        def finish(self, index, limit):
             asked.append((index, limit))
             now[0] += limit - 0.15  # no time is left for the third
-            return guessed._replace(step=3.0 * guessed.step)
+            return 3.0 * self.shortened[index]
 
     monkeypatch.setattr(pilots, "Pilots", Pilots)
     monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3, 1 / n_case) for i in range(6)))
@@ -108,91 +112,30 @@ def test_dearest_case_is_run_whole(monkeypatch, n_case, left):
     assert timing.pace.step * 6e3 == pytest.approx(known + other)
 
 
-@pytest.mark.parametrize(
-    ("revolutions", "limit", "met", "expected"),
-    [
-        (16, 0.5, (75, 150), (75 + 75 * (1 - 6 / (56 + 64)), 64 / 56)),  # each part meets as many
-        (16, 0.5, (75, 106), (31 + 31 * (1 - 6 / (56 + 64)), 64 / 56)),
-        (16, 1.5, (75, 106, 130), (55 + 24 * (1 - 12 / (56 + 64)), 64 / 56)),
-        (16, 1.5, (75, 106, 107), (32.0, 0.0)),
-        (16, 99.0, (75, 95, 120, 150, 190), (115 + 40 * (1 - 48 / (56 + 64)), 64 / 56)),
-        (16, 0.5, (200, 202), (2.0, 0.0)),  # it comes back to what it has met
-        (8, 0.5, (75, 150), (75 + 75 * (1 - 6 / 48), 0.0)),  # too short for its tangent to be carried on
-        (64, 0.5, (75, 150), (75 + 75 * (1 - 6 / (104 + 16)), 16 / 104)),  # 12 of 16 spans are in the record
-    ],
-    ids=[
-        "irregular",
-        "less and less",
-        "followed on",
-        "at last regular",
-        "nearly whole",
-        "regular",
-        "short",
-        "long",
-    ],
-)
-def test_each_doubling_of_an_irregular_motion_meets_half_as_many_new_modes(
-    revolutions, limit, met, expected, monkeypatch
-):
-    """With those of its tangent; three revolutions were run, then as many again, and again, a second each."""
-    recording = Recording(transient=40, revolutions=revolutions, samples_per_revolution=16)
-    found = pilot_cases.Pilots(SimpleNamespace(study=SimpleNamespace(recording=recording)))
-    found._final = SimpleNamespace()
-    counts = iter(met)
-    monkeypatch.setattr(pilot_cases, "_n_solved", lambda *_: next(counts))
-    ran = []
+def test_cases_of_a_ring_are_timed_in_pairs(monkeypatch):
+    """The one that was run for the contact modes that both share counts as well, and is not run again."""
+    asked = []
 
-    def run(_case, _setup, part, initial):
-        ran.append((part.longest_transient, initial))
-        return 1.0
+    class Pilots:
+        loading = compiling = 0.0
+        was_cut, arrays, shortened = False, {}, {}
+        irregular = frozenset()
 
-    monkeypatch.setattr(found, "_run", run)
-    share = 3 / (40 + revolutions)
-    assert found._to_come(SimpleNamespace(index=(3,)), None, share, limit) == pytest.approx(expected)
-    assert found.irregular == ({(3,)} if met[-1] > 1.01 * met[-2] else set())
-    parts = [share * 2**k for k in range(len(met) - 1)]
-    assert ran == [(round(40 * part), found._final) for part in parts]
+        def __init__(self, grid):
+            self.alike = {(0,): (1,), (2,): (3,)}
 
+        def pace(self, index, steps, limit):
+            asked.append(index)
+            return pilots.Pace((1.0 + index[0]) / steps, 0.0, 0.0, 0.0)
 
-def ring_pilots(monkeypatch, times, other=None):
-    """Pilots of a ring whose beginning took 2 s for 40 modes; 20 more are met by the rest, if it is run."""
-    found = pilot_cases.Pilots(SimpleNamespace(study=SimpleNamespace(recording=None)))
-    solved, left = [40], iter(times)
-    monkeypatch.setattr(pilot_cases, "_is_ring", lambda _: True)
-    monkeypatch.setattr(pilot_cases, "_n_solved", lambda *_: solved[0])
-    monkeypatch.setattr(found, "_runs", lambda *_: (2.0, [(0.05, 0.03)]))
-    monkeypatch.setattr(found, "_alike", lambda _: other)
-
-    def to_come(*_):
-        solved[0] = 60
-        return 20.0, 0.0
-
-    def run(case, setup, recording, most):
-        taken = next(left)
-        if taken > most:
-            raise pilot_cases._Enough
-        return taken
-
-    monkeypatch.setattr(found, "_to_come", to_come)
-    monkeypatch.setattr(found, "_run", run)
-    return found._modes_and_rest(SimpleNamespace(index=(0,)), None, 1e4, 2.0)
-
-
-def test_a_whole_case_takes_what_its_modes_took_before(monkeypatch):
-    """It is run with those solved that its parts met, at 2 s for 40 of them."""
-    modes, whole, is_whole = ring_pilots(monkeypatch, [1.5])
-    assert (modes, whole, is_whole) == (0.0, pytest.approx(60 * 2.0 / 40 + 1.5), True)
-
-
-def test_a_whole_case_that_is_cut_off_takes_at_least_as_long(monkeypatch):
-    modes, whole, is_whole = ring_pilots(monkeypatch, [100.0])
-    assert (modes, whole, is_whole) == (0.0, pytest.approx(60 * 2.0 / 40 + 3.0 * 2.0), False)
-
-
-def test_what_a_case_took_is_not_forgotten_where_another_is_cut_off(monkeypatch):
-    """The other is taken to last as long as it did."""
-    modes, whole, is_whole = ring_pilots(monkeypatch, [1.5, 100.0], SimpleNamespace(index=(1,)))
-    assert (modes, whole, is_whole) == (0.0, pytest.approx(0.5 * (4.5 + 6.0)), False)
+    monkeypatch.setattr(pilots, "Pilots", Pilots)
+    monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3, 1 / 4) for i in range(4)))
+    monkeypatch.setattr(pilots, "share_of", lambda *_: np.ones(4))
+    grid = SimpleNamespace(study=SimpleNamespace(branch=None))
+    timing = pilots.time_pilots(grid, None, [SimpleNamespace(cost=4e3)], np.ones(4, dtype=bool))
+    assert asked == [(0,), (1,), (2,), (3,)]
+    assert (timing.n_pilot, timing.spread) == (4, 0.0)
+    assert timing.pace.step * 4e3 == pytest.approx(1 + 2 + 3 + 4)
 
 
 @pytest.mark.parametrize(("n_pilot", "share"), [(3, "two plans in three"), (4, "eight to nine plans in ten")])

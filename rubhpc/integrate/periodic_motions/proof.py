@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.integrate.following import count_followed
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.orbit_measures import PERIOD_TOLERANCE
@@ -103,6 +104,7 @@ class Solver:
                 if reason is not None:
                     return
                 n_on += n_revolution
+                count_followed(n_revolution)
                 period, apart = _return_of(passed, _energy(setup, passed))
                 returned.append(apart)
                 draws_near = n_on == sum(spans) and apart <= DRAWING_NEAR and _falls(returned)

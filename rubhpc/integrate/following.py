@@ -1,0 +1,15 @@
+"""Counts the revolutions that are followed behind records, for their exponents and for motions to come."""
+
+from __future__ import annotations
+
+_followed = [0]
+
+
+def n_followed() -> int:
+    """Revolutions that this process has followed behind records so far; of two motions, those of both."""
+    return _followed[0]
+
+
+def count_followed(n_revolution: int) -> None:
+    """Add to `n_followed`."""
+    _followed[0] += n_revolution

@@ -1,0 +1,294 @@
+"""A case that `rubhpc plan` follows part by part, as far as there is time: what it takes, or will take."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from rubhpc.integrate.case import march_of, run_case
+from rubhpc.integrate.following import n_followed
+from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN
+from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS, N_ALL, N_FIRST, N_MOST
+from rubhpc.integrate.setup import ModalSetup
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.record import Record, State
+    from rubhpc.integrate.setup import Setup
+    from rubhpc.running.stopwatch import Stopwatch
+    from rubhpc.study.cases import Case
+    from rubhpc.study.study import Recording
+
+_LONG = 0.25  # s: cases that take less are run twice
+_PATIENCE = (
+    15.0  # s, after which a part is cut off at the earliest: a whip that begins meets 300 contact modes
+)
+_LITTLE = 0.5  # of what a case has taken: as much more is worth knowing better what is to come
+_FIRST, _FIRST_STEPS = 1 / 16, 50_000  # of a case, and predicted steps: its first part
+_GROWING = 0.01  # new contact modes over those of all revolutions before: beyond, a motion is irregular
+_LATE = 0.25  # least pace of a part without its contact modes, over that with them
+_PROBED = 8  # revolutions at most, of those that show what is left of a case will take
+
+
+class Forecast(NamedTuple):
+    """What a case that has not been run whole will take.
+
+    Attributes
+    ----------
+    seconds, per_revolution : float, s
+        Up to the end of the record, and for each revolution that is followed behind it.
+    least : float, s
+        What it takes at least.
+    modes, before : float, s
+        Of contact modes that as many revolutions as were run would meet, and how many those were.
+    n_left : float
+        Revolutions that are left up to the end of the record.
+    n_behind : int
+        Revolutions behind the record, at least.
+    lengths : tuple of int
+        Revolutions behind a record, of which one is followed (`lengths_behind`).
+    """
+
+    seconds: float
+    per_revolution: float = 0.0
+    least: float = 0.0
+    modes: float = 0.0
+    before: float = 1.0
+    n_left: float = 0.0
+    n_behind: int = 0
+    lengths: tuple[int, ...] = ()
+
+    def whole(self, n_behind: float) -> float:
+        """Time of the case, s, if so many revolutions are followed behind its record.
+
+        Where it still meets contact modes, each doubling of its revolutions is taken to meet half as many
+        as the last: the sets of contacts that a whip comes to are many, but not without end.
+        """
+        n = self._behind(n_behind)
+        n_doubling = math.log2(1.0 + (self.n_left + n) / self.before)
+        to_come = self.modes * (1.0 - math.exp2(-n_doubling))
+        return max(self.least, self.seconds + n * self.per_revolution + to_come)
+
+    def _behind(self, usual: float) -> float:
+        if self.per_revolution == 0.0:
+            return 0.0
+        if self.n_behind < max(self.lengths[:1], default=1):
+            return usual
+        return next((float(n) for n in self.lengths if n > self.n_behind), float(self.n_behind))
+
+
+class FollowedCase:
+    """A case, run part by part.
+
+    Attributes
+    ----------
+    seconds : float, s
+        What its parts have taken, contact modes included.
+    modes : float, s
+        What contact modes took of it, where it has one stator.
+    a_mode : float, s
+        About what a contact mode takes.
+    is_whole, is_irregular : bool
+        Whether it was run to its end, and whether it still met new contact modes where it was left.
+    n_behind : int
+        Revolutions that were followed behind the record.
+    record : Record or None
+        Of the latest part.
+    """
+
+    def __init__(self, setup: Setup, case: Case, recording: Recording, stopwatch: Stopwatch) -> None:
+        self._setup, self._case, self._recording, self._stopwatch = setup, case, recording, stopwatch
+        self.seconds = self.modes = self.a_mode = 0.0
+        self.is_whole = self.is_irregular = False
+        self.n_behind = 0
+        self.record: Record | None = None
+        self._state: State | None = None
+        self._n_motion = n_motion(setup)
+        self._n_passed = 0  # revolutions of the transient
+        self._pace = 0.0  # s a revolution of the latest part, without its contact modes
+        self._n_new = 0  # contact modes that it met
+        self._cut = 0.0  # s, after which the next part was cut off
+        self._cut_behind = 0  # revolutions behind the record by then
+
+    @property
+    def is_in_ring(self) -> bool:
+        """Whether it meets many sets of contacts."""
+        return is_ring(self._setup)
+
+    @property
+    def n_solved(self) -> int:
+        """Contact modes that cases of this friction have had solved so far."""
+        return n_solved(self._setup, self._case)
+
+    def follow(self, steps: float, n_behind: float, limit: float) -> None:
+        """Run part by part, each as long as all before, to the end or while `limit` s allow.
+
+        A motion may come to a whip after most of its transient, and then takes twenty times as long.
+
+        Parameters
+        ----------
+        steps : float
+            Predicted, of the whole case.
+        n_behind : float
+            Revolutions that are likely to be followed behind the record.
+        limit : float, s
+        """
+        recording, most = self._recording, max(_PATIENCE, limit)
+        n_transient = recording.longest_transient
+        part = max(1, round(min(_FIRST, _FIRST_STEPS / steps) * n_transient))
+        while self._n_passed < n_transient:
+            n = min(max(part, self._n_passed), n_transient - self._n_passed)
+            if not self._is_worth(n, limit) or not self._pass(n, most):
+                return
+        if self._is_worth(recording.revolutions + self._n_motion * n_behind, limit):
+            self.finish(most)
+
+    def _is_worth(self, n: float, limit: float) -> bool:
+        """Whether so many revolutions more are within a limit, s, or cost little beside those before."""
+        more = n * self._pace
+        return self.seconds + more <= limit or more <= _LITTLE * self.seconds
+
+    def run_at_once(self) -> None:
+        """Run it whole; once more where that takes little, for what contact modes take."""
+        self.finish(math.inf)
+        if self.seconds < _LONG and not self.is_in_ring:
+            again, _ = self._timed(self._recording, math.inf)
+            self.modes = max(self.seconds - again, 0.0)
+
+    def forecast(self) -> Forecast:
+        """What it will take, from where it was left."""
+        if self.is_whole:
+            return Forecast(self.seconds)
+        recording = self._recording
+        n_left = recording.longest_transient - self._n_passed + recording.revolutions
+        least = self.seconds + self._cut
+        if self._cut_behind:  # it was cut off there
+            behind = self._n_motion * self._cut_behind
+            pace = max(self._cut - self._n_new * self.a_mode, _LATE * self._cut) / (n_left + behind)
+            return Forecast(
+                least - behind * pace,
+                self._n_motion * pace,
+                least,
+                n_behind=self._cut_behind,
+                lengths=lengths_behind(self._setup, recording),
+            )
+        pace = self._probe()
+        return Forecast(
+            seconds=self.seconds + n_left * pace,
+            per_revolution=self._n_motion * pace if recording.revolutions >= LEAST_REVOLUTIONS else 0.0,
+            least=least,
+            modes=self._n_new * self.a_mode if self.is_irregular else 0.0,
+            before=max(self._n_passed, 1),
+            n_left=n_left,
+        )
+
+    def _pass(self, n: int, most: float) -> bool:
+        """Pass some revolutions of the transient; False where that was cut off."""
+        part = _passing(self._recording, n)
+        before, is_first = self.n_solved, self._n_passed == 0
+        taken, record = self._timed(part, most)
+        if record is None:
+            self._cut = taken
+            return False
+        self._n_new = self.n_solved - before
+        pace = taken / n
+        if is_first:
+            again, _ = self._timed(part, math.inf)
+            pace = min(pace, again / n)
+            if self.is_in_ring:
+                self.a_mode = max(taken - again, 0.0) / max(self._n_new, 1)
+            else:
+                self.modes = max(taken - again, 0.0)
+        else:
+            pace = max(taken - self._n_new * self.a_mode, _LATE * taken) / n
+        self._pace, self._state, self.record = pace, record.final, record
+        self.seconds += taken
+        self.is_irregular = self._n_new > _GROWING * before
+        self._n_passed += n
+        return True
+
+    def finish(self, limit: float) -> None:
+        """Run what is left of it at once, unless that takes more than `limit` s."""
+        recording = self._recording
+        if self._n_passed:
+            left = recording.longest_transient - self._n_passed
+            recording = replace(recording, transient=left)
+        before, solved = n_followed(), self.n_solved
+        taken, record = self._timed(recording, limit)
+        if record is None:
+            self._cut, self._cut_behind = taken, (n_followed() - before) // self._n_motion
+            self._n_new = self.n_solved - solved
+            return
+        self.n_behind = (n_followed() - before) // self._n_motion
+        self.is_whole, self.is_irregular, self.record = True, False, record
+        self.seconds += taken
+
+    def _probe(self) -> float:
+        """Time of a revolution from where it was left, s, as many recorded as in the case."""
+        recording = self._recording
+        n = recording.longest_transient + recording.revolutions
+        share = min(max(self._n_passed, 1), _PROBED) / n
+        part = replace(
+            recording,
+            transient=round(share * recording.longest_transient),
+            revolutions=min(round(share * recording.revolutions) or 1, LEAST_REVOLUTIONS - 1),
+        )
+        before = self.n_solved
+        taken, _ = self._timed(part, math.inf)
+        if self.n_solved > before:
+            taken, _ = self._timed(part, math.inf)
+        return taken / (part.longest_transient + part.revolutions)
+
+    def _timed(self, recording: Recording, most: float) -> tuple[float, Record | None]:
+        case = self._case
+        return self._stopwatch.timed(
+            lambda check: run_case(
+                self._setup,
+                clearance=case.clearance,
+                friction=case.friction,
+                recording=recording,
+                initial=self._state or case.initial,
+                check=check,
+            ),
+            most,
+        )
+
+
+def n_motion(setup: Setup) -> int:
+    """Motions that are followed behind the record: one with its tangent, or two side by side."""
+    return 1 if getattr(march_of(setup.scheme, setup), "has_closed_form", False) else 2
+
+
+def lengths_behind(setup: Setup, recording: Recording) -> tuple[int, ...]:
+    """Revolutions for which a motion without a period is followed behind its record, one of these."""
+    if recording.revolutions < LEAST_REVOLUTIONS:
+        return ()
+    known = recording.revolutions // SPAN if n_motion(setup) == 1 else 0  # spans: a tangent has those before
+    return tuple(SPAN * max(N_ALIGNING + n - known, 0) for n in (N_FIRST, N_ALL, N_MOST))
+
+
+def usual_behind(setup: Setup, recording: Recording) -> float:
+    """Revolutions behind the record of a case that takes long, where no other has shown more.
+
+    Set by trial: the tangents of whips in closed form were carried over the first length more often than not;
+    two motions in short steps showed chaos within theirs.
+    """
+    lengths = lengths_behind(setup, recording)
+    if not lengths:
+        return 0.0
+    return 0.5 * (lengths[0] + lengths[1]) if n_motion(setup) == 1 else lengths[0]
+
+
+def is_ring(setup: Setup) -> bool:
+    """Whether cases meet many sets of contacts."""
+    return len(setup.model.stators) > 1
+
+
+def n_solved(setup: Setup, case: Case) -> int:
+    """Contact modes that cases of this friction have had solved so far."""
+    return setup.n_solved(case.friction) if isinstance(setup, ModalSetup) else 0
+
+
+def _passing(recording: Recording, n: int) -> Recording:
+    """So many revolutions, the last of them recorded."""
+    return replace(recording, transient=n - 1, revolutions=1)
