@@ -107,7 +107,7 @@ class FollowedCase:
         self._n_passed = 0  # revolutions of the transient
         self._pace = 0.0  # s a revolution of the latest part, without its contact modes
         self._n_new = 0  # contact modes that it met
-        self._cut = 0.0  # s, after which the next part was cut off
+        self._cut = 0.0  # s, after which the next part was cut off, without its contact modes
         self._cut_behind = 0  # revolutions behind the record by then
 
     @property
@@ -164,7 +164,7 @@ class FollowedCase:
         least = self.seconds + self._cut
         if self._cut_behind:  # it was cut off there
             behind = self._n_motion * self._cut_behind
-            pace = max(self._cut - self._n_new * self.a_mode, _LATE * self._cut) / (n_left + behind)
+            pace = self._cut / (n_left + behind)
             return Forecast(
                 least - behind * pace,
                 self._n_motion * pace,
@@ -188,7 +188,7 @@ class FollowedCase:
         before, is_first = self.n_solved, self._n_passed == 0
         taken, record = self._timed(part, most)
         if record is None:
-            self._cut = taken
+            self._leave(taken, before)
             return False
         self._n_new = self.n_solved - before
         pace = taken / n
@@ -207,6 +207,14 @@ class FollowedCase:
         self._n_passed += n
         return True
 
+    def _leave(self, taken: float, before: int) -> None:
+        """Take in a part that was cut off, with so many contact modes solved before: they stay solved."""
+        self._n_new = self.n_solved - before
+        self.is_irregular = self._n_new > _GROWING * before
+        modes = min(self._n_new * self.a_mode, (1.0 - _LATE) * taken)
+        self.seconds += modes
+        self._cut = taken - modes
+
     def finish(self, limit: float) -> None:
         """Run what is left of it at once, unless that takes more than `limit` s."""
         recording = self._recording
@@ -216,8 +224,8 @@ class FollowedCase:
         before, solved = n_followed(), self.n_solved
         taken, record = self._timed(recording, limit)
         if record is None:
-            self._cut, self._cut_behind = taken, (n_followed() - before) // self._n_motion
-            self._n_new = self.n_solved - solved
+            self._cut_behind = (n_followed() - before) // self._n_motion
+            self._leave(taken, solved)
             return
         self.n_behind = (n_followed() - before) // self._n_motion
         self.is_whole, self.is_irregular, self.record = True, False, record
