@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import fcntl
+import gc
 import os
 import subprocess
 import sys
@@ -116,5 +117,6 @@ def _end_with_parent() -> None:
 
 
 if __name__ == "__main__":
+    gc.disable()  # it ends before it would need the room
     threading.Thread(target=_end_with_parent, daemon=True).start()
     _compile(sys.argv[1], is_soft="soft" in sys.argv[2:])

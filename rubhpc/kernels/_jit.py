@@ -16,10 +16,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
-from numba.core.compiler import Flags as NumbaFlags
 from numba.core.compiler_lock import global_compiler_lock
+
+from rubhpc.kernels._compiler import Flags, KernelCompiler, LinkedCompiler, PartCompiler
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -159,32 +158,6 @@ def _stamped(compiled: Any) -> Any:
     return compiled
 
 
-class Flags(NumbaFlags):
-    """The same flags, which compare only what is set and have their hash at hand.
-
-    Numba looks up each call that it types by the flags, and reads all of some 35 options for each hash and
-    comparison: a tenth of the time of a compilation. The class bears numba's name, which is in the names of
-    what is compiled.
-    """
-
-    __slots__ = ()
-
-    def __hash__(self) -> int:
-        return _HASH
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, NumbaFlags):
-            return NotImplemented
-        ours, theirs = self._values, other._values
-        return bool(
-            ours == theirs
-            or all(getattr(self, name) == getattr(other, name) for name in ours.keys() | theirs.keys())
-        )
-
-
-_HASH = hash(NumbaFlags())  # of the names of the options, as numba has it
-
-
 def _quick(compiled: Any) -> Any:
     """Give a kernel flags that are compared quickly."""
     if hasattr(compiled, "_compiler"):  # not under NUMBA_DISABLE_JIT
@@ -205,35 +178,7 @@ def _is_cached(compiled: Any, signature: Any) -> bool:
     return key in compiled._cache._cache_file._load_index()
 
 
-class _LinkedCode(JITCodeLibrary):
-    """Code that is compiled into kernels and never run by itself: no machine code is made of it."""
-
-    @property
-    def codegen(self) -> Any:
-        return self
-
-    def set_env(self, name: str, env: Any) -> None:
-        """Do nothing: what would be written to memory is that of the kernel."""
-
-    def get_pointer_to_function(self, name: str) -> int:
-        self._ensure_finalized()
-        return 0
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
-        self._finalized = True
-
-
-class _LinkedCompiler(Compiler):
-    """Compile a function as far as its callers need it, which saves a sixteenth of the time of all."""
-
-    def compile_extra(self, func: Any) -> Any:
-        self.state.library = _LinkedCode(self.state.targetctx.codegen(), func.__qualname__)
-        return super().compile_extra(func)
-
-
-def _of_kernels(compiled: Any, flags: dict[str, Any]) -> Any:
+def _of_kernels(compiled: Any, flags: dict[str, Any], compiler: type[LinkedCompiler]) -> Any:
     """Compile a kernel that other kernels call without the wrapper that takes Python's arguments apart.
 
     The wrapper of tables of arrays takes as long to compile as the kernel. What a kernel calls is compiled
@@ -241,9 +186,7 @@ def _of_kernels(compiled: Any, flags: dict[str, Any]) -> Any:
     """
     if not hasattr(compiled, "overloads"):  # under NUMBA_DISABLE_JIT
         return compiled
-    linked = numba.njit(
-        **{**flags, "cache": False, "no_cpython_wrapper": True}, pipeline_class=_LinkedCompiler
-    )
+    linked = numba.njit(**{**flags, "cache": False, "no_cpython_wrapper": True}, pipeline_class=compiler)
     inner = _quick(linked(compiled.py_func))
     template_of = compiled.get_call_template
 
@@ -261,8 +204,9 @@ def _of_kernels(compiled: Any, flags: dict[str, Any]) -> Any:
     return compiled
 
 
-def _compiled(function: F, flags: dict[str, Any]) -> F:
-    found: F = _of_kernels(_stamped(_quick(numba.njit(**flags)(function))), flags)
+def _compiled(function: F, flags: dict[str, Any], compiler: type[LinkedCompiler] = LinkedCompiler) -> F:
+    called = _stamped(_quick(numba.njit(**flags, pipeline_class=KernelCompiler)(function)))
+    found: F = _of_kernels(called, flags, compiler)
     return found
 
 
@@ -306,3 +250,8 @@ def jit_lean(function: F) -> F:
 def jit_lean_sum(function: F) -> F:
     """Compile such a kernel whose sums may be taken in any (fixed) order."""
     return _compiled(function, _LEAN_SUM_FLAGS)
+
+
+def jit_part_sum(function: F) -> F:
+    """Compile such a kernel that only kernels call: LLVM optimises it with its callers, not before them."""
+    return _compiled(function, _LEAN_SUM_FLAGS, PartCompiler)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean, jit_lean_sum, jit_part_sum
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -133,25 +133,57 @@ def add_rows(rows: Floats, value: Floats, target: Floats) -> None:
 
 
 @jit_lean_sum
+def enter_with(
+    n_eigenmode: int,
+    enter_re: Floats,
+    enter_im: Floats,
+    enter_cosine: Floats,
+    enter_sine: Floats,
+    enter_constant: Floats,
+    clearance: Floats,
+    cosine: float,
+    sine: float,
+    motion: Floats,
+    z: Floats,
+) -> None:
+    """Modal coordinates `z` (2, m) of a motion (2 n,) at the shaft's angle, with a mode's rows of the tables.
+
+    Python calls it with these alone: to take all tables apart takes as long to compile as the rest.
+    """
+    for part in range(2):
+        rows = enter_re if part == 0 else enter_im
+        target = z[part]
+        from_cosine, from_sine = enter_cosine[part], enter_sine[part]
+        for k in range(target.size):  # arrays in one expression would take 5 s longer to compile
+            target[k] = -from_cosine[k] * cosine - from_sine[k] * sine
+        for i in range(clearance.size):
+            source = enter_constant[i, part]
+            for k in range(target.size):
+                target[k] -= source[k] * clearance[i]
+        add_rows(rows, motion, target)
+    z[0, n_eigenmode], z[1, n_eigenmode] = cosine, sine
+    for i in range(clearance.size):
+        z[0, n_eigenmode + 1 + i], z[1, n_eigenmode + 1 + i] = clearance[i], 0.0
+
+
+@jit_part_sum
 def enter(
     tables: ModeTables, mode: int, clearance: Floats, cosine: float, sine: float, motion: Floats, z: Floats
 ) -> None:
     """Modal coordinates `z` (2, m) in a contact mode of a motion (2 n,) at the shaft's angle."""
-    for part in range(2):
-        rows = tables.enter_re[mode] if part == 0 else tables.enter_im[mode]
-        target = z[part]
-        from_cosine, from_sine = tables.enter_cosine[mode, part], tables.enter_sine[mode, part]
-        for k in range(target.size):  # arrays in one expression would take 5 s longer to compile
-            target[k] = -from_cosine[k] * cosine - from_sine[k] * sine
-        for i in range(clearance.size):
-            source = tables.enter_constant[mode, i, part]
-            for k in range(target.size):
-                target[k] -= source[k] * clearance[i]
-        add_rows(rows, motion, target)
-    first = tables.n_eigenmode[mode]
-    z[0, first], z[1, first] = cosine, sine
-    for i in range(clearance.size):
-        z[0, first + 1 + i], z[1, first + 1 + i] = clearance[i], 0.0
+    enter_with(
+        tables.n_eigenmode[mode],
+        tables.enter_re[mode],
+        tables.enter_im[mode],
+        tables.enter_cosine[mode],
+        tables.enter_sine[mode],
+        tables.enter_constant[mode],
+        clearance,
+        cosine,
+        sine,
+        motion,
+        z,
+    )
 
 
 @jit_lean_sum

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -217,7 +217,7 @@ def event_work(q: int) -> EventWork:
     )
 
 
-@jit_lean_sum
+@jit_part_sum
 def begin_mode(
     tables: ModeTables,
     reduced: Reduced,
@@ -267,7 +267,7 @@ def find_crossing(
     return crossing
 
 
-@jit_lean_sum
+@jit_part_sum
 def take_event(
     tables: ModeTables,
     reduced: Reduced,

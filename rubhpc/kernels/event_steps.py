@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
 from rubhpc.kernels.accumulators import observe_force
 from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import (
@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 GAP_TOLERANCE = 1e-13  # m
 
 
-@jit_lean_sum
+@jit_part_sum
 def enter_wanted(
     tables: ModeTables, clearance: Floats, clock: Clock, progress: Progress, motion: Floats, z: Floats
 ) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     DRIVE_WORK,
@@ -172,7 +172,7 @@ def energy_forms(
     entry[0], entry[1] = loss, work
 
 
-@jit_lean_sum
+@jit_part_sum
 def end_span(
     tables: ModeTables,
     clock: Clock,

@@ -1,4 +1,9 @@
-"""What users read of compilations."""
+"""What users read of compilations, and how much is compiled."""
+
+import subprocess
+import sys
+
+from running import environment
 
 from rubhpc.integrate import compilation
 from rubhpc.kernels import _jit
@@ -8,7 +13,7 @@ def test_each_part_is_announced_once(monkeypatch):
     monkeypatch.setattr(compilation, "_announced", set())
     before, texts = _jit.compilation.began, []
     with compilation.announced_by(texts.append):
-        for name in ("enter", "advance", "carry_along", "enter", "carry_along", "advance_by_steps"):
+        for name in ("enter_with", "advance", "carry_along", "enter_with", "carry_along", "advance_by_steps"):
             _jit.compilation.began(name)
     assert _jit.compilation.began is before
     common = "once after an installation: up to a minute"
@@ -47,3 +52,45 @@ def test_no_garbage_is_looked_for_while_kernels_are_compiled():
     assert collects
     assert not any(collects)
     assert gc.isenabled()
+
+
+MAY_COMPILE = {
+    "enter_with",
+    "advance",
+    "is_within",
+    "normal_and_gap",
+    "follow_piece",
+    "change_contacts",
+    "change_pressed",
+    "add_force",
+}
+FIRST_CASE = """
+import sys
+from rubhpc.integrate.case import compile_kernels
+from rubhpc.integrate.setup import prepare
+from rubhpc.rig.reading import read_rig
+from rubhpc.study.study import Contact, Integrator, Recording
+
+setup = prepare(
+    read_rig("mokhtar2017"), 150.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=32
+)
+compile_kernels(setup, clearance=1e-4, friction=0.3, recording=Recording())
+for path, module in list(sys.modules.items()):
+    for name, kernel in vars(module).items() if path.startswith("rubhpc.kernels.") else ():
+        if getattr(kernel, "__module__", "") == path:
+            for compiled in getattr(kernel, "overloads", {}).values():
+                code = compiled.library._get_module_for_linking()
+                print(name, sum(len(list(block.instructions)) for f in code.functions for block in f.blocks))
+"""
+
+
+def test_a_first_case_compiles_no_more_than_it_did():
+    """Its kernels, one signature each, and their instructions: 35 300, two thousand of them a second's work."""
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST_CASE], env=environment(), check=True, capture_output=True, text=True
+    )
+    compiled = [line.split() for line in done.stdout.splitlines()]
+    names, counts = zip(*compiled, strict=True)
+    assert set(names) <= MAY_COMPILE
+    assert len(names) == len(set(names))
+    assert 20_000 < sum(map(int, counts)) < 40_000

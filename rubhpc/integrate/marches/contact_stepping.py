@@ -11,7 +11,6 @@ from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.marches.workspace import workspace
 from rubhpc.integrate.packing import pairs_of
 from rubhpc.kernels.case_progress import FINISHED, NONE, shaft_turn
-from rubhpc.kernels.contact_modes import enter
 from rubhpc.kernels.contact_pairs import N_DEGREE
 from rubhpc.kernels.measuring import end_span
 from rubhpc.kernels.stepping_loop import ContactImpulses, advance_by_steps
@@ -88,7 +87,7 @@ class ContactSteppingMarch(ModalMarch):
         """
         self.clock, self._recorder = clock, recorder
         cosine, sine = shaft_turn(clock, self.progress.tick)
-        enter(self.tables, 0, self._clearance, cosine, sine, motion, self._z)
+        self._enter_at(0, self._clearance, cosine, sine, motion)
         level = 0
         while self.progress.tick % (1 << self._impulses.level):
             if self.progress.tick & 1 << level:

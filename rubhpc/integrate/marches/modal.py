@@ -21,7 +21,7 @@ from rubhpc.kernels.case_progress import (
     new_progress,
     restart_clock,
 )
-from rubhpc.kernels.contact_modes import enter, is_within
+from rubhpc.kernels.contact_modes import enter_with, is_within
 from rubhpc.kernels.sampling import recorder
 
 if TYPE_CHECKING:
@@ -150,7 +150,24 @@ class ModalMarch(March):
     def _start(self, mode: int) -> None:
         """Begin in a contact mode of the tables, at the shaft's angle 0."""
         begin_in(self._bare_progress, mode)
-        enter(self.tables, mode, self._entered_with, 1.0, 0.0, self._motion, self._z)
+        self._enter_at(mode, self._entered_with, 1.0, 0.0, self._motion)
+
+    def _enter_at(self, mode: int, clearance: Floats, cosine: float, sine: float, motion: Floats) -> None:
+        """Take the coordinates, in a contact mode of the tables, of a motion (2 n,) at the shaft's angle."""
+        tables = self.tables
+        enter_with(
+            int(tables.n_eigenmode[mode]),
+            tables.enter_re[mode],
+            tables.enter_im[mode],
+            tables.enter_cosine[mode],
+            tables.enter_sine[mode],
+            tables.enter_constant[mode],
+            clearance,
+            cosine,
+            sine,
+            motion,
+            self._z,
+        )
 
     def _call(
         self, stop: int, samples: Samples, accumulator: Accumulator, *, is_recorded: bool
