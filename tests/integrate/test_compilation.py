@@ -85,7 +85,7 @@ for path, module in list(sys.modules.items()):
 
 
 def test_a_first_case_compiles_no_more_than_it_did():
-    """Its kernels, one signature each, and their instructions: 35 300, two thousand of them a second's work."""
+    """Its kernels, one signature each, and their instructions: 35 300, of which a second makes 2000."""
     done = subprocess.run(
         [sys.executable, "-c", FIRST_CASE], env=environment(), check=True, capture_output=True, text=True
     )
