@@ -219,12 +219,11 @@ class Pilots:
     def _branches(self, case: Case) -> float:
         """Time of the branches of a case; `was_cut` where they were not followed to their ends."""
         study = self._study
-        assert study.branch is not None
-        branch, span = study.branch, study.axis(study.branch.along).drawn_from
-        assert span is not None
+        branch = study.branch
+        assert branch is not None
         taken, record = self._stopwatch.timed(
             lambda check: record_branches(
-                operation_of(self._grid, case), branch, span, study.recording, check
+                operation_of(self._grid, case), branch, study.axis(branch.along), study.recording, check
             ),
             _LONGEST_BRANCHES,
         )

@@ -188,11 +188,10 @@ class Worker:
                 raise _OverTime(f"over its time limit of {limit:g} s")
 
         if study.branch is not None:
-            span = study.axis(study.branch.along).drawn_from
-            assert span is not None
+            axis = study.axis(study.branch.along)
             operation = operation_of(self.grid, case)
             try:
-                return record_branches(operation, study.branch, span, study.recording, check, self.say)
+                return record_branches(operation, study.branch, axis, study.recording, check, self.say)
             finally:
                 self.say("")
         setup = self._setups.of(case)

@@ -80,7 +80,7 @@ def test_a_case_says_how_far_it_has_come(store, monkeypatch):
     next(file for file in sorted((path / "point_value" / "c").rglob("*")) if file.is_file()).unlink()
     rubhpc.run(read_study(store / "again" / "study.toml", path), quiet=True)
     assert said[-1] == ""
-    assert any(text.startswith("20 motions of branches found, now at clearance 0.0001") for text in said)
+    assert any(text.startswith("20 motions of branches found, now at clearance=1") for text in said)
     assert any(text.endswith("branches recorded") for text in said)
 
 

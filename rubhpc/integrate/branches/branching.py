@@ -40,7 +40,7 @@ class Branching:
     check : callable, optional
         Called before every search for a motion; what it raises ends the search for branches.
     say : callable, optional
-        Called then with how many motions have been found, and where the next is sought.
+        Called then with how many motions have been found, and the parameter beside which the next is sought.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Branching:
         family: Family,
         step: float,
         check: Callable[[], None] | None = None,
-        say: Callable[[str], None] | None = None,
+        say: Callable[[int, float], None] | None = None,
     ) -> None:
         """Take the cases."""
         self.family, self.step, self._check, self._say = family, step, check, say
@@ -180,7 +180,7 @@ class Branching:
         """Newton's method, with the parameter held or an unknown."""
         family, phase, states = self.family, base.phase, base.states
         if self._say is not None:
-            self._say(f"{self._n_found} motions of branches found, now at {family.along} {base.value:.4g}")
+            self._say(self._n_found, base.value)
         if self._check is not None:
             self._check()
         scale = base.scale

@@ -15,15 +15,16 @@ from rubhpc.integrate.branches.start import starts
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.periodic_motions.family import Family
 from rubhpc.schema import BRANCH_EVENT, DONE, MULTIPLIERS, POINT, branch_variables
+from rubhpc.study.axes import written
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from rubhpc.input.ranges import Range
     from rubhpc.integrate.branches.branch import Branch
     from rubhpc.integrate.periodic_motions.family import Operation
+    from rubhpc.study.axes import Axis
     from rubhpc.study.branch_keys import BranchKeys
     from rubhpc.study.tables import Recording
 
@@ -53,7 +54,7 @@ class BranchRecord:
 def record_branches(
     operation: Operation,
     keys: BranchKeys,
-    span: Range,
+    axis: Axis,
     recording: Recording,
     check: Callable[[], None] | None = None,
     say: Callable[[str], None] | None = None,
@@ -62,8 +63,8 @@ def record_branches(
 
     Parameters
     ----------
-    span : Range
-        Of the parameter that is followed, SI.
+    axis : Axis
+        The parameter that is followed, with the range that it is drawn from.
     recording : Recording
         Its transient is that of the simulations that lead to first motions.
     check : callable, optional
@@ -71,10 +72,16 @@ def record_branches(
     say : callable, optional
         Called with how far it has come, in words.
     """
-    began = time.perf_counter() - seconds_compiling()
+    began, span = time.perf_counter() - seconds_compiling(), axis.drawn_from
+    assert span is not None
+
+    def say_found(n_found: int, value: float) -> None:
+        if say is not None:
+            say(f"{n_found} motions of branches found, now at {written(axis.name, value, axis.unit)}")
+
     low, high = sorted((span.start, span.stop))
     step = (high - low) / STEPS if keys.step is None else keys.step
-    branching = Branching(Family(operation, keys.along, (low, high)), step, check, say)
+    branching = Branching(Family(operation, keys.along, (low, high)), step, check, say_found)
     values = np.linspace(low, high, keys.sweeps).tolist() if keys.sweeps > 1 else [0.5 * (low + high)]
     found = starts(branching, values, [int(period) for period in keys.periods], recording)
     tracks = search(branching, found, low=low, high=high, most=keys.points, doublings=keys.doublings)
