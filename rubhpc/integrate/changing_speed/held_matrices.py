@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 WIDEST, NARROWEST = 0.5, 1e-4  # half of the range over the speed
 WIDEST_TABULATED = 0.16  # the same where bearings follow a table, not a straight line
+AT_ENDS = 2.0  # error at the ends of a range over its mean: it grows evenly from the middle
 ACCELERATION_SHARE = 0.25  # of these errors, by the acceleration
 
 
@@ -43,7 +44,7 @@ def held_range(
         Change of stiffness and damping with the speed, per rad/s.
     speed, acceleration : float, rad/s, rad/s^2
     accuracy : float
-        Relative error of the response to unbalance by a mode, and of each exponent.
+        Relative error of the response to unbalance by a mode, and of each exponent, in the mean over a range.
     momentum : (n, n), optional
         Change of the stiffness with the acceleration, per rad/s^2.
     widest : float
@@ -59,10 +60,10 @@ def held_range(
         excited = np.clip(np.abs(exponent.imag), speed - half, speed + half)
         distance = np.hypot(exponent.real, np.abs(exponent.imag) - excited)
         distance = np.maximum(distance, abs(acceleration) / half)
-        allowed = accuracy * np.minimum(distance, np.abs(exponent))
+        allowed = AT_ENDS * accuracy * np.minimum(distance, np.abs(exponent))
         if half <= NARROWEST * speed or np.all(shift * half <= allowed):
             break
-        half *= 0.5
+        half *= 0.75
     if momentum is None:
         return half, math.inf
     turned = np.abs(np.einsum("ka,ab,bk->k", against, momentum, shape[:n], optimize=True))

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the speed is taken
 LONGEST_FALL = 1.0 / 3.0  # half of the range over the first speed of a coast-down, which stays above 0
 LEAST_GROWTH = 1e-5  # of the unbalance force in a piece
+DRIVEN_SHARE = 0.25  # of the accuracy, of matrices of a driven rotor, whose twist errs most
 MOST_HELD = 4  # matrices at hand, of a spin that swings between them
 MOST_BYTES = 3 * 2**29  # of contact modes that are kept, with their matrices, for other cases
 
@@ -192,7 +193,7 @@ class Pieces:
             drift,
             speed,
             acceleration,
-            accuracy=fastest.accuracy,
+            accuracy=fastest.accuracy if free is None else DRIVEN_SHARE * fastest.accuracy,
             momentum=self._momentum,
             widest=WIDEST_TABULATED if fastest.model.rotor.tabulated_speeds else WIDEST,
         )

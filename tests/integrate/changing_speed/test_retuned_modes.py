@@ -220,7 +220,10 @@ def test_tables_of_curved_gaps_are_those_at_that_speed(q):
 
 
 def test_matrices_are_held_while_the_response_errs_little():
-    """A tilting disc without coupling: its exponents move by half of Ip/It a unit of speed at standstill."""
+    """A tilting disc without coupling: its exponents move by half of Ip/It a unit of speed at standstill.
+
+    The error grows evenly from the middle of a range to its ends, where it is twice the mean.
+    """
     stiffness, damping = np.eye(2) * 400.0**2, np.eye(2) * 2.0 * 0.02 * 400.0
     gyroscopic = 0.1 * np.array([[0.0, 1.0], [-1.0, 0.0]])
 
@@ -235,9 +238,11 @@ def test_matrices_are_held_while_the_response_errs_little():
         return np.linalg.solve(matrix, [1.0, -1j])
 
     for speed in (100.0, 250.0, 370.0, 415.0, 600.0):
-        half = found(speed, 1e-3)
-        for at in (speed - half, speed + half):
+        half, errors = found(speed, 1e-3), []
+        for at in speed + half * np.linspace(-1.0, 1.0, 41):
             exact = response(at, at)
-            assert np.abs(response(at, speed) - exact).max() < 1.5e-3 * np.abs(exact).max()
+            errors.append(np.abs(response(at, speed) - exact).max() / np.abs(exact).max())
+        assert np.mean(errors) < 1.01e-3
+        assert max(errors) < 2.02e-3
     assert found(415.0, 1e-3) < 0.2 * found(600.0, 1e-3)
     assert found(415.0, 1e3) > found(415.0, 1e-3)  # a fast passage leaves no time to respond
