@@ -29,7 +29,7 @@ class Machine:
         calm = max(0, min(last, self.begins) - first)
         self.taken = calm * CALM + (last - first - calm) * WHIP
         if last > self.begins and self.modes:  # they are solved once
-            self.taken, self.modes = self.taken + 0.01 * self.modes, 0
+            self.taken, self.modes, self.solved = self.taken + 0.01 * self.modes, 0, self.modes
         count_followed(last - n)
         self.ran.append((first, last))
         return SimpleNamespace(final=SimpleNamespace(n=n))
@@ -42,7 +42,7 @@ class Machine:
             return most, None
         return self.taken, record
 
-    cut_behind = 0
+    cut_behind = solved = 0
 
 
 def followed(monkeypatch, machine, limit, n_stator=16):
@@ -76,6 +76,18 @@ def test_a_whip_that_begins_late_is_met(monkeypatch):
     found.finish(math.inf)
     assert found.is_whole
     assert found.forecast().whole(272) == found.seconds == pytest.approx(forecast.whole(80))
+
+
+def test_contact_modes_that_only_a_look_ahead_meets_are_counted(monkeypatch):
+    """A whip begins behind the parts that were run; its modes cost more than all before."""
+    machine = Machine(begins=10, modes=300)
+    monkeypatch.setattr(followed_case, "n_solved", lambda *_: machine.solved)
+    found = followed(monkeypatch, machine, limit=0.1)
+    passed = found.seconds
+    forecast = found.forecast()
+    assert (found.is_whole, found.is_irregular) == (False, True)
+    assert found.seconds == pytest.approx(passed + 300 * 0.01)
+    assert forecast.seconds > passed + 300 * 0.01
 
 
 def test_a_case_that_is_dear_from_the_beginning_is_left_soon(monkeypatch):
