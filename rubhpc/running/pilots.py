@@ -30,6 +30,7 @@ _ENOUGH, _MOST = 3.0, 15.0  # processor seconds after which no more are begun: w
 _AGREED = 0.25  # standard error of the mean pace, as a share of it, where cases agree
 _LONGEST = 75.0  # s, in which cases that were shortened are run whole, together
 _LEAST, _SHARE = 15.0, 0.5  # s that all may take, or that share of the time foreseen where it is more
+_DEAREST = 0.2  # of the time foreseen, for the dearest case in any case
 _LEAST_EACH = 1.0  # s, for each case
 _PATIENCE = 2.0  # times as long as foreseen, for a case that is finished
 _FEWEST = 3  # cases, timed in any case
@@ -137,7 +138,8 @@ def time_pilots(
             break
     if pilots.shortened:
         say(f"timing cases: {len(paces)} so far, the dearest of them to their end")
-    _finish(pilots, picked, sample, min(_LONGEST, allowed()))
+    left = max(allowed(), _DEAREST * n_case * float(np.mean(sample.seconds))) if paces else 0.0
+    _finish(pilots, picked, sample, min(_LONGEST, left))
     block = time_block(manifest, pilots.arrays) if pilots.arrays else 0.0
     seconds = time.process_time() - began - pilots.loading
     if not paces:

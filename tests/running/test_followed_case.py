@@ -130,9 +130,9 @@ def test_length_of_a_tangent_is_that_of_the_cases_that_ran_whole():
 @pytest.mark.parametrize(
     ("revolutions", "has_closed_form", "lengths", "usual"),
     [
-        (32, True, (48, 240, 1008), 144),
-        (16, True, (64, 256, 1024), 160),
-        (128, True, (0, 144, 912), 72),
+        (32, True, (48, 240, 1008), 192),
+        (16, True, (64, 256, 1024), 208),
+        (128, True, (0, 144, 912), 108),
         (32, False, (80, 272, 1040), 80),
         (15, True, (), 0),
     ],
