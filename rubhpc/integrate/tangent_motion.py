@@ -96,12 +96,12 @@ class TangentMotion:
         march.keep(None)
         if reason is not None:
             return False
-        count_followed(n_revolution)
         clock = march.clock
         first = -n_revolution * clock.samples_per_revolution << clock.sample_level
         before, self._state = self._state, march.final()
         if self._carry(trail, first, n_revolution):
             self._n_passed += n_revolution
+            count_followed(n_revolution)
             self._leave_room(trail, n_revolution)
             return True
         if march.n_left == n_left and n_revolution > 1:  # no room for their events
