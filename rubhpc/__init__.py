@@ -106,6 +106,10 @@ _HOMES = {
 }
 
 
+# Modules that register what datasets of a function have: the figures of `rub`.
+_BESIDES = {"run_up": "postproc.accessor"}
+
+
 class _Package(ModuleType):
     """The package; a module, once imported, does not hide the function of its name."""
 
@@ -120,6 +124,8 @@ sys.modules[__name__].__class__ = _Package
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name in _BESIDES:
+        import_module(_BESIDES[name])
     module, _, attribute = _HOMES[name].partition(":")
     value = getattr(import_module(module), attribute)
     setattr(sys.modules[__name__], name, value)

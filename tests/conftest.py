@@ -30,6 +30,7 @@ SLOW = (
     "fem/test_linear_design.py::test_tables_set_the_range_and_the_sag",
     "fem/test_speed_dependence.py::test_a_case_is_that_of_constant_bearings[central",
     "figures/test_accessor.py::test_each_figure_is_drawn",
+    "figures/test_accessor.py::test_what_run_up_returns_has_figures_though_no_store_was_opened",
     "figures/test_basins.py::test_a_start_and_a_parameter_make_a_plane",
     "figures/test_basins.py::test_cells_have_the_colour_of_their_motion",
     "figures/test_bifurcation.py::test_command",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import inspect
 import pydoc
+import subprocess
+import sys
 from typing import TYPE_CHECKING
 
 import matplotlib
@@ -154,3 +156,9 @@ def test_a_selection_can_be_gone_on_with(store: xr.Dataset) -> None:
 def test_a_wrong_value_names_what_is_near(store: xr.Dataset) -> None:
     with pytest.raises(InputError, match=r"speed_ratio = 1\.4: not on the grid; choose one of"):
         store.rub.orbit(speed_ratio=1.4)
+
+
+def test_what_run_up_returns_has_figures_though_no_store_was_opened() -> None:
+    script = "import rubhpc, xarray; rubhpc.run_up; print(hasattr(xarray.Dataset, 'rub'))"
+    found = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert found.stdout.strip() == "True"
