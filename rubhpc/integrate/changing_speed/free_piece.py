@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 
 DRIVEN_LAG = 0.25 * LAG  # rad, by which the shaft may depart from its angle: the twist feels its speed too
 # Rub comes in touches, between which the speed is not on its mean line: its share of the torques counts so
-# many times.
-UNEVEN = 25.0
+# many times, down to this part of a revolution.
+UNEVEN, SHORTEST = 25.0, 4
 GUESSED = 0.005 * LAG  # rad, by which the shaft's angle may depart from that of the acceleration guessed
 MOST_TRIES = 4  # of a piece, after which it is halved
 
@@ -142,7 +142,8 @@ class Spin:
                 )
             flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)
             rubbed = UNEVEN * abs(flows[FRICTION_LOSS]) / (turned * inertia)  # rad/s^2
-            if not is_fixed and rubbed * duration**2 > 12.0 * DRIVEN_LAG and length % 2 == 0:
+            is_long = rubbed * duration**2 > 12.0 * DRIVEN_LAG and SHORTEST * length > per_revolution
+            if not is_fixed and is_long and length % 2 == 0:
                 return None
             before = self._momentum(state_at(reached, setup), first)
             after = self._momentum(state_at(passed.end, setup), last)
