@@ -27,6 +27,9 @@ _LITTLE = 0.5  # of what a case has taken: as much more is worth knowing better 
 _FIRST, _FIRST_STEPS = 1 / 16, 50_000  # of a case, and predicted steps: its first part
 _GROWING = 0.01  # new contact modes over those of all revolutions before: beyond, a motion is irregular
 _LATE = 0.25  # least pace of a part without its contact modes, over that with them
+_REPEATED = (
+    1.25  # revolutions that are counted over a length: two motions that take over from a tangent align anew
+)
 _PROBED = 8  # revolutions at most, of those that show what is left of a case will take
 
 
@@ -74,7 +77,8 @@ class Forecast(NamedTuple):
             return 0.0
         if self.n_behind < max(self.lengths[:1], default=1):
             return usual
-        return next((float(n) for n in self.lengths if n > self.n_behind), float(self.n_behind))
+        likely = (n for n in self.lengths if n > self.n_behind / _REPEATED)
+        return float(max(next(likely, 0), self.n_behind))
 
 
 class FollowedCase:

@@ -205,16 +205,15 @@ class Pilots:
         """Time that it takes to finish a shortened case, s; infinite where it is kept no longer."""
         return self.foreseen(index) - self._kept[index].seconds if index in self._kept else math.inf
 
-    def finish(self, index: tuple[int, ...], limit: float) -> float | None:
-        """Time of a shortened case that goes on to its end, s; None where that takes over `limit` s."""
+    def finish(self, index: tuple[int, ...], limit: float) -> tuple[float, bool]:
+        """Time of a shortened case that goes on, s, and whether it came to its end within `limit` s more."""
         followed = self._kept.pop(index)
         followed.finish(limit)
         self._take_in(followed)
         if followed.is_whole:
             self.irregular.discard(index)
-            return followed.seconds
-        self.shortened[index] = followed.forecast()
-        return None
+            return followed.seconds, True
+        return followed.forecast().whole(self.n_behind), False
 
     def _branches(self, case: Case) -> float:
         """Time of the branches of a case; `was_cut` where they were not followed to their ends."""

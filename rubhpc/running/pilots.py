@@ -170,11 +170,11 @@ def _finish(pilots: Pilots, picked: list[tuple[int, ...]], sample: Sample, left:
         if left <= pilots.left(picked[k]):
             continue
         began = time.process_time()
-        seconds = pilots.finish(picked[k], max(left, _PATIENCE * pilots.left(picked[k])))
+        seconds, has_ended = pilots.finish(picked[k], max(left, _PATIENCE * pilots.left(picked[k])))
         left -= time.process_time() - began
-        if seconds is None:
+        sample.seconds[k], sample.is_whole[k] = seconds, True  # or nearly so
+        if not has_ended:
             break
-        sample.seconds[k], sample.is_whole[k] = seconds, True
     for k in shortened:
         foreseen = pilots.foreseen(picked[k])
         if sample.is_whole[k]:

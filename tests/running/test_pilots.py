@@ -95,7 +95,7 @@ def test_dearest_case_is_finished(monkeypatch, n_case, left):
         def finish(self, index, limit):
             asked.append((index, limit))
             now[0] += limit - 0.15  # no time is left for the third
-            return 3.0 * self.shortened[index]
+            return 3.0 * self.shortened[index], True
 
     monkeypatch.setattr(pilots, "Pilots", Pilots)
     monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3, 1 / n_case) for i in range(6)))
