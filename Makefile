@@ -9,7 +9,7 @@ PAPER := paper
 # Hundreds of processes start in the tests: a fifth of each start compiles sources whose bytecode is not kept.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo docs paper check test faults validation kernels lint bench bench-scale clean
+.PHONY: help demo docs paper check test faults validation kernels lint bounds bench bench-scale clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -65,6 +65,9 @@ lint: $(VENV)/.ready ## style, types and the layers of imports
 docs: $(VENV)/.docs ## the documentation as a site, in build/docs; warnings and broken links are errors
 	$(BIN)/python -m sphinx -E -W --keep-going -q -b html -d build/doctrees docs build/docs
 	@echo "Open $(CURDIR)/build/docs/index.html"
+
+bounds: $(VENV)/.ready ## kernels with checked indices, over random rigs, laws and motions; half an hour
+	$(BIN)/python tests/support/bounds.py 1800
 
 bench: $(VENV)/.ready ## timings
 	$(BIN)/python -m pytest tests/bench tests/faults/test_many_cases.py -m bench --benchmark-columns=min,median,rounds

@@ -243,15 +243,16 @@ def sweep_all(
 def go_on(mask: int, step: float, work: CurvedWork) -> None:
     """Make the end of a step (s) the beginning of the next."""
     follow_loads(mask, step, step, work)
+    end = N_NODE - 1
     for i in range(work.load.shape[1]):
         if is_closed(mask, i):
             for node in range(N_NODE):
                 work.span[LARGEST] = max(work.span[LARGEST], work.force[node, i])
             for a in range(work.load.shape[2]):
-                work.load[0, i, a] = work.load[-1, i, a]
-        work.h[0, i], work.rate[0, i] = work.h[-1, i], work.rate[-1, i]
-        work.force[0, i], work.slip[0, i] = work.force[-1, i], work.slip[-1, i]
-        work.gap[0, 0, i], work.gap[1, 0, i] = work.gap[0, -1, i], work.gap[1, -1, i]
+                work.load[0, i, a] = work.load[end, i, a]
+        work.h[0, i], work.rate[0, i] = work.h[end, i], work.rate[end, i]
+        work.force[0, i], work.slip[0, i] = work.force[end, i], work.slip[end, i]
+        work.gap[0, 0, i], work.gap[1, 0, i] = work.gap[0, end, i], work.gap[1, end, i]
 
 
 @jit_inline_sum
