@@ -172,10 +172,12 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
 
     for _ in range(MOST_TRIALS):
         near, far = free[-1][0], ends[b.sequence if is_first_free else a.sequence]
-        root = _root(free) or root  # a gap of rounding is not seen any more
+        ahead_of = _root(free)  # a gap of rounding is not seen any more, and another one may be
+        if _between(near, ahead_of, far) or (ahead_of is not None and not _between(near, root, far)):
+            root = ahead_of
         if root is not None:
             missing = min(missing, abs(root - near))
-        if root is None or not min(near, far) < root < max(near, far):
+        if root is None or not _between(near, root, far):
             share = 0.5 * (near + far)
         elif abs(root - near) < tolerance:
             return Grazing(free[-1][1], impacting(near))
@@ -236,6 +238,11 @@ def grazing_beside(branching: Branching, a: Point, b: Point) -> Grazing | None:
         if len(pair) < 2 or abs(pair[-1][0] - pair[-2][0]) * branching.step > branching.family.span:
             return None
     return Grazing(pair[-1][1], other)
+
+
+def _between(one: float, place: float | None, other: float) -> bool:
+    """Whether a place is known, and lies between two."""
+    return place is not None and min(one, other) < place < max(one, other)
 
 
 def _is_apart(free: Point, other: Point) -> bool:
