@@ -17,7 +17,7 @@ from rubhpc.integrate.changing_speed.case import by_revolution
 from rubhpc.integrate.changing_speed.driven import DrivenRun, integrate_driven
 from rubhpc.integrate.changing_speed.run_up import integrate_run_up
 from rubhpc.integrate.measuring.samples import by_name
-from rubhpc.integrate.setup import ModalSetup
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.schema import (

@@ -23,10 +23,11 @@ import numba
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.measuring.samples import new_accumulator
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.record import State
 from rubhpc.integrate.scheme import Scheme
-from rubhpc.integrate.setup import ModalSetup, prepare
+from rubhpc.integrate.setup import prepare
 from rubhpc.kernels._jit import cache_of, plain
 from rubhpc.kernels.flow import follow_piece
 from rubhpc.kernels.force_average import add_force

@@ -32,6 +32,7 @@ from rubhpc.integrate.measuring.samples import (
     probe_extents,
     samples_within,
 )
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.direct import pass_directly
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
@@ -39,7 +40,6 @@ from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.shared_motions import shared_motions
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.scheme import Scheme
-from rubhpc.integrate.setup import ModalSetup
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.integrate.transient import pass_revolutions, pass_transient

@@ -15,9 +15,9 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.fem.constraints import find_rigid_body_mode
 from rubhpc.fem.model import state_size
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State
-from rubhpc.integrate.setup import ModalSetup
 from rubhpc.kernels.complementarity import solve_complementarity
 from rubhpc.kernels.contact_pairs import AXIAL, normal_and_gap
 

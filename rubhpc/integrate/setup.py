@@ -3,289 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
-
-import numpy as np
+from typing import TYPE_CHECKING, TypeAlias
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.free_spin import release
 from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.central_difference_setup import CentralDifferenceSetup, prepare_steps
-from rubhpc.integrate.measuring.divergence import energy_limit
+from rubhpc.integrate.modal_setup import LONGEST_TURN, ModalSetup
 from rubhpc.integrate.packing import law_of
-from rubhpc.integrate.reduced_model.contact_mode import (
-    ContactMode,
-    KeptParts,
-    confine,
-    solve_contact_mode,
-    solve_parts,
-)
-from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
-from rubhpc.integrate.reduced_model.friction_library import FrictionLibrary
-from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
-from rubhpc.integrate.reduced_model.mode_library import (
-    ModeLibrary,
-    PenaltyLibrary,
-    Shared,
-    width_without_modes,
-)
-from rubhpc.integrate.reduced_model.mode_tables import tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import Penalty
-from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies, reduce_model
-from rubhpc.integrate.reduced_model.truncation import (
-    MOST_MODES,
-    kept_modes,
-    modal_error,
-    sufficient_accuracy,
-    touch_of,
-)
-from rubhpc.integrate.scheme import Scheme, scheme_of
-from rubhpc.kernels.case_progress import Clock
-from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
-from rubhpc.kernels.laws import MULTIPLIER
+from rubhpc.integrate.reduced_model.reduction import reduce_model
+from rubhpc.integrate.reduced_model.truncation import touch_of
+from rubhpc.integrate.scheme import scheme_of
 from rubhpc.study.tables import SEARCH_STEP
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from rubhpc.fem.free_spin import FreeSpin
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import Solved
-    from rubhpc.kernels.contact_modes import ModeTables, Reduced
-    from rubhpc.kernels.laws import Law
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.rig.probes import Probe
     from rubhpc.rig.rig import Rig
     from rubhpc.study.drive_law import DriveLaw
     from rubhpc.study.study import Contact, Integrator
-
-    Floats = NDArray[np.float64]
-
-L = TypeVar("L", bound=ModeLibrary)
-FINEST_TICK = 1.5e-9  # s
-CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
-LONGEST_TURN = FINEST_TICK * 2**46  # s, a day: 64 bits count the ticks of a hundred thousand
-FEWEST_STEPS = 16  # a revolution: none is longer than the power of two below it
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ModalSetup:
-    """All that the cases of one rig and speed share; contact modes are solved when they are first met."""
-
-    scheme: Scheme = Scheme.EVENT_DRIVEN  # with which a case begins
-    model: Model
-    reduced: ReducedModel
-    spin: float  # rad/s
-    step: float  # s, up to which steps are taken without a bound
-    contact_step: float  # s, of contact where it has no closed form
-    samples_per_revolution: int
-    is_updated: bool  # normal
-    displacement_limit: float  # m
-    law: Law = MULTIPLIER
-    accuracy: float = 1e-3  # relative, of the modes kept, and of loads where gaps are curved
-    free_spin: FreeSpin | None = None  # where a drive turns it
-    is_measured: bool = True  # or followed alone: tables then hold no outputs and energies
-    _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
-    _curved_libraries: dict[float, CurvedLibrary] = field(default_factory=dict)
-    _friction_libraries: dict[float, FrictionLibrary] = field(default_factory=dict)
-    _penalty_libraries: dict[float, PenaltyLibrary] = field(default_factory=dict)
-    _open_tables: dict[float, ModeTables] = field(default_factory=dict)
-
-    @cached_property
-    def energy_limit(self) -> float:
-        """Mechanical energy, J, beyond which a motion has diverged."""
-        return energy_limit(self.model, self.spin, self.displacement_limit)
-
-    @cached_property
-    def modal_error(self) -> float:
-        """Estimated error by the modes left out, as a share of each signal and force."""
-        touch = touch_of(self.model, self.law, is_updated=self.is_updated)
-        are_kept = kept_modes(self.model, self.spin, self.accuracy, touch)
-        return modal_error(self.model, self.spin, are_kept, touch)
-
-    @cached_property
-    def modes_missing(self) -> str:
-        """What to do where that error is above the accuracy asked for; "" where it is not."""
-        if self.modal_error <= self.accuracy:
-            return ""
-        fix = sufficient_accuracy(self.model, self.spin)
-        return (
-            f"it needs more than {MOST_MODES} modes: those left out may change it by "
-            f"{100 * self.modal_error:.2g} %; accuracy = {fix:.0e} keeps all"
-        )
-
-    def bodies(self, friction: float, clearance: Floats) -> Reduced:
-        """The reduced bodies of a case as kernels take them; clearance (q,), m."""
-        return kernel_bodies(self.reduced, self.model, friction, clearance, self.law, self.displacement_limit)
-
-    @cached_property
-    def interval(self) -> float:
-        """Time between samples, s."""
-        return 2.0 * math.pi / (abs(self.spin) * self.samples_per_revolution)
-
-    @cached_property
-    def sample_level(self) -> int:
-        """2^sample_level ticks are the interval of samples; no step of contact is shorter than a tick."""
-        return max(2, self._contact_levels, math.ceil(math.log2(self.interval / FINEST_TICK)))
-
-    @property
-    def _contact_levels(self) -> int:
-        """By how many levels the longest step of a recorded contact is below the interval of samples."""
-        return max(0, math.ceil(math.log2(CONTACT_STEPS / self.samples_per_revolution)))
-
-    @cached_property
-    def tick(self) -> float:
-        """Resolution of events, s."""
-        return self.interval / (1 << self.sample_level)
-
-    @cached_property
-    def clock(self) -> Clock:
-        """How time is counted, from the shaft's angle 0 on, before a record is asked for."""
-        return Clock(
-            spin=self.spin,
-            tick=self.tick,
-            sample_level=self.sample_level,
-            samples_per_revolution=self.samples_per_revolution,
-            search_level=self.level_within(self.step),
-            contact_level=self.sample_level - self._contact_levels,
-            n_sample=0,
-            growth=0.0,
-        )
-
-    def level_within(self, step: float) -> int:
-        """Largest level at which 2^level ticks are no longer than a step, s, and than a sample's interval."""
-        return max(0, min(self.sample_level, math.floor(math.log2(step / self.tick))))
-
-    @cached_property
-    def _opened(self) -> ContactMode:
-        """Motion with every pair open, whatever the friction."""
-        gap_jacobian, force_direction, _ = directions(self.reduced, self.model, 0.0)
-        return solve_contact_mode(self.reduced, gap_jacobian, force_direction, 0, self._known_of_ring)
-
-    @cached_property
-    def _n_level(self) -> int:
-        """Levels for which exponentials are tabulated."""
-        past_sample = max(SAMPLES_AT_ONCE, self.samples_per_revolution // FEWEST_STEPS)
-        return self.sample_level + past_sample.bit_length()
-
-    def library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction, shared by its cases."""
-        if friction not in self._libraries:
-            self._libraries[friction] = self._make_library(ModeLibrary, friction)
-        return self._libraries[friction]
-
-    def curved_library(self, friction: float) -> CurvedLibrary:
-        """Contact modes of a friction with what curved gaps need, shared by its cases."""
-        if friction not in self._curved_libraries:
-            self._curved_libraries[friction] = self._make_library(CurvedLibrary, friction)
-        return self._curved_libraries[friction]
-
-    def _make_library(self, kind: type[L], friction: float) -> L:
-        return kind(self.reduced, self.model, friction, **self._shared)
-
-    @property
-    def _shared(self) -> Shared:
-        """What all libraries take; that of Coulomb's law has parts of its own."""
-        return {
-            "opened": self._opened,
-            "known": self._known_of_ring,
-            "tick": self.tick,
-            "sample_level": self.sample_level,
-            "n_level": self._n_level,
-            "is_measured": self.is_measured,
-        }
-
-    @cached_property
-    def _known(self) -> Solved:
-        """The parts of the system with every pair open; those of several stators' contact modes join them."""
-        n = self.reduced.stiffness.shape[0]
-        opened = solve_parts(confine(self.reduced, np.zeros((0, n)), np.zeros((n, 0)))[2])
-        return KeptParts(opened) if len(self.model.stators) > 1 else opened
-
-    @property
-    def _known_of_ring(self) -> Solved:
-        """The same of several stators; of one there is little to look up."""
-        return self._known if len(self.model.stators) > 1 else {}
-
-    def friction_pairs(self, friction: float) -> FrictionPairs:
-        """The pairs of a friction."""
-        gap_jacobian, _, slip = directions(self.reduced, self.model, friction)
-        radius = np.array([stator.radius for stator in self.model.stators])
-        return FrictionPairs(
-            gap_jacobian=gap_jacobian,
-            friction_direction=-slip,
-            friction=friction,
-            static_ratio=self.law.static_friction_ratio,
-            rim_speed=radius * abs(self.spin),
-            stiffness=self.law.stiffness,
-            damping=self.law.damping,
-        )
-
-    def friction_library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction whose slip may turn, shared by its cases."""
-        if friction not in self._friction_libraries:
-            pairs = self.friction_pairs(friction)
-            opened = solve_friction_mode(self.reduced, pairs, 0, self._known)
-            shared: Shared = {**self._shared, "opened": opened, "known": self._known}
-            self._friction_libraries[friction] = FrictionLibrary(self.reduced, self.model, pairs, **shared)
-        return self._friction_libraries[friction]
-
-    @property
-    def _all_libraries(self) -> tuple[dict[float, Any], ...]:
-        return self._libraries, self._curved_libraries, self._friction_libraries, self._penalty_libraries
-
-    @property
-    def n_byte(self) -> dict[float, int]:
-        """Memory that tables of contact modes hold, by friction."""
-        found: Counter[float] = Counter()
-        for held in self._all_libraries:
-            found.update({friction: library.n_byte for friction, library in held.items()})
-        return found
-
-    def n_solved(self, friction: float) -> int:
-        """Contact modes of a friction that were solved, those that were given up and met again included."""
-        return sum(held[friction].n_solved for held in self._all_libraries if friction in held)
-
-    def forget(self, friction: float) -> None:
-        """Free the contact modes of a friction."""
-        self._open_tables.pop(friction, None)
-        for held in self._all_libraries:
-            held.pop(friction, None)
-        if not any(self._all_libraries):  # nor the parts that they share, but those with every pair open
-            vars(self).pop("_known", None)
-
-    def penalty_library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction under a penalty, shared by its cases."""
-        if friction not in self._penalty_libraries:
-            gap_jacobian, force_direction, _ = directions(self.reduced, self.model, friction)
-            penalty = Penalty(self.law.stiffness, self.law.damping, gap_jacobian, force_direction)
-            self._penalty_libraries[friction] = PenaltyLibrary(
-                self.reduced, self.model, friction, penalty=penalty, **self._shared
-            )
-        return self._penalty_libraries[friction]
-
-    def open_tables(self, friction: float) -> ModeTables:
-        """Tables of the mode with every pair open alone, as wide as those of the friction's library."""
-        if friction not in self._open_tables:
-            library = self._libraries.get(friction)
-            self._open_tables[friction] = tabulate(
-                self._opened,
-                self.reduced,
-                directions(self.reduced, self.model, friction)[2],
-                width=library.width
-                if library
-                else width_without_modes(self.reduced, self.model, friction, self._opened.exponent.size),
-                tick=self.tick,
-                sample_level=self.sample_level,
-                n_level=self._n_level,
-            )
-        return self._open_tables[friction]
-
 
 Setup: TypeAlias = CentralDifferenceSetup | ModalSetup
 

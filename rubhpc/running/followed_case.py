@@ -10,7 +10,7 @@ from rubhpc.integrate.case import march_of, run_case
 from rubhpc.integrate.following import n_followed
 from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN
 from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS, N_ALL, N_FIRST, N_MOST
-from rubhpc.integrate.setup import ModalSetup
+from rubhpc.integrate.modal_setup import ModalSetup
 
 if TYPE_CHECKING:
     from rubhpc.integrate.record import Record, State

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import TYPE_CHECKING
 
-from rubhpc.integrate.setup import ModalSetup
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.running.case_setup import set_up
 from rubhpc.study.drive_law import DriveLaw
 

@@ -15,7 +15,7 @@ import time
 from dataclasses import replace
 
 import rubhpc
-from rubhpc.integrate.setup import ModalSetup
+from rubhpc.integrate.modal_setup import ModalSetup
 
 COUNTS = (3, 8, 12, 16, 32)
 FRICTION = 0.05

@@ -6,7 +6,8 @@ import pytest
 
 import rubhpc
 from rubhpc import InputError
-from rubhpc.integrate.setup import CONTACT_STEPS, FINEST_TICK, LONGEST_TURN, prepare
+from rubhpc.integrate.modal_setup import CONTACT_STEPS, FINEST_TICK, LONGEST_TURN
+from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import Contact, Integrator
 

@@ -15,7 +15,7 @@ from rubhpc.integrate.changing_speed.run_up import integrate_run_up
 from rubhpc.integrate.changing_speed.turns import contact_measures
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.measuring.samples import by_name, probe_extents
-from rubhpc.integrate.setup import ModalSetup
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.schema import AMPLITUDE, DIVERGED, DONE, ORDERS, PHASE, PROBE, TRACKED, case_measures
 from rubhpc.spectra import track_orders
 from rubhpc.study.drive_law import DriveLaw

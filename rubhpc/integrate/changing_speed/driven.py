@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
-    from rubhpc.integrate.setup import ModalSetup
     from rubhpc.study.drive_law import DriveLaw
     from rubhpc.study.initial import Initial
 

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.changing_speed.carried_modes import Standing
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
-    from rubhpc.integrate.setup import ModalSetup
     from rubhpc.study.drive_law import DriveLaw
 
     Floats = NDArray[np.float64]

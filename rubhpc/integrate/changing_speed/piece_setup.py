@@ -12,10 +12,10 @@ from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
 from rubhpc.integrate.changing_speed.retuned_modes import Desk, RetunedLibrary
 from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.reduced_model.contact_mode import KeptParts
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import directions
-from rubhpc.integrate.setup import ModalSetup
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.integrate.modal_setup import ModalSetup
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
     from rubhpc.integrate.marches.modal import Place
-    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator
     from rubhpc.study.speed_law import SpeedLaw
 

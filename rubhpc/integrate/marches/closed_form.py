@@ -13,7 +13,7 @@ from rubhpc.kernels._jit import plain
 from rubhpc.kernels.laws import is_penalty, is_set_valued
 
 if TYPE_CHECKING:
-    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.kernels.laws import Law
 
 _MARCHES: WeakKeyDictionary[ModalSetup, type[EventDrivenMarch]] = WeakKeyDictionary()

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
-    from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Clock
     from rubhpc.kernels.sampling import Recorder

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.marches.modal import Place
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
-    from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Progress
     from rubhpc.kernels.contact_modes import ModeTables

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.marches.modal import Place
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
-    from rubhpc.integrate.setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.contact_pairs import Workspace

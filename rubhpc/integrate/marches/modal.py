@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.setup import ModalSetup
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Progress
     from rubhpc.kernels.contact_modes import ModeTables

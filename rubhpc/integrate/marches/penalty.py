@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
-    from rubhpc.integrate.setup import ModalSetup
 
     Floats = NDArray[np.float64]
 

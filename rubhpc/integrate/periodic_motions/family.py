@@ -12,6 +12,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.integrate.marches.met_modes import NoClosedForm
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import law_of
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
 from rubhpc.integrate.periodic_motions.saltation import by_clearance
@@ -19,7 +20,7 @@ from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.along_speeds import AlongSpeeds
 from rubhpc.integrate.reduced_model.truncation import touch_of
 from rubhpc.integrate.scheme import Scheme
-from rubhpc.integrate.setup import ModalSetup, prepare
+from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
     from rubhpc.integrate.periodic_motions.shooting import Orbit
     from rubhpc.integrate.record import Record, State
-    from rubhpc.integrate.setup import ModalSetup
 
     Floats = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from rubhpc.kernels.friction_states import STUCK, state_of
 
 if TYPE_CHECKING:
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
-    from rubhpc.integrate.setup import ModalSetup
 
 Floats = NDArray[np.float64]
 Change = Literal["touch", "release", "slip", "stick"]

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
-    from rubhpc.integrate.setup import ModalSetup
 
     Floats = NDArray[np.float64]
 

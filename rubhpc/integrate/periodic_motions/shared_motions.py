@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rubhpc.integrate.marches.march import March
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
     from rubhpc.integrate.record import State
-    from rubhpc.integrate.setup import ModalSetup
     from rubhpc.study.study import Recording
 
 SPEEDS, DIRECTIONS = (1.0, 3.0), 4  # of the output node, over spin times clearance; on the way to a motion

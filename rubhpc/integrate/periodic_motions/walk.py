@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
     from rubhpc.integrate.marches.modal import Place
+    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.periodic_motions.known_motions import KnownMotions
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
     from rubhpc.integrate.periodic_motions.shooting import Orbit
-    from rubhpc.integrate.setup import ModalSetup
     from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]

@@ -255,7 +255,7 @@ def test_modes_of_both_planes_are_kept_together():
 
 def test_number_of_modes_is_bounded_and_the_rest_is_reported(monkeypatch):
     monkeypatch.setattr(truncation, "MOST_MODES", 30)
-    monkeypatch.setattr("rubhpc.integrate.setup.MOST_MODES", 30)
+    monkeypatch.setattr("rubhpc.integrate.modal_setup.MOST_MODES", 30)
     rig = at_node_5(radius=0.01, youngs_modulus=3e10)
     case = {"speed_ratio": 1.1, "clearance": "100 um", "transient": 0, "revolutions": 2}
     record = simulate(rig, **case)
