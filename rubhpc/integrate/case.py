@@ -6,14 +6,15 @@ import math
 import time
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.integrate.ahead import compile_ahead
+from rubhpc.integrate.closed_form_case import exponents_of, neighbours_of, solver_of, trail_of
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
-from rubhpc.integrate.lyapunov import Growth, Marches
+from rubhpc.integrate.lyapunov import Growth
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
@@ -23,7 +24,6 @@ from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.carried import carrier_displacement, tip_deflection
 from rubhpc.integrate.measuring.diverged_record import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of
-from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS
 from rubhpc.integrate.measuring.samples import (
     add_sag,
     by_name,
@@ -34,16 +34,14 @@ from rubhpc.integrate.measuring.samples import (
 )
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.direct import pass_directly
-from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.shared_motions import shared_motions
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.start import start_of
-from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
-from rubhpc.schema import DONE, SECTION_NAMES, lyapunov_variables
+from rubhpc.schema import DONE, SECTION_NAMES
 from rubhpc.spectra import amplitude_spectrum
 from rubhpc.study.initial import Initial
 
@@ -53,13 +51,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.lyapunov import Neighbours
     from rubhpc.integrate.marches.march import March
     from rubhpc.integrate.periodic_motions.shooting import Orbit
     from rubhpc.integrate.periodic_motions.walk import Passed
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
-    from rubhpc.kernels.trail import Trail
     from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
@@ -186,7 +182,7 @@ def _integrate(
     else:
         energy_before = march.energy()
         accumulator.is_touching[:] = march.touching()  # a contact under way did not begin in the record
-        trail = _trail(march, recording)
+        trail = trail_of(march, recording)
         reason = march.advance(0, n_sample, samples, accumulator, is_recorded=True)
     n_step, n_left = n_step + march.n_step, n_left + march.n_left
     if reason is not None:
@@ -205,8 +201,8 @@ def _integrate(
         add_sag(samples, accumulator, setup.model)
         signals, final = by_name(samples.whole, setup.model), march.final()
         energy = energy_before, march.energy()
-        solver = _solver(march, setup, clearance, friction, final, begun_on)
-        growth = Growth(lambda: _neighbours(march, trail, start, final, setup, recording))
+        solver = solver_of(march, setup, clearance, friction, final, begun_on)
+        growth = Growth(lambda: neighbours_of(march, trail, start, final, setup, recording))
         record = Record(
             status=DONE,
             samples_per_revolution=per_revolution,
@@ -238,7 +234,7 @@ def _integrate(
             n_exponent=recording.lyapunov,
         )
         if recording.lyapunov:
-            record.measures.update(_spectrum(march, begin, final, recording.lyapunov))
+            record.measures.update(exponents_of(march, begin, final, recording.lyapunov))
         if "waveform" not in recording.keep:
             record.signals.clear()
     record.measures.update(transient_revolutions=n_transient, steps=n_step, left_closed_form=n_left)
@@ -283,60 +279,6 @@ def _solve_from(setup: Setup, clearance: float, friction: float, state: State) -
     """Piecewise motion of a case in closed form."""
     assert isinstance(setup, ModalSetup)
     return PiecewiseMotion(setup, clearance, friction, state)
-
-
-def _spectrum(
-    march: March, begin: Callable[[State], PiecewiseMotion], final: State, n_exponent: int
-) -> dict[str, float]:
-    """Lyapunov exponents from where a march has ended; NaN where it has no closed form."""
-    if isinstance(march, EventDrivenMarch) and march.has_closed_form:
-        found = spectrum_of(partial(begin, final), n_exponent)
-        largest = found["lyapunov_1"]
-        return found if math.isnan(largest) else found | {"lyapunov_exponent": largest}
-    return dict.fromkeys(lyapunov_variables(n_exponent), math.nan)
-
-
-def _solver(
-    march: March,
-    setup: Setup,
-    clearance: float,
-    friction: float,
-    final: State,
-    begun_on: tuple[PiecewiseMotion, Orbit] | None,
-) -> Solver | None:
-    """What finds periodic motions next to where a march has ended; None where it has no closed form."""
-    if isinstance(march, EventDrivenMarch) and march.has_closed_form and isinstance(setup, ModalSetup):
-        return Solver(setup, clearance, friction, final, begun_on, march)
-    return None
-
-
-def _trail(march: March, recording: Recording) -> Trail | None:
-    """Have the events of a record noted, where its tangent may be carried along them."""
-    if (
-        isinstance(march, EventDrivenMarch)
-        and march.has_closed_form
-        and recording.revolutions >= LEAST_REVOLUTIONS
-    ):
-        trail = march.new_trail()
-        march.keep(trail)
-        return trail
-    return None
-
-
-def _neighbours(
-    march: March,
-    trail: Trail | None,
-    start: Callable[[State], March],
-    final: State,
-    setup: Setup,
-    recording: Recording,
-) -> Neighbours:
-    """A motion beside that from where a march has ended."""
-    if isinstance(march, EventDrivenMarch) and march.has_closed_form:
-        return TangentMotion(
-            cast("Callable[[State], EventDrivenMarch]", start), final, setup, recording, trail, march
-        )
-    return Marches(start, final, setup, recording)
 
 
 def _spectra(samples: Samples, model: Model) -> dict[str, Floats]:

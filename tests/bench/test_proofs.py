@@ -25,10 +25,10 @@ def test_proofs_cost_a_quarter_of_a_map_at_most(tmp_path, monkeypatch, capsys):
         assert old in text
         text = text.replace(old, new)
     (tmp_path / "study.toml").write_text(text)
-    solver = integration._solver
+    solver = integration.solver_of
 
     def seconds(name: str, finds: bool) -> float:
-        monkeypatch.setattr(integration, "_solver", solver if finds else lambda *_: None)
+        monkeypatch.setattr(integration, "solver_of", solver if finds else lambda *_: None)
         study = read_study(tmp_path / "study.toml", tmp_path / f"{name}.zarr")
         began = time.process_time()
         rubhpc.run(study, quiet=True)

@@ -38,8 +38,8 @@ def test_motion_that_the_record_has_left_is_solved_for_anew(monkeypatch):
         found.append((begun_on, setup, clearance, friction, final))
         return solver(march, setup, clearance, friction, final, begun_on)
 
-    solver = case._solver
-    monkeypatch.setattr(case, "_solver", note)
+    solver = case.solver_of
+    monkeypatch.setattr(case, "solver_of", note)
     simulate("mokhtar2017", transient="direct", revolutions=5, **TWICE)
     (piecewise, orbit), setup, clearance, friction, final = found[0]
     held = proof.Solver(setup, clearance, friction, final, (piecewise, orbit))
