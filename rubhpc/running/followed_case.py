@@ -20,16 +20,12 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Recording
 
 _LONG = 0.25  # s: cases that take less are run twice
-_PATIENCE = (
-    15.0  # s, after which a part is cut off at the earliest: a whip that begins meets 300 contact modes
-)
+_PATIENCE = 15.0  # s that a part may take in any case: a whip that begins meets 300 contact modes
 _LITTLE = 0.5  # of what a case has taken: as much more is worth knowing better what is to come
 _FIRST, _FIRST_STEPS = 1 / 16, 50_000  # of a case, and predicted steps: its first part
 _GROWING = 0.01  # new contact modes over those of all revolutions before: beyond, a motion is irregular
 _LATE = 0.25  # least pace of a part without its contact modes, over that with them
-_REPEATED = (
-    1.25  # revolutions that are counted over a length: two motions that take over from a tangent align anew
-)
+_REPEATED = 1.25  # revolutions counted over a length: two motions that take over from a tangent align anew
 _PROBED = 8  # revolutions at most, of those that show what is left of a case will take
 
 

@@ -158,9 +158,7 @@ def time_pilots(
 
 
 def _finish(pilots: Pilots, picked: list[tuple[int, ...]], sample: Sample, left: float) -> None:
-    """Finish cases that were shortened, the dearest first.
-
-    All of them take some `left` seconds.
+    """Finish cases that were shortened, the dearest first, in some `left` seconds together.
 
     What such a case comes to is hardly known from its beginning: more and more sets of contacts, a tangent
     that is carried on and on. The others are foreseen anew, and corrected by what it came to.
