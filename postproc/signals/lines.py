@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 SPIKE = 0.004  # half width of a spike, as a part of the abscissa
 MAX_DENOMINATOR = 8  # sub-harmonics beyond the eighth cannot be distinguished from quasi-periodic lines
+_EXACT = 1e-6  # orders
+_NAMED = 0.25  # lines between the order of a sine and the one that it is named by, at most
 
 
 def order_name(order: float, tolerance: float = 1e-6, max_denominator: int = MAX_DENOMINATOR) -> str:
@@ -24,6 +26,37 @@ def order_name(order: float, tolerance: float = 1e-6, max_denominator: int = MAX
         if fraction != 0 and abs(float(fraction) - order) <= tolerance:
             return f"{fraction}X"
     return f"{order:.2f}X"
+
+
+def sine_order(order: NDArray[np.float64], amplitude: NDArray[np.float64], peak: int) -> float:
+    """Order of the sine that a peak of a spectrum belongs to, in a record without a window.
+
+    The line of a sine falls with one over its distance, so that the peak and its higher neighbour, of
+    amplitudes A and B, lie to both sides of it, at distances as B to A.
+
+    Parameters
+    ----------
+    order, amplitude : (n,)
+        Of all lines, evenly spaced.
+    peak : int
+        Index of a local maximum.
+    """
+    beside = [i for i in (peak - 1, peak + 1) if 0 <= i < len(order)]
+    higher = max(beside, key=lambda i: float(amplitude[i]))
+    share = float(amplitude[higher] / (amplitude[peak] + amplitude[higher]))
+    return float(order[peak] + share * (order[higher] - order[peak]))
+
+
+def _name_line(
+    order: NDArray[np.float64], amplitude: NDArray[np.float64], peak: int, max_denominator: int
+) -> str:
+    """Name of a peak by its order, or by that of its sine; by decimals where neither is a simple fraction."""
+    name = order_name(float(order[peak]), _EXACT, max_denominator)
+    if "." not in name:
+        return name
+    return order_name(
+        sine_order(order, amplitude, peak), _NAMED * abs(float(order[1] - order[0])), max_denominator
+    )
 
 
 def parse_orders(text: str, where: str) -> list[Fraction]:
@@ -68,8 +101,9 @@ def strongest_lines(
     Returns
     -------
     Dataset over `line`
-        `order`, `amplitude`, `name`, and `frequency` (Hz) where the spectrum has it. A name holds to within
-        half a line's width, since a record that does not hold whole periods shifts a line off its order.
+        `order`, `amplitude`, `name`, and `frequency` (Hz) where the spectrum has it. A record that does not
+        hold whole periods of a sine shifts its line off its order, by half a line at most; such a line is
+        named by where the sine lies between it and its higher neighbour (`sine_order`).
     """
     order = spectrum["order"].values
     amplitude = np.where(np.isfinite(spectrum.values), spectrum.values, 0.0)
@@ -79,12 +113,12 @@ def strongest_lines(
     is_peak &= amplitude >= threshold * amplitude.max(initial=0.0)
     peaks = np.flatnonzero(is_peak)
     peaks = peaks[np.argsort(-amplitude[peaks], kind="stable")][:n_line]
-    half_width = abs(float(order[1] - order[0])) / 2 * (1 + 1e-9)
+    names = [_name_line(order, amplitude, i, max_denominator) for i in peaks.tolist()]
     lines = xr.Dataset(
         {
             "order": ("line", order[peaks], {"units": "1"}),
             "amplitude": ("line", amplitude[peaks], dict(spectrum.attrs)),
-            "name": ("line", [order_name(order[i], half_width, max_denominator) for i in peaks]),
+            "name": ("line", names),
         }
     )
     if "frequency" in spectrum.coords:

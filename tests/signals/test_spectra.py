@@ -125,6 +125,15 @@ def test_lines_beside_their_order_keep_its_name():
     assert str(lines["name"].values[0]) == "1/3X"
 
 
+@pytest.mark.parametrize(
+    ("order", "name"), [(2 / 3, "2/3X"), (21 / 32, "0.66X"), (0.647, "0.65X"), (1.0, "1X")]
+)
+def test_a_line_is_named_by_an_order_only_where_its_sine_lies(order, name):
+    # a line at 21/32 alone is no 2/3: of one at 2/3 the next line would have half the height
+    lines = strongest_lines(amplitude_spectrum(wave(lambda a: np.cos(order * a), revolutions=32)), n_line=1)
+    assert str(lines["name"].values[0]) == name
+
+
 def test_the_strongest_lines_come_first_and_weak_ones_not_at_all():
     signal = wave(lambda a: 5 + np.cos(2 * a) + 3 * np.cos(a) + 0.01 * np.cos(4 * a))
     lines = strongest_lines(amplitude_spectrum(signal))
