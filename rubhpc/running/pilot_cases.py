@@ -10,6 +10,7 @@ from rubhpc.integrate.branches.case import record_branches
 from rubhpc.integrate.case import compile_kernels
 from rubhpc.integrate.changing_speed.case import RunUpRecord
 from rubhpc.integrate.compilation import seconds_compiling
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.running.case_setup import operation_of, set_up, set_up_for_kernels
 from rubhpc.running.followed_case import FollowedCase, Forecast, is_ring, usual_behind
 from rubhpc.running.stopwatch import Stopwatch
@@ -61,6 +62,8 @@ class Pilots:
         Those of them that still met new contact modes where they ended.
     arrays : dict
         Signals and the like of the latest case that was run, by name.
+    modes : list of int
+        Bytes of contact modes that cases of one set-up and friction held in a ring, for each that was timed.
     """
 
     def __init__(self, grid: CaseGrid) -> None:
@@ -80,6 +83,7 @@ class Pilots:
         self.shortened: dict[tuple[int, ...], Forecast] = {}
         self.irregular: set[tuple[int, ...]] = set()
         self.arrays: dict[str, NDArray[Any]] = {}
+        self.modes: list[int] = []
 
     @property
     def compiling(self) -> float:
@@ -116,6 +120,8 @@ class Pilots:
             self.arrays = arrays_of(record)
             return Pace(seconds / steps, rig, speed, 0.0)
         modes, rest = self._taken.get(index) or self._modes_and_rest(case, setup, steps, limit)
+        if is_ring(setup) and isinstance(setup, ModalSetup) and setup.n_byte:
+            self.modes.append(max(setup.n_byte.values()))
         self._paces.append(rest / steps)
         return Pace(step=rest / steps, rig=rig, speed=speed, friction=modes)
 

@@ -57,6 +57,8 @@ class Timing:
         Whether a case took longer than is waited for, so that the pace is a lower bound.
     seconds : float
         Processor time that it took, but for what a run takes as well: kernels that are loaded.
+    modes : float
+        Bytes of the contact modes that cases of one set-up and friction hold in a ring.
     failures : tuple of str
         Coordinates of the cases that failed, and why.
     """
@@ -67,6 +69,7 @@ class Timing:
     known: float = 0.0
     is_bound: bool = False
     seconds: float = 0.0
+    modes: float = 0.0
     failures: tuple[str, ...] = ()
 
 
@@ -153,6 +156,7 @@ def time_pilots(
         known=sample.known,
         is_bound=is_bound,
         seconds=seconds,
+        modes=float(np.mean(pilots.modes)) if pilots.modes else 0.0,
         failures=tuple(failures),
     )
 

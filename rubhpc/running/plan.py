@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.running.kept_setups import MOST_BYTES, MOST_SETUPS
 from rubhpc.running.pilot_estimate import within
 from rubhpc.running.pilots import Timing, seconds_of, time_pilots
 from rubhpc.running.preparations import count_preparations
@@ -39,6 +40,7 @@ _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the se
 _AT_EDGES = 1.1  # cases that a refined map computes over all cases, seconds a step, about
 _AGREED = 0.03  # standard error of the time, as a share of it, up to which no range is given
 _FEW = 3  # cases, which may all lack what most of the time is spent on
+_LEDGERS = 2  # times that measures of all cases are held while they are packed, about
 _PRIVATE_FILES = 8  # manifests, journals, records of runs
 
 
@@ -61,7 +63,13 @@ class Plan:
     core_hours : float
         For what is missing, from the pilot cases; NaN where they failed.
     start_up : float
-        Processor seconds that each process takes to start and to end, about; 0 where that is unknown.
+        Processor seconds that each process takes to start and to end, about, which are not in `core_hours`;
+        0 where that is unknown.
+    beside : float
+        Bytes that a process holds beside what the process that made the plan has held: contact modes of rings
+        that are kept for other cases, and the measures of all cases.
+    memory : float
+        Bytes that a process holds at most, about; 0 where that is unknown.
     timing : Timing
         What the pilot cases have shown.
     warnings : tuple of str
@@ -88,6 +96,8 @@ class Plan:
     core_hours: float
     timing: Timing
     start_up: float = 0.0
+    beside: float = 0.0
+    memory: float = 0.0
     warnings: tuple[str, ...] = ()
     part: str = ""
     n_expected: int | None = None
@@ -121,9 +131,15 @@ class Plan:
     def _range(self) -> str:
         """From and to where the time lies, for people; "" where cases agree, or nobody knows."""
         timing, seconds = self.timing, 3600.0 * self.core_hours
-        if timing.is_bound or not _AGREED < timing.spread < math.inf:
+        if timing.is_bound or not _AGREED * self._whole < timing.spread * seconds < math.inf:
             return ""
-        return span(*within(seconds, timing.spread * seconds, timing.n_pilot, timing.known))
+        least, most = within(seconds, timing.spread * seconds, timing.n_pilot, timing.known)
+        return span(least + self.start_up, most + self.start_up)
+
+    @property
+    def _whole(self) -> float:
+        """Seconds on one core, with the start of its process."""
+        return 3600.0 * self.core_hours + (self.start_up if self.counts[MISSING] else 0.0)
 
     @property
     def _idle(self) -> str:
@@ -137,19 +153,20 @@ class Plan:
         n_case = math.prod(self.shape.values())
         sizes = " x ".join(f"{n} {name}" for name, n in self.shape.items())
         cost = (
-            f"{'at least ' * self.timing.is_bound}{self.core_hours:.3g} core-hours "
-            f"({self._range or duration(self.core_hours * 3600)} on one core)"
+            f"{'at least ' * self.timing.is_bound}{self._whole / 3600:.3g} core-hours "
+            f"({self._range or duration(self._whole)} on one core)"
             if math.isfinite(self.core_hours)
             else "core-hours unknown: the pilot cases failed"
         )
         if self.start_up > 0.0 and self.counts[MISSING]:
-            cost += f", and {self.start_up:.1f} s to start each process"
+            cost += f", with the {self.start_up:.1f} s that a process takes to start"
         return "\n".join(
             [
                 f"{self.title} -> {self.store}",
                 f"cases       {n_case} = {sizes}",
                 f"blocks      {self.n_block}, at most {self.n_per_block} cases each; {self._idle}",
                 f"store       {_size(self.n_byte)} before compression, {self._files}",
+                *([f"memory      {_size(self.memory)} a process, about"] if self.memory else []),
                 *(
                     [
                         f"refined     computes at most all {n_case} cases, about {self.n_expected}"
@@ -219,10 +236,12 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
     all_steps = sum(block.cost * share for block, share in left)
     steps = left_of_all * all_steps
     timing = time_pilots(grid, manifest, [block for block, _ in left], missing, say)
-    seconds = most = 0.0
+    seconds = most = beside = 0.0
     if left:
         prepared = count_preparations(grid, missing)
         n_case = int(missing.sum())
+        n_held = min(prepared.friction, MOST_SETUPS * prepared.friction / max(prepared.speed, 1.0)) - 1.0
+        beside = min(MOST_BYTES, max(n_held, 0.0) * timing.modes) + _LEDGERS * grid.n_case * kind.itemsize
         most = seconds = seconds_of(timing.pace, all_steps, n_case, prepared, len(left))
         if manifest.refine is not None:
             pace = timing.pace
@@ -254,6 +273,7 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
         core_hours=seconds / 3600,
         most_core_hours=most / 3600,
         timing=timing,
+        beside=beside,
         warnings=grid.warnings(),
         part="" if chosen is None else str(chosen),
         n_expected=n_expected,

@@ -6,11 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rubhpc.running import pilots
+from rubhpc.running import block_time, pilots, plan
+from rubhpc.running.kept_setups import MOST_BYTES
+from rubhpc.running.memory import peak_memory
 from rubhpc.running.plan import Plan
 from rubhpc.running.timed_run_ups import parts
+from rubhpc.storage.new_manifest import manifest_of
+from rubhpc.study.cases import CaseGrid
 from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.speed_law import SpeedLaw
+from rubhpc.study.study import read_study
+from tests.support.running import write_study
 
 
 @pytest.mark.parametrize(
@@ -28,7 +34,7 @@ def test_more_cases_are_timed_where_they_differ(costs, n_pilot, monkeypatch):
     class Pilots:
         loading = compiling = 0.0
         was_cut, arrays, alike, shortened = False, {}, {}, {}
-        irregular = frozenset()
+        irregular, modes = frozenset(), []
 
         def __init__(self, grid):
             pass
@@ -78,7 +84,7 @@ def test_dearest_case_is_finished(monkeypatch, n_case, left):
     class Pilots:
         loading = compiling = 0.0
         was_cut, arrays, alike = False, {}, {}
-        irregular = frozenset()
+        irregular, modes = frozenset(), []
 
         def __init__(self, grid):
             self.shortened = {(0,): 3.0, (1,): 0.2, (2,): 0.1}
@@ -119,7 +125,7 @@ def test_cases_of_a_ring_are_timed_in_pairs(monkeypatch):
     class Pilots:
         loading = compiling = 0.0
         was_cut, arrays, shortened = False, {}, {}
-        irregular = frozenset()
+        irregular, modes = frozenset(), []
 
         def __init__(self, grid):
             self.alike = {(0,): (1,), (2,): (3,)}
@@ -141,7 +147,7 @@ def test_cases_of_a_ring_are_timed_in_pairs(monkeypatch):
 @pytest.mark.parametrize(("n_pilot", "share"), [(3, "two plans in three"), (4, "eight to nine plans in ten")])
 def test_plan_of_few_cases_claims_less(n_pilot, share):
     timing = pilots.Timing(pace=pilots.Pace(1.0, 0.0, 0.0, 0.0), n_pilot=n_pilot, spread=0.3)
-    plan = Plan(
+    found = Plan(
         title="",
         store=Path("x.zarr"),
         shape={"speed": 9},
@@ -157,4 +163,41 @@ def test_plan_of_few_cases_claims_less(n_pilot, share):
         timing=timing,
     )
     they = "are few and differ" if n_pilot == 3 else "differ"
-    assert f"cases; they {they}: such a range holds the time of {share}" in plan.text()
+    assert f"cases; they {they}: such a range holds the time of {share}" in found.text()
+
+
+def test_a_block_is_timed_with_its_folders(tmp_path, monkeypatch):
+    """Files of a small store lie in folders of their own, which take longer to make than the files."""
+    grid = CaseGrid(read_study(write_study(tmp_path)))
+    manifest = manifest_of(grid)
+    written, flushed = [], []
+
+    def write_whole(path, data, *, is_synced):
+        written.append(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+
+    monkeypatch.setattr(block_time, "write_whole", write_whole)
+    monkeypatch.setattr(block_time, "flush_to_disk", flushed.append)
+    assert block_time.time_block(manifest, {}) > 0.0
+    assert written == flushed
+    assert len({path.parent for path in written}) == len(written)  # each in a new one
+
+
+def test_memory_holds_other_set_ups_of_a_ring(tmp_path, monkeypatch):
+    """Contact modes of other set-ups are kept, up to a bound; the rest was seen while cases were timed."""
+    study = read_study(write_study(tmp_path))  # two speeds, two gaps that set the speed's, three frictions
+
+    def beside(modes):
+        pace = pilots.Pace(1.0, 0.0, 0.0, 0.0)
+        monkeypatch.setattr(plan, "time_pilots", lambda *_: pilots.Timing(pace=pace, n_pilot=1, modes=modes))
+        return plan.make_plan(study).beside
+
+    none = beside(0.0)
+    assert beside(1e6) - none == pytest.approx(5e6)  # 2 speeds of 3 frictions, but for one
+    assert beside(1e9) - none == MOST_BYTES
+
+
+def test_peak_memory_is_that_of_this_process():
+    held = np.ones(20_000_000)
+    assert held.nbytes < peak_memory() < 1e12

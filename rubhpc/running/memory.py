@@ -1,0 +1,19 @@
+"""Memory of this process at its peak."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+_STATUS = Path("/proc/self/status")
+_PEAK = "VmHWM:"  # of the program itself: what getrusage says begins with that of the process that started it
+
+
+def peak_memory() -> float:
+    """Most memory that this process has held so far, bytes."""
+    try:
+        return 1024.0 * float(_STATUS.read_text().split(_PEAK)[1].split()[0])
+    except (OSError, IndexError, ValueError):  # no Linux
+        from resource import RUSAGE_SELF, getrusage
+
+        return getrusage(RUSAGE_SELF).ru_maxrss * (1.0 if sys.platform == "darwin" else 1024.0)
