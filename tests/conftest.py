@@ -48,6 +48,7 @@ SLOW = (
     "integrate/branches/test_branch.py",
     "integrate/marches/test_contact_stepping_march.py",
     "integrate/marches/test_curved_march.py",
+    "integrate/changing_speed/test_carried_modes.py",
     "integrate/changing_speed/test_driven.py",
     "integrate/marches/test_event_driven_march.py::test_dry_whip_diverges_and_says_so",
     "integrate/marches/test_event_driven_march.py::test_endless_events_are_left_to_short_steps",

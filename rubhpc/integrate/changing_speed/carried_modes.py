@@ -2,8 +2,10 @@
 
 With the speed a mode's shape and its static part change evenly; matrices that are held change at once,
 and a motion that goes on unchanged then holds each mode by another amount. Over an even change that takes
-the time T the amplitude of a mode of frequency w, under a force that turns with the spin W, keeps its value
-but for `sin(a) / a` of that jump, with `a = (w - W) T / 2`. The rest is taken off here.
+the time T the amplitude of a mode of frequency w takes of a mode of frequency w' but `sin(a) / a` of its
+share in it, with `a = (w - w') T / 2`, and as much of the jump of its own static part, where w' is the spin.
+The rest is taken off here. Modes of one frequency, as equal stators have them, so pass into one another as
+they are.
 """
 
 from __future__ import annotations
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 LOWEST = 3.0  # frequency of a mode over the spin; lower ones take part in contact
-SAME = 0.9  # share of a mode in the one before that it is taken for
 
 
 class Standing(NamedTuple):
@@ -70,14 +71,21 @@ def carried(
     z_before = was.entered(before.end.motion, before.constants, *_turning(old), before.time)
     z = now.entered(march.begun_motion, march.constants, *_turning(new), 0.0)
     pairs = np.flatnonzero(now.is_pair & (np.abs(now.exponent.imag) > LOWEST * abs(new.spin)))
-    share = 0.5 * now.enter[pairs] @ was.motion
-    match = np.abs(share).argmax(axis=1)
-    found = np.take_along_axis(share, match[:, np.newaxis], axis=1)[:, 0]
-    is_same = (np.abs(found) > SAME) & was.is_pair[match]
-    off = 0.5 * (np.abs(now.exponent.imag[pairs]) - abs(new.spin)) * lasted
-    jump = np.where(is_same, z[pairs] - found * z_before[match], 0.0) * (1.0 - np.sinc(off / np.pi))
+    frequency, others = now.exponent.imag[pairs, np.newaxis], was.exponent.imag
+    held = 0.5 * (now.enter[pairs] @ was.motion) * z_before
+    mirrored = 0.5 * (now.enter[pairs] @ was.motion.conj()) * z_before.conj()
+    still = z[pairs] - (held + mirrored).sum(axis=1)
+    jump = (held * _lost((frequency - others) * lasted)).sum(axis=1)
+    jump += (mirrored * _lost((frequency + others) * lasted)).sum(axis=1)
+    jump += still * _lost((np.abs(frequency[:, 0]) - abs(new.spin)) * lasted)
     motion = march.begun_motion - (now.motion[:, pairs] @ jump).real
     return Place(motion, setup.model.sag, begun.contact_force)
+
+
+def _lost(turned: Floats) -> Floats:
+    """Share that a change of amplitude loses over a time in which its phase turns, rad."""
+    lost: Floats = 1.0 - np.sinc(turned / (2.0 * np.pi))
+    return lost
 
 
 def _turning(setup: PieceSetup) -> tuple[complex, complex]:

@@ -75,9 +75,14 @@ class Passing:
     def continued(
         self, setup: PieceSetup, begun: State | Place, before: Standing | None, lasted: float
     ) -> State | Place:
-        """Where a piece begins after another in other matrices, which were held for a time, s."""
+        """Where a piece begins after another in other matrices, which were held for a time, s.
+
+        What a curved gap adds follows the motion, which may not change while that is closed.
+        """
         is_other = before is not None and before.setup.held is not setup.held
         if self._march is None or before is None or not is_other or not isinstance(begun, Place):
+            return begun
+        if not self._march.has_closed_form and (begun.contact_force > 0.0).any():
             return begun
         return carried(before, lasted, self._march, setup, begun)
 

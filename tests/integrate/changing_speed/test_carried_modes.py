@@ -1,0 +1,55 @@
+"""What a change of the matrices does to a motion amid contacts of equal stators."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from trial_rig import trial_rig
+
+from rubhpc import run_up
+from rubhpc.integrate.changing_speed.passing import Passing
+
+DRIVE = {"torque": 0.3, "inertia": 2e-3, "lowest": 20.0, "start": 250.0, "revolutions": 8}
+
+
+def whip_of(monkeypatch, count, **changed):
+    """A drive in a ring, and how much of its velocity each change of matrices takes, by pairs closed."""
+    rig = trial_rig(1, **changed)
+    ring = tuple(replace(rig.stator[0], angle=0.3 + 2.0 * math.pi * i / count) for i in range(count))
+    changes, go_on = [], Passing.continued
+
+    def watched(passing, setup, begun, before, lasted):
+        after = go_on(passing, setup, begun, before, lasted)
+        if before is not None and before.setup.held is not setup.held:
+            n = begun.motion.size // 2
+            moved = np.linalg.norm(after.motion[n:] - begun.motion[n:]) / np.linalg.norm(begun.motion[n:])
+            changes.append((np.count_nonzero(begun.contact_force), moved))
+        return after
+
+    monkeypatch.setattr(Passing, "continued", watched)
+    found = run_up(
+        replace(rig, stator=ring),
+        drive=DRIVE,
+        clearance=3e-5,
+        friction=0.2,
+        pieces_per_revolution=8,
+        normal="updated" if changed else "fixed",
+    )
+    return found, np.array(changes)
+
+
+def test_modes_of_equal_stators_are_not_taken_for_one_another(monkeypatch):
+    """Higher modes of several tips that press have one frequency, and no shape of their own."""
+    found, changes = whip_of(monkeypatch, 8)
+    assert changes[:, 0].max() >= 3
+    assert changes[:, 1].max() < 2e-3
+    assert found.energy_residual < 1e-6
+
+
+def test_bent_stators_that_press_go_on_with_the_motion_as_it_is(monkeypatch):
+    """What their curved gaps add to a motion goes with it."""
+    found, changes = whip_of(monkeypatch, 4, geometry="second_order")
+    closed = changes[:, 0] > 0
+    assert closed.any()
+    assert not changes[closed, 1].any()
+    assert found.energy_residual < 1e-6
