@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from rubhpc.errors import InputError
@@ -19,7 +19,7 @@ from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
 from rubhpc.recent import recent
 from rubhpc.rig.probes import Probe
-from rubhpc.rig.reading import read_rig, with_keys
+from rubhpc.rig.reading import packaged_name, read_rig, with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.study.contact_keys import ContactArguments
 from rubhpc.study.initial import Initial, check_initials
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 FRICTION = 0.3  # coefficient, where none is given
+AT_REST = Initial()
 
 
 class CaseArguments(ContactArguments, total=False):
@@ -100,8 +101,26 @@ def case_of(
         if name not in known:
             raise InputError(f"{caller}: {name}: unknown argument; {nearest(name, known)}")
     start = _read_initial(caller, initial)
+    known_by = None if isinstance(rig, Rig) else packaged_name(rig)  # its content never changes
     if not isinstance(rig, Rig):
         rig = read_rig(rig)
+    measured = tuple(probes)
+    case = recent(
+        lambda: _assembled(caller, rig, given, samples_per_revolution, measured, drive),
+        *("case", known_by or rig, given, samples_per_revolution, measured, drive),
+    )
+    return replace(case, initial=start)
+
+
+def _assembled(
+    caller: str,
+    rig: Rig,
+    given: CaseArguments,
+    samples_per_revolution: int,
+    probes: tuple[Probe, ...],
+    drive: DriveLaw | None,
+) -> Case:
+    """Check and assemble all of a case but where it starts."""
     rig = with_keys(rig, given.get("overrides") or {})
     speed, speed_ratio = given.get("speed"), given.get("speed_ratio")
     clearance, clearance_ratio = given.get("clearance"), given.get("clearance_ratio")
@@ -144,7 +163,7 @@ def case_of(
             probes=probes,
             drive=drive,
         ),
-        *("set-up", rig, spin, contact, integrator, samples_per_revolution, tuple(probes), drive),
+        *("set-up", rig, spin, contact, integrator, samples_per_revolution, probes, drive),
     )
     return Case(
         rig=rig,
@@ -154,7 +173,7 @@ def case_of(
         clearance=gap,
         friction=mu,
         contact_free_amplitude=amplitude,
-        initial=start,
+        initial=AT_REST,
         note=unstable,
     )
 
@@ -191,10 +210,12 @@ def _read_initial(caller: str, initial: object) -> State | Initial:
     """Where to start."""
     if isinstance(initial, State):
         return initial
-    if initial is not None and not isinstance(initial, dict):
+    if initial is None:
+        return AT_REST
+    if not isinstance(initial, dict):
         problem = "is neither a State nor a dict"
         raise InputError(f"{caller}: initial: {brief(initial)} {problem}; give a record's `final`")
-    start = build(Initial, initial or {}, caller, "initial")
+    start = build(Initial, initial, caller, "initial")
     try:
         check_initials(start, [])
         return with_state(start) if start.is_from_store else start

@@ -244,7 +244,7 @@ def _integrate(
 def _pass_directly(
     march: EventDrivenMarch,
     start: Callable[[State], March],
-    begin: Callable[[State], PiecewiseMotion],
+    begin: Callable[[State, EventDrivenMarch], PiecewiseMotion],
     initial: State,
     setup: Setup,
     clearance: float,
@@ -275,10 +275,12 @@ def _pass_directly(
     return passed, record
 
 
-def _solve_from(setup: Setup, clearance: float, friction: float, state: State) -> PiecewiseMotion:
-    """Piecewise motion of a case in closed form."""
+def _solve_from(
+    setup: Setup, clearance: float, friction: float, state: State, march: EventDrivenMarch | None = None
+) -> PiecewiseMotion:
+    """Piecewise motion of a case in closed form; a march of it that is given is started anew."""
     assert isinstance(setup, ModalSetup)
-    return PiecewiseMotion(setup, clearance, friction, state)
+    return PiecewiseMotion(setup, clearance, friction, state, march)
 
 
 def _spectra(samples: Samples, model: Model) -> dict[str, Floats]:

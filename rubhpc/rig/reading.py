@@ -28,7 +28,13 @@ def rig_from_dict(table: Mapping[str, Any], where: str = "rig") -> Rig:
 
 def packaged_rigs() -> list[str]:
     """Return the names of the packaged rigs."""
-    return sorted(p.stem for p in PACKAGED.glob("*.toml"))
+    return list(_packaged_names())
+
+
+def packaged_name(name_or_path: str | PathLike[str]) -> str | None:
+    """Return the name of a packaged rig; None of a file or a function."""
+    name = str(name_or_path)
+    return name if name in _packaged_names() else None
 
 
 def read_rig(
@@ -65,13 +71,19 @@ def read_rig(
         if not isinstance(rig, Rig):
             raise InputError(f"{where}: {place(name)} returned a {type(rig).__name__}; return a rubhpc.Rig")
         return rig
-    if name in packaged_rigs():
+    if packaged_name(name):
         return _packaged(PACKAGED / f"{name}.toml")
     path = (relative_to or Path()) / name
     if not name.endswith(".toml") and "/" not in name and not os.path.exists(path):
         fix = nearest(name, packaged_rigs())
         raise InputError(f"{where}: neither a packaged rig nor a file {place(str(path))}; {fix}")
     return build(Rig, read_toml(path, where), str(path))
+
+
+@cache
+def _packaged_names() -> tuple[str, ...]:
+    """Names of the packaged rigs, found once."""
+    return tuple(sorted(p.stem for p in PACKAGED.glob("*.toml")))
 
 
 @cache

@@ -10,6 +10,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.periodic_motions import direct
 from rubhpc.integrate.periodic_motions.direct import draws_near
 from rubhpc.integrate.periodic_motions.known_motions import Approach
+from rubhpc.integrate.periodic_motions.powers import Powers
 from rubhpc.integrate.transient import has_settled
 from rubhpc.schema import REGIME
 from rubhpc.study.study import Recording
@@ -165,7 +166,7 @@ def test_what_simulation_cannot_resolve_has_arrived():
 
 def test_distance_falls_though_the_energy_rises_at_first():
     monodromy = np.array([[0.9, 5.0], [0.0, 0.8]])
-    approach, apart = Approach(monodromy, np.ones(2)), np.array([0.0, 1.0])
+    approach, apart = Approach(Powers(monodromy), np.ones(2)), np.array([0.0, 1.0])
     energies, squares = [], []
     for _ in range(5):
         energies.append(apart @ apart)
@@ -195,9 +196,14 @@ class Spiral:
             self.at = self.change(self.at)
             self.passed = np.vstack([self.passed, self.at + ORBIT.motion])
 
+    def stand(self):
+        """It goes on from where it is."""
+
 
 TURN = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
-ORBIT = SimpleNamespace(motion=np.array([1.0, 0.0]), monodromy=0.98 * TURN, period=1)
+ORBIT = SimpleNamespace(
+    motion=np.array([1.0, 0.0]), monodromy=0.98 * TURN, powers=Powers(0.98 * TURN), period=1
+)
 STILL = SimpleNamespace(n=1, setup=SimpleNamespace(spin=1.0, tick=1e-9), size=np.linalg.norm)
 
 

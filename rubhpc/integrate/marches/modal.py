@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-_BEGUN = bare(new_progress(1))
+_NEW = new_progress(1)
+_BEGUN = bare(_NEW)
 
 
 class Place(NamedTuple):
@@ -64,14 +65,20 @@ class ModalMarch(March):
         offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
         self._at_rest, self._coefficient = clearance + offsets, friction
         self._model: Model | None = None  # to which the clearances belong
+        self._bodies_of: ModalSetup | None = None  # whose the bodies are
         self._ended: Floats | None = None  # motion where the last call has ended
-        records = new_progress(1)
+        records = _NEW.copy()
         self.progress: Progress = records[0]
         self._bare_records = bare(records)
         self._bare_progress = self._bare_records[0]  # the same, for kernels
         self._take(setup)
         self._motion = self.reduced(initial)
         self._recorder = recorder(setup.model.n_place, setup.model.n_probe)
+
+    @property
+    def setup(self) -> ModalSetup:
+        """That of the speed at which the case goes on."""
+        return self._setup
 
     def reached(self) -> Place:
         """Where the case stands, for another speed to go on from."""
@@ -82,8 +89,9 @@ class ModalMarch(March):
         """Count time from 0, at the speed of a set-up."""
         if self._model is not setup.model:
             self._model, self._clearance = setup.model, self._at_rest - sag_at_stators(setup.model)[0]
+        if self._bodies_of is not setup:
+            self._bodies_of, self.bodies = setup, setup.bodies(self._coefficient, self._clearance)
         self._setup, self.clock = setup, setup.clock
-        self.bodies = setup.bodies(self._coefficient, self._clearance)
         self._begin_time()
         self._entered_with = self._clearance  # values of the coordinates that do not move
 

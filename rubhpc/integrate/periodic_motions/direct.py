@@ -46,7 +46,7 @@ MOST_EVENTS = 24, 8  # in a revolution: of one pair, and more for each further o
 
 def pass_directly(
     march: EventDrivenMarch,
-    solve_from: Callable[[State], PiecewiseMotion],
+    solve_from: Callable[[State, EventDrivenMarch], PiecewiseMotion],
     recording: Recording,
     known: KnownMotions | None = None,
 ) -> Passed:
@@ -62,7 +62,7 @@ def pass_directly(
     march : EventDrivenMarch
         The case at its beginning.
     solve_from : callable
-        Makes its piecewise motion from a state.
+        Makes its piecewise motion from a state, with the march that has come there.
     known : KnownMotions, optional
         Motions that the case may reach.
     """
@@ -77,11 +77,11 @@ def pass_directly(
         if reason is not None or walk.n_left <= 0:
             return walk.ended(reason)
         wanted = int(LONGER * walk.n_revolution)
+        states = march.states
+        walk.stand()
         piecewise = piecewise or _piecewise(walk, solve_from)
         if piecewise is None:
             continue
-        place, states = march.reached(), march.states
-        walk.begin_at(piecewise.setup, place)
         orbit = _search(piecewise, states, walk.passed, walk.n_revolution)
         if orbit is None:
             continue
@@ -96,10 +96,12 @@ def pass_directly(
             return walk.ended(reason, found=(piecewise, orbit) if is_near else None)
 
 
-def _piecewise(walk: Walk, solve_from: Callable[[State], PiecewiseMotion]) -> PiecewiseMotion | None:
+def _piecewise(
+    walk: Walk, solve_from: Callable[[State, EventDrivenMarch], PiecewiseMotion]
+) -> PiecewiseMotion | None:
     """What motions of the case are followed with; None where it has no closed form."""
     try:
-        return solve_from(walk.march.final())
+        return solve_from(walk.march.final(), walk.march)
     except NoClosedForm:
         return None
 
@@ -116,9 +118,9 @@ def draws_near(walk: Walk, piecewise: PiecewiseMotion, orbit: Orbit, until: int)
     only passes by, does not draw near so. It is watched until so many revolutions have passed, or
     it disobeys the theory in further ones.
     """
-    approach = Approach(orbit.monodromy, np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n))
-    stride = max(1, LOOK // orbit.period)  # periods from one look to the next
-    span, onward = stride * orbit.period, np.linalg.matrix_power(orbit.monodromy, stride)
+    approach = Approach(orbit.powers, np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n))
+    doubled = max(1, LOOK // orbit.period).bit_length() - 1
+    span, onward = (1 << doubled) * orbit.period, orbit.powers.of(doubled)  # from one look to the next
     least = -(-WATCHED // span)
     there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
     theory: Onward | None = None
@@ -139,6 +141,7 @@ def draws_near(walk: Walk, piecewise: PiecewiseMotion, orbit: Orbit, until: int)
         if piecewise.size(apart) <= there:
             return True, None
         if last <= untried and _agree(looks, least):
+            walk.stand()
             theory = theory or Onward(piecewise, orbit)
             if theory.keeps_contacts(apart, approach.periods_to(FAR, apart)):
                 return True, None

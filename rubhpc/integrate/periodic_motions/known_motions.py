@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rubhpc.integrate.periodic_motions.powers import Powers
 from rubhpc.integrate.periodic_motions.saltation import monodromy
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MOST_SQUARINGS = 60  # of the monodromy matrix, until nothing is left of it
+ROUNDING = float(np.finfo(float).eps)
 MOST_PERIODS = 4000  # that the linear theory is followed
 NEAR = 0.5  # of a motion's size, within which a case is looked at
 WATCHED = 2  # revolutions, at least, over which it must do as the linear theory says
@@ -45,24 +47,23 @@ class Approach:
 
     Parameters
     ----------
-    monodromy : (2 n, 2 n)
-        Its eigenvalues lie within the unit circle.
+    powers : Powers
+        Of the monodromy matrix (2 n, 2 n), whose eigenvalues lie within the unit circle.
     energy : (2 n,)
         Diagonal of W.
     """
 
-    def __init__(self, monodromy: Floats, energy: Floats) -> None:
+    def __init__(self, powers: Powers, energy: Floats) -> None:
         """Sum the energies, twice as many periods at a time."""
-        self._monodromy = monodromy
-        self._powers = [monodromy]  # over 1, 2, 4, ... periods
-        power, form = monodromy, np.diag(energy)
-        for _ in range(MOST_SQUARINGS):
-            more = power.T @ form @ power
+        self._powers, self._n_power = powers, 1
+        form = np.diag(energy)
+        for k in range(MOST_SQUARINGS):
+            power = powers.of(k)
+            more = power.T @ (form @ power)
             form = form + more
-            if np.abs(more).max() <= np.finfo(float).eps * np.abs(form).max():
+            self._n_power = k + 1
+            if more.diagonal().max() <= ROUNDING * form.diagonal().max():  # no entry is larger
                 break
-            power = power @ power
-            self._powers.append(power)
         self._form = form
 
     def square(self, apart: Floats) -> float:
@@ -79,8 +80,8 @@ class Approach:
         least, n_period = share * self.square(apart), 0
         if self.square(apart) <= least:
             return 0
-        for k in range(len(self._powers) - 1, -1, -1):  # the square falls in every period
-            moved = self._powers[k] @ apart
+        for k in range(self._n_power - 1, -1, -1):  # the square falls in every period
+            moved = self._powers.of(k) @ apart
             if n_period + (1 << k) < MOST_PERIODS and self.square(moved) > least:
                 apart, n_period = moved, n_period + (1 << k)
         return n_period + 1
@@ -92,7 +93,7 @@ class Approach:
         """
         predicted = before
         for _ in range(n_period):
-            predicted = self._monodromy @ predicted
+            predicted = self._powers.of(0) @ predicted
         three = np.array([before, after, predicted, after - predicted])
         begun, ended, expected, strays = np.einsum("ki,ij,kj->k", three, self._form, three)
         return bool(strays <= LINEAR**2 * begun and begun - ended >= SHARE * (begun - expected))
@@ -151,9 +152,9 @@ class KnownMotions:
         """Keep a stable motion."""
         turns, motion, states = orbit.revolutions, orbit.motion, orbit.states
         for k, turn in enumerate(turns):
-            derivative = monodromy(piecewise, (*turns[k:], *turns[:k])) if k else orbit.monodromy
+            powers = Powers(monodromy(piecewise, (*turns[k:], *turns[:k]))) if k else orbit.powers
             state = piecewise.march.state_of(motion, piecewise.contact_force(states, motion))
-            approach = Approach(derivative, self._energy)
+            approach = Approach(powers, self._energy)
             self._places.append(Place(motion, state, orbit.period, piecewise.size(motion), approach))
             motion, states = turn.end, turn.states
         self._sections = np.array([place.motion for place in self._places])

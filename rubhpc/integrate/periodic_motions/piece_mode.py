@@ -62,7 +62,8 @@ def mode_of(march: EventDrivenMarch, states: int) -> Mode:
         march.derived[states] = _read_mode(march, states)
     mode: Mode = march.derived[states]
     offset = mode.tables.offset.copy()
-    offset[:, 2] = np.tensordot(march.bodies.clearance, mode.unit_length, 1)
+    lengths = mode.unit_length.reshape(len(mode.unit_length), -1)
+    offset[:, 2] = (march.bodies.clearance @ lengths).reshape(2, -1)
     followed = mode.tables._replace(
         offset=offset,
         translations=march.bodies.translations,

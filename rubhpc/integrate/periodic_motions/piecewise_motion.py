@@ -161,13 +161,15 @@ class PiecewiseMotion:
         Unfollowed
             The case meets more modes than can be tabulated.
         """
+        if self.march.tables is not self._tables:  # rows may have been given to other modes
+            self._take_tables()
         if states not in self._modes:
             if not np.any(self.march.tables.mask == states):
                 try:
                     self.march.find(states)
                 except NoClosedForm:
                     raise Unfollowed("more sets of closed contacts than can be tabulated") from None
-            if self.march.tables is not self._tables:  # rows may have been given to other modes
+            if self.march.tables is not self._tables:
                 self._take_tables()
             self._modes[states] = mode_of(self.march, states)
         return self._modes[states]

@@ -27,23 +27,35 @@ def monodromy(motion: PiecewiseMotion, revolutions: Iterable[Revolution]) -> Flo
 
     The product of `exp(A tau)` over the pieces and of the saltation matrices of the events between.
     """
-    tangent: Floats | None = None
+    return tangents(motion, revolutions)[-1]
+
+
+def tangents(motion: PiecewiseMotion, revolutions: Iterable[Revolution]) -> list[Floats]:
+    """Derivatives (2 n, 2 n) by the beginning, of the motion after each piece and the event that ends it."""
+    found: list[Floats] = []
     for revolution in revolutions:
-        tangent = carried(motion, revolution, tangent)
-    assert tangent is not None
-    return tangent
+        _carry(motion, revolution, found[-1] if found else None, found)
+    return found
 
 
 def carried(motion: PiecewiseMotion, revolution: Revolution, columns: Floats | None) -> Floats:
     """What becomes of small changes (2 n, k) of a revolution's beginning; by default of all unit ones."""
+    found: list[Floats] = []
+    _carry(motion, revolution, columns, found)
+    return found[-1]
+
+
+def _carry(
+    motion: PiecewiseMotion, revolution: Revolution, columns: Floats | None, found: list[Floats]
+) -> None:
+    """Add to a list what becomes of small changes after each piece."""
     for piece, following in pairwise([*revolution.pieces, None]):
         assert piece is not None
         moved = motion.mode(piece.states).propagator(piece.duration)
         columns = moved if columns is None else moved @ columns
         if following is not None:
             columns = saltate(motion, piece, following, columns)
-    assert columns is not None
-    return columns
+        found.append(columns)
 
 
 def by_clearance(motion: PiecewiseMotion, revolutions: Iterable[Revolution]) -> Floats:

@@ -15,7 +15,8 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import (
     Revolution,
     Unfollowed,
 )
-from rubhpc.integrate.periodic_motions.saltation import monodromy
+from rubhpc.integrate.periodic_motions.powers import Powers
+from rubhpc.integrate.periodic_motions.saltation import tangents
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,8 +45,9 @@ class Orbit:
         Reduced displacements and velocities with the shaft at its angle 0, and the states of the pairs then.
     revolutions : tuple of Revolution
         As many as its period.
-    monodromy : (2 n, 2 n)
-        Derivative of the motion after a period by that before it.
+    tangents : list of (2 n, 2 n)
+        Derivatives of the motion after each piece of its period by that at the beginning; the last one is the
+        monodromy matrix.
     residual : float
         Distance of the two over the size of the motion.
     iterations : int
@@ -55,7 +57,7 @@ class Orbit:
     motion: Floats
     states: int
     revolutions: tuple[Revolution, ...]
-    monodromy: Floats
+    tangents: list[Floats]
     residual: float
     iterations: int
 
@@ -63,6 +65,16 @@ class Orbit:
     def period(self) -> int:
         """Revolutions."""
         return len(self.revolutions)
+
+    @property
+    def monodromy(self) -> Floats:
+        """Derivative of the motion after a period by that before it, (2 n, 2 n)."""
+        return self.tangents[-1]
+
+    @cached_property
+    def powers(self) -> Powers:
+        """Powers of the monodromy matrix."""
+        return Powers(self.monodromy)
 
     @cached_property
     def multipliers(self) -> Complexes:
@@ -140,15 +152,16 @@ def shoot(
         raise NotConverged(str(problem)) from None
     if not trial.residual <= most_residual:
         raise NotConverged(f"the beginning is far from closing, residual {trial.residual:.2g}")
-    derivative, is_fresh = None, False
+    derivative: list[Floats] | None = None
+    is_fresh = False
     for iteration in range(most_iterations + 1):
         if trial.end_states == trial.states and trial.residual <= CONVERGED:
             return _settled(piecewise, trial, derivative if is_fresh else None, iteration)
         if iteration == most_iterations:
             break
         if derivative is None:
-            derivative, is_fresh = monodromy(piecewise, trial.revolutions), True
-        step = _solved(identity - derivative, trial.defect)
+            derivative, is_fresh = tangents(piecewise, trial.revolutions), True
+        step = _solved(identity - derivative[-1], trial.defect)
         better = _shortened(piecewise, trial, step, least_step, most_events)
         if better is None:
             if not is_fresh:
@@ -211,7 +224,9 @@ def _grazing(trial: _Trial, usual: Floats) -> str:
     return f": a contact grazes, its speed of approach is {min(slow):.2g} m/s" if slow else ""
 
 
-def _settled(piecewise: PiecewiseMotion, trial: _Trial, derivative: Floats | None, iterations: int) -> Orbit:
+def _settled(
+    piecewise: PiecewiseMotion, trial: _Trial, derivative: list[Floats] | None, iterations: int
+) -> Orbit:
     """Return the orbit of a converged trial, over its shortest period."""
     period = len(trial.revolutions)
     beginnings = [trial.motion, *(revolution.end for revolution in trial.revolutions)]
@@ -223,12 +238,12 @@ def _settled(piecewise: PiecewiseMotion, trial: _Trial, derivative: Floats | Non
     )
     revolutions = tuple(trial.revolutions[:primitive])
     if derivative is None or primitive != period:
-        derivative = monodromy(piecewise, revolutions)
+        derivative = tangents(piecewise, revolutions)
     return Orbit(
         motion=trial.motion,
         states=trial.states,
         revolutions=revolutions,
-        monodromy=derivative,
+        tangents=derivative,
         residual=trial.residual,
         iterations=iterations,
     )

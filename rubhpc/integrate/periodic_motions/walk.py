@@ -90,6 +90,11 @@ class Walk:
         """Go on with another motion, or with the same and tables that may have been filled anew."""
         self._place = setup, place
 
+    def stand(self) -> None:
+        """Go on from here, whatever else the march is used for meanwhile."""
+        if self._place is None:
+            self.begin_at(self.march.setup, self.march.reached())
+
     def _begin(self) -> None:
         if self._place is not None:
             self.n_step += self.march.n_step
