@@ -128,6 +128,12 @@ def _sliding(motion: PiecewiseMotion, change: Floats, velocity: Floats) -> tuple
     """Directions F and `(R F)^-1 R` of the impulses behind a change (n,) to a velocity (n,), of sliding."""
     bodies = motion.bodies
     normal = bodies.gap_jacobian
+    if motion.q == 1:
+        pressing = bool(motion.march.impulse_of_change[0] @ change > 0.0)
+        parted = pressing and bool(abs(normal[0] @ velocity) > AT_REST)
+        key = bytes((pressing, parted))
+        if key in motion.impacts:
+            return motion.impacts[key]
     hit = _pressing(motion.march.impulse_of_change @ change)
     has_parted = hit & (np.abs(normal @ velocity) > AT_REST)
     key = hit.tobytes() + has_parted.tobytes()
