@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum
-from rubhpc.kernels.contact_modes import ModeTables, dot, floor_log2, positive_interval, propagate
+from rubhpc.kernels.contact_modes import ModeTables, dot, floor_log2, propagate
+from rubhpc.kernels.event_bounds import FREE
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.friction_coordinates import used_width
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
@@ -24,117 +25,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-THIRD, SIXTH = 1.0 / 3.0, 1.0 / 6.0
-FREE, SURE = range(2)  # rows of what is known of the switch functions
 NEWTON_TRIES = 6  # places tried before the bracket is halved instead
-
-
-@jit_inline_sum
-def free_until(
-    states: int,
-    mode: int,
-    switch_re: Floats,
-    switch_im: Floats,
-    rate_re: Floats,
-    rate_im: Floats,
-    bend_re: Floats,
-    bend_im: Floats,
-    bound: Floats,
-    turn: Floats,
-    z_re: Floats,
-    z_im: Floats,
-    now: int,
-    tick: float,
-    longest: int,
-    known: Ints,
-) -> tuple[int, int]:
-    """How long no switch function (2 q, m) of a set of states can vanish unseen.
-
-    Parameters
-    ----------
-    now : int
-        Tick at which the coordinates stand; each lasts `tick` (s).
-    longest : int
-        Ticks beyond which none is asked for.
-    known : (2, 2 q)
-        The tick before which each of them cannot vanish, and that before which it does so once at most and
-        stays negative, as they were proved last: those alone are asked anew that come before the others. In
-        place.
-
-    Returns
-    -------
-    int
-        Tick before which none can vanish.
-    int
-        Tick before which one that has vanished is negative still: that is seen at the end of a step.
-    """
-    n_switch, first = known.shape[1], -1
-    for j in range(n_switch):
-        is_watched = j % 2 == 0 or state_of(states, j // 2) != OPEN
-        if is_watched and (first < 0 or known[SURE, j] < known[SURE, first]):
-            first = j
-    reached, most = now + longest, longest * tick
-    for turn_of in range(n_switch):  # the one that comes first, then the others
-        j = first + turn_of
-        j = j - n_switch if j >= n_switch else j
-        if known[SURE, j] < reached and (j % 2 == 0 or state_of(states, j // 2) != OPEN):
-            re, im, turning_re, turning_im = (
-                switch_re[mode, j],
-                switch_im[mode, j],
-                rate_re[mode, j],
-                rate_im[mode, j],
-            )
-            bending_re, bending_im, weight, next_weight = (
-                bend_re[mode, j],
-                bend_im[mode, j],
-                bound[mode, j],
-                turn[mode, j],
-            )
-            value, rate, bend, most_bend, most_turn = 0.0, 0.0, 0.0, 0.0, 0.0
-            for k in range(z_re.size):  # in one loop: five would wait for their sums five times
-                a, b = z_re[k], z_im[k]
-                size = abs(a) + abs(b)
-                value += re[k] * a - im[k] * b
-                rate += turning_re[k] * a - turning_im[k] * b
-                bend += bending_re[k] * a - bending_im[k] * b
-                most_bend += weight[k] * size
-                most_turn += next_weight[k] * size
-            free = min(positive_interval(value, rate, most_bend), most)
-            if value > 0.0:
-                while free < most and is_positive(value, rate, bend, most_turn, 2.0 * free):
-                    free *= 2.0
-            sure = max(free, falling_until(rate, bend, most_turn, free)) if value > 0.0 else free
-            known[FREE, j] = now + int(free / tick)
-            known[SURE, j] = now + int(min(sure, most) / tick)
-            reached = min(reached, known[SURE, j])
-    free_to = reached
-    for j in range(n_switch):
-        if j % 2 == 0 or state_of(states, j // 2) != OPEN:
-            free_to = min(free_to, known[FREE, j])
-    return free_to, reached
-
-
-@jit_inline_sum
-def is_positive(value: float, rate: float, bend: float, turn: float, time: float) -> bool:
-    """Whether `value + rate t + bend t^2 / 2 - turn t^3 / 6` is positive up to a time (s).
-
-    It is if its coefficients in Bernstein's polynomials are.
-    """
-    third, sixth = rate * time * THIRD, bend * time * time * SIXTH
-    second = value + 2.0 * third + sixth
-    last = value + 3.0 * third + 3.0 * sixth - turn * time * time * time * SIXTH
-    return value > 0.0 and value + third > 0.0 and second > 0.0 and last > 0.0
-
-
-@jit_inline_sum
-def falling_until(rate: float, bend: float, turn: float, begin: float) -> float:
-    """Time (s) until which `rate + bend t + turn t^2 / 2` is negative from `begin` on; 0 where it is not."""
-    if not rate + begin * (bend + 0.5 * begin * turn) < 0.0:
-        return 0.0
-    root = np.sqrt(max(bend * bend - 2.0 * turn * rate, 0.0))
-    if bend > 0.0:  # this form of it does not cancel
-        return float(-2.0 * rate / (root + bend))
-    return float((root - bend) / turn) if turn > 0.0 else np.inf
 
 
 @jit_inline_sum
@@ -150,7 +41,7 @@ def find_change(
 ) -> int:
     """Bits of the switch functions (2 q, m) of a set of states that are negative at a tick.
 
-    Those that are known to be positive until then (`free_until`) are not looked at.
+    Those that are known to be positive until then (`event_bounds.free_until`) are not looked at.
     """
     crossing = int(np.int64(0))
     for j in range(switch_re.shape[1]):
@@ -304,7 +195,7 @@ def approach_change(
     now : int
         Tick at the beginning.
     known : (2, 2 q)
-        As `free_until` fills it.
+        As `event_bounds.free_until` fills it.
 
     Returns
     -------

@@ -36,7 +36,7 @@ class FrictionWork(NamedTuple):
     slip: Floats  # (q,), m/s
     free_until: NDArray[
         np.int64
-    ]  # (2, 2 q), what is known of the switch functions: `event_search.free_until`
+    ]  # (2, 2 q), what is known of the switch functions: `event_bounds.free_until`
     impulse: Floats  # (q,), accumulated before the event, N s
     rest: Floats  # (2 q, 2 q), rates of the gaps, then slips, by impulses along them, 1/kg
     rest_speed: Floats  # (2 q,), m/s

@@ -33,7 +33,8 @@ from rubhpc.kernels.contact_modes import (
     Reduced,
     is_beyond,
 )
-from rubhpc.kernels.event_search import approach_change, find_change, free_until, take_step
+from rubhpc.kernels.event_bounds import free_until
+from rubhpc.kernels.event_search import approach_change, find_change, take_step
 from rubhpc.kernels.event_steps import (
     choose_step,
     contact_age,

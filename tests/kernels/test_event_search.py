@@ -22,7 +22,7 @@ NAMES = (
     "dot",
     "state_of",
 )
-NAMES += ("stuck_pairs", "used_width", "floor_log2", "positive_interval", "is_positive", "falling_until")
+NAMES += ("stuck_pairs", "used_width", "floor_log2")
 
 
 @pytest.fixture(autouse=True)
@@ -136,37 +136,6 @@ def test_a_double_root_is_passed_on_the_way_to_the_next():
 def test_an_open_pair_is_looked_at_for_its_gap_alone():
     exponents, row = around(400.5, (-1.0, 1e-3))
     assert search(exponents, np.stack([row, -row]), state=OPEN) == (400, 1)
-
-
-def test_no_function_changes_unseen_within_the_interval_that_is_promised():
-    random, n_seen = np.random.default_rng(3), 0
-    for _ in range(400):
-        m = 4
-        exponents = (-random.uniform(0.0, 1e-3, m) + 1j * random.uniform(0.0, 1e-2, m)) / TICK
-        rows = random.normal(size=(2, m)) + 1j * random.normal(size=(2, m))
-        rows *= np.sign(rows.real.sum(axis=1))[:, None]  # positive at first
-        tables = tables_of(exponents, rows, FORWARD)
-        z_re, z_im = np.ones(m), np.zeros(m)
-        names = ("switch_re", "switch_im", "rate_re", "rate_im", "bend_re", "bend_im", "bound", "turn")
-        fields = [getattr(tables, name) for name in names]
-        known = np.zeros((2, 2), dtype=np.int64)
-        now, longest = 7, 10_000
-        given = (FORWARD, 0, *fields, z_re, z_im, now, TICK, longest)
-        free, sure = plain(event_search.free_until)(*given, known)
-        assert now <= free <= sure == known[1].min() <= now + longest
-        assert free <= known[0].min()
-        assert (known[0] <= known[1]).all()
-        assert values_of(exponents, rows, np.linspace(0.0, free - now, 200)).min() > -1e-12
-        for j in range(2):  # one that has vanished is negative from then on
-            is_negative = values_of(exponents, rows, np.linspace(0.0, known[1, j] - now, 400))[j] < -1e-12
-            assert not (is_negative[:-1] & ~is_negative[1:]).any()
-            n_seen += is_negative.any()
-        # What is known, and comes later than another, is not asked anew.
-        later = int(known[1].argmax())
-        known[1, later] = marked = known[1, later] + 1
-        assert plain(event_search.free_until)(*given, known) == (free, sure)
-        assert known[1, later] == marked
-    assert n_seen > 100
 
 
 def test_a_step_of_any_ticks_is_made_up_of_powers_of_two(monkeypatch):

@@ -15,7 +15,7 @@ from rubhpc.integrate.reduced_model.curved_tables import (
     still_parts,
     tuned_tables,
 )
-from rubhpc.integrate.reduced_model.mode_tables import TableStack
+from rubhpc.integrate.reduced_model.table_stack import TableStack
 from rubhpc.kernels.curved_contact import CurvedTables
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
 from rubhpc.integrate.changing_speed.mode_parts import WITHOUT_RIM, Linear, output_operators
 from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
-from rubhpc.integrate.reduced_model.mode_tables import TableStack
 from rubhpc.integrate.reduced_model.reduction import directions
+from rubhpc.integrate.reduced_model.table_stack import TableStack
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.retuning import HeldMode, Speeds, retune
 from rubhpc.kernels.retuning_laws import Springs

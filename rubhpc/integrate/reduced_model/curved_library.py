@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.integrate.reduced_model.curved_tables import motion_rows, tabulate_curved
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
-from rubhpc.integrate.reduced_model.mode_tables import TableStack
+from rubhpc.integrate.reduced_model.table_stack import TableStack
 
 if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode

@@ -9,15 +9,10 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 import numpy as np
 
 from rubhpc.integrate.reduced_model.contact_mode import ContactMode, count_coordinates, solve_contact_mode
-from rubhpc.integrate.reduced_model.mode_tables import (
-    MOST_BYTES,
-    MOST_MODES,
-    TableStack,
-    mode_of,
-    tabulate,
-)
+from rubhpc.integrate.reduced_model.mode_tables import mode_of, tabulate
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
+from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.friction_coordinates import LANES
 

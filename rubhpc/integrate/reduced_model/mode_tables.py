@@ -1,102 +1,27 @@
-"""Tables of contact modes as the kernels read them: those of one mode, and the stack of many."""
+"""The tables of a contact mode as the kernels read them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
 
+from rubhpc.integrate.reduced_model.energy_forms import Growth, energy_forms
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 from rubhpc.kernels import contact_modes as kernel
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 from rubhpc.kernels.sampling import LANES
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-MOST_MODES = 1024  # sets of closed contacts of one speed and friction
-FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
-NEXT_ROOM = 16  # for a case that goes on rubbing; then for all, since what is there has to be copied
-MOST_BYTES = 2**30  # of their tables
 GONE = -40.0  # exponent of what has died away
-STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
-
-
-class TableStack:
-    """Tables of contact modes of one width, one after the other.
-
-    Attributes
-    ----------
-    n_most : int
-        ModeTables that there is room for: those of every pair closed by itself, and of as many more sets as
-        `n_most` and `most_bytes` allow.
-    """
-
-    def __init__(self, n_least: int, n_most: int = MOST_MODES, most_bytes: int = MOST_BYTES) -> None:
-        self._most_bytes = most_bytes
-        self.n_most = max(n_least, n_most)
-        self._n_least, self._n_filled, self._n_written = n_least, 0, 0
-        self._vacant: int | None = None  # place for the next one
-        self._room: list[Any] = []
-        self._view: Any = None
-
-    def add(self, row: Any, count: int = 1) -> None:
-        """Take in the tables of a mode, a named tuple of (1, ...) each, `count` times."""
-        rows: list[Any] = list(row)
-        if self._vacant is not None:
-            for field, new in zip(self._room, rows, strict=True):
-                field[self._vacant] = new[0]
-            self._vacant = self._view = None
-            return
-        first, end = self._n_filled, self._n_filled + count
-        if not self._room:
-            n_bytes = sum(field.nbytes for field in rows)
-            self.n_most = max(self._n_least, min(self.n_most, self._most_bytes // n_bytes))
-            n_room = max(count, min(self._n_least, FIRST_ROOM))
-            self._room = [np.empty((n_room, *field.shape[1:]), field.dtype) for field in rows]
-            self._kind = type(row)
-        elif end > len(self._room[0]):  # memory that is not written yet is not taken
-            n_room = max(end, min(NEXT_ROOM, self.n_most) if end <= NEXT_ROOM else self.n_most)
-            for i, field in enumerate(self._room):  # one after the other: all at once would take it twice
-                self._room[i] = np.empty((n_room, *field.shape[1:]), field.dtype)
-                self._room[i][:first] = field[:first]
-        for field, new in zip(self._room, rows, strict=True):
-            field[first:end] = new
-        self._n_filled, self._n_written = end, max(self._n_written, end)
-        self._view = None
-
-    def clear(self) -> None:
-        """Give all room back to contact modes to come."""
-        self._n_filled, self._view, self._vacant = 0, None, None
-
-    def vacate(self, place: int) -> None:
-        """Give the place of a mode to the next one."""
-        self._vacant = place
-
-    @property
-    def n_byte(self) -> int:
-        """Memory that is held."""
-        return self.n_byte_of_one * self._n_written
-
-    def row(self, place: int) -> Any:
-        """The tables of one mode, (1, ...) each."""
-        return self._kind(*(field[place : place + 1] for field in self._room))
-
-    @property
-    def n_byte_of_one(self) -> int:
-        """Memory that the tables of one mode take."""
-        return sum(field[0].nbytes for field in self._room)
-
-    def view(self) -> Any:
-        """The tables of all contact modes."""
-        if self._view is None:
-            self._view = self._kind(*(field[: self._n_filled] for field in self._room))
-        return self._view
 
 
 def tabulate(
@@ -159,7 +84,7 @@ def tabulate(
     work, steady_power = np.zeros((2, 0), dtype=complex), np.zeros(2)
     if is_measured:
         output = _outputs(reduced, exponent, motion, tick * 2.0**sample_level, n_ahead)
-        loss, work, steady_power = _energies(reduced, exponent, motion, rubbing, mode.n_eigenmode, growing)
+        loss, work, steady_power = energy_forms(reduced, exponent, motion, rubbing, mode.n_eigenmode, growing)
     halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q or more, 2, m)
     row = kernel.ModeTables(
         mask=np.array(mode.mask),
@@ -194,14 +119,6 @@ def tabulate(
     )
     fields: list[Any] = [np.ascontiguousarray(np.asarray(field)[None]) for field in row]
     return kernel.ModeTables(*fields)
-
-
-class Growth(NamedTuple):
-    """Coordinates that grow linearly, in a mode in which pairs stick."""
-
-    which: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-    speed: NDArray[np.float64] = np.zeros(0)  # 1/s times their unit
-    steady: int = -1  # the coordinate that is 1
 
 
 def mode_of(row: kernel.ModeTables, kind: type[ContactMode], exponents: tuple[Floats, Floats]) -> ContactMode:
@@ -260,74 +177,3 @@ def _outputs(
     outputs[: exponent.size, : table.shape[1]] = table.real
     outputs[exponent.size :, : table.shape[1]] = -table.imag
     return outputs
-
-
-def _energies(
-    reduced: ReducedModel,
-    exponent: Complexes,
-    motion: Complexes,
-    friction: Complexes,
-    n_eigenmode: int,
-    growing: Growth,
-) -> tuple[Floats, Complexes, Floats]:
-    """Primitives of the powers of damping and unbalance: (2 m, 2 m), (2, m) and steady (2,), W.
-
-    With the damping counts `friction` (n, m), whose power on the motion is what the drive gives for it less
-    what it turns into heat.
-    Products of two coordinates go as exp((l_k + l_j) t) or exp((l_k + conj l_j) t). What has no primitive
-    among them is steady: that of the unbalance response with itself. Undamped modes have none either,
-    and nothing to lose.
-    """
-    n = reduced.stiffness.shape[0]
-    skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
-    shape, rate = motion[:n], motion[n:]
-    resisting = reduced.damping @ rate + skew @ shape - friction
-    phasor = reduced.force[0] - 1j * reduced.force[1]
-    turning = np.full(exponent.shape, 1j * reduced.spin)
-    forms = []
-    for partner, other in ((resisting, exponent), (resisting.conj(), exponent.conj())):
-        form = _primitive(rate.T @ partner, exponent[:, None] + other)
-        if growing.which.size:
-            _follow_growth(form, rate.T @ partner, exponent, n_eigenmode, growing)
-        forms.append(form)
-    with_itself, with_conjugate = forms
-    loss = 0.5 * np.block(
-        [
-            [(with_itself + with_conjugate).real, (with_conjugate - with_itself).imag],
-            [-(with_itself + with_conjugate).imag, (with_conjugate - with_itself).real],
-        ]
-    )
-    work = 0.5 * np.stack(
-        [
-            _primitive(phasor @ rate, exponent + turning),
-            _primitive(phasor.conj() @ rate, exponent - turning),
-        ]
-    )
-    response = rate[:, n_eigenmode]
-    steady = np.array([response @ resisting[:, n_eigenmode].conj(), response @ phasor.conj()])
-    if growing.which.size:
-        steady[0] += 2.0 * rate[:, growing.steady] @ resisting[:, growing.steady]
-    return 0.5 * (loss + loss.T), work, 0.5 * steady.real
-
-
-def _follow_growth(
-    form: Complexes, power: Complexes, exponent: Complexes, n_eigenmode: int, growing: Growth
-) -> None:
-    """Correct primitives for coordinates that grow: `int z phi = z phi / l - phi' z / l^2`.
-
-    Products of the coordinate that is 1 go as phi / phi' with a clearance, as phi^2 / (2 phi') with phi; that
-    with itself is left to the steady power.
-    """
-    moving, one = slice(n_eigenmode + 1), growing.steady
-    for phi, speed in zip(growing.which, growing.speed, strict=True):
-        form[moving, one] -= speed * power[moving, phi] / exponent[moving] ** 2
-        form[phi, phi] += 0.5 * power[one, phi] / speed
-    first, speed = growing.which[0], growing.speed[0]
-    clearances = slice(n_eigenmode + 1, one)
-    form[first, clearances] += power[one, clearances] / speed
-
-
-def _primitive(power: Complexes, exponent: Complexes) -> Complexes:
-    """Power over its exponent, 1/s; zero where that is zero."""
-    has_one = np.abs(exponent) > STEADY * np.abs(exponent).max()
-    return np.divide(power, exponent, out=np.zeros_like(power), where=has_one)

@@ -1,0 +1,84 @@
+"""Tables of contact modes of one width, one after the other, in room that grows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+MOST_MODES = 1024  # sets of closed contacts of one speed and friction
+FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
+NEXT_ROOM = 16  # for a case that goes on rubbing; then for all, since what is there has to be copied
+MOST_BYTES = 2**30  # of their tables
+
+
+class TableStack:
+    """Tables of contact modes of one width, one after the other.
+
+    Attributes
+    ----------
+    n_most : int
+        ModeTables that there is room for: those of every pair closed by itself, and of as many more sets as
+        `n_most` and `most_bytes` allow.
+    """
+
+    def __init__(self, n_least: int, n_most: int = MOST_MODES, most_bytes: int = MOST_BYTES) -> None:
+        self._most_bytes = most_bytes
+        self.n_most = max(n_least, n_most)
+        self._n_least, self._n_filled, self._n_written = n_least, 0, 0
+        self._vacant: int | None = None  # place for the next one
+        self._room: list[Any] = []
+        self._view: Any = None
+
+    def add(self, row: Any, count: int = 1) -> None:
+        """Take in the tables of a mode, a named tuple of (1, ...) each, `count` times."""
+        rows: list[Any] = list(row)
+        if self._vacant is not None:
+            for field, new in zip(self._room, rows, strict=True):
+                field[self._vacant] = new[0]
+            self._vacant = self._view = None
+            return
+        first, end = self._n_filled, self._n_filled + count
+        if not self._room:
+            n_bytes = sum(field.nbytes for field in rows)
+            self.n_most = max(self._n_least, min(self.n_most, self._most_bytes // n_bytes))
+            n_room = max(count, min(self._n_least, FIRST_ROOM))
+            self._room = [np.empty((n_room, *field.shape[1:]), field.dtype) for field in rows]
+            self._kind = type(row)
+        elif end > len(self._room[0]):  # memory that is not written yet is not taken
+            n_room = max(end, min(NEXT_ROOM, self.n_most) if end <= NEXT_ROOM else self.n_most)
+            for i, field in enumerate(self._room):  # one after the other: all at once would take it twice
+                self._room[i] = np.empty((n_room, *field.shape[1:]), field.dtype)
+                self._room[i][:first] = field[:first]
+        for field, new in zip(self._room, rows, strict=True):
+            field[first:end] = new
+        self._n_filled, self._n_written = end, max(self._n_written, end)
+        self._view = None
+
+    def clear(self) -> None:
+        """Give all room back to contact modes to come."""
+        self._n_filled, self._view, self._vacant = 0, None, None
+
+    def vacate(self, place: int) -> None:
+        """Give the place of a mode to the next one."""
+        self._vacant = place
+
+    @property
+    def n_byte(self) -> int:
+        """Memory that is held."""
+        return self.n_byte_of_one * self._n_written
+
+    def row(self, place: int) -> Any:
+        """The tables of one mode, (1, ...) each."""
+        return self._kind(*(field[place : place + 1] for field in self._room))
+
+    @property
+    def n_byte_of_one(self) -> int:
+        """Memory that the tables of one mode take."""
+        return sum(field[0].nbytes for field in self._room)
+
+    def view(self) -> Any:
+        """The tables of all contact modes."""
+        if self._view is None:
+            self._view = self._kind(*(field[: self._n_filled] for field in self._room))
+        return self._view

@@ -1,0 +1,50 @@
+"""How long no switch function can vanish unseen, against many instants; in Python: nothing is compiled."""
+
+import numpy as np
+import pytest
+
+from rubhpc.kernels import event_bounds
+from rubhpc.kernels._jit import plain
+from rubhpc.kernels.friction_states import FORWARD
+
+TICK = 1e-6  # s
+
+
+@pytest.fixture(autouse=True)
+def in_python(monkeypatch):
+    for name in ("positive_interval", "is_positive", "falling_until", "state_of"):
+        monkeypatch.setattr(event_bounds, name, plain(getattr(event_bounds, name)))
+
+
+def test_no_function_changes_unseen_within_the_interval_that_is_promised():
+    def values_of(ticks):
+        return (rows @ np.exp(np.outer(exponents, TICK * ticks))).real
+
+    random, n_seen = np.random.default_rng(3), 0
+    for _ in range(400):
+        m = 4
+        exponents = (-random.uniform(0.0, 1e-3, m) + 1j * random.uniform(0.0, 1e-2, m)) / TICK
+        rows = random.normal(size=(2, m)) + 1j * random.normal(size=(2, m))
+        rows *= np.sign(rows.real.sum(axis=1))[:, None]  # positive at first
+        rate, bend, size = rows * exponents, rows * exponents**2, abs(rows)
+        derivatives = (of[None] for term in (rows, rate, bend) for of in (term.real, term.imag))
+        bounds = (size * abs(exponents) ** 2)[None], (size * abs(exponents) ** 3)[None]
+        z_re, z_im = np.ones(m), np.zeros(m)
+        known = np.zeros((2, 2), dtype=np.int64)
+        now, longest = 7, 10_000
+        given = (FORWARD, 0, *derivatives, *bounds, z_re, z_im, now, TICK, longest)
+        free, sure = plain(event_bounds.free_until)(*given, known)
+        assert now <= free <= sure == known[1].min() <= now + longest
+        assert free <= known[0].min()
+        assert (known[0] <= known[1]).all()
+        assert values_of(np.linspace(0.0, free - now, 200)).min() > -1e-12
+        for j in range(2):  # one that has vanished is negative from then on
+            is_negative = values_of(np.linspace(0.0, known[1, j] - now, 400))[j] < -1e-12
+            assert not (is_negative[:-1] & ~is_negative[1:]).any()
+            n_seen += is_negative.any()
+        # What is known, and comes later than another, is not asked anew.
+        later = int(known[1].argmax())
+        known[1, later] = marked = known[1, later] + 1
+        assert plain(event_bounds.free_until)(*given, known) == (free, sure)
+        assert known[1, later] == marked
+    assert n_seen > 100
