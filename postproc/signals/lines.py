@@ -50,13 +50,11 @@ def sine_order(order: NDArray[np.float64], amplitude: NDArray[np.float64], peak:
 def _name_line(
     order: NDArray[np.float64], amplitude: NDArray[np.float64], peak: int, max_denominator: int
 ) -> str:
-    """Name of a peak by its order, or by that of its sine; by decimals where neither is a simple fraction."""
+    """Name of a peak: the simple fraction at its order, or else at that of its sine, or else decimals."""
     name = order_name(float(order[peak]), _EXACT, max_denominator)
-    if "." not in name:
-        return name
-    return order_name(
-        sine_order(order, amplitude, peak), _NAMED * abs(float(order[1] - order[0])), max_denominator
-    )
+    near = _NAMED * abs(float(order[1] - order[0]))
+    of_sine = order_name(sine_order(order, amplitude, peak), near, max_denominator)
+    return name if "." in of_sine else of_sine
 
 
 def parse_orders(text: str, where: str) -> list[Fraction]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -124,7 +123,6 @@ def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) ->
     Core-hours come from cases spread over all axes, timed on this machine for a few seconds and scaled by the
     predicted steps.
     """
-    from rubhpc.running.memory import peak_memory
     from rubhpc.running.plan import make_plan
     from rubhpc.running.progress import one_line
     from rubhpc.study.study import read_study
@@ -132,8 +130,7 @@ def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) ->
     with one_line() as say:
         found = make_plan(read_study(study, output, trust_rig=trust_rig), part, say)
     start_up = time.process_time() - found.timing.seconds  # what this process and a run have in common
-    memory = found.beside + peak_memory() if math.isfinite(found.core_hours) else 0.0
-    click.echo(replace(found, start_up=_WHOLE_START * start_up, memory=memory).text())
+    click.echo(replace(found, start_up=_WHOLE_START * start_up).text())
     return 0
 
 

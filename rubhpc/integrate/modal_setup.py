@@ -234,6 +234,12 @@ class ModalSetup:
             found.update({friction: library.n_byte for friction, library in held.items()})
         return found
 
+    @property
+    def n_byte_of_parts(self) -> int:
+        """Memory that parts of contact modes hold, which those of a ring have in common."""
+        known = vars(self).get("_known")
+        return known.n_byte if isinstance(known, KeptParts) else 0
+
     def n_solved(self, friction: float) -> int:
         """Contact modes of a friction that were solved, those that were given up and met again included."""
         return sum(held[friction].n_solved for held in self._all_libraries if friction in held)

@@ -13,6 +13,7 @@ from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.running.case_setup import operation_of, set_up, set_up_for_kernels
 from rubhpc.running.followed_case import FollowedCase, Forecast, is_ring, usual_behind
+from rubhpc.running.memory import peak_memory
 from rubhpc.running.stopwatch import Stopwatch
 from rubhpc.running.timed_run_ups import time_run_up
 from rubhpc.schema import FINAL_STATE
@@ -64,6 +65,8 @@ class Pilots:
         Signals and the like of the latest case that was run, by name.
     modes : list of int
         Bytes of contact modes that cases of one set-up and friction held in a ring, for each that was timed.
+    memory : float
+        Bytes that this process held at most before the first case, its kernels loaded.
     """
 
     def __init__(self, grid: CaseGrid) -> None:
@@ -84,6 +87,7 @@ class Pilots:
         self.irregular: set[tuple[int, ...]] = set()
         self.arrays: dict[str, NDArray[Any]] = {}
         self.modes: list[int] = []
+        self.memory = 0.0
 
     @property
     def compiling(self) -> float:
@@ -115,13 +119,14 @@ class Pilots:
         if self._study.branch is not None:
             return Pace(self._branches(case) / steps, 0.0, 0.0, 0.0)
         rig, speed, setup = self._prepared(case)
+        self.memory = self.memory or peak_memory()
         if case.speed_law is not None:
             seconds, record = time_run_up(self._study, case, setup, case.speed_law, self._stopwatch)
             self.arrays = arrays_of(record)
             return Pace(seconds / steps, rig, speed, 0.0)
         modes, rest = self._taken.get(index) or self._modes_and_rest(case, setup, steps, limit)
         if is_ring(setup) and isinstance(setup, ModalSetup) and setup.n_byte:
-            self.modes.append(max(setup.n_byte.values()))
+            self.modes.append(max(setup.n_byte.values()) + setup.n_byte_of_parts)
         self._paces.append(rest / steps)
         return Pace(step=rest / steps, rig=rig, speed=speed, friction=modes)
 

@@ -57,8 +57,10 @@ class Timing:
         Whether a case took longer than is waited for, so that the pace is a lower bound.
     seconds : float
         Processor time that it took, but for what a run takes as well: kernels that are loaded.
-    modes : float
-        Bytes of the contact modes that cases of one set-up and friction hold in a ring.
+    modes : tuple of float
+        Bytes of the contact modes that cases of one set-up and friction held in a ring, of each that was timed.
+    memory : float
+        Bytes that this process held before the first case.
     failures : tuple of str
         Coordinates of the cases that failed, and why.
     """
@@ -69,7 +71,8 @@ class Timing:
     known: float = 0.0
     is_bound: bool = False
     seconds: float = 0.0
-    modes: float = 0.0
+    modes: tuple[float, ...] = ()
+    memory: float = 0.0
     failures: tuple[str, ...] = ()
 
 
@@ -156,7 +159,8 @@ def time_pilots(
         known=sample.known,
         is_bound=is_bound,
         seconds=seconds,
-        modes=float(np.mean(pilots.modes)) if pilots.modes else 0.0,
+        modes=tuple(pilots.modes),
+        memory=pilots.memory,
         failures=tuple(failures),
     )
 

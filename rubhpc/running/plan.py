@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.running.kept_setups import MOST_BYTES, MOST_SETUPS
+from rubhpc.running.memory import peak_memory
 from rubhpc.running.pilot_estimate import within
 from rubhpc.running.pilots import Timing, seconds_of, time_pilots
 from rubhpc.running.preparations import count_preparations
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.running.preparations import Preparations
     from rubhpc.storage.manifest import Manifest
     from rubhpc.study.study import Study
 
@@ -40,6 +42,7 @@ _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the se
 _AT_EDGES = 1.1  # cases that a refined map computes over all cases, seconds a step, about
 _AGREED = 0.03  # standard error of the time, as a share of it, up to which no range is given
 _FEW = 3  # cases, which may all lack what most of the time is spent on
+_ROOM = 1.15  # memory for contact modes over what their tables and parts hold (1.04 to 1.12, rings of 16)
 _LEDGERS = 2  # times that measures of all cases are held while they are packed, about
 _PRIVATE_FILES = 8  # manifests, journals, records of runs
 
@@ -65,11 +68,8 @@ class Plan:
     start_up : float
         Processor seconds that each process takes to start and to end, about, which are not in `core_hours`;
         0 where that is unknown.
-    beside : float
-        Bytes that a process holds beside what the process that made the plan has held: contact modes of rings
-        that are kept for other cases, and the measures of all cases.
     memory : float
-        Bytes that a process holds at most, about; 0 where that is unknown.
+        Bytes that a process of the run holds at most, about; 0 where no case was timed.
     timing : Timing
         What the pilot cases have shown.
     warnings : tuple of str
@@ -96,7 +96,6 @@ class Plan:
     core_hours: float
     timing: Timing
     start_up: float = 0.0
-    beside: float = 0.0
     memory: float = 0.0
     warnings: tuple[str, ...] = ()
     part: str = ""
@@ -236,12 +235,11 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
     all_steps = sum(block.cost * share for block, share in left)
     steps = left_of_all * all_steps
     timing = time_pilots(grid, manifest, [block for block, _ in left], missing, say)
-    seconds = most = beside = 0.0
+    seconds = most = memory = 0.0
     if left:
         prepared = count_preparations(grid, missing)
         n_case = int(missing.sum())
-        n_held = min(prepared.friction, MOST_SETUPS * prepared.friction / max(prepared.speed, 1.0)) - 1.0
-        beside = min(MOST_BYTES, max(n_held, 0.0) * timing.modes) + _LEDGERS * grid.n_case * kind.itemsize
+        memory = _memory(timing, prepared) + _LEDGERS * grid.n_case * kind.itemsize
         most = seconds = seconds_of(timing.pace, all_steps, n_case, prepared, len(left))
         if manifest.refine is not None:
             pace = timing.pace
@@ -273,11 +271,24 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
         core_hours=seconds / 3600,
         most_core_hours=most / 3600,
         timing=timing,
-        beside=beside,
+        memory=memory if timing.n_pilot else 0.0,
         warnings=grid.warnings(),
         part="" if chosen is None else str(chosen),
         n_expected=n_expected,
     )
+
+
+def _memory(timing: Timing, prepared: Preparations) -> float:
+    """Bytes that a process holds at most, but for the measures of all cases.
+
+    In a ring those are contact modes: of the dearest case, and of set-ups and frictions that are kept beside
+    them. Otherwise this process, which has run cases and written a block, has held as much.
+    """
+    if not timing.modes:
+        return peak_memory()
+    n_kept = min(prepared.friction, MOST_SETUPS * prepared.friction / max(prepared.speed, 1.0)) - 1.0
+    beside = min(MOST_BYTES, max(n_kept, 0.0) * float(np.mean(timing.modes)))
+    return timing.memory + _ROOM * (max(timing.modes) + beside)
 
 
 def _refined(

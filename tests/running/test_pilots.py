@@ -34,7 +34,7 @@ def test_more_cases_are_timed_where_they_differ(costs, n_pilot, monkeypatch):
     class Pilots:
         loading = compiling = 0.0
         was_cut, arrays, alike, shortened = False, {}, {}, {}
-        irregular, modes = frozenset(), []
+        irregular, modes, memory = frozenset(), [], 0.0
 
         def __init__(self, grid):
             pass
@@ -84,7 +84,7 @@ def test_dearest_case_is_finished(monkeypatch, n_case, left):
     class Pilots:
         loading = compiling = 0.0
         was_cut, arrays, alike = False, {}, {}
-        irregular, modes = frozenset(), []
+        irregular, modes, memory = frozenset(), [], 0.0
 
         def __init__(self, grid):
             self.shortened = {(0,): 3.0, (1,): 0.2, (2,): 0.1}
@@ -125,7 +125,7 @@ def test_cases_of_a_ring_are_timed_in_pairs(monkeypatch):
     class Pilots:
         loading = compiling = 0.0
         was_cut, arrays, shortened = False, {}, {}
-        irregular, modes = frozenset(), []
+        irregular, modes, memory = frozenset(), [], 0.0
 
         def __init__(self, grid):
             self.alike = {(0,): (1,), (2,): (3,)}
@@ -185,17 +185,19 @@ def test_a_block_is_timed_with_its_folders(tmp_path, monkeypatch):
 
 
 def test_memory_holds_other_set_ups_of_a_ring(tmp_path, monkeypatch):
-    """Contact modes of other set-ups are kept, up to a bound; the rest was seen while cases were timed."""
-    study = read_study(write_study(tmp_path))  # two speeds, two gaps that set the speed's, three frictions
+    """Contact modes of the dearest case and of other set-ups and frictions, up to a bound."""
+    study = read_study(write_study(tmp_path))  # two speeds, three frictions
 
-    def beside(modes):
+    def memory(*modes):
         pace = pilots.Pace(1.0, 0.0, 0.0, 0.0)
-        monkeypatch.setattr(plan, "time_pilots", lambda *_: pilots.Timing(pace=pace, n_pilot=1, modes=modes))
-        return plan.make_plan(study).beside
+        found = pilots.Timing(pace=pace, n_pilot=2, modes=modes, memory=3e8)
+        monkeypatch.setattr(plan, "time_pilots", lambda *_: found)
+        return plan.make_plan(study).memory
 
-    none = beside(0.0)
-    assert beside(1e6) - none == pytest.approx(5e6)  # 2 speeds of 3 frictions, but for one
-    assert beside(1e9) - none == MOST_BYTES
+    none = memory(0.0)
+    assert none == pytest.approx(3e8, rel=1e-3)
+    assert memory(1e6, 3e6) - none == pytest.approx(plan._ROOM * (3e6 + 5 * 2e6))
+    assert memory(1e9) - none == pytest.approx(plan._ROOM * (1e9 + MOST_BYTES))
 
 
 def test_peak_memory_is_that_of_this_process():

@@ -126,7 +126,7 @@ def test_lines_beside_their_order_keep_its_name():
 
 
 @pytest.mark.parametrize(
-    ("order", "name"), [(2 / 3, "2/3X"), (21 / 32, "0.66X"), (0.647, "0.65X"), (1.0, "1X")]
+    ("order", "name"), [(2 / 3, "2/3X"), (21 / 32, "0.66X"), (0.647, "0.66X"), (1.0, "1X")]
 )
 def test_a_line_is_named_by_an_order_only_where_its_sine_lies(order, name):
     # a line at 21/32 alone is no 2/3: of one at 2/3 the next line would have half the height
