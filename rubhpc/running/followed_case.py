@@ -82,6 +82,8 @@ class FollowedCase:
 
     Attributes
     ----------
+    setup : Setup
+        What it shares with other cases.
     seconds : float, s
         What its parts have taken, contact modes included.
     modes : float, s
@@ -97,7 +99,7 @@ class FollowedCase:
     """
 
     def __init__(self, setup: Setup, case: Case, recording: Recording, stopwatch: Stopwatch) -> None:
-        self._setup, self._case, self._recording, self._stopwatch = setup, case, recording, stopwatch
+        self.setup, self._case, self._recording, self._stopwatch = setup, case, recording, stopwatch
         self.seconds = self.modes = self.a_mode = 0.0
         self.is_whole = self.is_irregular = False
         self.n_behind = 0
@@ -113,12 +115,12 @@ class FollowedCase:
     @property
     def is_in_ring(self) -> bool:
         """Whether it meets many sets of contacts."""
-        return is_ring(self._setup)
+        return is_ring(self.setup)
 
     @property
     def n_solved(self) -> int:
         """Contact modes that cases of this friction have had solved so far."""
-        return n_solved(self._setup, self._case)
+        return n_solved(self.setup, self._case)
 
     def follow(self, steps: float, n_behind: float, limit: float) -> None:
         """Run part by part, each as long as all before, to the end or while `limit` s allow.
@@ -170,7 +172,7 @@ class FollowedCase:
                 self._n_motion * pace,
                 least,
                 n_behind=self._cut_behind,
-                lengths=lengths_behind(self._setup, recording),
+                lengths=lengths_behind(self.setup, recording),
             )
         pace = self._probe()
         return Forecast(
@@ -254,7 +256,7 @@ class FollowedCase:
         case = self._case
         return self._stopwatch.timed(
             lambda check: run_case(
-                self._setup,
+                self.setup,
                 clearance=case.clearance,
                 friction=case.friction,
                 recording=recording,

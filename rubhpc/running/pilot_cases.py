@@ -13,6 +13,7 @@ from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.running.case_setup import operation_of, set_up, set_up_for_kernels
 from rubhpc.running.followed_case import FollowedCase, Forecast, is_ring, usual_behind
+from rubhpc.running.kept_setups import MOST_BYTES
 from rubhpc.running.memory import peak_memory
 from rubhpc.running.stopwatch import Stopwatch
 from rubhpc.running.timed_run_ups import time_run_up
@@ -173,10 +174,22 @@ class Pilots:
             self.irregular.add(case.index)
         self._longest = max(self._longest, self.foreseen(case.index))
         self._kept[case.index] = followed
-        if followed.is_in_ring:  # whose tables of contact modes take memory
-            dearest = max(self._kept, key=self.foreseen)
-            self._kept = {dearest: self._kept[dearest]}
+        self._kept = self._affordable()
         return self.foreseen(case.index)
+
+    def _affordable(self) -> dict[tuple[int, ...], FollowedCase]:
+        """The dearest of the cases that may be finished, and others while contact modes leave memory."""
+        kept: dict[tuple[int, ...], FollowedCase] = {}
+        held: set[int] = set()
+        n_byte = 0
+        for index in sorted(self._kept, key=self.foreseen, reverse=True):
+            setup = self._kept[index].setup
+            more = 0 if id(setup) in held else bytes_of_modes(setup)
+            if not kept or n_byte + more <= MOST_BYTES:
+                kept[index] = self._kept[index]
+                held.add(id(setup))
+                n_byte += more
+        return kept
 
     def _alike(self, case: Case) -> Case | None:
         """Another case, far along one axis, that shares the contact modes of this one."""
@@ -239,6 +252,13 @@ class Pilots:
         )
         self.was_cut = record is None
         return taken
+
+
+def bytes_of_modes(setup: Setup) -> int:
+    """Memory that contact modes of a ring hold; that of one pair is little."""
+    if not (is_ring(setup) and isinstance(setup, ModalSetup)):
+        return 0
+    return sum(setup.n_byte.values()) + setup.n_byte_of_parts
 
 
 def arrays_of(record: Record | RunUpRecord) -> dict[str, NDArray[Any]]:

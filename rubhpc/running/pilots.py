@@ -58,7 +58,7 @@ class Timing:
     seconds : float
         Processor time that it took, but for what a run takes as well: kernels that are loaded.
     modes : tuple of float
-        Bytes of the contact modes that cases of one set-up and friction held in a ring, of each that was timed.
+        Bytes of contact modes that cases of one set-up and friction held in a ring, for each that was timed.
     memory : float
         Bytes that this process held before the first case.
     failures : tuple of str

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rubhpc.running import block_time, pilots, plan
+from rubhpc.running import block_time, pilot_cases, pilots, plan
 from rubhpc.running.kept_setups import MOST_BYTES
 from rubhpc.running.memory import peak_memory
 from rubhpc.running.plan import Plan
@@ -203,3 +203,21 @@ def test_memory_holds_other_set_ups_of_a_ring(tmp_path, monkeypatch):
 def test_peak_memory_is_that_of_this_process():
     held = np.ones(20_000_000)
     assert held.nbytes < peak_memory() < 1e12
+
+
+def test_shortened_cases_of_a_ring_are_kept_while_memory_lasts(monkeypatch):
+    """The dearest in any case, those that share its set-up, and others whose contact modes find room."""
+    study = SimpleNamespace(recording=None)
+    found = pilot_cases.Pilots(SimpleNamespace(study=study))
+    sizes = {"a": 3 * MOST_BYTES // 4, "b": MOST_BYTES // 2, "c": MOST_BYTES // 8, "large": 4 * MOST_BYTES}
+    cases = [("large", 9.0), ("a", 8.0), ("a", 5.0), ("b", 4.0), ("c", 1.0)]
+
+    def kept(cases):
+        setups = {name: SimpleNamespace(name=name) for name in sizes}
+        found._kept = {(k,): SimpleNamespace(setup=setups[name]) for k, (name, _) in enumerate(cases)}
+        monkeypatch.setattr(found, "foreseen", lambda index: cases[index[0]][1])
+        return [found._kept[index].setup.name for index in found._affordable()]
+
+    monkeypatch.setattr(pilot_cases, "bytes_of_modes", lambda setup: sizes[setup.name])
+    assert kept(cases) == ["large"]
+    assert kept(cases[1:]) == ["a", "a", "c"]
