@@ -61,6 +61,8 @@ class Timing:
         Bytes of contact modes that cases of one set-up and friction held in a ring, for each that was timed.
     memory : float
         Bytes that this process held before the first case.
+    has_compiled : bool
+        Whether kernels were compiled that no cache held, which takes memory.
     failures : tuple of str
         Coordinates of the cases that failed, and why.
     """
@@ -73,6 +75,7 @@ class Timing:
     seconds: float = 0.0
     modes: tuple[float, ...] = ()
     memory: float = 0.0
+    has_compiled: bool = False
     failures: tuple[str, ...] = ()
 
 
@@ -161,6 +164,7 @@ def time_pilots(
         seconds=seconds,
         modes=tuple(pilots.modes),
         memory=pilots.memory,
+        has_compiled=pilots.compiling > 0.0,
         failures=tuple(failures),
     )
 

@@ -159,13 +159,14 @@ class Plan:
         )
         if self.start_up > 0.0 and self.counts[MISSING]:
             cost += f", with the {self.start_up:.1f} s that a process takes to start"
+        compiled = "; kernels were compiled, less from now on" if self.timing.has_compiled else ""
         return "\n".join(
             [
                 f"{self.title} -> {self.store}",
                 f"cases       {n_case} = {sizes}",
                 f"blocks      {self.n_block}, at most {self.n_per_block} cases each; {self._idle}",
                 f"store       {_size(self.n_byte)} before compression, {self._files}",
-                *([f"memory      {_size(self.memory)} a process, about"] if self.memory else []),
+                *([f"memory      {_size(self.memory)} a process, about{compiled}"] if self.memory else []),
                 *(
                     [
                         f"refined     computes at most all {n_case} cases, about {self.n_expected}"
