@@ -59,7 +59,7 @@ def passed(
         if graze is None:
             continue
         sides = [graze.point, graze.beyond]
-        if graze.point.sequence != a.sequence:
+        if touches(graze.point) != touches(a):
             sides.reverse()
         if np.linalg.norm(branching.difference(*sides)) <= nearest:
             return [
@@ -166,7 +166,7 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
                     found = branching.correct(base, share * change, direction, is_free=True)
                 except NotConverged:
                     continue
-                if found.sequence == other.sequence:
+                if touches(found) == touches(other):
                     return found
         return other
 
@@ -191,7 +191,7 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
             trial = branching.correct(free[-1][1], (share - near) * ahead, direction)
         except NotConverged:
             trial = None
-        if trial is not None and trial.sequence == free[0][1].sequence:
+        if trial is not None and touches(trial) == touches(free[0][1]):  # in any order
             free = [free[-1], (share, trial)]
         else:
             ends[b.sequence if is_first_free else a.sequence] = share
