@@ -14,6 +14,8 @@ from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike, NDArray
 
     Floats = NDArray[np.float64]
@@ -116,12 +118,17 @@ def piece_length(per_revolution: int, pieces_per_revolution: int) -> int:
     return per_revolution // pieces_per_revolution
 
 
-def cut(law: SpeedLaw, per_revolution: int, pieces_per_revolution: int | None = None) -> Ints:
+def cut(
+    law: SpeedLaw,
+    per_revolution: int,
+    pieces_per_revolution: int | None = None,
+    allowed: Callable[[float, float], float] = lambda _speed, _turns: LAG,
+) -> Ints:
     """Cut a law into pieces, each of which is taken at its mean speed.
 
     Under the acceleration a the shaft's angle departs from that of a steady spin by `a T^2 / 12` over a piece
-    of the duration T, which is to be within `LAG`: pieces are of 1, 2, 4 ... revolutions or of halves,
-    quarters ... of one. A bend of the speed lies between two samples, which are a piece by themselves.
+    of the duration T, which is to be within what is allowed: pieces are of 1, 2, 4 ... revolutions or of
+    halves, quarters ... of one. A bend of the speed lies between two samples, a piece by themselves.
 
     Parameters
     ----------
@@ -129,6 +136,8 @@ def cut(law: SpeedLaw, per_revolution: int, pieces_per_revolution: int | None = 
         Samples in a revolution; pieces are of whole numbers of them.
     pieces_per_revolution : int, optional
         Cut every revolution into as many, whatever the law.
+    allowed : callable, optional
+        That lag, rad, at a speed, rad/s, in pieces of so many revolutions; `LAG` if not given.
 
     Returns
     -------
@@ -144,7 +153,7 @@ def cut(law: SpeedLaw, per_revolution: int, pieces_per_revolution: int | None = 
     if pieces_per_revolution is not None:
         length = piece_length(per_revolution, pieces_per_revolution)
         return _around(law.bends(per_revolution), np.arange(n * pieces_per_revolution + 1) * length)
-    time, _, rate = law.at_angle(2.0 * np.pi * np.arange(n + 1))
+    time, speed, rate = law.at_angle(2.0 * np.pi * np.arange(n + 1))
     bends = law.bends(per_revolution)
     cuts, turn = [0], 0
     while turn < n:
@@ -152,12 +161,16 @@ def cut(law: SpeedLaw, per_revolution: int, pieces_per_revolution: int | None = 
         while count > 1 and (
             turn + count > n
             or np.any((bends > turn * per_revolution) & (bends < (turn + count) * per_revolution))
-            or abs(rate[turn]) * (time[turn + count] - time[turn]) ** 2 > 12.0 * LAG
+            or abs(rate[turn]) * (time[turn + count] - time[turn]) ** 2 > 12.0 * allowed(speed[turn], count)
         ):
             count //= 2
         within = law.acceleration[law.between(time[turn], time[turn + 1])]
         parts, lag = 1, np.abs(within).max() * (time[turn + 1] - time[turn]) ** 2 / 12.0
-        while count == 1 and lag > LAG * parts**2 and per_revolution % (2 * parts) == 0:
+        while (
+            count == 1
+            and lag > allowed(speed[turn], 1.0 / parts) * parts**2
+            and per_revolution % (2 * parts) == 0
+        ):
             parts *= 2
         stride = per_revolution * count // parts
         cuts += range(cuts[-1] + stride, cuts[-1] + per_revolution * count + 1, stride)

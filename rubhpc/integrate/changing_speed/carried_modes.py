@@ -1,11 +1,12 @@
 """Higher modes carried over a change of the matrices, which else would make them ring.
 
-With the speed a mode's shape and its static part change evenly; matrices that are held change at once,
-and a motion that goes on unchanged then holds each mode by another amount. Over an even change that takes
-the time T the amplitude of a mode of frequency w takes of a mode of frequency w' but `sin(a) / a` of its
-share in it, with `a = (w - w') T / 2`, and as much of the jump of its own static part, where w' is the spin.
-The rest is taken off here. Modes of one frequency, as equal stators have them, so pass into one another as
-they are.
+With the speed a mode's response to what is slower than itself changes evenly; matrices that are held change
+at once. In the modes `l` of the matrices to come, a motion `exp(m t)` that went on unchanged would leave each
+mode another amount to ring with. An even change from the time `-a` before to `b` after leaves of it the mean
+of `exp((m - l) s)` over these times, which is 1 for what is slow and vanishes for what is fast. Powers of it,
+but for the phase, stand for a change that begins and ends smoothly; what dies away within these times leaves
+nothing. Of a motion that has touched, higher modes that ring go on as they are. What a sudden change of the
+acceleration makes ring is real, and stays.
 """
 
 from __future__ import annotations
@@ -23,8 +24,12 @@ if TYPE_CHECKING:
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
-LOWEST = 3.0  # frequency of a mode over the spin; lower ones take part in contact
+# Size of a mode's exponent over the spin; of a motion that has touched, lower ones take part in contact.
+LOWEST, LOWEST_TOUCHING = 1.5, 3.0
+TOUCH = 0.25  # revolutions, at most, before and after which a contact is what it is
+SLOW = 1e-6  # exponent times time below which a change is at once
 
 
 class Standing(NamedTuple):
@@ -37,6 +42,22 @@ class Standing(NamedTuple):
     time: float  # s, since the piece began
 
 
+class Change(NamedTuple):
+    """How the speed changes where matrices do."""
+
+    held_for: float  # s, since when the matrices before were held
+    ahead: float  # s, that the piece to come takes
+    jump: float = 0.0  # rad/s^2, sudden change of the acceleration
+    angle: float = 0.0  # rad, of the shaft
+
+
+class Parts(NamedTuple):
+    """A motion as a sum of exponentials, each the real part of its shape."""
+
+    exponent: Complexes  # (p,), 1/s
+    shape: Complexes  # (2 n, p)
+
+
 def standing(march: EventDrivenMarch, setup: PieceSetup, end: Place, time: float) -> Standing | None:
     """Where a march has ended a piece; None where modes are not carried over."""
     library = march.library
@@ -46,7 +67,7 @@ def standing(march: EventDrivenMarch, setup: PieceSetup, end: Place, time: float
 
 
 def carried(
-    before: Standing, lasted: float, march: EventDrivenMarch, setup: PieceSetup, begun: Place
+    before: Standing, change: Change, march: EventDrivenMarch, setup: PieceSetup, begun: Place
 ) -> Place:
     """The place from which a piece begins, with what its matrices would make ring taken off.
 
@@ -54,8 +75,6 @@ def carried(
     ----------
     before : Standing
         At the same instant.
-    lasted : float, s
-        Since when the matrices before were held.
     march : EventDrivenMarch
         Which stands nowhere afterwards, until it begins anew.
     begun : Place
@@ -65,27 +84,88 @@ def carried(
     library, mask = march.library, march.mask
     assert isinstance(library, RetunedLibrary)
     was, now = before.library.eigenmodes(mask), library.eigenmodes(mask)
-    if was is None or now is None or was.exponent.size != now.exponent.size:
+    if was is None or now is None:
         return begun
-    old, new = before.setup, setup
-    z_before = was.entered(before.end.motion, before.constants, *_turning(old), before.time)
-    z = now.entered(march.begun_motion, march.constants, *_turning(new), 0.0)
-    pairs = np.flatnonzero(now.is_pair & (np.abs(now.exponent.imag) > LOWEST * abs(new.spin)))
-    frequency, others = now.exponent.imag[pairs, np.newaxis], was.exponent.imag
-    held = 0.5 * (now.enter[pairs] @ was.motion) * z_before
-    mirrored = 0.5 * (now.enter[pairs] @ was.motion.conj()) * z_before.conj()
-    still = z[pairs] - (held + mirrored).sum(axis=1)
-    jump = (held * _lost((frequency - others) * lasted)).sum(axis=1)
-    jump += (mirrored * _lost((frequency + others) * lasted)).sum(axis=1)
-    jump += still * _lost((np.abs(frequency[:, 0]) - abs(new.spin)) * lasted)
-    motion = march.begun_motion - (now.motion[:, pairs] @ jump).real
+    old, factor = _turning(before.setup)
+    new, factor_ahead = _turning(setup)
+    z = was.entered(before.end.motion, before.constants, old, factor, before.time)
+    factor = factor * np.exp(old * before.time)
+    forced = was.response(old, factor)
+    still = march.begun_motion - (was.motion @ z).real - forced.real
+    parts = Parts(
+        np.concatenate([was.exponent, [0.0, old]]),
+        np.column_stack([was.motion * z, still, forced]),
+    )
+    has_touched = any(march.met)
+    lowest = LOWEST_TOUCHING if has_touched else LOWEST
+    fast = np.abs(now.exponent) > lowest * abs(setup.spin)
+    exponent, enter = now.exponent[fast], now.enter[fast]
+    left = 0.5 * np.stack([enter @ parts.shape, enter @ parts.shape.conj()])  # (2, modes, parts)
+    direct, mirrored = now.forced(old, factor)
+    left[0, :, -1] -= direct[fast]
+    left[1, :, -1] -= mirrored[fast]
+    left[0, :, -2] -= (march.constants @ now.constant)[fast]
+    real = np.zeros_like(left)  # what is sudden indeed
+    if change.jump:
+        steady = Parts(parts.exponent[-2:], parts.shape[:, -2:])
+        real[..., -2:] = _pushed(steady, exponent, enter, change.jump * setup.held.momentum)
+    longest = TOUCH * 2.0 * np.pi / abs(setup.spin) if mask else np.inf
+    spans = np.minimum(_spans(before.setup, setup, change), longest)
+    taken = 1.0 - left_over(_apart(parts, exponent), *spans, has_touched=has_touched)
+    if has_touched:
+        taken[..., :-2] *= np.abs(was.exponent) <= lowest * abs(setup.spin)
+    off = -((left - real) * taken).sum(axis=(0, 2))
+    # The force as well, whose phase differs in pieces of another length, but for its own sudden change.
+    sudden = now.forced(new, -1j * change.jump * np.exp(1j * change.angle))
+    ahead, half = now.forced(new, factor_ahead), 0.5 * before.time
+    for here, there, jump, turning in zip(
+        (direct, mirrored), ahead, sudden, (old, old.conjugate()), strict=True
+    ):
+        share = left_over(turning - exponent, half, half, has_touched=has_touched) - 1.0
+        off += (here - there + jump)[fast] * share
+    motion = march.begun_motion + (now.motion[:, fast] @ off).real
     return Place(motion, setup.model.sag, begun.contact_force)
 
 
-def _lost(turned: Floats) -> Floats:
-    """Share that a change of amplitude loses over a time in which its phase turns, rad."""
-    lost: Floats = 1.0 - np.sinc(turned / (2.0 * np.pi))
-    return lost
+def left_over(exponent: Complexes, before: float, after: float, *, has_touched: bool) -> Complexes:
+    """What an even change from a time before, s, to one after leaves of what it would be at once.
+
+    `exponent` (1/s) is that of the motion less that of the mode which it makes ring.
+    """
+    whole = 0.5 * (before + after)
+    x = exponent * whole
+    x = np.where(np.abs(x) < SLOW, SLOW, x)
+    dying = 2.0 * np.abs(x.real)
+    mean = (np.exp(x - dying) - np.exp(-x - dying)) / (2.0 * x)
+    smooth = mean**3 if has_touched else np.where(np.abs(x.imag) < np.pi, mean, mean**2)
+    turned: Complexes = smooth * np.exp(0.5j * exponent.imag * (after - before))
+    return turned
+
+
+def _spans(old: PieceSetup, new: PieceSetup, change: Change) -> tuple[float, float]:
+    """Times, s, since the speed was that of the matrices before, and until it is that of those to come."""
+    speed = 0.5 * (old.spin + new.spin)
+    since, until = (
+        abs((speed - of.held.reduced.spin) / of.held.acceleration) if of.held.acceleration else 0.0
+        for of in (old, new)
+    )
+    since = min(since, change.held_for)
+    return since, min(until, change.ahead if change.jump else max(since, change.ahead))
+
+
+def _pushed(parts: Parts, exponent: Complexes, enter: Complexes, stiffness: Floats) -> Complexes:
+    """What each part and its conjugate make of each mode, (2, modes, p), as a stiffness acts at once."""
+    n = len(stiffness)
+    given = 0.5 * (enter[:, n:] @ stiffness) @ np.stack([parts.shape[:n], parts.shape[:n].conj()])
+    pushed: Complexes = given / _apart(parts, exponent)
+    return pushed
+
+
+def _apart(parts: Parts, exponent: Complexes) -> Complexes:
+    """Exponents of the parts and of their conjugates less those of the modes, (2, modes, p)."""
+    both = np.stack([parts.exponent, parts.exponent.conj()])
+    apart: Complexes = both[:, np.newaxis] - exponent[:, np.newaxis]
+    return apart
 
 
 def _turning(setup: PieceSetup) -> tuple[complex, complex]:

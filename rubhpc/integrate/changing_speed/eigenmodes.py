@@ -30,10 +30,23 @@ class Eigenmodes(NamedTuple):
         `turning` (1/s) is the exponent of the unbalance force, `factor` (1/s^2) that of the unbalance at unit
         speed at time 0.
         """
-        direct = self.drive * factor / (turning - self.exponent)
-        mirrored = self.mirrored_drive * factor / (turning - self.exponent.conj())
-        other = np.where(self.is_pair, mirrored, direct).conj()
+        direct, other = self.forced(turning, factor)
         turned = np.exp(turning * time)
-        response = 0.5 * (direct * turned + other * turned.conj())
+        response = direct * turned + other * turned.conj()
         coordinates: Complexes = self.enter @ motion - constants @ self.constant - response
         return coordinates
+
+    def forced(self, turning: complex, factor: complex) -> tuple[Complexes, Complexes]:
+        """Response to the unbalance at time 0: what turns as `exp(turning t)`, and what as its conjugate."""
+        direct = self.drive * factor / (turning - self.exponent)
+        mirrored = self.mirrored_drive * factor / (turning - self.exponent.conj())
+        other: Complexes = np.where(self.is_pair, mirrored, direct).conj()
+        return 0.5 * direct, 0.5 * other
+
+    def response(self, turning: complex, factor: complex) -> Complexes:
+        """The same as a motion (2 n,), which turns as `exp(turning t)`: its real part."""
+        direct, other = self.forced(turning, factor)
+        twice = np.where(self.is_pair, 1.0, 2.0) * direct
+        back = np.where(self.is_pair, other.conj(), 0.0)
+        motion: Complexes = self.motion @ twice + self.motion.conj() @ back
+        return motion

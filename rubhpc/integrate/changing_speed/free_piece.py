@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rubhpc.integrate.changing_speed.carried_modes import Change
 from rubhpc.integrate.changing_speed.passing import Passed, Passing, energy_of, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp
@@ -128,7 +129,9 @@ class Spin:
                 else:
                     self._begun = start
             reached = ramp.about_middle(self._begun, setup)
-            begun = self._passing.continued(setup, reached, self._standing, self.time - self._held_from)
+            begun = self._passing.continued(
+                setup, reached, self._standing, Change(self.time - self._held_from, duration)
+            )
             carried = 0.0  # J
             if isinstance(begun, Place) and isinstance(reached, Place) and begun is not reached:
                 carried = energy_of(begun, setup) - energy_of(reached, setup)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 WIDEST, NARROWEST = 0.5, 1e-4  # half of the range over the speed
 WIDEST_TABULATED = 0.16  # the same where bearings follow a table, not a straight line
 AT_ENDS = 2.0  # error at the ends of a range over its mean: it grows evenly from the middle
-ACCELERATION_SHARE = 0.25  # of these errors, by the acceleration
+ACCELERATION_SHARE = 0.05  # of these errors, by the acceleration, which may change at once
 
 
 def held_range(

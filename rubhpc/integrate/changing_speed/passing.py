@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.case import march_of
-from rubhpc.integrate.changing_speed.carried_modes import Standing, carried, standing
+from rubhpc.integrate.changing_speed.carried_modes import Change, Standing, carried, standing
 from rubhpc.integrate.changing_speed.piece_setup import with_values
 from rubhpc.integrate.changing_speed.stretch import Stretch, take_stretch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
@@ -73,9 +73,9 @@ class Passing:
             return self._pass(steps, setup, n_sample, earlier, is_balanced)
 
     def continued(
-        self, setup: PieceSetup, begun: State | Place, before: Standing | None, lasted: float
+        self, setup: PieceSetup, begun: State | Place, before: Standing | None, change: Change
     ) -> State | Place:
-        """Where a piece begins after another in other matrices, which were held for a time, s.
+        """Where a piece begins after another in other matrices.
 
         What a curved gap adds follows the motion, which may not change while that is closed.
         """
@@ -84,7 +84,7 @@ class Passing:
             return begun
         if not self._march.has_closed_form and (begun.contact_force > 0.0).any():
             return begun
-        return carried(before, lasted, self._march, setup, begun)
+        return carried(before, change, self._march, setup, begun)
 
     def standing(self, setup: PieceSetup, end: State | Place, n_sample: int) -> Standing | None:
         """Where the piece that was taken last has ended, in its own modes, if it has some."""

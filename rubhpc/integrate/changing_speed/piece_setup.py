@@ -39,7 +39,10 @@ D = TypeVar("D")
 
 
 class HeldMatrices:
-    """Matrices at a speed, rad/s, and an acceleration, rad/s^2, and what has been solved of them."""
+    """Matrices at a speed, rad/s, and an acceleration, rad/s^2, and what has been solved of them.
+
+    `momentum` (n, n) is the change of the stiffness with the acceleration, per rad/s^2.
+    """
 
     template: PieceSetup  # of which a piece has another speed
 
@@ -48,6 +51,7 @@ class HeldMatrices:
         model: Model,
         reduced: ReducedModel,
         phasor: Complexes,
+        momentum: Floats,
         acceleration: float,
         slope: float,
         reach: tuple[float, float],
@@ -61,7 +65,8 @@ class HeldMatrices:
         self.kept = KeptParts()
         self.bodies: dict[float, Reduced] = {}  # of each friction, but for what a piece changes
         self.sample_level = sample_level  # of the lowest speed
-        self._phasor, self._reach, self._acceleration = phasor, reach, acceleration
+        self.acceleration, self.momentum = acceleration, momentum
+        self._phasor, self._reach = phasor, reach
         self._slope = slope  # N m s, of a drive's torque over the speed
         self._libraries: dict[tuple[str, float], RetunedLibrary] = {}
         self._pairs: dict[float, FrictionPairs] = {}
@@ -76,7 +81,7 @@ class HeldMatrices:
     def serve(self, speed: float, acceleration: float, slope: float = 0.0) -> bool:
         """Whether a piece may use them."""
         far, changed = self._reach
-        is_near = abs(speed - self.reduced.spin) <= far and abs(acceleration - self._acceleration) <= changed
+        is_near = abs(speed - self.reduced.spin) <= far and abs(acceleration - self.acceleration) <= changed
         return is_near and slope == self._slope
 
     def sagging(self, torque: float, acceleration: float) -> Model:

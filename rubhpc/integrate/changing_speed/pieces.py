@@ -16,6 +16,7 @@ from rubhpc.fem.statics import sag_under
 from rubhpc.integrate.changing_speed.held_matrices import WIDEST, WIDEST_TABULATED, held_range
 from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, sagging, with_values
 from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE, Desk, speeds_of
+from rubhpc.integrate.changing_speed.ripples import Linear, Ripples
 from rubhpc.integrate.packing import whole_system
 from rubhpc.kernels.case_progress import Clock
 
@@ -41,6 +42,7 @@ MOST_BYTES = 3 * 2**29  # of contact modes that are kept, with their matrices, f
 # cases too.
 _KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[float, float, float], HeldMatrices]] = WeakKeyDictionary()
 
+_RIPPLES: WeakKeyDictionary[ModalSetup, Ripples] = WeakKeyDictionary()
 _DESKS: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], Desk]] = WeakKeyDictionary()
 
 
@@ -78,6 +80,22 @@ class Pieces:
             self._turning = fastest.free_spin.share @ self._basis[:n]
         phasor = (model.unbalance_cosine - 1j * model.unbalance_sine) @ self._basis[:n]
         self._phasor = phasor.astype(np.complex128)
+
+    @property
+    def ripples(self) -> Ripples:
+        """How long pieces may be; also for other cases of the same set-up."""
+        fastest = self._fastest
+        if fastest not in _RIPPLES:
+            _RIPPLES[fastest] = Ripples(self._linear, fastest.accuracy)
+        return _RIPPLES[fastest]
+
+    def _linear(self, speed: float) -> Linear:
+        """The rotor without contact at a speed, rad/s, as the output node and probes see it."""
+        model, damping, stiffness = self._matrices(speed, 0.0, 0.0)
+        output = self._fastest.reduced.output[:2]
+        of_output = np.stack([output, 0.0 * output, 0.0 * output])
+        seen = np.concatenate([of_output, model.probe_rows @ self._basis], axis=1)
+        return Linear.of_moved(stiffness, damping, self._phasor, seen, speed)
 
     def setup(
         self,
@@ -221,7 +239,7 @@ class Pieces:
         ranges = near_end, swing
         desks = _DESKS.setdefault(fastest, {})
         at = acceleration, slope, ranges
-        held = HeldMatrices(model, reduced, self._phasor, *at, slowest.sample_level, desks)
+        held = HeldMatrices(model, reduced, self._phasor, self._momentum, *at, slowest.sample_level, desks)
         held.template = PieceSetup(
             scheme=fastest.scheme,
             model=model,

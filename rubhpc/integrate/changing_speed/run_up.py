@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.fem.free_spin import unit_rotation
+from rubhpc.integrate.changing_speed.carried_modes import Change
 from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.sample_times import bring_to_angles
@@ -100,7 +101,8 @@ def integrate_run_up(
         Called between kernel calls; what it raises ends the run-up.
     """
     model, per_revolution = fastest.model, fastest.samples_per_revolution
-    cuts = cut(law, per_revolution, pieces_per_revolution)
+    pieces, passing = Pieces(fastest), Passing(clearance, friction, check)
+    cuts = cut(law, per_revolution, pieces_per_revolution, pieces.ripples.allowed)
     n_stator, n = len(model.stators), law.n_revolution
     angles = 2.0 * np.pi / per_revolution * cuts.astype(np.float64)
     times, at_cuts, _ = law.at_angle(angles)
@@ -108,7 +110,6 @@ def integrate_run_up(
     begins, _, _ = law.at_angle(2.0 * np.pi * np.arange(n + 1))
     whole = empty_samples(model.n_place, n * per_revolution, model.n_probe).whole
     gathered = Turns(n, model)
-    pieces, passing = Pieces(fastest), Passing(clearance, friction, check)
     reached: State | Place | None = initial if isinstance(initial, State) else None
     n_step, reason, n_done = 0, "", n
     earlier = new_accumulator(n_stator, model.n_place)
@@ -134,10 +135,12 @@ def integrate_run_up(
         if last is not None and reached is not None and last[0].held is not setup.held:
             ended = passing.standing(last[0], reached, last[1])
             # What an acceleration that jumps leaves to ring is no work of the matrices.
-            jump = (accelerations[piece] - accelerations[piece - 1]) * setup.held.lean
-            reached = moved(reached, setup, jump, none)
-            reached = passing.continued(setup, reached, ended, times[piece] - held_from)
-            reached = moved(reached, setup, -jump, none)
+            jump = float(accelerations[piece] - accelerations[piece - 1])
+            change = Change(times[piece] - held_from, durations[piece], jump, angles[piece])
+            leant = jump * setup.held.lean
+            reached = moved(reached, setup, leant, none)
+            reached = passing.continued(setup, reached, ended, change)
+            reached = moved(reached, setup, -leant, none)
             held_from = times[piece]
         while not reason and (place := piece - block) < len(setups):
             first = int(cuts[piece])

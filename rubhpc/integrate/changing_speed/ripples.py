@@ -1,0 +1,100 @@
+"""What the pieces of a run-up leave of the unbalance force, and how long they may be for its sake.
+
+Within a piece of the duration T at a constant speed the shaft's angle is off by a parabola of mean zero, from
+`lag = a T^2 / 12` at both ends to `-lag / 2` in the middle. Pieces of equal length repeat it: beside the
+force at the speed W stand those at `W +- k D`, `D = 2 pi / T`, each `3 lag / (pi k)^2` times as large. A
+signal errs by what it has of these over what it has of the force itself, which is much where one of them
+meets a resonance, or where a node hardly moves at W.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rubhpc.study.speed_law import LAG
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
+
+SIDEBANDS, HIGHEST = 3, 2.0  # on either side at least, and up to this multiple of the speed away
+SHARE = 0.75  # of the accuracy asked for, by which a signal may err in its 1X
+NEXT_SPEED = 0.02  # of a speed, to the next one for which pieces are judged
+STILL = 1e-12  # of the largest degree, below which one is not moved
+PASSING = 0.01  # growth over the speed, 1/rad, at which a passage meets a resonance
+LEAST = LAG / 64.0  # rad, for signals of nodes that do not move with the shaft
+
+
+class Linear(NamedTuple):
+    """A rotor without contact at a speed, in the reduced degrees that the unbalance moves."""
+
+    stiffness: Floats  # (n, n)
+    damping: Floats  # (n, n)
+    phasor: Complexes  # (n,), unbalance
+    seen: Floats  # (3, n_signal, n), what signals see of displacements, velocities and accelerations
+
+    def signals(self, exponents: Complexes) -> Complexes:
+        """Signals (n_exponent, n_signal) under the unbalance times `exp(exponent t)`, 1/s."""
+        s = exponents[:, np.newaxis, np.newaxis]
+        n = self.phasor.size
+        matrices = self.stiffness + s * self.damping + s**2 * np.eye(n)
+        motion = np.linalg.solve(matrices, np.broadcast_to(self.phasor[:, np.newaxis], (s.size, n, 1)))
+        rows = self.seen[0] + s * self.seen[1] + s**2 * self.seen[2]
+        found: Complexes = (rows @ motion)[..., 0]
+        return found
+
+    @classmethod
+    def of_moved(
+        cls, stiffness: Floats, damping: Floats, phasor: Complexes, seen: Floats, speed: float
+    ) -> Linear:
+        """The same in the degrees that the unbalance moves at a speed, rad/s."""
+        motion = np.abs(np.linalg.solve(stiffness + 1j * speed * damping, phasor))
+        moved = np.flatnonzero(motion > STILL * motion.max(initial=0.0))
+        both = np.ix_(moved, moved)
+        return cls(stiffness[both], damping[both], phasor[moved], seen[..., moved])
+
+
+class Ripples:
+    """How much the shaft may lag within the pieces of a run-up.
+
+    Parameters
+    ----------
+    linear : callable
+        The rotor at a speed, rad/s.
+    accuracy : float
+        Relative.
+    """
+
+    def __init__(self, linear: Callable[[float], Linear], accuracy: float) -> None:
+        self._linear, self._accuracy = linear, accuracy
+        self._known: dict[int, Linear] = {}
+        self._allowed: dict[tuple[int, float], float] = {}
+
+    def allowed(self, speed: float, turns: float) -> float:
+        """Lag (rad) of a piece at a speed, rad/s, that takes so many revolutions."""
+        place = round(math.log(speed) / NEXT_SPEED)
+        asked = place, turns
+        if asked not in self._allowed:
+            error = self._per_lag(place, turns) / (SHARE * self._accuracy)
+            self._allowed[asked] = LAG / max(LAG * error, 1.0)
+        return max(self._allowed[asked], LEAST)
+
+    def _per_lag(self, place: int, turns: float) -> float:
+        """Relative error of the worst signal over the lag, 1/rad."""
+        speed = math.exp(place * NEXT_SPEED)
+        if place not in self._known:
+            self._known[place] = self._linear(speed)
+        count = np.arange(1, max(SIDEBANDS, math.ceil(HIGHEST * turns)) + 1)
+        count = np.concatenate([-count, count])
+        at = np.concatenate([[1.0], 1.0 + count / turns])
+        signals = np.abs(self._known[place].signals((1j * at + PASSING) * speed))
+        own, sides = signals[0], signals[1:] * (3.0 / (np.pi * count[:, np.newaxis]) ** 2)
+        is_heard = own > 0.0
+        return float((np.linalg.norm(sides, axis=0)[is_heard] / own[is_heard]).max(initial=0.0))

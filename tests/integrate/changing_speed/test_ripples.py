@@ -1,0 +1,67 @@
+"""What pieces of constant speed leave of the unbalance force, and what is left of changes that are spread."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rubhpc.integrate.changing_speed.carried_modes import left_over
+from rubhpc.integrate.changing_speed.ripples import Linear, Ripples
+from rubhpc.study.speed_law import LAG, SpeedLaw, cut
+
+NATURAL, DAMPING = 200.0, 0.02  # rad/s, of critical
+
+
+def one_mass(_speed):
+    seen = np.array([0.0, 0.0, 1.0]).reshape(3, 1, 1)
+    return Linear(np.array([[NATURAL**2]]), np.array([[2 * DAMPING * NATURAL]]), np.ones(1, complex), seen)
+
+
+@pytest.mark.parametrize("turns", [0.5, 1.0, 4.0])
+def test_error_is_that_of_the_parabola(turns):
+    """The periodic response to a force whose phase repeats a parabola, line by line."""
+    speed, lag, accuracy = math.exp(round(math.log(0.5 * NATURAL) / 0.02) * 0.02), 1e-4, 1e-3
+    n = 256 * round(max(turns, 1.0))
+    angle = 2.0 * math.pi * max(turns, 1.0) * np.arange(n) / n
+    within = (angle / (2.0 * math.pi * turns)) % 1.0
+    force = np.exp(1j * (angle + lag * (6.0 * within * (1.0 - within) - 1.0)))
+    order = np.fft.fftfreq(n, 1.0 / n) / max(turns, 1.0)
+    s = (1j * order + 0.01) * speed  # as a passage meets a resonance
+    lines = np.fft.fft(force) / n * s**2 / (NATURAL**2 + 2.0 * DAMPING * NATURAL * s + s**2)
+    at = np.isclose(order, 1.0)
+    error = np.linalg.norm(lines[~at]) / abs(lines[at][0])
+    found = Ripples(one_mass, accuracy).allowed(speed, turns)
+    # Three lines on both sides count, or those up to three times the speed.
+    assert 0.75 * accuracy / found * lag == pytest.approx(error, rel=0.2)
+
+
+def test_pieces_are_shorter_where_twice_the_speed_is_a_resonance():
+    law = SpeedLaw(time=(0.0, 2.0), speed=(80.0, 120.0))
+    allowed = Ripples(one_mass, 1e-3).allowed
+    assert allowed(100.0, 1.0) < 0.5 * allowed(70.0, 1.0)
+    assert allowed(100.0, 1.0) < 0.1 * LAG
+    cuts = cut(law, 64, None, allowed)
+    _, speed, _ = law.at_angle(2.0 * math.pi * cuts[:-1] / 64)
+    near = np.abs(speed - 100.0) < 3.0
+    assert np.diff(cuts)[near].mean() < np.diff(cuts)[speed > 115.0].mean()
+
+
+def test_pieces_go_with_the_accuracy():
+    """A fifth of the accuracy allows a fifth of the lag, down to a 64th of the greatest."""
+    coarse, fine = (Ripples(one_mass, accuracy).allowed(120.0, 0.125) for accuracy in (1e-3, 2e-4))
+    assert fine == pytest.approx(0.2 * coarse)
+    assert Ripples(one_mass, 1e-9).allowed(120.0, 0.125) == pytest.approx(LAG / 64.0)
+
+
+def test_a_change_that_is_spread():
+    """Of what is slow the mean is left, of what is fast its square; what dies leaves none."""
+    turning = np.array([0.0, 1j, 40j, 200j, -1000.0])
+    before, after = 0.02, 0.03
+    found = left_over(turning, before, after, has_touched=False)
+    time = np.linspace(-before, after, 100_001)
+    mean = np.exp(turning[:, np.newaxis] * time).mean(axis=1)
+    assert found[:3] == pytest.approx(mean[:3], abs=2e-4)
+    assert abs(found[3]) == pytest.approx(abs(mean[3]) ** 2, abs=2e-4)
+    assert abs(found[4]) < 1e-6
+    touched = left_over(turning, before, after, has_touched=True)
+    assert np.abs(touched[:4]) == pytest.approx(np.abs(mean[:4]) ** 3, abs=2e-4)

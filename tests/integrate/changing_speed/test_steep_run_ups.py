@@ -1,0 +1,136 @@
+"""Steep run-ups of a rotor in three tabulated bearings, held to stepping of all its degrees.
+
+The speed passes half of a natural frequency, which pieces of one revolution would excite at 2X.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from rubhpc import LumpedStator, Probe, Rig, Unbalance, run_up
+from rubhpc.fem.assemble import assemble, model_at
+from rubhpc.fem.probes import with_probes
+from rubhpc.integrate.packing import whole_system
+from rubhpc.rig.bearing_table import BearingTable
+from rubhpc.rig.parts import Damping, Disc, ShaftSection, Torsion
+from rubhpc.rig.rotors import Rotor
+from rubhpc.study.speed_law import SpeedLaw
+
+STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
+SPEEDS = (150.0, 260.0, 380.0, 520.0)  # rad/s
+PER_REVOLUTION, STEPS = 128, 8  # steps of the reference between samples
+HIGHEST = 10  # order up to which signals are compared
+PROBES = tuple(
+    Probe(name=f"at_{node}", node=node, angle=angle, quantity="acceleration")
+    for node, angle in ((1, -math.pi / 4), (5, math.pi / 4), (3, 0.3), (9, 0.1))
+)
+
+
+def bearing(node, share):
+    return BearingTable(
+        node=node,
+        speed=SPEEDS,
+        kyy=[share * k for k in (3e7, 2.2e7, 1.8e7, 1.7e7)],
+        kzz=[share * k for k in (2e7, 1.5e7, 1.2e7, 1.1e7)],
+        kyz=[share * k for k in (3e6, 1.5e6, 8e5, 5e5)],
+        kzy=[share * k for k in (-1e6, -2e6, -2.4e6, -2.6e6)],
+        cyy=[share * c for c in (9e3, 5e3, 3e3, 2e3)],
+        czz=[share * c for c in (7e3, 4e3, 2.5e3, 2e3)],
+    )
+
+
+def machine():
+    rotor = Rotor(
+        shaft=(
+            ShaftSection(length=0.9, outer_diameter=0.035, elements=6, **STEEL),
+            ShaftSection(length=0.25, outer_diameter=0.03, elements=2, **STEEL),
+        ),
+        disc=(
+            Disc(node=3, diameter=0.22, thickness=0.025, density=7850.0),
+            Disc(node=9, diameter=0.2, thickness=0.03, density=7850.0),
+        ),
+        bearing=(bearing(1, 1.0), bearing(5, 1.2), bearing(7, 0.8)),
+        unbalance=(
+            Unbalance(node=9, mass=0.01, radius=0.07, phase=0.6),
+            Unbalance(node=3, mass=0.02, radius=0.08, phase=-1.2),
+        ),
+        torsion=Torsion(fixed_node=1),
+        damping=Damping(alpha=6.0, beta=1e-5),
+        gravity=9.81,
+    )
+    stator = LumpedStator(node=9, angle=0.2, mass=0.3, stiffness=1e6, damping=300.0)
+    return Rig(name="three bearings", rotor=rotor, stator=(stator,))
+
+
+def stepped(rig, law):
+    """Accelerations at the probes, (4, n_sample), by Newmark's method with an even acceleration."""
+    base = assemble(rig)
+    grid = np.arange(min(law.speed) - 1.0, max(law.speed) + 1.0)
+    tables = np.array([whole_system(model_at(base, speed), 0.0)[1:3] for speed in grid])
+    mass, damping, _, _ = whole_system(base, 0.0)
+    gyroscopic = whole_system(base, 1.0)[1] - damping
+    n, rotor = len(mass), base.rotor
+
+    def matrices(speed, rate):
+        place = min(int(speed - grid[0]), grid.size - 2)
+        share = speed - grid[place]
+        held = (1.0 - share) * tables[place] + share * tables[place + 1]
+        return held[0] + speed * gyroscopic, held[1] + rate * gyroscopic
+
+    phasor, load, spinning = np.zeros(n, complex), np.zeros(n), np.zeros(n)
+    phasor[: rotor.n_dof] = base.unbalance_cosine - 1j * base.unbalance_sine
+    load[: rotor.n_dof] = base.load
+    spinning[: rotor.n_dof] = [name == "thx" for _, name in rotor.degrees]
+    angles = 2.0 * math.pi * np.arange(law.n_revolution * PER_REVOLUTION * STEPS) / (PER_REVOLUTION * STEPS)
+    times, speeds, rates = law.at_angle(angles)
+    first, rate = speeds[0], rates[0]
+    damper, spring = matrices(first, 0.0)
+    whirl = np.linalg.solve(spring + 1j * first * damper - first**2 * mass, first**2 * phasor)
+    u = whirl.real + np.linalg.solve(spring, load - rate * mass @ spinning)
+    v = (1j * first * whirl).real
+
+    def force(k):
+        turned = (phasor * (speeds[k] ** 2 - 1j * rates[k]) * np.exp(1j * angles[k])).real
+        return load + turned - rates[k] * mass @ spinning
+
+    damper, spring = matrices(first, rate)
+    a = np.linalg.solve(mass, force(0) - damper @ v - spring @ u)
+    seen = [a]
+    for k in range(1, angles.size):
+        h = times[k] - times[k - 1]
+        damper, spring = matrices(speeds[k], rates[k])
+        ahead, onward = u + h * v + h**2 / 4 * a, v + h / 2 * a
+        left = mass + h / 2 * damper + h**2 / 4 * spring
+        a = np.linalg.solve(left, force(k) - damper @ onward - spring @ ahead)
+        u, v = ahead + h**2 / 4 * a, onward + h / 2 * a
+        if k % STEPS == 0:
+            seen.append(a)
+    rows = with_probes(base, rig, PROBES, first).probe_rows[2]
+    return rows @ np.array(seen).T
+
+
+def error(found, expected):
+    window = np.hanning(expected.size)
+    own, full = np.fft.rfft([(s - s.mean()) * window for s in (found, expected)])
+    kept = HIGHEST * expected.size // PER_REVOLUTION
+    return np.linalg.norm((own - full)[:kept]) / np.linalg.norm(full[:kept])
+
+
+@pytest.mark.parametrize("speeds", [(300.0, 345.0), (352.0, 310.0)], ids=["up", "down"])
+def test_accelerations_of_a_steep_passage(speeds):
+    """By 90 rad/s2, accelerations at all nodes are within 0.5 %, those at a bearing that hardly moves too."""
+    rig, law = machine(), SpeedLaw(time=(0.0, 0.5), speed=speeds)
+    expected = stepped(rig, law)
+    found = run_up(
+        rig,
+        start=speeds[0],
+        stop=speeds[1],
+        time=0.5,
+        clearance=1.0,
+        friction=0.0,
+        probes=PROBES,
+        samples_per_revolution=PER_REVOLUTION,
+    )
+    off = {p.name: error(found[f"probe_{p.name}"].values, s) for p, s in zip(PROBES, expected, strict=True)}
+    assert max(off.values()) < 5e-3, off
