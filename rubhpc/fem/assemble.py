@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 from rubhpc.errors import InputError
@@ -13,6 +13,7 @@ from rubhpc.fem.model import Model
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.fem.statics import sag_under
 from rubhpc.fem.stator import assemble_stator
+from rubhpc.rig.stators import Stator
 
 if TYPE_CHECKING:
     from rubhpc.fem.model import CarrierModel, StatorModel
@@ -38,11 +39,15 @@ def assemble(rig: Rig) -> Model:
         body = assemble_rotor(rig.rotor)
         constant, cosine, sine = forces_on(rig.rotor, body)
     check_computable("[rotor]", body)
-    stators, n_degree = [], body.n_dof
+    stators: list[StatorModel] = []
+    n_degree = body.n_dof
     for number, stator in enumerate(rig.stator, 1):
-        with computable(f"[stator.{number}]"):
-            model = _stator(rig, stator)
-        check_computable(f"[stator.{number}]", model.body)
+        if number > 1 and _is_turned(rig.stator[number - 2], stator):
+            model = replace(stators[-1], angle=stator.angle)
+        else:
+            with computable(f"[stator.{number}]"):
+                model = _stator(rig, stator)
+            check_computable(f"[stator.{number}]", model.body)
         stators.append(model)
         n_degree += model.body.n_dof
         if n_degree > MOST_DEGREES:
@@ -91,6 +96,14 @@ def _on_carriers(rig: Rig, stators: list[StatorModel]) -> tuple[list[StatorModel
         for (i, _, _), model in zip(on_it, moved, strict=True):
             placed[i - 1] = model
     return placed, carriers
+
+
+def _is_turned(before: AnyStator, stator: AnyStator) -> bool:
+    """Whether a cantilever is the one before it turned about the shaft, as in a ring: they share a body."""
+    if type(stator) is not Stator or type(before) is not Stator:
+        return False
+    names = (field.name for field in fields(stator) if field.name != "angle")
+    return all(getattr(before, name) == getattr(stator, name) for name in names)
 
 
 def _stator(rig: Rig, stator: AnyStator) -> StatorModel:

@@ -24,8 +24,13 @@ def find_rigid_body_mode(model: Model) -> str:
     if row := rigid_body_row(model.rotor, [row for row in seen if row >= 0]):
         motion = "turn (torsion)" if model.rotor.degrees[row - 1][1] in KINDS["torsional"] else "move"
         return f"the rotor is free to {motion}"
+    held = set()  # bodies, which the stators of a ring or a carrier share
     for i, stator in enumerate(model.stators, 1):
-        if rigid_body_row(stator.body, [row for row in (stator.axial, stator.lateral) if row >= 0]):
+        rows = [row for row in (stator.axial, stator.lateral) if row >= 0]
+        if (place := (id(stator.body), *rows)) in held:
+            continue
+        held.add(place)
+        if rigid_body_row(stator.body, rows):
             on = next((carrier.name for carrier in model.carriers if i in carrier.stators), "")
             return f"{f'carrier {on}' if on else f'stator {i}'} is free to move"
     return ""
