@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.reduced_model.curved_bodies import motion_rows
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.curved_tables import (
     StillParts,
-    motion_rows,
     steps_of,
     still_parts,
     tuned_tables,

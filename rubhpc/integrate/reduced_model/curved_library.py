@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.integrate.reduced_model.curved_tables import motion_rows, tabulate_curved
+from rubhpc.integrate.reduced_model.curved_bodies import motion_rows
+from rubhpc.integrate.reduced_model.curved_tables import tabulate_curved
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.table_stack import TableStack
 
