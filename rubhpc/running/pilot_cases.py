@@ -229,6 +229,12 @@ class Pilots:
         """Time that it takes to finish a shortened case, s; infinite where it is kept no longer."""
         return self.foreseen(index) - self._kept[index].seconds if index in self._kept else math.inf
 
+    def left_of_record(self, index: tuple[int, ...]) -> float:
+        """The same up to the end of its record."""
+        return (
+            self.shortened[index].whole(0.0) - self._kept[index].seconds if index in self._kept else math.inf
+        )
+
     def finish(self, index: tuple[int, ...], limit: float) -> tuple[float, bool]:
         """Time of a shortened case that goes on, s, and whether it came to its end within `limit` s more."""
         followed = self._kept.pop(index)

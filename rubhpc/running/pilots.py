@@ -173,14 +173,17 @@ def _finish(pilots: Pilots, picked: list[tuple[int, ...]], sample: Sample, left:
     """Finish cases that were shortened, the dearest first, in some `left` seconds together.
 
     What such a case comes to is hardly known from its beginning: more and more sets of contacts, a tangent
-    that is carried on and on. The others are foreseen anew, and corrected by what it came to.
+    that is carried on and on. A case whose record alone has room is finished too: it is not known whether
+    anything is followed behind it. The others are foreseen anew, and corrected by what it came to.
     """
     shortened = [k for k, index in enumerate(picked) if index in pilots.shortened]
     for k in sorted(shortened, key=lambda k: -sample.seconds[k]):
-        if left <= pilots.left(picked[k]):
+        if left <= pilots.left_of_record(picked[k]):
             continue
+        to_come = pilots.left(picked[k])
         began = time.process_time()
-        seconds, has_ended = pilots.finish(picked[k], max(left, _PATIENCE * pilots.left(picked[k])))
+        limit = left if left <= to_come else max(left, _PATIENCE * to_come)
+        seconds, has_ended = pilots.finish(picked[k], limit)
         left -= time.process_time() - began
         sample.seconds[k], sample.is_whole[k] = seconds, True  # or nearly so
         if not has_ended:

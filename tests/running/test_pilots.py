@@ -9,6 +9,7 @@ import pytest
 from rubhpc.running import block_time, pilot_cases, pilots, plan
 from rubhpc.running.kept_setups import MOST_BYTES
 from rubhpc.running.memory import peak_memory
+from rubhpc.running.pilot_estimate import Sample
 from rubhpc.running.plan import Plan
 from rubhpc.running.timed_run_ups import parts
 from rubhpc.storage.new_manifest import manifest_of
@@ -96,7 +97,7 @@ def test_dearest_case_is_finished(monkeypatch, n_case, left):
         def foreseen(self, index):
             return self.shortened[index]
 
-        left = foreseen
+        left = left_of_record = foreseen
 
         def finish(self, index, limit):
             asked.append((index, limit))
@@ -116,6 +117,30 @@ def test_dearest_case_is_finished(monkeypatch, n_case, left):
     known = 3 * 3.0 + 3 * 0.1 + 3 * 0.1
     other = 0.2 * (known - 0.3 + 3.1 / 2) / (3.1 + 3.1 / 2)  # ratio of the two, and one of 1
     assert timing.pace.step * 6e3 == pytest.approx(known + other)
+
+
+@pytest.mark.parametrize(("left", "limit"), [(0.9, None), (4.0, 4.0), (6.0, 10.0)])
+def test_a_case_whose_record_has_room_is_finished(left, limit):
+    """What may be followed behind it takes 4 s more; no more is spent on it than is left."""
+    asked = []
+
+    def finish(index, limit):
+        asked.append(limit)
+        return 1.5, True
+
+    found = SimpleNamespace(
+        shortened={(0,): None},
+        left=lambda _: 5.0,
+        left_of_record=lambda _: 1.0,
+        foreseen=lambda _: 6.0,
+        finish=finish,
+    )
+    sample = Sample(2, 2e3)
+    sample.add(1e3, 0.5, 6.0, is_whole=False)
+    pilots._finish(found, [(0,)], sample, left)
+    assert asked == ([] if limit is None else [limit])
+    assert sample.seconds == [6.0 if limit is None else 1.5]
+    assert sample.checked == ([] if limit is None else [(6.0, 1.5)])
 
 
 def test_cases_of_a_ring_are_timed_in_pairs(monkeypatch):
