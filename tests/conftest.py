@@ -138,6 +138,7 @@ LONG = (
     "integrate/test_initial_state.py::test_a_wall_that_moves_in_pushes_as_it_would_slowly[updated]",
     "integrate/changing_speed/test_run_up.py::test_rub_in_a_passage_meets_full_order_stepping[150.0-",
     "integrate/changing_speed/test_steep_run_ups.py::test_accelerations_of_a_steep_passage[down]",
+    "integrate/changing_speed/test_steep_run_ups.py::test_rigid_rub_in_a_steep_passage",
     "mpi/test_carried_chains.py::test_chains_that_are_killed_go_on_where_they_were",
     "mpi/test_launchers.py::test_the_wrong_launcher_is_refused[Open MPI]",
     "mpi/test_launchers.py::test_the_wrong_launcher_is_refused[srun",

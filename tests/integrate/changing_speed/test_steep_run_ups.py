@@ -1,6 +1,7 @@
 """Steep run-ups of a rotor in three tabulated bearings, held to stepping of all its degrees.
 
-The speed passes half of a natural frequency, which pieces of one revolution would excite at 2X.
+The speed passes half of a natural frequency, which pieces of one revolution would excite at 2X. With rub,
+contacts are rigid, and the reference is Moreau's: impulses that leave no pair approaching, in even steps.
 """
 
 import math
@@ -40,7 +41,7 @@ def bearing(node, share):
     )
 
 
-def machine():
+def machine(count=1):
     rotor = Rotor(
         shaft=(
             ShaftSection(length=0.9, outer_diameter=0.035, elements=6, **STEEL),
@@ -59,8 +60,11 @@ def machine():
         damping=Damping(alpha=6.0, beta=1e-5),
         gravity=9.81,
     )
-    stator = LumpedStator(node=9, angle=0.2, mass=0.3, stiffness=1e6, damping=300.0)
-    return Rig(name="three bearings", rotor=rotor, stator=(stator,))
+    stators = tuple(
+        LumpedStator(node=9, angle=0.2 + 2.0 * math.pi * i / count, mass=0.3, stiffness=1e6, damping=300.0)
+        for i in range(count)
+    )
+    return Rig(name="three bearings", rotor=rotor, stator=stators)
 
 
 def stepped(rig, law):
@@ -134,3 +138,79 @@ def test_accelerations_of_a_steep_passage(speeds):
     )
     off = {p.name: error(found[f"probe_{p.name}"].values, s) for p, s in zip(PROBES, expected, strict=True)}
     assert max(off.values()) < 5e-3, off
+
+
+RUB = {"clearance": 1.6e-4, "friction": 0.1}
+EVEN_STEP = 2e-6  # s
+
+
+def rubbed(rig, law, until):
+    """Vertical, horizontal and torsional motion at the rim, (3, n_step), and work of friction, J."""
+    base = assemble(rig)
+    mass, damping, _, _ = whole_system(base, 0.0)
+    gyroscopic = whole_system(base, 1.0)[1] - damping
+    n, rotor, q = len(mass), base.rotor, len(base.stators)
+    lateral, torsion = [rotor.index(9, name) for name in ("v", "w")], rotor.index(9, "thx")
+    phasor, load, spinning = np.zeros(n, complex), np.zeros(n), np.zeros(n)
+    phasor[: rotor.n_dof] = base.unbalance_cosine - 1j * base.unbalance_sine
+    load[: rotor.n_dof] = base.load
+    spinning[: rotor.n_dof] = [name == "thx" for _, name in rotor.degrees]
+    gap, along = np.zeros((2, q, n))
+    for i, (first, stator) in enumerate(zip(base.stator_start, base.stators, strict=True)):
+        c, s = math.cos(stator.angle), math.sin(stator.angle)
+        gap[i, [*lateral, first + stator.axial]] = -c, -s, 1.0
+        along[i, [*lateral, torsion]] = -s, c, stator.radius
+    pushed = (gap - RUB["friction"] * along).T
+    h, rate = EVEN_STEP, float(law.acceleration[0])
+    spring = whole_system(model_at(base, law.speed[0]), law.speed[0])[2]
+    u, v = np.linalg.solve(spring, load - rate * mass @ spinning), np.zeros(n)
+    seen, work, held = [], 0.0, -1.0
+    for k in range(math.ceil(until / h)):
+        seen.append(u[[*lateral, torsion]])
+        middle = (k + 0.5) * h
+        spin, angle = law.speed[0] + rate * middle, law.speed[0] * middle + rate * middle**2 / 2
+        if abs(spin - held) > 0.05:
+            held = spin
+            _, damper, spring, _ = whole_system(model_at(base, held), held)
+            spring = spring + rate * gyroscopic
+            inverse = np.linalg.inv(mass + h / 2 * damper + h**2 / 4 * spring)
+            by_motion = inverse @ np.hstack([mass - h / 2 * damper - h**2 / 4 * spring, -h * spring])
+            by_impulse, still = inverse @ pushed, h * inverse @ (load - rate * mass @ spinning)
+            turned, met = h * inverse @ phasor, gap @ inverse @ pushed
+        force = (spin**2 - 1j * rate) * np.exp(1j * angle)
+        ahead = by_motion @ np.concatenate([v, u]) + still + (turned * force).real
+        closed = np.flatnonzero(RUB["clearance"] + gap @ (u + h / 2 * v) <= 0.0)
+        impulse = np.zeros(q)
+        for _ in range(20 if closed.size else 0):
+            for i in closed:
+                impulse[i] = max(0.0, impulse[i] - (gap[i] @ ahead + met[i] @ impulse) / met[i, i])
+        ahead = ahead + by_impulse @ impulse
+        if impulse.any():
+            slip = [stator.radius * spin for stator in base.stators] + along @ (v + ahead) / 2
+            work += RUB["friction"] * float(impulse @ slip)
+        u, v = u + h / 2 * (v + ahead), ahead
+    return np.array(seen).T, work
+
+
+@pytest.mark.parametrize("count", [1, 8])
+def test_rigid_rub_in_a_steep_passage(count):
+    """Six revolutions from rest under gravity, speeding up by 90 rad/s2: one stator, and a ring of eight."""
+    rig, law = machine(count), SpeedLaw(time=(0.0, 0.13), speed=(300.0, 311.7))
+    end = float(law.at_angle(12.0 * math.pi)[0])
+    steps, work = rubbed(rig, law, end)
+    found = run_up(
+        rig,
+        start=300.0,
+        stop=311.7,
+        time=0.13,
+        **RUB,
+        initial={"from": "rest"},
+        samples_per_revolution=PER_REVOLUTION,
+    )
+    assert (found.contact_fraction[:6] > 0.0).any(dim="stator").sum() >= 5
+    n = 6 * PER_REVOLUTION
+    times = law.at_angle(2.0 * math.pi * np.arange(n) / PER_REVOLUTION)[0]
+    for signal, own in zip(steps, (found.vertical, found.horizontal, found.torsion), strict=True):
+        expected = np.interp(times, EVEN_STEP * np.arange(signal.size), signal)
+        assert np.linalg.norm(own.values[:n] - expected) < 2e-3 * np.linalg.norm(expected - expected.mean())
+    assert float(found.friction_work[:6].sum()) == pytest.approx(work, rel=2e-3)
