@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-# Size of a mode's exponent over the spin; of a motion that has touched, lower ones take part in contact.
-LOWEST, LOWEST_TOUCHING = 1.5, 3.0
+LOWEST = 3.0  # frequency of a mode over the spin; lower ones take part in contact
+# The same of what has not touched and rings long: its damping over its frequency.
+LOWEST_RINGING, RINGING = 1.5, 0.1
 TOUCH = 0.25  # revolutions, at most, before and after which a contact is what it is
 SLOW = 1e-6  # exponent times time below which a change is at once
 
@@ -48,7 +49,6 @@ class Change(NamedTuple):
     held_for: float  # s, since when the matrices before were held
     ahead: float  # s, that the piece to come takes
     jump: float = 0.0  # rad/s^2, sudden change of the acceleration
-    angle: float = 0.0  # rad, of the shaft
 
 
 class Parts(NamedTuple):
@@ -87,7 +87,6 @@ def carried(
     if was is None or now is None:
         return begun
     old, factor = _turning(before.setup)
-    new, factor_ahead = _turning(setup)
     z = was.entered(before.end.motion, before.constants, old, factor, before.time)
     factor = factor * np.exp(old * before.time)
     forced = was.response(old, factor)
@@ -97,8 +96,10 @@ def carried(
         np.column_stack([was.motion * z, still, forced]),
     )
     has_touched = any(march.met)
-    lowest = LOWEST_TOUCHING if has_touched else LOWEST
-    fast = np.abs(now.exponent) > lowest * abs(setup.spin)
+    size, spin = np.abs(now.exponent.imag), abs(setup.spin)
+    fast = size > LOWEST * spin
+    if not has_touched:
+        fast |= (size > LOWEST_RINGING * spin) & (np.abs(now.exponent.real) < RINGING * size)
     exponent, enter = now.exponent[fast], now.enter[fast]
     left = 0.5 * np.stack([enter @ parts.shape, enter @ parts.shape.conj()])  # (2, modes, parts)
     direct, mirrored = now.forced(old, factor)
@@ -109,20 +110,12 @@ def carried(
     if change.jump:
         steady = Parts(parts.exponent[-2:], parts.shape[:, -2:])
         real[..., -2:] = _pushed(steady, exponent, enter, change.jump * setup.held.momentum)
-    longest = TOUCH * 2.0 * np.pi / abs(setup.spin) if mask else np.inf
+    longest = TOUCH * 2.0 * np.pi / spin if mask else np.inf
     spans = np.minimum(_spans(before.setup, setup, change), longest)
     taken = 1.0 - left_over(_apart(parts, exponent), *spans, has_touched=has_touched)
     if has_touched:
-        taken[..., :-2] *= np.abs(was.exponent) <= lowest * abs(setup.spin)
+        taken[..., :-2] *= np.abs(was.exponent) <= LOWEST * spin
     off = -((left - real) * taken).sum(axis=(0, 2))
-    # The force as well, whose phase differs in pieces of another length, but for its own sudden change.
-    sudden = now.forced(new, -1j * change.jump * np.exp(1j * change.angle))
-    ahead, half = now.forced(new, factor_ahead), 0.5 * before.time
-    for here, there, jump, turning in zip(
-        (direct, mirrored), ahead, sudden, (old, old.conjugate()), strict=True
-    ):
-        share = left_over(turning - exponent, half, half, has_touched=has_touched) - 1.0
-        off += (here - there + jump)[fast] * share
     motion = march.begun_motion + (now.motion[:, fast] @ off).real
     return Place(motion, setup.model.sag, begun.contact_force)
 

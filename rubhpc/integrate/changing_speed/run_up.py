@@ -136,7 +136,7 @@ def integrate_run_up(
             ended = passing.standing(last[0], reached, last[1])
             # What an acceleration that jumps leaves to ring is no work of the matrices.
             jump = float(accelerations[piece] - accelerations[piece - 1])
-            change = Change(times[piece] - held_from, durations[piece], jump, angles[piece])
+            change = Change(times[piece] - held_from, durations[piece], jump)
             leant = jump * setup.held.lean
             reached = moved(reached, setup, leant, none)
             reached = passing.continued(setup, reached, ended, change)
