@@ -144,7 +144,8 @@ def collide(
 ) -> bool:
     """Take the impacts of rigid pairs whose gaps close, in a velocity (n,); False where none obey the laws.
 
-    Fills which pairs take part in what goes on: the gap in `work.solver` of any other is infinite.
+    Fills which pairs take part in what goes on: the gap in `work.solver` of any other is infinite. A pair
+    that stuck has not slid by an impact elsewhere: whether it is held is seen by the forces that go on.
     """
     q, n = reduced.gap_jacobian.shape
     solver = work.solver
@@ -178,7 +179,7 @@ def collide(
             for k in range(n):
                 velocity[k] += force * reduced.gap_jacobian[i, k] - traction * reduced.slip[i, k]
             bound = solver.cone[i] * force * (1.0 - ROUNDING)
-            solver.is_sticking[i] = abs(traction) < bound
+            solver.is_sticking[i] = solver.is_sticking[i] or abs(traction) < bound
     return True
 
 
