@@ -81,9 +81,7 @@ def test_kills_leave_the_same_bytes(tmp_path, text, how):
         job = start(study, *options, **under)
         while job.poll() is None and len(list(journals.glob("*.journal"))) == n_before:
             time.sleep(0.02)
-        time.sleep(
-            moments.uniform(0.0, 0.2) * taken
-        )  # it begins to compute when a journal of its own appears
+        time.sleep(moments.uniform(0.0, 0.2) * taken)  # it computes since a journal of its own is there
         n_killed += job.poll() is None
         job.kill()
         job.communicate()
