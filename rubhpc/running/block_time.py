@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.manifest import Manifest
 
-_MOST = 8  # blocks that are written
+_MOST = 8  # of the first blocks, that are written
 
 
 def time_block(manifest: Manifest, arrays: dict[str, NDArray[Any]]) -> float:
@@ -40,10 +40,8 @@ def time_block(manifest: Manifest, arrays: dict[str, NDArray[Any]]) -> float:
     try:
         with tempfile.TemporaryDirectory() as folder:
             files = BlockFiles(Path(folder), manifest)
-            blocks = np.ndindex(*(-(-n // k) for n, k in zip(manifest.shape, manifest.chunk, strict=True)))
-            for place in islice(
-                blocks, _MOST
-            ):  # the first ones of a run, which share their folders as those do
+            n_block = [-(-n // k) for n, k in zip(manifest.shape, manifest.chunk, strict=True)]
+            for place in islice(np.ndindex(*n_block), _MOST):  # they share folders as those of a run do
                 began = time.process_time()
                 for i in range(n_case):
                     case_checksum(data, i)
