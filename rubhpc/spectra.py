@@ -30,9 +30,10 @@ def amplitude_spectrum(signal: Floats) -> Floats:
         In the signal's unit; line k is order k over the revolutions recorded, line 0 the size of the mean.
     """
     n_sample = signal.shape[-1]
-    spectrum: Floats = np.abs(scipy.fft.rfft(np.asarray(signal, dtype=np.float64), axis=-1)) * (
-        2.0 / n_sample
-    )
+    spectrum = np.zeros((*signal.shape[:-1], n_sample // 2 + 1))
+    moves = np.any(signal != 0.0, axis=-1)  # in a ring that nothing has touched, few signals do
+    moving = np.asarray(signal[moves], dtype=np.float64)
+    spectrum[moves] = np.abs(scipy.fft.rfft(moving, axis=-1)) * (2.0 / n_sample)
     spectrum[..., 0] *= 0.5
     if n_sample % 2 == 0:
         spectrum[..., -1] *= 0.5

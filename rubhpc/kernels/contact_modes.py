@@ -19,6 +19,7 @@ TWIST_ACCELERATION_ROW = 6
 LATERAL_ROW, LATERAL_RATE = 1, 2
 
 SAMPLES_AT_ONCE = 8  # read from one set of modal coordinates
+BOUND_LEVEL = 3  # `ModeTables.bound` holds over 2^level samples, or the longest step where that is longer
 FORCED_LEVEL = 6  # steps of up to 2^level ticks follow an event unquestioned, so that time goes on
 RESOLVED = 0.02  # of a signal's size: its fourth derivative times the step to the fourth
 DYING = -1.0  # pace of a mode that is gone before anything is asked after an event
@@ -38,7 +39,7 @@ class ModeTables(NamedTuple):
     switch_im: Floats
     rate_re: Floats  # (p, q, m), its time derivative
     rate_im: Floats
-    bound: Floats  # (p, q, m), bound on its second time derivative for a unit coordinate
+    bound: Floats  # (p, q, m), bound on its second time derivative for a unit coordinate (`BOUND_LEVEL`)
     bend_re: Floats  # (p, q, m), its second time derivative; under set-valued friction alone, as the next
     bend_im: Floats
     turn: Floats  # (p, q, m), bound on its third time derivative for a unit coordinate

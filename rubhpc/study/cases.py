@@ -21,7 +21,7 @@ from rubhpc.study.axes import RUN_UP_TIME
 from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.final_states import check_start, count_state
 from rubhpc.study.identity import identity_parts
-from rubhpc.study.operating_points import OperatingPoints
+from rubhpc.study.operating_points import operating_points_of
 from rubhpc.study.point_checks import check_gap, check_points
 from rubhpc.study.points import Points, boxed
 from rubhpc.study.predicted_steps import predicted_steps
@@ -116,7 +116,7 @@ class CaseGrid:
                 )
         self.n_stator = len(study.rig.stator)
         with _named(study):
-            self._operating_points = OperatingPoints(study)
+            self._operating_points = operating_points_of(study)
             check_points(self._operating_points)
             self.continuation = continuation_of(study.axes)
             keeps_state = self.continuation is not None or STATE in study.recording.keep

@@ -39,7 +39,15 @@ if TYPE_CHECKING:
     from rubhpc.study.speed_law import SpeedLaw
     from rubhpc.study.study import Study
 
+_latest: list[OperatingPoints] = []  # of the study that was asked for last
 _MOST_RIGS = 256  # whose time step is determined, 1 ms each; with more, that of the first is used for all
+
+
+def operating_points_of(study: Study) -> OperatingPoints:
+    """Return the operating points of a study; a run makes several grids of one, which share them."""
+    if not (_latest and _latest[0].study is study):
+        _latest[:] = [OperatingPoints(study)]
+    return _latest[0]
 
 
 class OperatingPoints:
@@ -57,6 +65,8 @@ class OperatingPoints:
         Whether clearances are given as shares of the contact-free amplitude.
     costly_dims : list of int
         The dimensions along which speed, rig or contact change: cases that differ there share no setup.
+    is_checked : bool
+        Whether `point_checks.check_points` has found nothing wrong with them.
     rig_axes, response_axes : list of int
         Axes that set the rig, and those of them that set the contact-free response.
     """
@@ -64,6 +74,7 @@ class OperatingPoints:
     def __init__(self, study: Study) -> None:
         self.study = study
         self.points = Points(study.axes)
+        self.is_checked = False
         self._values = [axis.values for axis in study.axes]
         names = [axis.name for axis in study.axes]
         self._speed_axis, self._clearance_axis, self._friction_axis = (

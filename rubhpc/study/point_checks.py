@@ -23,12 +23,15 @@ def check_points(points: OperatingPoints) -> None:
         When the time step exceeds the stability limit of a rig, the modal scheme meets a rig with a
         rigid-body mode, or an impulse acts on a node that does not move sideways.
     """
+    if points.is_checked:
+        return
     integrator = points.study.integrator
     if integrator.step is not None and integrator.method == "central-difference":
         _check_step(points, integrator.step)
     if integrator.method == "modal":
         _check_held(points)
     _check_knocks(points)
+    points.is_checked = True
 
 
 def check_gap(points: OperatingPoints, least: float) -> None:

@@ -209,9 +209,9 @@ class RetunedLibrary(ModeLibrary):
             self._tabulate(mode)
         return True
 
-    def _tabulate(self, mode: ContactMode) -> None:
+    def _tabulate(self, mode: ContactMode, row: ModeTables | None = None) -> None:
         self._note_exponents(mode)
-        row = self._tables_of(mode, self.reduced)
+        row = row or self._tables_of(mode, self.reduced)
         n_output = -(-SAMPLES_AT_ONCE * len(self._output) // LANES) * LANES
         shapes = {"output": (1, 2 * self.width, n_output)} | {
             name: getattr(row, name).shape for name in ("power_re", "power_im", "bound")

@@ -163,7 +163,7 @@ def foreshortening_ratio(
     for i, stator in enumerate(stators):
         drawn = 0.6 / stator.length if stator.squared_slope is None else 0.0
         away = 0.0 if is_round or stator.radius == 0.0 else 0.5 / stator.radius
-        compression = force[i] * stator.axial_compliance
+        compression = force[i] * stator.axial_compliance if force[i] > 0.0 else 0.0
         if compression > 0.0:
             ratio[i] = (drawn + away) * deflection[i] ** 2 / compression
     return ratio

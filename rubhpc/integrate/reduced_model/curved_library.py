@@ -11,6 +11,7 @@ from rubhpc.integrate.reduced_model.table_stack import TableStack
 
 if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
+    from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.curved_contact import CurvedTables
 
 
@@ -53,8 +54,8 @@ class CurvedLibrary(ModeLibrary):
     def _friction_of(self, mode: ContactMode) -> None:
         """Not counted: its direction is that of the momentary normal."""
 
-    def _tabulate(self, mode: ContactMode) -> None:
-        super()._tabulate(mode)
+    def _tabulate(self, mode: ContactMode, row: ModeTables | None = None) -> None:
+        super()._tabulate(mode, row)
         if self._curved is None:
             self._curved = TableStack(1 + len(self.gap_jacobian), self._most_modes)
         self._curved.add(

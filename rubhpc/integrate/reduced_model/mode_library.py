@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 import numpy as np
 
 from rubhpc.integrate.reduced_model.contact_mode import ContactMode, count_coordinates, solve_contact_mode
-from rubhpc.integrate.reduced_model.mode_tables import mode_of, tabulate
+from rubhpc.integrate.reduced_model.mode_tables import bytes_ahead, mode_of, tabulate
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
@@ -85,18 +85,22 @@ class ModeLibrary:
         self.first_masks = [0] if q > 1 else [0, self._closed]
         modes = [self._solved(mask) for mask in self.first_masks]
         self.width = self._width([mode.exponent.size for mode in modes])
-        if self._is_measured:
-            n_byte = sum(field.nbytes for field in self._tables_of(modes[0], reduced))
-            self._is_large = self._is_parted and self._most_modes * n_byte > MOST_BYTES
-        if self._is_large and q > FEW_PAIRS:
+        may_be_large, ahead = self._is_measured and self._is_parted, (self._n_ahead, n_level)
+        if may_be_large and q > FEW_PAIRS:
             self._n_ahead, self._n_level = 1, sample_level + 1
+        rows = [self._tables_of(mode, reduced) for mode in modes]
+        if may_be_large:
+            self._is_large = self._most_modes * bytes_ahead(rows[0], reduced, *ahead) > MOST_BYTES
+        if (self._n_ahead, self._n_level) != ahead and not self._is_large:
+            self._n_ahead, self._n_level = ahead
+            rows = [self._tables_of(mode, reduced) for mode in modes]
         self._tables = TableStack(1 + q, self._most_modes, MOST_BYTES)
         self.masks = [mode.mask for mode in modes]
         self._exponents: dict[int, tuple[Floats, Floats]] = {}
         self.derived: dict[int, Any] = {}  # what others make of the modes, by mask
         self._chance = np.random.default_rng(0)
-        for mode in modes:
-            self._tabulate(mode)
+        for mode, row in zip(modes, rows, strict=True):
+            self._tabulate(mode, row)
 
     @property
     def followed(self) -> ModeLibrary:
@@ -240,9 +244,10 @@ class ModeLibrary:
         friction: Complexes = (self.force_direction - self.gap_jacobian)[closed].T @ mode.switch[closed]
         return friction
 
-    def _tabulate(self, mode: ContactMode) -> None:
+    def _tabulate(self, mode: ContactMode, row: kernel.ModeTables | None = None) -> None:
+        """Take in a mode, and its tables where they are known."""
         self._note_exponents(mode)
-        self._tables.add(self._tables_of(mode, self.reduced))
+        self._tables.add(row or self._tables_of(mode, self.reduced))
 
     def _note_exponents(self, mode: ContactMode) -> None:
         exponent, drift, m = np.zeros((2, self.width)), np.zeros(self.width), mode.exponent.size

@@ -64,7 +64,8 @@ def tabulate(
     motion[:, :end], switch[:, :end] = mode.motion, mode.switch
     enter[:, :n_filled], take_off[:, :n_filled] = mode.enter.T, mode.take_off
     steps = tick * 2.0 ** np.arange(n_level)
-    growth = np.exp(np.maximum(exponent.real, 0.0) * steps[-1])
+    bounded_over = max(steps[-1], tick * 2.0 ** (sample_level + kernel.BOUND_LEVEL))
+    growth = np.exp(np.maximum(exponent.real, 0.0) * bounded_over)
     power = np.exp(exponent * steps[:, None]) * used
     rate = switch * exponent
     sliding = (slip if is_measured else slip[:0]) @ motion[n:]
@@ -119,6 +120,16 @@ def tabulate(
     )
     fields: list[Any] = [np.ascontiguousarray(np.asarray(field)[None]) for field in row]
     return kernel.ModeTables(*fields)
+
+
+def bytes_ahead(tables: kernel.ModeTables, reduced: ReducedModel, n_ahead: int, n_level: int) -> int:
+    """Memory that the tables of a mode would take with so many samples ahead, and levels of exponentials."""
+    m = tables.pace.shape[1]
+    n_place = len(reduced.degree) + len(reduced.carrier)
+    n_output = n_ahead * (kernel.N_ROTOR_ROW + 3 * n_place + reduced.probe.shape[1])
+    columns = -(-n_output // LANES) * LANES - tables.output.shape[2]
+    levels = n_level - tables.power_re.shape[1]
+    return int(sum(field.nbytes for field in tables) + 2 * m * (columns + levels) * tables.pace.itemsize)
 
 
 def mode_of(row: kernel.ModeTables, kind: type[ContactMode], exponents: tuple[Floats, Floats]) -> ContactMode:

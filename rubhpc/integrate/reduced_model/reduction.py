@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
-from rubhpc.integrate.reduced_model.coupling import coupled_rows
+from rubhpc.integrate.reduced_model.coupling import Grouped, coupled_rows
 from rubhpc.integrate.reduced_model.standstill import Modes, at_standstill, parted, seen_degrees
 from rubhpc.integrate.reduced_model.truncation import SMOOTH, kept_modes
 from rubhpc.kernels._jit import plain
@@ -17,6 +17,8 @@ from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.contact_pairs import N_DEGREE, TORSION, V, W, rim_sense
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from rubhpc.fem.free_spin import FreeSpin
@@ -127,11 +129,18 @@ def reduce_to(
     symmetric, seen = standstill.stiffness, seen_degrees(model)
     kept = np.hstack([those.kept for those in modes])
     frequency = np.concatenate([those.kept_frequency for those in modes])
-    drawn = np.hstack([0.5 * (damping + damping.T) @ kept, (stiffness - symmetric) @ (kept / frequency)])
+    drawn = np.hstack(
+        [
+            Grouped(standstill.groups, kept).under(0.5 * (damping + damping.T)),
+            Grouped(standstill.groups, kept / frequency).under(stiffness - symmetric),
+        ]
+    )
     least = LEAST_RESPONSE * np.sqrt(accuracy)
     patterns = model.probe_patterns
-    basis = np.hstack([kept, *(_attachment_modes(those, seen, patterns, drawn, least) for those in modes)])
-    stiffness, damping = basis.T @ stiffness @ basis, basis.T @ damping @ basis
+    find = _attachments_once() if len(standstill.groups) > 1 else _attachment_modes
+    basis = np.hstack([kept, *(find(those, seen, patterns, drawn, least) for those in modes)])
+    grouped = Grouped(standstill.groups, basis)
+    stiffness, damping = grouped.form(stiffness), grouped.form(damping)
     keep = np.flatnonzero(_visible(np.vstack([basis[seen], patterns.T @ basis]), stiffness, damping))
     basis, pick = basis[:, keep], np.ix_(keep, keep)
     at_contacts = np.where((degree >= 0)[:, :, None], basis[np.maximum(degree, 0)], 0.0)
@@ -173,6 +182,27 @@ def _attachment_modes(modes: Modes, seen: Ints, patterns: Floats, drawn: Floats,
     independent = size > 1e-8 * size[-1]
     mixed: Floats = modes.rest @ (shape @ mix[:, independent] / np.sqrt(size[independent]))
     return mixed
+
+
+def _attachments_once() -> Callable[[Modes, Ints, Floats, Floats, float], Floats]:
+    """Return `_attachment_modes` that takes bodies which are alike, as in a ring, once."""
+    known: dict[bytes, Floats] = {}
+
+    def find(modes: Modes, seen: Ints, patterns: Floats, drawn: Floats, least: float) -> Floats:
+        rows = modes.rows
+        place = np.full(len(modes.rest), -1)
+        place[rows] = np.arange(rows.size)
+        own = modes._replace(rows=place[rows], kept=modes.kept[rows], rest=modes.rest[rows])
+        seen, patterns, drawn = place[seen[place[seen] >= 0]], patterns[rows], drawn[rows]
+        drawn = drawn[:, drawn.any(axis=0)]
+        name = b"".join(a.tobytes() for a in (own.rest, own.rest_frequency, seen, patterns, drawn))
+        if name not in known:
+            known[name] = _attachment_modes(own, seen, patterns, drawn, least)
+        found = np.zeros((len(modes.rest), known[name].shape[1]))
+        found[rows] = known[name]
+        return found
+
+    return find
 
 
 def _visible(seen: Floats, stiffness: Floats, damping: Floats) -> NDArray[np.bool_]:

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
+from rubhpc.integrate.reduced_model.coupling import coupled_parts
 
 if TYPE_CHECKING:
-    from rubhpc.fem.model import Model
+    from collections.abc import Sequence
+
+    from rubhpc.fem.model import Body, Model
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,6 +29,7 @@ Bools = NDArray[np.bool_]
 CUTOFF_RATIO = 10.0
 FEWEST_MODES = 2  # kept of every part, whatever their frequency
 SMALL = 256  # degrees of a body whose modes are kept for other rigs with the same body: 1.5 MB
+FEW_PAIRS = 5  # of which there is little to take apart
 FREE = 1e-12  # square of a frequency over the greatest, below which a mode is free motion
 
 
@@ -45,6 +47,7 @@ class Part(NamedTuple):
     """Undamped modes of what mass and stiffness couple, orthonormal in the mass."""
 
     n_seen: int  # of its degrees, and of their combinations, are seen by contact, outputs or probes
+    rows: Ints  # its degrees
     mode: Floats  # (n_all, n)
     frequency: Floats  # (n,), rad/s
 
@@ -55,22 +58,21 @@ class Standstill(NamedTuple):
     stiffness: Floats  # (n_all, n_all), its symmetric part
     parts: list[Part]  # those that contact or outputs feel
     contact_frequency: float  # rad/s
+    groups: list[Ints]  # degrees that nothing couples to others at any speed; all together for few pairs
 
 
 @lru_cache(maxsize=4)
 def at_standstill(model: Model) -> Standstill:
     """Find the modes of a model, once for all speeds."""
-    mass, damping, stiffness, _ = whole_system(model, 1.0)  # at a speed, for what gyroscopic terms couple
+    mass, _, stiffness, _ = whole_system(model, 1.0)
     symmetric, seen = 0.5 * (stiffness + stiffness.T), seen_degrees(model)
-    coupled = (mass != 0) | (stiffness != 0)
-    n_part, number = connected_components(csr_array(coupled), directed=False)
-    _, whole = connected_components(csr_array(coupled | (damping != 0)), directed=False)
+    number, whole = _coupled_degrees(model.bodies)
     is_seen, is_felt = np.zeros((2, len(mass)), dtype=bool)
     looked_at = model.probe_patterns != 0.0
     is_seen[seen], is_felt[whole[seen]] = True, True
     is_felt[whole[looked_at.any(axis=1)]] = True
     parts = []
-    for i_part in range(n_part):
+    for i_part in range(number.max() + 1):
         rows = np.flatnonzero(number == i_part)
         if not is_felt[whole[rows[0]]]:
             continue
@@ -87,8 +89,31 @@ def at_standstill(model: Model) -> Standstill:
         mode = np.zeros((mass.shape[0], rows.size))
         mode[rows] = shape
         n_seen = is_seen[rows].sum() + looked_at[rows].any(axis=0).sum()
-        parts.append(Part(int(n_seen), mode, np.sqrt(square)))
-    return Standstill(symmetric, parts, _contact_frequency(parts, degrees_of(model), model))
+        parts.append(Part(int(n_seen), rows, mode, np.sqrt(square)))
+    if len(model.stators) <= FEW_PAIRS:
+        whole[:] = 0
+    groups = [np.flatnonzero(whole == i) for i in range(whole.max() + 1)]
+    return Standstill(symmetric, parts, _contact_frequency(parts, degrees_of(model), model), groups)
+
+
+def _coupled_degrees(bodies: Sequence[Body]) -> tuple[Ints, Ints]:
+    """Number of the part of each degree (n_all,) that mass and stiffness couple, and all matrices at speed.
+
+    Bodies that are alike, as in a ring, are looked at once.
+    """
+    found: dict[int, list[Ints]] = {}
+    numbers: list[list[Ints]] = [[], []]
+    n_part = [0, 0]
+    for body in bodies:
+        if id(body) not in found:
+            coupled = (body.mass != 0) | (body.stiffness != 0)
+            moving = coupled | (body.damping + body.gyroscopic != 0)
+            found[id(body)] = [coupled_parts(of) for of in (coupled, moving)]
+        for i, own in enumerate(found[id(body)]):
+            numbers[i].append(own + n_part[i])
+            n_part[i] += own.max(initial=-1) + 1
+    parts, whole = (np.concatenate(of) for of in numbers)
+    return parts, whole
 
 
 @lru_cache(maxsize=16)
@@ -131,6 +156,7 @@ def _contact_frequency(parts: list[Part], degree: Ints, model: Model) -> float:
 class Modes(NamedTuple):
     """Undamped modes of a part, orthonormal in the mass."""
 
+    rows: Ints  # its degrees
     kept: Floats  # (n_all, n_kept)
     kept_frequency: Floats  # (n_kept,), rad/s
     rest: Floats  # (n_all, n_rest), which only static shapes represent
@@ -141,7 +167,7 @@ def parted(part: Part, is_kept: Bools) -> Modes:
     """Modes kept (n,), and the others."""
     order, n_kept = np.argsort(~is_kept, kind="stable"), np.count_nonzero(is_kept)
     mode, frequency = part.mode.take(order, axis=1), part.frequency[order]
-    return Modes(mode[:, :n_kept], frequency[:n_kept], mode[:, n_kept:], frequency[n_kept:])
+    return Modes(part.rows, mode[:, :n_kept], frequency[:n_kept], mode[:, n_kept:], frequency[n_kept:])
 
 
 def modes_below(part: Part, cutoff: float) -> Bools:

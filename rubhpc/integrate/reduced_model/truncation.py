@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rubhpc.integrate.packing import degrees_of, output_degrees, whole_system
+from rubhpc.integrate.reduced_model.coupling import Grouped
 from rubhpc.integrate.reduced_model.standstill import (
     CUTOFF_RATIO,
     at_standstill,
@@ -140,7 +141,7 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
     standstill = at_standstill(model)
     frequency = np.concatenate([part.frequency for part in standstill.parts])
     mode = np.hstack([part.mode for part in standstill.parts])
-    damping = mode.T @ whole_system(model, spin)[1] @ mode
+    damping = Grouped(standstill.groups, mode).form(whole_system(model, spin)[1])
     decay = np.maximum(0.5 * np.diag(damping), 0.0)  # 1/s, of each mode
     lasting = 1.0 / (1.0 + np.pi * decay / standstill.contact_frequency)
     signals = [mode[row] for row in output_degrees(model) if row >= 0]
@@ -159,9 +160,10 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
         across = ey * v + ez * w
         impact = max(impact, struck_share(across, axial, frequency))
         pulse = pulse_spectrum(across, axial, frequency, standstill.contact_frequency)
-        bounce = bounce_spectrum(across, axial, frequency, decay, standstill.contact_frequency, touch)
-        bounced = pulse_spectrum(across, axial, frequency, standstill.contact_frequency, bounce)
-        raised = np.maximum(raised, bounced / pulse)
+        if touch.spring > 0.0:
+            bounce = bounce_spectrum(across, axial, frequency, decay, standstill.contact_frequency, touch)
+            bounced = pulse_spectrum(across, axial, frequency, standstill.contact_frequency, bounce)
+            raised = np.maximum(raised, bounced / pulse)
         rung, seen = (of * pulse / frequency for of in (np.array([*signals, axial, lateral]), lively))
         along = lateral + ez * v - ey * w - stator.radius * twist
         still = np.zeros(frequency.size)

@@ -13,6 +13,7 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.reduced_model import mode_library
 from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode, solve_parts
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
+from rubhpc.integrate.reduced_model.mode_tables import bytes_ahead
 from rubhpc.integrate.reduced_model.reduction import directions, reduce_model
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.contact_modes import (
@@ -370,3 +371,14 @@ def test_more_room_keeps_no_motion_in_closed_form_for_longer(monkeypatch):
     assert both.followed.n_most == 2 * 2**20 // n_byte > 4
     assert both.followed.n_usual == 3 * 2**19 // n_byte
     assert both.n_usual == both.n_most
+
+
+def test_memory_with_more_samples_ahead_is_foreseen(case):
+    """From tables of one sample, as those of a large ring, to those that the library holds."""
+    library, held = case.library, case.library._tables_of(case.library._opened, case.reduced)
+    more = library._n_ahead, library._n_level
+    library._n_ahead, library._n_level = 1, SAMPLE_LEVEL + 1
+    few = library._tables_of(library._opened, case.reduced)
+    library._n_ahead, library._n_level = more
+    sizes = [sum(field.nbytes for field in tables) for tables in (few, held)]
+    assert sizes[0] < sizes[1] == bytes_ahead(few, case.reduced, *more)

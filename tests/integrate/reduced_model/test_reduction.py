@@ -13,6 +13,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import steady_response
 from rubhpc.integrate.packing import degrees_of, output_degrees
+from rubhpc.integrate.reduced_model.coupling import Grouped, coupled_rows
 from rubhpc.integrate.reduced_model.reduction import directions, reduce_model
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W
 from rubhpc.rig.parts import Damping, Torsion
@@ -223,3 +224,37 @@ def test_unbalance_is_answered_at_any_speed(speed):
     found = reduced.output @ np.linalg.solve(system, reduced.force[0] - 1j * reduced.force[1])
     known = steady_response(model, speed)[output_degrees(model)]
     assert found == pytest.approx(known, abs=1e-3 * abs(known).max())
+
+
+@pytest.mark.parametrize("n_stator", [1, 8])
+def test_answers_of_a_ring_reduced_body_by_body(n_stator):
+    """Accelerations over forces, of alike stators too: within the accuracy of those of all bodies at once."""
+    rig = read_rig("mokhtar2017")
+    (stator,) = rig.stator
+    ring = tuple(replace(stator, angle=2.0 * np.pi * i / n_stator) for i in range(n_stator))
+    model = assemble(replace(rig, stator=ring))
+    reduced = reduce_model(model, SPIN, 1e-3)
+    for frequency in (0.0, SPIN, 1000.0):
+        found, full = reduced_answer(reduced, frequency), full_answer(model, frequency, SPIN)
+        assert found == pytest.approx(full, abs=2e-3 * np.abs(full).max())
+        apart = degrees_of(model)[:, AXIAL]
+        own = np.flatnonzero(
+            np.isin(np.concatenate([degrees_of(model).ravel(), output_degrees(model)]), apart)
+        )
+        assert np.diag(found)[own] == pytest.approx(np.diag(full)[own], rel=1e-4)
+
+
+def test_products_group_by_group():
+    rng = np.random.default_rng(5)
+    sizes, widths = (4, 3, 3, 1), (2, 3, 3, 1)
+    matrix = block_diag(*(rng.normal(size=(n, n)) for n in sizes))
+    columns = block_diag(*(rng.normal(size=(n, m)) for n, m in zip(sizes, widths, strict=True)))
+    mixed = rng.permutation(len(matrix))
+    matrix, columns = matrix[np.ix_(mixed, mixed)], columns[mixed]
+    groups = coupled_rows(matrix != 0.0)
+    assert sorted(map(len, groups)) == sorted(sizes)
+    assert [rows[0] for rows in groups] == sorted(rows[0] for rows in groups)
+    for those in (groups, [np.arange(len(matrix))]):
+        grouped = Grouped(those, columns)
+        assert grouped.under(matrix) == pytest.approx(matrix @ columns)
+        assert grouped.form(matrix) == pytest.approx(columns.T @ matrix @ columns)
