@@ -157,6 +157,8 @@ def follow(
             corner = [point for event, point in happened if event is Event.GRAZING][-1:]
             history, heading, has_turned = [*(corner or history[-2:]), found], None, not is_same
             length = min(LONGEST, 1.5 * length) if miss < GOOD else (0.6 * length if miss > POOR else length)
+            if corner:
+                length = max(length, FIRST)  # it was short for the sake of the grazing
     except (Unfollowed, InputError, NotConverged, np.linalg.LinAlgError) as problem:
         end = str(problem)
     if events[-1] is Event.NONE and len(points) < most:

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 MOST_ITERATIONS = 7
 SOON = 1e-4  # residual from which an iteration that is late may go on
 FAST = 0.02  # ratio of two residuals below which a derivative serves once more
+LESS = 0.7  # ratio of a residual to the least before it that is progress
+MORE, PATIENCE = (2.0, 10.0), (2, 3)  # ratio to the one before, and iterations without progress, borne
+ROUNDING = 1e-8  # residual below which want of progress may be rounding
 STEEP = 0.4  # share of the parameter in a step below which it is an unknown
 
 
@@ -170,7 +173,7 @@ class Branching:
                 if is_asked or not found.is_near_fold:
                     return found
             except NotConverged:
-                if is_asked:
+                if is_asked or not base.may_fold:
                     raise
         return self._corrected(base, guess, along, period, most, is_held=False)
 
@@ -187,6 +190,7 @@ class Branching:
         value = base.value + guess[-1] * self.step
         before = base.motion + guess[:-1] / scale
         origin, rate, derivative, last = base.case, None, None, math.inf
+        least, n_worse = math.inf, 0
         try:
             case = family.at(value)
             motion = family.carry(before, origin, case)
@@ -202,7 +206,11 @@ class Branching:
                     )  # fmt: skip
                 states = revolutions[-1].states
                 is_late = iteration >= most and residual > SOON
-                if residual > 2.0 * last or is_late or not math.isfinite(residual):
+                n_worse = 0 if residual < LESS * least else n_worse + 1
+                least = min(least, residual)
+                is_stuck = n_worse > PATIENCE[is_held] and residual > ROUNDING
+                is_lost = residual > MORE[is_held] * last or is_stuck
+                if is_lost or is_late or not math.isfinite(residual):
                     break
                 if derivative is None or residual > FAST * last:
                     derivative = monodromy(case, revolutions) - np.eye(motion.size)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.branches.point import SAME_MOTION
+from rubhpc.integrate.branches.point import REAL, SAME_MOTION
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 LOCATED = 1e-9  # of the range: how near to an event its point is
-REAL = 1e-6  # imaginary part of a multiplier that is taken for a real one
 LEFT = 1e-6  # distance of a multiplier from the unit circle beyond which it has left
 ALONG = 0.9  # share of the parameter in a step above which it may be held
 JUMP = 1e-3  # of the distance of a multiplier from the unit circle at both ends, that is left at its crossing

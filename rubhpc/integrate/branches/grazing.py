@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rubhpc.integrate.branches.branching import STEEP
 from rubhpc.integrate.branches.events import LOCATED, Event, crossings, tolerance_of
-from rubhpc.integrate.branches.weak_impact import weakly_impacting
+from rubhpc.integrate.branches.weak_impact import DEPTH, weakly_impacting
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 
 if TYPE_CHECKING:
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     Predictor = Callable[[Branching, list[Point], float], tuple[Floats, Floats]]
 
 APPROACH = 0.1  # of its distance to grazing that a trial leaves
+LOOK = 0.05  # of the way to a motion beyond a grazing, at which the first trial shows how the gap falls
+HOPELESS, STILL = 0.01, 0.3  # of the way that is left, and of the gap: it falls smoothly
+CERTAIN = 3.0  # times the error of a secant, that a trial stays short of where it leads
 MOST_TRIALS = 40
 CLOSE = 1e-4  # steps before a grazing at which its point may lie
 BESIDE = (
@@ -139,7 +143,7 @@ class Grazing(NamedTuple):
 def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
     """Locate the grazing between two points with one contact more or less.
 
-    On the side with fewer contacts the least gap falls linearly to zero, along which it is sought; else the
+    On the side with fewer contacts the least gap falls smoothly to zero, where secants lead; else the
     place is halved. None where that side is lost before the gap has vanished, as by a fold close by.
     """
     change = branching.difference(a, b)
@@ -147,19 +151,25 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
     if n_touch[0] == n_touch[1]:
         return None
     direction, is_first_free = change / np.linalg.norm(change), n_touch[0] < n_touch[1]
-    tolerance = tolerance_of(branching, a, b)
-    ends = {a.sequence: 0.0, b.sequence: 1.0}
-    free: list[tuple[float, Point]] = [(0.0, a) if is_first_free else (1.0, b)]
-    root, missing = None, np.inf
+    tolerance, measure = tolerance_of(branching, a, b), change
+    if abs(direction[-1]) > STEEP and not a.may_fold and not b.may_fold:
+        measure = np.append(np.zeros(change.size - 1), change[-1])  # the way is measured by the parameter
+    first, other = (a, b) if is_first_free else (b, a)
+    far = 1.0 if is_first_free else 0.0  # where a motion is that has more contacts, or none was found
+    free: list[tuple[float, Point]] = [(1.0 - far, first)]
+    root, error, missing = None, np.inf, np.inf
 
     def impacting(at: float) -> Point:
         """The motion with more contacts that is nearest to the grazing."""
-        end, other = (1.0, b) if is_first_free else (0.0, a)
+        end, depth = 1.0 if is_first_free else 0.0, DEPTH
+        most = MEETING * float(np.linalg.norm(branching.difference(free[-1][1], other)))
         with suppress(NotConverged):
-            found = weakly_impacting(branching, [a if is_first_free else b, *(point for _, point in free)])
-            length = np.linalg.norm(branching.difference(free[-1][1], found))
-            if touches(found) == touches(other) and length <= MEETING * np.linalg.norm(change):
-                return found
+            for _ in range(2):
+                found = weakly_impacting(branching, [point for _, point in free], depth)
+                length = float(np.linalg.norm(branching.difference(free[-1][1], found)))
+                if touches(found) == touches(other) and length <= most:
+                    return found
+                depth *= min(1.0, 0.5 * most / length) ** 2  # the distance goes with the root of the depth
         for part in BESIDE:
             for base, share in ((a, at + part * (end - at)), (free[-1][1], part * (end - at))):
                 try:
@@ -170,31 +180,39 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
                     return found
         return other
 
+    more = list((touches(other) - touches(first)).keys())
     for _ in range(MOST_TRIALS):
-        near, far = free[-1][0], ends[b.sequence if is_first_free else a.sequence]
-        ahead_of = _root(free)  # a gap of rounding is not seen any more, and another one may be
+        near = free[-1][0]
+        if root is not None and abs(root - near) < tolerance and not _falls(free[-2:], more):
+            return Grazing(free[-1][1], impacting(near))  # a gap of rounding is not seen any more
+        ahead_of = _root(free[-2:], more)
         if _between(near, ahead_of, far) or (ahead_of is not None and not _between(near, root, far)):
+            if root is not None and ahead_of is not None and len(free) > 2 and free[-3][0] != ahead_of:
+                error = abs((ahead_of - root) * (near - ahead_of) / (free[-3][0] - ahead_of))
             root = ahead_of
         if root is not None:
             missing = min(missing, abs(root - near))
         if root is None or not _between(near, root, far):
-            share = 0.5 * (near + far)
+            share = near + (LOOK if len(free) == 1 else 0.5) * (far - near)
         elif abs(root - near) < tolerance:
             return Grazing(free[-1][1], impacting(near))
-        else:
-            share = root + APPROACH * (near - root)
+        else:  # not beyond it, where the motion has the contact
+            left = max(0.5 * tolerance, CERTAIN * error)
+            share = root + np.sign(near - root) * min(left, APPROACH * abs(near - root))
+        if abs(near - far) < HOPELESS and _least(free[-1][1], more) > STILL * _least(first, more):
+            return None  # it would have to fall all at once
         if abs(near - far) < tolerance:
-            is_missed = missing > MISSED and _is_apart(free[-1][1], b if is_first_free else a)
+            is_missed = missing > MISSED and _is_apart(free[-1][1], other)
             return None if is_missed else Grazing(free[-1][1], impacting(near))
         try:
-            ahead = _ahead(branching, free, change)
-            trial = branching.correct(free[-1][1], (share - near) * ahead, direction)
+            ahead = _ahead(branching, free[-2:], change, measure)
+            trial = branching.correct(free[-1][1], (share - near) * ahead, measure / np.linalg.norm(measure))
         except NotConverged:
             trial = None
-        if trial is not None and touches(trial) == touches(free[0][1]):  # in any order
-            free = [free[-1], (share, trial)]
+        if trial is not None and touches(trial) == touches(first):  # in any order
+            free.append((share, trial))
         else:
-            ends[b.sequence if is_first_free else a.sequence] = share
+            far = share
     return None
 
 
@@ -252,22 +270,39 @@ def _is_apart(free: Point, other: Point) -> bool:
     return bool(np.isfinite(np.concatenate([gap, force])).any() and not np.any(gap <= MISSED))
 
 
-def _ahead(branching: Branching, free: list[tuple[float, Point]], change: Floats) -> Floats:
-    """Where the side without the contact goes in a whole step, by its last two points; else `change`."""
+def _ahead(branching: Branching, free: list[tuple[float, Point]], change: Floats, measure: Floats) -> Floats:
+    """Where the side without the contact goes in a whole step, by its last two points; else `change`.
+
+    A step is whole that is as long as `measure` (2 n + 1,) in its direction.
+    """
     if len(free) < 2:
         return change
     ahead = branching.difference(free[0][1], free[1][1])
-    along = float(ahead @ change)
-    return ahead * (change @ change / along) if along else change
+    along = float(ahead @ measure)
+    return ahead * (measure @ measure / along) if along else change
 
 
-def _root(free: list[tuple[float, Point]]) -> float | None:
-    """Where the first least gap or force vanishes that falls from one point to the next."""
+def _root(free: list[tuple[float, Point]], pairs: list[int] | None = None) -> float | None:
+    """Where the first least gap or force, of some pairs, vanishes that falls from one point to the next."""
     if len(free) < 2:
         return None
     (x, before), (y, point) = free
-    n = 2 * point.case.q
-    was, now = distances(before)[:n], distances(point)[:n]
+    was, now = _turning(before, pairs), _turning(point, pairs)
     with np.errstate(invalid="ignore", divide="ignore"):
         ahead = np.where(np.isfinite(was) & np.isfinite(now) & (now < was), now / (was - now), np.inf)
     return float(y + (y - x) * ahead.min()) if np.isfinite(ahead.min()) else None
+
+
+def _falls(free: list[tuple[float, Point]], pairs: list[int]) -> bool:
+    """Whether the least of the gaps and forces of some pairs falls from one point to the next."""
+    return _least(free[-1][1], pairs) < _least(free[0][1], pairs)
+
+
+def _least(point: Point, pairs: list[int]) -> float:
+    return float(_turning(point, pairs).min())
+
+
+def _turning(point: Point, pairs: list[int] | None) -> Floats:
+    """Least gaps and forces, of some pairs or of all."""
+    found = distances(point)[: 2 * point.case.q].reshape(2, -1)
+    return found.ravel() if pairs is None else found[:, pairs].ravel()

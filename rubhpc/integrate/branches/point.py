@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.periodic_motions.saltation import monodromy
+from rubhpc.integrate.periodic_motions.saltation import tangents
 from rubhpc.integrate.periodic_motions.shooting import floquet_multipliers
 
 if TYPE_CHECKING:
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 TURN = 0.2  # change of the motion, over its size, that counts as one step
 SAME_MOTION = 1e-6  # of its size
 NEAR_FOLD = 0.03  # distance of a multiplier from 1 within which the parameter is not held
+MAY_FOLD = 0.7  # a real multiplier beyond which a fold may be a step ahead
+REAL = 1e-6  # imaginary part of a multiplier that is taken for a real one
 CENTRAL = 0.2  # share of an event-free piece at either end in which no section is placed
 
 
@@ -54,9 +56,14 @@ class Point:
         return len(self.revolutions)
 
     @cached_property
+    def tangents(self) -> list[Floats]:
+        """Derivatives (2 n, 2 n) by the motion, of what it is after each piece and the event that ends it."""
+        return tangents(self.case, self.revolutions)
+
+    @property
     def monodromy(self) -> Floats:
         """Derivative (2 n, 2 n) of the motion after a period by that before it."""
-        return monodromy(self.case, self.revolutions)
+        return self.tangents[-1]
 
     @cached_property
     def multipliers(self) -> Complexes:
@@ -73,6 +80,12 @@ class Point:
     def is_near_fold(self) -> bool:
         """Whether the motion hardly closes less well next to it, with the parameter held."""
         return bool(np.abs(self.multipliers - 1.0).min() < NEAR_FOLD)
+
+    @property
+    def may_fold(self) -> bool:
+        """Whether a fold may lie within a step of the branch."""
+        is_real = np.abs(self.multipliers.imag) <= REAL
+        return bool((is_real & (self.multipliers.real > MAY_FOLD)).any())
 
     @property
     def n_unstable(self) -> int:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.branches.events import LEFT, REAL, Event, has_halved, kind_of
+from rubhpc.integrate.branches.events import LEFT, Event, has_halved, kind_of
 from rubhpc.integrate.branches.grazing import distances, passed
+from rubhpc.integrate.branches.point import REAL
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 
 if TYPE_CHECKING:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.integrate.branches.least_gap import least_gap
 from rubhpc.integrate.periodic_motions.family import flow
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
@@ -23,13 +26,14 @@ if TYPE_CHECKING:
 NEAR = 1e-8, 1e-2  # of the clearance: gaps from which a gap of zero is extrapolated
 BACK = 1e-3  # of the way to the first motion, where the others nearly touch or do not
 DEPTH = 1e-5  # of the clearance, by which a motion without the impact would pass the wall
-SMALL = 1e-7  # steps, by which derivatives are taken at most
+SMALL = 1e-6  # steps, by which derivatives are taken at most
+ALIKE = 0.1  # of a least gap, between what was interpolated as it was followed and what it is
 PART = 0.1  # of the gap over the clearance, which they are at most: no gap closes meanwhile
 MOST_ITERATIONS = 20
 
 
-def weakly_impacting(branching: Branching, free: Sequence[Point]) -> Point:
-    """Find the periodic motion that a wall holds up from passing it by a hundred-thousandth of the clearance.
+def weakly_impacting(branching: Branching, free: Sequence[Point], share: float = DEPTH) -> Point:
+    """Find the periodic motion that a wall holds up from passing it by a small share of the clearance.
 
     The speed of an impact goes with the root of that depth p, the change of the motion with the root of the
     change of the parameter: at a given parameter Newton's method meets a derivative without bound. In terms
@@ -40,8 +44,10 @@ def weakly_impacting(branching: Branching, free: Sequence[Point]) -> Point:
     Parameters
     ----------
     free : sequence of Point
-        Motions without the impact, towards the grazing; the last one is taken whose least gap is between
-        1e-8 and 1e-2 of its clearance, or one a thousandth of the way back.
+        Motions without the impact, towards the grazing; of those whose least gap is between 1e-8 and 1e-2 of
+        its clearance the one is taken where it is nearest to 1e-5, or one a thousandth of the way back.
+    share : float
+        Of the clearance.
 
     Raises
     ------
@@ -49,25 +55,41 @@ def weakly_impacting(branching: Branching, free: Sequence[Point]) -> Point:
         None was found, or no gap is that small.
     """
     base, pair, gap, clearance = _beside(branching, free)
-    row = _gradient(branching, base, pair, min(SMALL, PART * gap / clearance))
-    guess = np.zeros(row.size)
-    guess[-1] = -(gap + DEPTH * clearance) / row[-1]
-    return branching.correct(base, guess, -row / np.linalg.norm(row), most=MOST_ITERATIONS, is_free=True)
+    least = least_gap(base, pair)
+    if least is None or abs(least.gap - gap) > ALIKE * gap:
+        raise NotConverged("the least gap does not turn")
+    rate, ended = _rates(branching, base, pair, min(SMALL, PART * gap / clearance))
+    row = np.append(least.gradient / base.scale, rate)
+    if not np.isfinite(row).all() or rate == 0.0:
+        raise NotConverged("the least gap has no derivative")
+    depth = share * clearance
+    matrix = np.block([[(base.monodromy - np.eye(ended.size)) / base.scale, ended[:, None]], [row[None, :]]])
+    guesses, along = (
+        [np.append(np.zeros(ended.size), -(least.gap + depth) / rate)],
+        -row / np.linalg.norm(row),
+    )
+    with suppress(np.linalg.LinAlgError):
+        guesses.append(np.linalg.solve(matrix, np.append(-least.impact(depth), -(least.gap + depth))))
+    for guess in guesses[::-1]:
+        with suppress(NotConverged):
+            return branching.correct(base, guess, along, most=MOST_ITERATIONS, is_free=True)
+    raise NotConverged("no motion with a weak impact was found")
 
 
 def _beside(branching: Branching, free: Sequence[Point]) -> tuple[Point, int, float, float]:
     """A motion that nearly grazes, the pair that does, its least gap and its clearance, m."""
 
     def nearly(points: Iterable[Point]) -> tuple[Point, int, float, float] | None:
+        found = []
         for point in points:
-            gap = _least_gap(branching, point)
+            gap = _least_gaps(point)
             clearance = point.case.bodies.clearance[: gap.size]
             pair = int(np.argmin(gap / clearance))
             if NEAR[0] * clearance[pair] < gap[pair] < NEAR[1] * clearance[pair]:
-                return point, pair, float(gap[pair]), float(clearance[pair])
-        return None
+                found.append((point, pair, float(gap[pair]), float(clearance[pair])))
+        return min(found, key=lambda one: abs(math.log(one[2] / one[3] / DEPTH)), default=None)
 
-    if (found := nearly(free[::-1])) is not None:
+    if (found := nearly(free)) is not None:
         return found
     back = branching.difference(free[-1], free[0])
     if length := float(np.linalg.norm(back)):
@@ -77,29 +99,21 @@ def _beside(branching: Branching, free: Sequence[Point]) -> tuple[Point, int, fl
     raise NotConverged("no gap is about to close")
 
 
-def _least_gap(branching: Branching, point: Point, step: Floats | None = None) -> Floats:
-    """Least gaps (q,), m, over a period from a motion, or from a step (2 n + 1,) beside it."""
-    case, motion = point.case, point.motion
-    if step is not None:
-        motion = motion + step[:-1] / point.scale
-        if step[-1] != 0.0:
-            case = branching.family.at(point.value + step[-1] * branching.step)
-            motion = branching.family.carry(motion, point.case, case)
+def _least_gaps(point: Point) -> Floats:
+    """Least gaps (q,), m, over a period."""
+    return np.asarray(np.min([revolution.least_gap for revolution in point.revolutions], axis=0))
+
+
+def _rates(branching: Branching, point: Point, pair: int, small: float) -> tuple[float, Floats]:
+    """Derivatives by the parameter, a step, the beginning held: of a least gap, m, and of the end (2 n,)."""
+    family = branching.family
     try:
-        revolutions = flow(case, motion, point.states, point.period, point.phase)
+        there = family.at(point.value + small * branching.step)
+        begun = family.carry(point.motion, point.case, there)
+        revolutions = flow(there, begun, point.states, point.period, point.phase)
     except Unfollowed as problem:
         raise NotConverged(str(problem)) from None
-    return np.asarray(np.min([revolution.least_gap for revolution in revolutions], axis=0))
-
-
-def _gradient(branching: Branching, point: Point, pair: int, small: float) -> Floats:
-    """Derivative (2 n + 1,) of a least gap, m, by the motion and the parameter, in steps."""
-    row = np.empty(point.motion.size + 1)
-    for k in range(row.size):
-        step = np.zeros(row.size)
-        step[k] = small
-        ahead, behind = (_least_gap(branching, point, way * step)[pair] for way in (1.0, -1.0))
-        row[k] = (ahead - behind) / (2.0 * small)
-    if not np.isfinite(row).all() or row[-1] == 0.0:
-        raise NotConverged("the least gap has no derivative")
-    return row
+    gap = min(float(revolution.least_gap[pair]) for revolution in revolutions)
+    defect = family.carry(revolutions[-1].end, there, point.case) - family.carry(begun, there, point.case)
+    apart = point.revolutions[-1].end - point.motion
+    return (gap - float(_least_gaps(point)[pair])) / small, (defect - apart) / small

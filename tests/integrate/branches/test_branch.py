@@ -57,7 +57,9 @@ def test_branches_end_where_the_contact_free_motion_grazes(found):
 
 def test_points_are_periodic_motions(found):
     for branch in found[:2]:
-        for point in branch.points[:: len(branch.points) // 3]:
+        # at an event a multiplier is on the unit circle
+        points = [point for point in branch.points if point.event == "none"]
+        for point in points[:: len(points) // 3]:
             motion = rubhpc.periodic(
                 "mokhtar2017",
                 clearance=point.value,

@@ -31,6 +31,7 @@ class Curve:
         return SimpleNamespace(
             value=float(self._value(x)), phase=0.0, period=1, motion=np.array([x]), sequence=events,
             multipliers=np.array([multiplier], dtype=complex), n_unstable=int(abs(multiplier) > 1.0),
+            may_fold=False,
             revolutions=[SimpleNamespace(least_gap=least, least_force=np.array([np.inf]), pieces=[])],
             case=SimpleNamespace(
                 q=1, setup=SimpleNamespace(spin=1.0), bodies=SimpleNamespace(clearance=np.ones(1))

@@ -1,0 +1,133 @@
+"""The least gap of a pair within a period: when it is, and what it changes with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.periodic_motions.saltation import saltate
+from rubhpc.kernels.event_steps import GAP_TOLERANCE
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.branches.point import Point
+    from rubhpc.integrate.periodic_motions.piecewise_motion import Piece, PiecewiseMotion
+
+    Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
+
+LOOKS = 256  # in a revolution, among which the least gap is looked for
+MOST_ITERATIONS, TURNED = 30, 1e-14  # of Newton's method for its time, which is known to a share of the turn
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LeastGap:
+    """The least gap of an open pair where it turns within a period.
+
+    Attributes
+    ----------
+    gap : float, m
+    bend : float, m/s^2
+        Its second derivative by the time.
+    """
+
+    point: Point
+    pair: int
+    gap: float
+    bend: float
+    _place: int  # of its piece, counted over all revolutions
+    _time: float  # s, in that piece
+
+    @property
+    def gradient(self) -> Floats:
+        """Derivative (2 n,) of the gap by the motion at the section: its row, times the tangent there."""
+        case = self.point.case
+        mode = case.mode(_pieces(self.point)[self._place].states)
+        row = (mode.tables.switch_re + 1j * mode.tables.switch_im)[_switch(case, self.pair), mode.moving]
+        carried = row * np.exp(mode.exponent * self._time)
+        gradient: Floats = np.ascontiguousarray(carried).view(np.float64) @ mode.enter
+        return gradient @ self.point.tangents[self._place - 1] if self._place else gradient
+
+    def impact(self, depth: float) -> Floats:
+        """What an impact here adds to the motion (2 n,) after the period, to the leading order.
+
+        A wall that is passed by a depth p is hit with the speed `v = sqrt(2 p d)`, d being the second
+        derivative of the gap, and the pair parts at once. The pairs that are closed stay closed.
+        """
+        case, pieces = self.point.case, _pieces(self.point)
+        piece, bodies = pieces[self._place], self.point.case.bodies
+        closed = case.mode(piece.states).is_closed.copy()
+        closed[self.pair] = True
+        hit = np.flatnonzero(closed)
+        speed = np.where(hit == self.pair, np.sqrt(2.0 * max(depth * self.bend, 0.0)), 0.0)
+        gained = (1.0 + bodies.restitution) * speed
+        rows, directions = bodies.gap_jacobian[hit], bodies.force_direction[hit].T
+        change = np.zeros((2 * case.n, 1))
+        change[case.n :, 0] = directions @ np.linalg.solve(rows @ directions, gained)
+        change = case.mode(piece.states).propagator(piece.duration - self._time) @ change
+        for ended, following in pairwise(pieces[self._place :]):
+            if ended.crossing:
+                change = saltate(case, ended, following, change)
+            change = case.mode(following.states).propagator(following.duration) @ change
+        return np.asarray(change[:, 0])
+
+
+def least_gap(point: Point, pair: int) -> LeastGap | None:
+    """Find where the gap of a pair is least; None where it turns in no piece of the period."""
+    case, best = point.case, (np.inf, 0, 0.0)
+    pieces = _pieces(point)
+    begins = [point.motion, *(piece.after for piece in pieces)]
+    for place, (piece, begun) in enumerate(zip(pieces, begins, strict=False)):
+        if not case.mode(piece.states).is_open[pair]:
+            continue
+        looks = np.linspace(0.0, piece.duration, max(8, int(LOOKS * piece.duration / case.turn)))
+        gap, rate, _ = _gap(case, piece, begun, pair, looks)
+        is_turn = (rate[:-1] < 0.0) & (rate[1:] >= 0.0)
+        turns = np.flatnonzero(is_turn & (np.minimum(gap[:-1], gap[1:]) > GAP_TOLERANCE))  # none just opened
+        if turns.size:
+            first = turns[np.argmin(np.minimum(gap[turns], gap[turns + 1]))]
+            if (least := min(gap[first], gap[first + 1])) < best[0]:
+                best = float(least), place, float(looks[first if gap[first] == least else first + 1])
+    if not np.isfinite(best[0]):
+        return None
+    _, place, time = best
+    piece, begun = pieces[place], begins[place]
+    for _ in range(MOST_ITERATIONS):
+        gap, rate, bend = _gap(case, piece, begun, pair, np.array([time]))
+        if not bend[0] > 0.0:
+            return None
+        moved = -rate[0] / bend[0]
+        time = float(np.clip(time + moved, 0.0, piece.duration))
+        if abs(moved) < TURNED * case.turn:
+            break
+    return LeastGap(
+        point=point, pair=pair, gap=float(gap[0]), bend=float(bend[0]), _place=place, _time=time
+    )  # fmt: skip
+
+
+def _pieces(point: Point) -> list[Piece]:
+    return [piece for revolution in point.revolutions for piece in revolution.pieces]
+
+
+def _switch(case: PiecewiseMotion, pair: int) -> int:
+    """Row of the gap of a pair among the switch functions."""
+    return pair * int(case.n_switch // case.q)
+
+
+def _gap(
+    case: PiecewiseMotion, piece: Piece, begun: Floats, pair: int, times: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Gap of a pair and its first and second derivative at some times (k,), s, of a piece."""
+    mode = case.mode(piece.states)
+    tables, j = mode.tables, _switch(case, pair)
+    re, im = case.enter(mode, piece.begin, begun)
+    exponent = tables.exponent[0] + 1j * tables.exponent[1]
+    terms = (re + 1j * im) * np.exp(np.multiply.outer(times, exponent))
+    row = tables.switch_re[j] + 1j * tables.switch_im[j]
+    drift = float(tables.switch_re[j] @ tables.drift)
+    gap, rate, bend = (np.real(terms @ (row * exponent**k)) for k in range(3))
+    return gap + drift * times, rate + drift, bend
