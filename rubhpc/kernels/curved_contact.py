@@ -24,6 +24,7 @@ Ints = NDArray[np.int64]
 ALONG, ACROSS, BENDING = range(3)
 # Loads of a pair: h, its rate, and the changes of the contact force along, across and on each bending.
 HEIGHT, HEIGHT_RATE, LOAD_ALONG, LOAD_ACROSS, LOAD_BENDING = range(5)
+ALL = -1  # set of all pairs
 N_NODE = 5  # of a step, its beginning and end among them
 _ASIDE = 0.5 * np.sqrt(3.0 / 7.0)
 NODES = np.array([0.0, 0.5 - _ASIDE, 0.5, 0.5 + _ASIDE, 1.0])  # over its length (Lobatto)
@@ -35,11 +36,10 @@ PARTS = np.ascontiguousarray(
     np.diff(NODES[:, None] ** np.arange(1, N_NODE + 1) / np.arange(1, N_NODE + 1), axis=0) @ LAGRANGE.T
 )
 # Of `CurvedWork.span`: length of the step that loads are continued from (0: none), largest force of the
-# contact, time that resolves force and slip, set of the pairs that `secant` is of, steps before one may be
-# longer, time since the step that loads are continued from began, how often the last step moved its loads,
-# level of the steps that `system` is of.
-BEFORE, LARGEST, RESOLVED, PAIRS, PATIENCE, PAST, SWEEPS, SOLVED = range(8)
-MOST_UNKNOWNS = 64  # loads of a step that are found by a secant method; more are found by sweeps
+# contact, time that resolves force and slip, steps before one may be longer, time since the step that loads
+# are continued from began, how often the last step moved its loads, level of the steps that `system` is of
+# (an only pair), whether `follow` is of the closed pairs (several).
+BEFORE, LARGEST, RESOLVED, PATIENCE, PAST, SWEEPS, SOLVED, SLOPED = range(8)
 
 
 class CurvedPairs(NamedTuple):
@@ -111,9 +111,7 @@ class CurvedWork(NamedTuple):
     elimination: Floats  # (q, q + 1)
     course: Floats  # (5,), coefficients of what crosses zero over a step
     ahead: Floats  # (4, 5), what the loads of the step before count for at the nodes
-    secant: Floats  # (n_level, u, u), how loads move for a unit of what they are missed by
-    is_learnt: NDArray[np.bool_]  # (n_level,), whether that holds anything
-    point: Floats  # (7, 4 q (4 + b)), rows of `curved_secant`
+    point: Floats  # (6, 4 q (4 + b)), rows of `curved_loads`
     transient: Floats  # (2, m), coordinates but for what follows the loads
     seen: Floats  # (r + 2,), of `CurvedTables.drain`
     whole: Floats  # (4 (3 d + 1),), with them
@@ -123,21 +121,39 @@ class CurvedWork(NamedTuple):
     response: Floats  # (5, 2, m), rates of the coordinates under the loads at the nodes
     middle: Floats  # (2, m), coordinates at a node
     shape: Floats  # (2, q, n), Jacobian and directions of an event
-    # Of `curved_newton`, for the only pair at the nodes after the first, three states (h, rate, force) each:
+    # Of `curved_newton`, at the nodes after the first, for the three states (h, rate, force) of an only pair:
     part: Floats  # (6, 3 + b), derivatives at a node
     slope: Floats  # (4, 3, 3 d + 1), of the states in what is read
     lever: Floats  # (4, 2 + b), loads of a unit of force
     answer: Floats  # (12, 4 (4 + b)), of the states in the loads
     system: Floats  # (12, 12)
     order: Ints  # (12,), its rows as they were exchanged
-    unknown: Floats  # (12,)
+    unknown: Floats  # (12 q,), of any number of pairs
+    # Of `curved_joint`, for several pairs (else without rows); states and forces are of the closed ones:
+    systems: Floats  # (n_level, 12 q, 12 q), for steps of each length
+    orders: Ints  # (n_level, 12 q)
+    is_solved: NDArray[np.bool_]  # (n_level,), whether they are of the closed pairs
+    exchanged: Ints  # (q,)
+    follow: Floats  # (4, 3 q, 2, m), of the states in the coordinates
+    push: Floats  # (4, q, 2, m), rates of the coordinates under a unit of force
+    levers: Floats  # (4, q, 2 + b), loads of a unit of force
+    base: Floats  # (4, 2, m), coordinates at the nodes under the loads at the beginning of the step alone
+    right: Floats  # (q, 2, m)
+    steep: Floats  # (q, 2 + b), slopes of h in the motions
+    steeper: Floats  # (q, 2 + b), of its rate
+    turn: Floats  # (q, 2 + b), of the angle of the normal
+    mutual: Floats  # (q, q)
+    inverse: Floats  # (q, q)
+    bending: Floats  # (q, 2 + b), of the force balance of a pair in the motions of all
+    balance: Floats  # (4, 3 + b), likewise in its rates and free accelerations; and on the way to them
 
 
 def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int, n_level: int) -> CurvedWork:
     """Work space for q pairs of `n_row` motions, n reduced degrees, m coordinates, r losses, levels."""
     nodes = np.zeros((4, N_NODE, q))
     n_unknown = (N_NODE - 1) * q * (n_row + 1)
-    n_learnt = min(n_unknown, MOST_UNKNOWNS)
+    n_state, n_motion = 3 * (N_NODE - 1), n_row - 1
+    n_joint, width = (q, m) if q > 1 else (0, 0)
     load = np.zeros((N_NODE, q, n_row + 1))
     return CurvedWork(
         h=nodes[0].copy(),
@@ -160,9 +176,7 @@ def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int, n_level: int) -
         elimination=np.zeros((q, q + 1)),
         course=np.zeros(N_NODE),
         ahead=np.zeros((N_NODE - 1, N_NODE)),
-        secant=np.zeros((n_level, n_learnt, n_learnt)),
-        is_learnt=np.zeros(n_level, dtype=np.bool_),
-        point=np.zeros((7, n_unknown)),
+        point=np.zeros((6, n_unknown)),
         transient=np.zeros((2, m)),
         seen=np.zeros(n_loss + 2),
         whole=np.zeros((N_NODE - 1) * (3 * n_row - 2)),
@@ -174,11 +188,27 @@ def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int, n_level: int) -
         shape=np.zeros((2, q, n)),
         part=np.zeros((6, n_row)),
         slope=np.zeros((N_NODE - 1, 3, 3 * n_row - 2)),
-        lever=np.zeros((N_NODE - 1, n_row - 1)),
-        answer=np.zeros((3 * (N_NODE - 1), (N_NODE - 1) * (n_row + 1))),
-        system=np.zeros((3 * (N_NODE - 1), 3 * (N_NODE - 1))),
-        order=np.zeros(3 * (N_NODE - 1), dtype=np.int64),
-        unknown=np.zeros(3 * (N_NODE - 1)),
+        lever=np.zeros((N_NODE - 1, n_motion)),
+        answer=np.zeros((n_state, (N_NODE - 1) * (n_row + 1))),
+        system=np.zeros((n_state, n_state)),
+        order=np.zeros(n_state, dtype=np.int64),
+        unknown=np.zeros(n_state * q),
+        systems=np.zeros((n_level, n_state * n_joint, n_state * n_joint)),
+        orders=np.zeros((n_level, n_state * n_joint), dtype=np.int64),
+        is_solved=np.zeros(n_level, dtype=np.bool_),
+        exchanged=np.zeros(n_joint, dtype=np.int64),
+        follow=np.zeros((N_NODE - 1, 3 * n_joint, 2, width)),
+        push=np.zeros((N_NODE - 1, n_joint, 2, width)),
+        levers=np.zeros((N_NODE - 1, n_joint, n_motion)),
+        base=np.zeros((N_NODE - 1, 2, width)),
+        right=np.zeros((n_joint, 2, width)),
+        steep=np.zeros((n_joint, n_motion)),
+        steeper=np.zeros((n_joint, n_motion)),
+        turn=np.zeros((n_joint, n_motion)),
+        mutual=np.zeros((n_joint, n_joint)),
+        inverse=np.zeros((n_joint, n_joint)),
+        bending=np.zeros((n_joint, n_motion)),
+        balance=np.zeros((4, n_row)),
     )
 
 

@@ -40,14 +40,16 @@ def curvature(radius: float, across: float, is_round: bool) -> float:
 
 @jit_lean_sum
 def read_motion(
-    tables: CurvedTables, mode: int, mask: int, z_re: Floats, z_im: Floats, motion: Floats
+    tables: CurvedTables, mode: int, mask: int, which: int, z_re: Floats, z_im: Floats, motion: Floats
 ) -> None:
-    """Motions (3, q, 3 + b) of all pairs, their rates and free accelerations, with the h of all taken for 0.
+    """Motions (3, q, 3 + b) of the pairs `which` and their rates, with the h of all taken for 0.
 
-    Accelerations are those of the closed pairs, and of the others too where any is closed.
+    And free accelerations of the closed ones.
     """
     q, d = tables.bound.shape[1], tables.bound.shape[2]
     for i in range(q):
+        if not is_closed(which, i):
+            continue
         for j in range(d):
             motion[0, i, j] = dot(tables.read_re[mode, i, j], tables.read_im[mode, i, j], z_re, z_im)
         for j in range(d + 1):
@@ -81,11 +83,7 @@ def find_heights(
                 h[node, i] = new
         if change <= EXACT:
             break
-    for i in range(q):
-        for k in range(q):
-            if is_closed(mask, k):
-                for j in range(d):
-                    motion[0, i, j] -= moved[mode, i, j, k] * h[node, k]
+    take_off(tables, mode, mask, mask, 0, h[node], motion)
     for i in range(q):  # how fast h follows the motions
         if is_closed(mask, i):
             across = motion[0, i, ACROSS] + pairs.aside[i]
@@ -110,17 +108,28 @@ def find_heights(
                 rate[node, i] = new
         if change <= 1e4 * EXACT:
             break
+    take_off(tables, mode, mask, mask, 1, rate[node], motion)
     for i in range(q):
         for k in range(q):
-            if is_closed(mask, k):
-                for j in range(d + 1):
-                    motion[1, i, j] -= moved[mode, i, j, k] * rate[node, k]
-                if is_closed(mask, i):
-                    for j in range(d):
-                        motion[2, i, j] += (
-                            tables.accel[mode, i, j, k] * h[node, k]
-                            + tables.accel_rate[mode, i, j, k] * rate[node, k]
-                        )
+            if is_closed(mask, i) and is_closed(mask, k):
+                for j in range(d):
+                    motion[2, i, j] += (
+                        tables.accel[mode, i, j, k] * h[node, k]
+                        + tables.accel_rate[mode, i, j, k] * rate[node, k]
+                    )
+
+
+@jit_inline_sum
+def take_off(
+    tables: CurvedTables, mode: int, mask: int, which: int, derivative: int, h: Floats, motion: Floats
+) -> None:
+    """Take off the motions, or their rates, of the pairs `which` what the h (q,), or its rate, moves."""
+    q, n_row = h.size, tables.bound.shape[2] + derivative
+    for i in range(q):
+        for k in range(q):
+            if is_closed(which, i) and is_closed(mask, k):
+                for j in range(n_row):
+                    motion[derivative, i, j] -= tables.moved[mode, i, j, k] * h[k]
 
 
 @jit_lean_sum
@@ -180,41 +189,22 @@ def evaluate(
     z_im: Floats,
     work: CurvedWork,
 ) -> bool:
-    """Forces, slips and loads of the closed pairs at a node, and gaps of the others; False without forces.
+    """Forces, slips and loads of the closed pairs at a node; False without forces.
 
     The forces are those under which the gaps stay closed: with J the gap Jacobian and F the directions of the
     forces, `J F N = -(J a + b)`, a the free accelerations and b those at constant rates.
     """
-    read_motion(tables, mode, mask, z_re, z_im, work.motion)
-    return find_forces(pairs, tables, rim_speed, mode, mask, node, work)
-
-
-@jit_lean_sum
-def find_forces(
-    pairs: CurvedPairs,
-    tables: CurvedTables,
-    rim_speed: Floats,
-    mode: int,
-    mask: int,
-    node: int,
-    work: CurvedWork,
-) -> bool:
-    """Go on where `evaluate` has read the motions into `work.motion`."""
+    read_motion(tables, mode, mask, mask, z_re, z_im, work.motion)
     q, d = tables.bound.shape[1], tables.bound.shape[2]
     find_heights(pairs, tables, mode, mask, node, work)
     for i in range(q):
-        gap, bends = fill_geometry(pairs, i, d, work)
         work.active[i] = is_closed(mask, i)
         if work.active[i]:
+            _, bends = fill_geometry(pairs, i, d, work)
             for j in range(d):
                 bends += work.jacobian[i, j] * work.motion[2, i, j]
             work.opening[i] = bends
             work.slip[node, i] = slip_of(pairs, i, d, rim_speed[i], work)
-        else:
-            opens = 0.0
-            for j in range(d):
-                opens += work.jacobian[i, j] * work.motion[1, i, j]
-            work.gap[0, node, i], work.gap[1, node, i] = gap, opens
     for i in range(q):
         if work.active[i]:
             for k in range(q):
@@ -236,6 +226,31 @@ def find_forces(
 
 
 @jit_lean_sum
+def find_gaps(
+    pairs: CurvedPairs,
+    tables: CurvedTables,
+    mode: int,
+    mask: int,
+    node: int,
+    z_re: Floats,
+    z_im: Floats,
+    work: CurvedWork,
+) -> None:
+    """Gaps of the open pairs at a node and their rates, with the h of the closed ones found."""
+    q, d = tables.bound.shape[1], tables.bound.shape[2]
+    read_motion(tables, mode, mask, ~mask, z_re, z_im, work.motion)
+    take_off(tables, mode, mask, ~mask, 0, work.h[node], work.motion)
+    take_off(tables, mode, mask, ~mask, 1, work.rate[node], work.motion)
+    for i in range(q):
+        if not is_closed(mask, i):
+            work.gap[0, node, i], _ = fill_geometry(pairs, i, d, work)
+            opens = 0.0
+            for j in range(d):
+                opens += work.jacobian[i, j] * work.motion[1, i, j]
+            work.gap[1, node, i] = opens
+
+
+@jit_lean_sum
 def fill_loads(pairs: CurvedPairs, i: int, d: int, node: int, work: CurvedWork) -> None:
     """Fill the loads of pair i at a node, of which the geometry is filled and the force is known."""
     force, load, direction = work.force[node, i], work.load[node, i], work.direction[i]
@@ -250,7 +265,7 @@ def fill_loads(pairs: CurvedPairs, i: int, d: int, node: int, work: CurvedWork) 
 def find_lone_forces(
     pairs: CurvedPairs, tables: CurvedTables, rim_speed: Floats, mode: int, node: int, work: CurvedWork
 ) -> bool:
-    """`find_forces` of the only pair, which is closed: its h by Newton's method, the rest without systems."""
+    """`evaluate` of the only pair, which is closed: its h by Newton's method, the rest without systems."""
     d = tables.bound.shape[2]
     motion, rates, free = work.motion[0, 0], work.motion[1, 0], work.motion[2, 0]
     jacobian, direction, radius = work.jacobian[0], work.direction[0], pairs.radius[0]

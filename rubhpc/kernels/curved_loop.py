@@ -41,6 +41,7 @@ from rubhpc.kernels.curved_contact import (
     PAST,
     PATIENCE,
     RESOLVED,
+    SLOPED,
     SOLVED,
     CurvedPairs,
     CurvedTables,
@@ -48,7 +49,7 @@ from rubhpc.kernels.curved_contact import (
     is_closed,
 )
 from rubhpc.kernels.curved_event import take_curved_event
-from rubhpc.kernels.curved_forces import evaluate
+from rubhpc.kernels.curved_forces import evaluate, find_gaps
 from rubhpc.kernels.curved_measuring import (
     begin_curved_span,
     observe_curved_step,
@@ -312,7 +313,11 @@ def enter_curved(
     progress.resolved_level, progress.halving_level, progress.is_after_event = FORCED_LEVEL, NONE, 1
     progress.contact_age = NONE
     work.span[BEFORE], work.span[PAST], work.span[LARGEST], work.span[PATIENCE] = 0.0, 0.0, 0.0, 0.0
-    work.span[SOLVED] = 1.0 * NONE
+    work.span[SOLVED], work.span[SLOPED] = 1.0 * NONE, 0.0
+    work.is_solved[:] = False
     if closed == 0:
         return True
-    return evaluate(pairs, curved, reduced.rim_speed, found, closed, 0, z[0], z[1], work)
+    if not evaluate(pairs, curved, reduced.rim_speed, found, closed, 0, z[0], z[1], work):
+        return False
+    find_gaps(pairs, curved, found, closed, 0, z[0], z[1], work)
+    return True

@@ -89,7 +89,7 @@ def begin_curved_span(
     must resolve that alone.
     """
     mode, transient = progress.mode, work.transient
-    respond(curved, mode, int(tables.mask[mode]), 1, work)
+    respond(curved, mode, int(tables.mask[mode]), 0, 1, work)
     for k in range(z.shape[1]):
         a, b = curved.inverse_re[mode, k], curved.inverse_im[mode, k]
         re, im = work.response[0, 0, k], work.response[0, 1, k]

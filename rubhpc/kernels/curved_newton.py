@@ -26,7 +26,7 @@ from rubhpc.kernels.curved_contact import (
     CurvedTables,
     CurvedWork,
 )
-from rubhpc.kernels.curved_secant import LOADS, MISSED, MOVE
+from rubhpc.kernels.curved_loads import LOADS, MISSED, MOVE
 
 Floats = NDArray[np.float64]
 

@@ -63,9 +63,9 @@ def take_motion(d: int, node: int, work: CurvedWork) -> None:
 
 
 @jit_inline_sum
-def respond(tables: CurvedTables, mode: int, mask: int, n_node: int, work: CurvedWork) -> None:
-    """Rates of the coordinates under the loads at the first `n_node` nodes, into `work.response`."""
-    for node in range(n_node):
+def respond(tables: CurvedTables, mode: int, mask: int, first: int, n_node: int, work: CurvedWork) -> None:
+    """Rates of the coordinates under the loads at the nodes `first` to `n_node`, into `work.response`."""
+    for node in range(first, n_node):
         re, im = work.response[node, 0], work.response[node, 1]
         for k in range(re.size):
             re[k], im[k] = 0.0, 0.0
@@ -76,9 +76,11 @@ def respond(tables: CurvedTables, mode: int, mask: int, n_node: int, work: Curve
 
 
 @jit_lean_sum
-def add_responses(weight_re: Floats, weight_im: Floats, response: Floats, re: Floats, im: Floats) -> None:
-    """Add the responses at a node to the loads at all nodes, with their weights there (5, m)."""
-    for a in range(N_NODE):
+def add_responses(
+    weight_re: Floats, weight_im: Floats, response: Floats, first: int, n_node: int, re: Floats, im: Floats
+) -> None:
+    """Add the responses to the loads at the nodes `first` to `n_node`, with their weights (5, m)."""
+    for a in range(first, n_node):
         w_re, w_im, r_re, r_im = weight_re[a], weight_im[a], response[a, 0], response[a, 1]
         for k in range(re.size):
             re[k] += w_re[k] * r_re[k] - w_im[k] * r_im[k]
@@ -93,7 +95,29 @@ def move_coordinates(
     p_re, p_im = tables.node_re[mode, level, node - 1], tables.node_im[mode, level, node - 1]
     propagate(p_re, p_im, z[0], z[1], target[0], target[1])
     w_re, w_im = tables.weight_re[mode, level, node - 1], tables.weight_im[mode, level, node - 1]
-    add_responses(w_re, w_im, work.response, target[0], target[1])
+    add_responses(w_re, w_im, work.response, 0, N_NODE, target[0], target[1])
+
+
+@jit_inline_sum
+def leave_from(tables: CurvedTables, mode: int, mask: int, level: int, z: Floats, work: CurvedWork) -> None:
+    """Fill `work.base` with the coordinates at the nodes under the loads at the beginning alone."""
+    respond(tables, mode, mask, 0, 1, work)
+    for node in range(1, N_NODE):
+        base = work.base[node - 1]
+        p_re, p_im = tables.node_re[mode, level, node - 1], tables.node_im[mode, level, node - 1]
+        propagate(p_re, p_im, z[0], z[1], base[0], base[1])
+        w_re, w_im = tables.weight_re[mode, level, node - 1], tables.weight_im[mode, level, node - 1]
+        add_responses(w_re, w_im, work.response, 0, 1, base[0], base[1])
+
+
+@jit_inline_sum
+def arrive(tables: CurvedTables, mode: int, level: int, node: int, work: CurvedWork, target: Floats) -> None:
+    """Coordinates (2, m) at a node where `leave_from` left, under the responses of `work`."""
+    base, re, im = work.base[node - 1], target[0], target[1]
+    for k in range(re.size):
+        re[k], im[k] = base[0, k], base[1, k]
+    w_re, w_im = tables.weight_re[mode, level, node - 1], tables.weight_im[mode, level, node - 1]
+    add_responses(w_re, w_im, work.response, 1, N_NODE, re, im)
 
 
 @jit_inline_sum

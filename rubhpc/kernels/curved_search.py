@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.contact_modes import ModeTables, bounded, dot, event_free_interval
 from rubhpc.kernels.curved_contact import (
+    ALL,
     LAGRANGE,
     N_NODE,
     NODES,
@@ -48,7 +49,7 @@ def curved_free_interval(
     if free >= enough:
         return free
     d = curved.bound.shape[2]
-    read_motion(curved, mode, 0, z_re, z_im, work.motion)
+    read_motion(curved, mode, 0, ALL, z_re, z_im, work.motion)
     free = np.inf
     for i in range(pairs.radius.size):
         gap, _ = fill_geometry(pairs, i, d, work)
@@ -83,7 +84,7 @@ def open_crossing(
         is_near = is_near or gap < -GAP_TOLERANCE
     if not is_near:
         return crossing
-    read_motion(curved, mode, 0, z_re, z_im, work.motion)
+    read_motion(curved, mode, 0, ALL, z_re, z_im, work.motion)
     for i in range(pairs.radius.size):
         gap, _ = fill_geometry(pairs, i, curved.bound.shape[2], work)
         if gap < -GAP_TOLERANCE:

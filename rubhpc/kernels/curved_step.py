@@ -14,6 +14,7 @@ from rubhpc.kernels.curved_contact import (
     N_NODE,
     PAST,
     PATIENCE,
+    SLOPED,
     SOLVED,
     SWEEPS,
     CurvedPairs,
@@ -21,9 +22,24 @@ from rubhpc.kernels.curved_contact import (
     CurvedWork,
     is_closed,
 )
-from rubhpc.kernels.curved_forces import evaluate, find_lone_forces
+from rubhpc.kernels.curved_forces import evaluate, find_gaps, find_lone_forces
+from rubhpc.kernels.curved_joint import fill_answers, find_joint_system, move_jointly, take_joint_states
+from rubhpc.kernels.curved_loads import (
+    FORCES,
+    GUESS,
+    IMAGE,
+    LOADS,
+    MISSED,
+    MOVE,
+    give_loads,
+    size_of,
+    take_loads,
+    weigh_loads,
+)
 from rubhpc.kernels.curved_newton import fill_slopes, find_system, move_by_newton, take_states
 from rubhpc.kernels.curved_response import (
+    arrive,
+    leave_from,
     lone_pair,
     move_coordinates,
     predict_loads,
@@ -31,23 +47,6 @@ from rubhpc.kernels.curved_response import (
     read_loaded,
     respond,
     take_motion,
-)
-from rubhpc.kernels.curved_secant import (
-    FORCES,
-    GUESS,
-    IMAGE,
-    LOADS,
-    MISSED,
-    MOVE,
-    SAID,
-    forget,
-    give_loads,
-    learn,
-    move_loads,
-    size_of,
-    take_loads,
-    take_secant,
-    weigh_loads,
 )
 
 if TYPE_CHECKING:
@@ -115,50 +114,53 @@ def take_step(
     is_lone = lone_pair(mask, pairs.radius.size) == 0
     if is_lone:
         read_free(curved, mode, level, z[0], z[1], work)
+    else:
+        leave_from(curved, mode, mask, level, z, work)
     point, n_load = work.point, work.load.shape[2]
     weigh_loads(pairs, mask, step, work)
     n = take_loads(mask, work, point[LOADS])
     for j in range(n):
         point[GUESS, j] = point[LOADS, j]
-    if not is_lone:
-        take_secant(mask, level, n, work)
-    is_newton, takes_slopes = is_lone and work.span[SOLVED] == 1.0 * level, False
+    is_newton, takes_slopes = work.span[SOLVED] == 1.0 * level if is_lone else work.is_solved[level], False
     moved, first, sweep, is_last = np.inf, np.inf, 0, False
     while True:
+        has_none = not is_newton and work.span[SLOPED] == 0.0
+        takes_slopes = sweep == STALE or (has_none and (sweep > 0 or work.span[SWEEPS] > 0.0))
         if is_lone:
-            takes_slopes = sweep == STALE or (not is_newton and (sweep > 0 or work.span[SWEEPS] > 0.0))
             is_found = sweep_alone(pairs, curved, rim_speed, mode, level, takes_slopes, work)
         else:
-            is_found = sweep_all(pairs, curved, rim_speed, mode, mask, level, z, work)
+            is_found = sweep_all(pairs, curved, rim_speed, mode, mask, level, takes_slopes, work)
         if not is_found:
-            lose_patience(level, work)
+            work.span[PATIENCE] = 1.0 * PATIENT
             return False, 0
         take_loads(mask, work, point[IMAGE])
         for j in range(n):
             point[MISSED, j] = point[IMAGE, j] - point[LOADS, j]
         moved = size_of(point[MISSED], n, n_load, point[FORCES])
         if moved <= settled or sweep == MOST_SWEEPS:
+            if takes_slopes and not is_lone:
+                work.is_solved[level], work.span[SLOPED] = False, 1.0  # its factors are of other slopes
             break
         first = moved if sweep == 0 else first
         if sweep >= HOPELESS and not moved <= FALLEN * first:
             break
-        if is_lone:
-            if takes_slopes:
+        if takes_slopes or (not is_newton and work.span[SLOPED] == 1.0):
+            if is_lone:
                 is_newton = find_system(curved, mode, level, work)
                 work.span[SOLVED] = 1.0 * level if is_newton else -1.0
-            if is_newton:
-                move_by_newton(work)
-                is_last = not is_recorded and moved <= ANSWERED * allowed
             else:
-                for j in range(n):
-                    point[MOVE, j] = point[MISSED, j]
-                    point[LOADS, j] = point[IMAGE, j]
+                is_newton = find_joint_system(curved, mode, level, mask, work)
+                work.is_solved[level], work.span[SLOPED] = is_newton, 1.0
+        if is_newton:
+            if is_lone:
+                move_by_newton(work)
+            else:
+                move_jointly(curved, mode, level, mask, work)
+            is_last = not is_recorded and moved <= ANSWERED * allowed
         else:
-            if sweep > 0:
-                learn(level, n, work)
             for j in range(n):
-                point[SAID, j] = point[MISSED, j]
-            move_loads(level, n, work)
+                point[MOVE, j] = point[MISSED, j]
+                point[LOADS, j] = point[IMAGE, j]
         if sweep == 0 and level > 0:
             missed = INTERPOLATED * size_of(point[MOVE], n, n_load, point[FORCES])
             if missed > 4.0 * allowed:
@@ -166,7 +168,10 @@ def take_step(
         give_loads(mask, work)
         sweep += 1
         if is_last:
-            take_states(work)
+            if is_lone:
+                take_states(work)
+            else:
+                take_joint_states(mask, work)
             break
     take_loads(mask, work, point[LOADS])
     for j in range(n):
@@ -176,23 +181,20 @@ def take_step(
     if is_settled:
         work.span[PATIENCE] = max(work.span[PATIENCE] - 1.0, 0.0)
     else:
-        lose_patience(level, work)
-    respond(curved, mode, mask, N_NODE, work)
-    move_coordinates(curved, mode, level, N_NODE - 1, z, work, z_next)
+        work.span[PATIENCE] = 1.0 * PATIENT
+    if level > 0 and not (is_settled and missed <= allowed):
+        return False, 0
+    respond(curved, mode, mask, 0, N_NODE, work)
+    if is_lone:
+        move_coordinates(curved, mode, level, N_NODE - 1, z, work, z_next)
+    else:
+        for node in range(1, N_NODE):
+            arrive(curved, mode, level, node, work, z_next)
+            find_gaps(pairs, curved, mode, mask, node, z_next[0], z_next[1], work)
     growth = 0
     if missed <= EASY * allowed and sweep <= QUICK and work.span[PATIENCE] == 0.0:
         growth = 2 if missed <= VERY_EASY * allowed else 1
-    return level == 0 or (is_settled and missed <= allowed), growth
-
-
-@jit_inline_sum
-def lose_patience(level: int, work: CurvedWork) -> None:
-    """Take no longer steps for a while, since loads were not found: they are learnt anew for this length.
-
-    Where the step before it failed too, for all lengths.
-    """
-    forget(0 if work.span[PATIENCE] == PATIENT else level, work)
-    work.span[PATIENCE] = 1.0 * PATIENT
+    return True, growth
 
 
 @jit_inline_sum
@@ -227,14 +229,16 @@ def sweep_all(
     mode: int,
     mask: int,
     level: int,
-    z: Floats,
+    takes_slopes: bool,
     work: CurvedWork,
 ) -> bool:
-    """Loads of all closed pairs at the nodes, as `sweep_alone`, from the coordinates `z` on."""
-    respond(curved, mode, mask, N_NODE, work)
+    """Loads of all closed pairs at the nodes, as `sweep_alone`."""
+    respond(curved, mode, mask, 1, N_NODE, work)
     for node in range(1, N_NODE):
-        move_coordinates(curved, mode, level, node, z, work, work.middle)
+        arrive(curved, mode, level, node, work, work.middle)
         if not evaluate(pairs, curved, rim_speed, mode, mask, node, work.middle[0], work.middle[1], work):
+            return False
+        if takes_slopes and not fill_answers(pairs, curved, mode, mask, node, work):
             return False
     return True
 

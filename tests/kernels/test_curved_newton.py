@@ -8,8 +8,8 @@ from scipy.optimize import brentq
 
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.curved_contact import N_NODE
+from rubhpc.kernels.curved_loads import LOADS, MISSED
 from rubhpc.kernels.curved_newton import factorise, fill_slopes, find_system, move_by_newton, solve
-from rubhpc.kernels.curved_secant import LOADS, MISSED
 
 RADIUS, CLEARANCE, ASIDE, FRICTION = 0.05, 1e-4, 2e-5, 0.3
 N_STATE = 3
