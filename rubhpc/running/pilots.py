@@ -56,7 +56,8 @@ class Timing:
     is_bound : bool
         Whether a case took longer than is waited for, so that the pace is a lower bound.
     seconds : float
-        Processor time that it took, but for what a run takes as well: kernels that are loaded.
+        Processor time that it took, with lines of a refined map, but for what a run takes as well: kernels
+        that are loaded.
     modes : tuple of float
         Bytes of contact modes that cases of one set-up and friction held in a ring, for each that was timed.
     memory : float
@@ -79,7 +80,7 @@ class Timing:
     failures: tuple[str, ...] = ()
 
 
-def seconds_of(pace: Pace, steps: float, n_case: float, n: Preparations, n_block: int) -> float:
+def seconds_of(pace: Pace, steps: float, n_case: float, n: Preparations, n_block: float) -> float:
     """Time of a whole run on one core."""
     prepared = pace.rig * n.rig + pace.speed * n.speed + pace.friction * n.friction
     return pace.step * steps + pace.case * n_case + prepared + pace.block * n_block

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,8 @@ from rubhpc.running.kept_setups import MOST_BYTES, MOST_SETUPS
 from rubhpc.running.memory import peak_memory
 from rubhpc.running.pilot_estimate import within
 from rubhpc.running.pilots import Timing, seconds_of, time_pilots
-from rubhpc.running.preparations import count_preparations
+from rubhpc.running.preparations import count_preparations, touched
+from rubhpc.running.refined_lines import expected_cases
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
 from rubhpc.storage.duration import duration, span
 from rubhpc.storage.growth import origins
@@ -31,10 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from rubhpc.running.preparations import Preparations
-    from rubhpc.storage.manifest import Manifest
     from rubhpc.study.study import Study
 
 _LINE = 400  # bytes of a case in a journal, about, for one stator
@@ -223,9 +222,8 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
         if manifest.refine is not None and ledger.measures is not None:
             records[origin >= 0] = converted(ledger.measures, kind)[origin[origin >= 0]]
         shares = store.parts.read_shares(manifest)
-    n_expected, left_of_all = None, 1.0
-    if manifest.refine is not None:
-        n_expected, left_of_all, status = _refined(manifest, status, records)
+    refinement = Refinement(manifest, status, records) if manifest.refine is not None else None
+    known, status = status != MISSING, status_of(manifest, status, records)
     is_in_part = np.ones(grid.n_case, bool)
     if chosen is not None:
         if shares is None or shares.count != chosen.total:
@@ -234,8 +232,20 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
     missing = (is_in_part & (status == MISSING)).reshape(grid.shape)
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
     all_steps = sum(block.cost * share for block, share in left)
-    steps = left_of_all * all_steps
     timing = time_pilots(grid, manifest, [block for block, _ in left], missing, say)
+    steps = all_steps
+    n_expected, left_of_all = None, 1.0
+    if refinement is not None:
+        a_case = timing.pace.case + timing.pace.step * all_steps / max(int(missing.sum()), 1)
+        began = time.process_time()
+        expected = expected_cases(refinement, grid, kind, a_case)
+        spent = timing.seconds + time.process_time() - began
+        n_expected = round(expected.n_case)
+        n_left = max(expected.n_case - float((refinement.asked().cases.ravel() & known).sum()), 0.0)
+        left_of_all = min(n_left / max(int((~known).sum()), 1), 1.0)
+        steps = left_of_all * all_steps
+        spread = math.hypot(timing.spread, expected.error / max(expected.n_case, 1.0))
+        timing = replace(timing, spread=spread, seconds=spent)
     seconds = most = memory = 0.0
     if left:
         prepared = count_preparations(grid, missing)
@@ -245,8 +255,8 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
         if manifest.refine is not None:
             pace = timing.pace
             at_edges = pace._replace(step=_AT_EDGES * pace.step, case=_AT_EDGES * pace.case)
-            n_block = round(left_of_all * len(left))
-            seconds = min(most, seconds_of(at_edges, steps, left_of_all * n_case, prepared, n_block))
+            some = prepared.for_some(left_of_all, n_case), touched(len(left), left_of_all, n_case)
+            seconds = min(most, seconds_of(at_edges, steps, left_of_all * n_case, *some))
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
     shards = zip(manifest.shape, manifest.shard, strict=False)
     n_shard = math.prod(-(-n // s) for n, s in shards) if manifest.shard else 0
@@ -290,17 +300,6 @@ def _memory(timing: Timing, prepared: Preparations) -> float:
     n_kept = min(prepared.friction, MOST_SETUPS * prepared.friction / max(prepared.speed, 1.0)) - 1.0
     beside = min(MOST_BYTES, max(n_kept, 0.0) * float(np.mean(timing.modes)))
     return timing.memory + _ROOM * (max(timing.modes) + beside)
-
-
-def _refined(
-    manifest: Manifest, status: NDArray[np.int8], records: NDArray[np.void]
-) -> tuple[int, float, NDArray[np.int8]]:
-    """Cases that a refined map computes, the share of the missing ones that it still needs, and statuses."""
-    asked = Refinement(manifest, status, records).asked()
-    n_expected = asked.n_expected
-    n_known = int((asked.cases.ravel() & (status != MISSING)).sum())
-    n_missing = int((status == MISSING).sum())
-    return n_expected, (n_expected - n_known) / max(n_missing, 1), status_of(manifest, status, records)
 
 
 def _size(n_byte: float) -> str:

@@ -31,6 +31,15 @@ class Preparations(NamedTuple):
     speed: float
     friction: float
 
+    def for_some(self, share: float, n_case: int) -> Preparations:
+        """Those of a share of the `n_case` cases, anywhere among them: what no case needs is not prepared."""
+        return Preparations(*(touched(n, share, n_case) for n in self))
+
+
+def touched(n: float, share: float, n_case: float) -> float:
+    """How many of n groups of `n_case` cases hold one of a share of these, anywhere among them."""
+    return n * (1.0 - (1.0 - share) ** (n_case / n)) if n and share < 1.0 else n
+
 
 def count_preparations(grid: CaseGrid, missing: NDArray[np.bool_]) -> Preparations:
     """Go through the missing cases in the order of a run, as a worker does that keeps the latest set-ups.
