@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PHYSICS = 22  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
 MODAL = 3  # method = "modal": modes kept, and `modal_error`
-DIRECT = 4  # transient = "direct"
+DIRECT = 5  # transient = "direct"
 CHANGING_SPEED = 18  # run-ups and drives
 COULOMB = 8  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept

@@ -19,7 +19,7 @@ import numpy as np
 
 from postproc.signals import contacts
 from postproc.signals.hilbert_huang import hilbert_huang, median_frequency
-from rubhpc import LumpedStator, read_rig, simulate
+from rubhpc import LumpedStator, periodic, read_rig, simulate
 from rubhpc.integrate import tangent_motion
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches import friction as friction_march
@@ -33,7 +33,7 @@ from rubhpc.threads import on_one_thread
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rubhpc import Rig
+    from rubhpc import Record, Rig
 
 PACKAGED = read_rig("mokhtar2017")
 STIFF = with_keys(PACKAGED, {"stator.youngs_modulus": "30 GPa"})
@@ -190,6 +190,60 @@ def settling() -> None:
     Solver.later = follow  # type: ignore[method-assign]
 
 
+def transients() -> None:
+    """Transients to equal errors of the orbit: direct, auto, given (guide, performance: the direct way)."""
+    keep = {"samples_per_revolution": 64, "revolutions": 4, "keep": ("waveform",), "transient_limit": 40_000}
+    rows = ((0.9, 0.523, 0.3), (1.3, 0.968, 0.269), (1.6, 0.74, 0.33), (3.0, 0.5, 0.2))
+    for alpha, (ratio, clearance, friction) in product((0.4, 0.8, 1.6, 4.0), rows):
+        case: dict[str, Any] = {
+            "rig": with_keys(PACKAGED, {"rotor.damping.alpha": alpha}), "speed_ratio": ratio,
+            "clearance_ratio": clearance, "friction": friction,
+        }  # fmt: skip
+
+        def run(case: dict[str, Any] = case, **transient: Any) -> Record:
+            kept = keep if isinstance(transient["transient"], str) else keep | {"transient_limit": None}
+            return simulate(**case, **kept, **transient)
+
+        def timed(rounds: int, run: Callable[..., Record] = run, **transient: Any) -> float:
+            spent = []
+            for _ in range(rounds):
+                began = time.process_time()
+                run(**transient)
+                spent.append(time.process_time() - began)
+            return 1e3 * min(spent)
+
+        direct = run(transient="direct")
+        exact = periodic(**case, period=direct.period, initial=direct.final, samples_per_revolution=64).record
+
+        def error(record: Record, exact: Record = exact) -> float:
+            return min(
+                max(
+                    np.abs(record.signals[name] - np.resize(np.roll(exact.signals[name], 64 * k), 256)).max()
+                    / np.ptp(exact.signals[name])
+                    for name in ("vertical", "horizontal")
+                )
+                for k in range(exact.period)
+            )
+
+        cost = timed(15, transient="direct")
+        print(f"alpha {alpha}, r {ratio}: period {direct.period}, direct {cost:.1f} ms, {error(direct):.1e}")
+        for wanted in (1e-3, 1e-6, max(1e-9, 3.0 * error(direct))):
+            for tolerance in (m * 10.0**-k for k in range(2, 12) for m in (3, 1)):
+                found = run(transient="auto", transient_tolerance=tolerance)
+                if error(found) <= wanted:
+                    break
+            else:
+                continue
+            auto = timed(3, transient="auto", transient_tolerance=tolerance)
+            n = found.transient_revolutions
+            while n > 8 and error(run(transient=int(0.95 * n))) <= wanted:
+                n = int(0.95 * n)
+            print(
+                f"    to {wanted:.1e}: auto {tolerance:.0e}, {found.transient_revolutions} revolutions, "
+                f"{auto:.1f} ms, {auto / cost:.1f} times; {n} given, {timed(3, transient=n) / cost:.1f} times"
+            )
+
+
 def default_accuracy() -> None:
     """Distance of the modal scheme from the central difference (guide, performance: accuracy)."""
     soft = PACKAGED
@@ -287,6 +341,7 @@ if __name__ == "__main__":
         rounding,
         short_records,
         settling,
+        transients,
         default_accuracy,
         signals,
         whip,

@@ -18,7 +18,7 @@ from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoo
 from rubhpc.integrate.periodic_motions.walk import LEADING, LOOK, Passed, Walk
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection
 
     from numpy.typing import NDArray
 
@@ -68,6 +68,7 @@ def pass_directly(
     """
     walk, wanted = Walk(march, recording), FIRST
     piecewise: PiecewiseMotion | None = None
+    vain: set[int] = set()  # periods of motions that were found, and that the case did not draw near to
     while True:
         if known is not None:
             reached, reason = walk.arrive(known, wanted)
@@ -82,7 +83,7 @@ def pass_directly(
         piecewise = piecewise or _piecewise(walk, solve_from)
         if piecewise is None:
             continue
-        orbit = _search(piecewise, states, walk.passed, walk.n_revolution)
+        orbit = _search(piecewise, states, walk.passed, walk.n_revolution, vain)
         if orbit is None:
             continue
         until = int(FURTHER * walk.n_revolution)
@@ -94,6 +95,7 @@ def pass_directly(
             walk.begin_at(piecewise.setup, Place(orbit.motion, piecewise.setup.model.sag, force))
         if is_near or reason is not None:
             return walk.ended(reason, found=(piecewise, orbit) if is_near else None)
+        vain.add(orbit.period)
 
 
 def _piecewise(
@@ -171,14 +173,16 @@ def _agree(looks: list[tuple[float, float, float]], least: int) -> bool:
     return bool(np.any((strayed <= (SHARE * expected) ** 2) & (lost >= LOST * expected)))
 
 
-def _search(piecewise: PiecewiseMotion, states: int, passed: Floats, n_revolution: int) -> Orbit | None:
+def _search(
+    piecewise: PiecewiseMotion, states: int, passed: Floats, n_revolution: int, vain: Collection[int]
+) -> Orbit | None:
     """Return the stable periodic motion that the last ones lead to: of one revolution, or as they return.
 
     The first that they follow to, else of two the nearer one. An unstable motion whose disturbances change
-    sides in every period is followed to twice its period.
+    sides in every period is followed to twice its period. Periods that were `vain` before come last.
     """
     found: list[tuple[float, Orbit]] = []
-    for period in _periods(piecewise, passed, n_revolution):
+    for period in sorted(_periods(piecewise, passed, n_revolution), key=vain.__contains__):
         orbit = _solved(piecewise, states, passed, asked := period)
         while orbit and orbit.multipliers[0].real < -1.0 and (asked := 2 * asked) <= LONGEST_PERIOD:
             orbit = _solved(piecewise, states, passed, asked)
