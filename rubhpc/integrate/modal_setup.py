@@ -103,7 +103,7 @@ class ModalSetup:
         fix = sufficient_accuracy(self.model, self.spin)
         return (
             f"it needs more than {MOST_MODES} modes: those left out may change it by "
-            f"{100 * self.modal_error:.2g} %; accuracy = {fix:.0e} keeps all"
+            f"{100 * self.modal_error:.2g} %, motions that part by more; accuracy = {fix:.0e} keeps all"
         )
 
     def bodies(self, friction: float, clearance: Floats) -> Reduced:

@@ -16,6 +16,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from test_laws import ROWS
 
 from postproc.signals import contacts
 from postproc.signals.hilbert_huang import hilbert_huang, median_frequency
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 PACKAGED = read_rig("mokhtar2017")
 STIFF = with_keys(PACKAGED, {"stator.youngs_modulus": "30 GPa"})
 COULOMB = {"friction_law": "coulomb"}
+SLIDING = (*ROWS[0][:4], "steady sliding", {}, 1.0)
 BARE: dict[str, Any] = {"samples_per_revolution": 64, "keep": ()}
 
 
@@ -267,6 +269,54 @@ def default_accuracy() -> None:
         print(f"| {name} (P{own.period}) | {' | '.join(f'{x:.0e}' for x in off)} |")
 
 
+def distance(record: Any, known: Any) -> float:
+    """Largest rms difference of a displacement or force over its rms about the mean."""
+    seen = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral", "contact_force")
+    pairs = [(np.asarray(getattr(one, name)) for one in (record, known)) for name in seen]
+    return max(np.sqrt(np.mean((a - b) ** 2)) / b.std() for a, b in pairs if b.any())
+
+
+def accuracy_of_laws() -> None:
+    """Regular motions of the cases of `test_laws.py` beside all modes (guide, performance: accuracy)."""
+    for name, count, friction, cases, law_name, given, _ in [SLIDING, *ROWS]:
+        law = dict(given)
+        rig = ring(STIFF.stator[0], count)
+        if "geometry" in law:
+            rig = with_keys(rig, {"stator.geometry": law.pop("geometry")})
+        text = []
+        for accuracy in (1e-3, 5e-4, 2e-4):
+            errors, peaks = [], []
+            for ratio, clearance in cases[:: max(1, len(cases) // 13)]:
+                case = {"speed_ratio": ratio, "clearance": clearance, "friction": friction, **law}
+                case |= {"transient": 120, "revolutions": 10, "keep": ("waveform",)}
+                found = simulate(rig, **case, accuracy=accuracy)
+                if found.period == 0 or not found.contact_impulse.any():
+                    continue
+                exact = simulate(rig, **case, accuracy=1e-9)
+                errors.append(distance(found, exact))
+                peaks.append(abs(found.peak_contact_force.max() / exact.peak_contact_force.max() - 1.0))
+            if errors:
+                text.append(f"{np.median(errors):.0e}, {max(errors):.1e}, {max(peaks):.0e} ({len(errors)})")
+        print(f"| {name}: {law_name} | {' | '.join(text)} |", flush=True)
+
+
+def growth() -> None:
+    """Errors beside `modal_error` times how neighbouring motions part (theory, modal: reduction)."""
+    random, cases = np.random.default_rng(1), []
+    for _ in range(60):
+        case = {"speed_ratio": random.uniform(0.6, 6.0), "clearance": random.uniform(40e-6, 100e-6)}
+        case |= {"friction": 0.3, "transient": 0, "revolutions": 20, "keep": ("waveform",)}
+        found, exact = (simulate(STIFF, **case, accuracy=accuracy) for accuracy in (1e-3, 1e-9))
+        beside = simulate(STIFF, **case | {"clearance": case["clearance"] * (1.0 + 1e-9)})
+        if exact.contact_impulse.any():
+            parted = max(1.0, distance(beside, found) / 1e-9)
+            cases.append((parted, distance(found, exact) / found.modal_error))
+    for least, most in ((1.0, 10.0), (10.0, 100.0), (100.0, 1e3), (1e3, np.inf)):
+        errors = [(error, error / parted) for parted, error in cases if least <= parted < most]
+        first, second = np.max(errors, axis=0)
+        print(f"| {least:g} to {most:g} | {len(errors)} | {first:.2g} | {second:.2g} |")
+
+
 def signals() -> None:
     """Contacts, jumps, decays and frequencies of signals (guide, signal analysis)."""
     for ratio, modulus, micron in ((0.75, 3, 100), (0.75, 3, 84), (0.75, 30, 84), (2, 30, 70), (3, 3, 76)):
@@ -343,6 +393,8 @@ if __name__ == "__main__":
         settling,
         transients,
         default_accuracy,
+        accuracy_of_laws,
+        growth,
         signals,
         whip,
     ]

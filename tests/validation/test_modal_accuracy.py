@@ -11,7 +11,8 @@ from random_machines import random_machine
 from random_rigs import found_error, random_rig
 from record_distance import MOTIONS
 
-from rubhpc import simulate
+from rubhpc import read_rig, simulate
+from rubhpc.rig.reading import with_keys
 
 STIFF = {"stator.youngs_modulus": "30 GPa"}
 ORBITS = {
@@ -105,6 +106,33 @@ def test_random_rigs_are_as_accurate_as_asked(seed):
     record, exact = simulate(rig, **case), simulate(rig, **case, accuracy=1e-15)
     if np.any(exact.contact_impulse > 0.0):
         assert found_error(record, exact) < 1e-3
+
+
+GROWING = [  # seed of a rig, or speed ratio and clearance (um) of the packaged one; how far neighbours part
+    (6, 1e2), (38, 1e2), (9, 1e2), (14, 1e3), (3, np.inf), (8, np.inf), (24, np.inf),
+    ((5.09, 70.0), 1e2), ((1.3238, 64.187), np.inf), ((2.6543, 83.518), np.inf),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("given", "most"), GROWING)
+def test_error_is_the_estimate_times_how_neighbouring_motions_part(given, most):
+    """Of clearances 1e-9 apart, over that; some motions err by more than the estimate alone."""
+    if isinstance(given, int):
+        rig, case = random_rig(given)
+        case |= {"revolutions": 10}
+    else:
+        rig = with_keys(read_rig("mokhtar2017"), STIFF)
+        case = {"speed_ratio": given[0], "clearance": given[1] * 1e-6, "friction": 0.3, "revolutions": 20}
+    case |= {"transient": 0, "samples_per_revolution": 128, "keep": ("waveform",)}
+    name = "clearance" if "clearance" in case else "clearance_ratio"
+    record, exact = simulate(rig, **case), simulate(rig, **case, accuracy=1e-15)
+    beside = simulate(rig, **case | {name: case[name] * (1 + 1e-9)})
+    parted = max(1.0, found_error(beside, record) / 1e-9)
+    assert parted < most if most < np.inf else parted > 1e3
+    error = found_error(record, exact)
+    assert 0.0 < error < record.modal_error * parted
+    if parted < 100:
+        assert error < 2.0 * record.modal_error
 
 
 def errors_of(record, exact):
