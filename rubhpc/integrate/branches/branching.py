@@ -215,7 +215,7 @@ class Branching:
                 if derivative is None or residual > FAST * last:
                     derivative = monodromy(case, revolutions) - np.eye(motion.size)
                 last = residual
-                if is_held:
+                if is_held or (residual <= ROUNDING and not base.may_fold):  # other cases round otherwise
                     motion = motion - np.linalg.solve(derivative, defect)
                     continue
                 if rate is None or rate.size != motion.size:

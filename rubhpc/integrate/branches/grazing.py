@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 APPROACH = 0.1  # of its distance to grazing that a trial leaves
 LOOK = 0.05  # of the way to a motion beyond a grazing, at which the first trial shows how the gap falls
+NEXT_TO = 0.01  # of the way, within which a motion found beyond a grazing is next to it
 HOPELESS, STILL = 0.01, 0.3  # of the way that is left, and of the gap: it falls smoothly
 CERTAIN = 3.0  # times the error of a secant, that a trial stays short of where it leads
 MOST_TRIALS = 40
@@ -157,10 +158,13 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
     first, other = (a, b) if is_first_free else (b, a)
     far = 1.0 if is_first_free else 0.0  # where a motion is that has more contacts, or none was found
     free: list[tuple[float, Point]] = [(1.0 - far, first)]
+    impacts: list[tuple[float, Point]] = []
     root, error, missing = None, np.inf, np.inf
 
     def impacting(at: float) -> Point:
         """The motion with more contacts that is nearest to the grazing."""
+        if impacts and abs(impacts[-1][0] - at) <= NEXT_TO:
+            return impacts[-1][1]
         end, depth = 1.0 if is_first_free else 0.0, DEPTH
         most = MEETING * float(np.linalg.norm(branching.difference(free[-1][1], other)))
         with suppress(NotConverged):
@@ -213,6 +217,8 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
             free.append((share, trial))
         else:
             far = share
+            if trial is not None and touches(trial) == touches(other):
+                impacts.append((share, trial))
     return None
 
 
