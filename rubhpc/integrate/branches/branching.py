@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.integrate.branches.point import SAME_MOTION, Point, away_from_events
+from rubhpc.integrate.branches.point import SAME_MOTION, HeldCase, Point, away_from_events
 from rubhpc.integrate.periodic_motions.family import flow
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.saltation import monodromy
@@ -73,7 +73,7 @@ class Branching:
             motion=orbit.motion,
             states=orbit.states,
             revolutions=list(orbit.revolutions),
-            case=case,
+            held=HeldCase(self.family, value, case),
         )
         return self.moved(point, away_from_events(point))
 
@@ -88,7 +88,7 @@ class Branching:
             motion=motion,
             states=states,
             revolutions=flow(point.case, motion, states, point.period, phase),
-            case=point.case,
+            held=point.held,
         )
 
     def repeated(self, point: Point, times: int) -> Point:
@@ -202,7 +202,7 @@ class Branching:
                     self._n_found += 1
                     return Point(
                         value=value, phase=phase, motion=motion, states=states, revolutions=revolutions,
-                        case=case,
+                        held=HeldCase(family, value, case),
                     )  # fmt: skip
                 states = revolutions[-1].states
                 is_late = iteration >= most and residual > SOON

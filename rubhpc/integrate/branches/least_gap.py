@@ -50,7 +50,7 @@ class LeastGap:
         row = (mode.tables.switch_re + 1j * mode.tables.switch_im)[_switch(case, self.pair), mode.moving]
         carried = row * np.exp(mode.exponent * self._time)
         gradient: Floats = np.ascontiguousarray(carried).view(np.float64) @ mode.enter
-        return gradient @ self.point.tangents[self._place - 1] if self._place else gradient
+        return gradient @ self.point.tangents()[self._place - 1] if self._place else gradient
 
     def impact(self, depth: float) -> Floats:
         """What an impact here adds to the motion (2 n,) after the period, to the leading order.

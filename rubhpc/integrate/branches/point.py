@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
+from weakref import ref
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from rubhpc.integrate.periodic_motions.shooting import floquet_multipliers
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.periodic_motions.family import Family
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Revolution
 
     Floats = NDArray[np.float64]
@@ -25,6 +27,24 @@ NEAR_FOLD = 0.03  # distance of a multiplier from 1 within which the parameter i
 MAY_FOLD = 0.7  # a real multiplier beyond which a fold may be a step ahead
 REAL = 1e-6  # imaginary part of a multiplier that is taken for a real one
 CENTRAL = 0.2  # share of an event-free piece at either end in which no section is placed
+
+
+class HeldCase:
+    """The case of a point, as long as anything else needs it: its tables are many times larger than a point.
+
+    Later it is set up anew.
+    """
+
+    def __init__(self, family: Family, value: float, case: PiecewiseMotion) -> None:
+        self._family, self._value, self._case = family, value, ref(case)
+
+    def __call__(self) -> PiecewiseMotion:
+        """The case."""
+        case = self._case()
+        if case is None:
+            case = self._family.at(self._value)
+            self._case = ref(case)
+        return case
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,7 +59,7 @@ class Point:
         Angle of the shaft, in revolutions, at which `motion` (2 n,) is taken, and `states` of the pairs.
     revolutions : list of Revolution
         As many as its period.
-    case : PiecewiseMotion
+    held : HeldCase
         Whose coordinates these are.
     """
 
@@ -48,22 +68,26 @@ class Point:
     motion: Floats
     states: int
     revolutions: list[Revolution]
-    case: PiecewiseMotion
+    held: HeldCase
+
+    @property
+    def case(self) -> PiecewiseMotion:
+        """The case whose motion this is, with its tables."""
+        return self.held()
 
     @property
     def period(self) -> int:
         """Revolutions."""
         return len(self.revolutions)
 
-    @cached_property
     def tangents(self) -> list[Floats]:
         """Derivatives (2 n, 2 n) by the motion, of what it is after each piece and the event that ends it."""
         return tangents(self.case, self.revolutions)
 
-    @property
+    @cached_property
     def monodromy(self) -> Floats:
         """Derivative (2 n, 2 n) of the motion after a period by that before it."""
-        return self.tangents[-1]
+        return self.tangents()[-1]
 
     @cached_property
     def multipliers(self) -> Complexes:

@@ -7,9 +7,10 @@ import pytest
 
 import rubhpc
 from rubhpc.errors import InputError
+from rubhpc.integrate.branches.arclength import follow
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.initial_state import fit_to_gaps
-from rubhpc.integrate.periodic_motions.family import Family, Operation, flow
+from rubhpc.integrate.periodic_motions.family import MOST_KEPT, Family, Operation, flow
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.reduced_model.truncation import SMOOTH
 from rubhpc.study.contact_keys import Contact
@@ -70,6 +71,23 @@ def test_points_are_periodic_motions(found):
             )
             assert (motion.iterations, motion.is_stable) == (0, point.is_stable)
             assert motion.multipliers[0] == pytest.approx(point.multipliers[0], abs=1e-6)
+
+
+def test_points_let_go_of_the_tables_of_their_cases():
+    """Some cases are kept ready, whatever the length of a branch; others are set up anew, alike."""
+    family = family_of("clearance", (1.05e-4, 1.2e-4))
+    motion = rubhpc.periodic("mokhtar2017", clearance=1.06e-4, period=2, keep=(), **CASE)
+    setup, clearance, friction = family.settings(1.06e-4)
+    case = PiecewiseMotion(setup, clearance, friction, fit_to_gaps(motion.state, setup, clearance))
+    first = Branching(family, 3e-7).begin(1.06e-4, case.start, case.states, 2)
+    track = follow(Branching(family, 3e-7), [first], 1.0, low=1.05e-4, high=1.2e-4, most=30)
+    assert len(track.points) == 30
+    alive = {id(held) for point in track.points if (held := point.held._case()) is not None}
+    assert len(alive) <= MOST_KEPT
+    point = track.points[3]
+    assert id(point.held._case()) not in alive
+    again = flow(point.case, point.motion, point.states, 2, point.phase)
+    assert np.array_equal(again[-1].end, point.revolutions[-1].end)
 
 
 def test_stability_changes_at_events_alone(found):
