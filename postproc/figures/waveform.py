@@ -61,6 +61,8 @@ def draw_waveform(signal: xr.DataArray, ax: Axes) -> Axes:
     for name, curve in overlaid(signal, "sample"):
         ax.plot(x, curve.values * scale.factor, label=name)
     ax.set(xlim=(x[0], x[-1]), xlabel=x_label, ylabel=scale.label(short_name(signal)))
+    if signal.name == "contact_force" and not signal.any():  # a force has no negative part
+        ax.set_ylim(bottom=0.0)
     return ax
 
 

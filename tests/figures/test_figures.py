@@ -242,6 +242,12 @@ def test_panels_have_units_and_shade_the_contact(case):
     assert [len(ax.patches) for ax in axes] == [5] * 4
 
 
+def test_a_force_that_is_zero_throughout_has_no_negative_scale(case, ax):
+    force = waveform_data(case)["contact_force"]
+    draw_waveform(0.0 * force if force.ndim == 1 else 0.0 * force.isel(stator=0), ax)
+    assert ax.get_ylim()[0] == 0.0 < ax.get_ylim()[1]
+
+
 def test_waveforms_of_several_speeds_run_over_revolutions(store, ax):
     data = waveform_data(select(store, rest("speed_ratio")), ["torsion"], over="speed_ratio")
     draw_waveform(data["torsion"].isel(speed_ratio=slice(0, 3)), ax)
