@@ -30,13 +30,14 @@ CENTRAL = 0.2  # share of an event-free piece at either end in which no section 
 
 
 class HeldCase:
-    """The case of a point, as long as anything else needs it: its tables are many times larger than a point.
+    """The case of a point, as long as the family has room: its tables are many times larger than a point.
 
     Later it is set up anew.
     """
 
     def __init__(self, family: Family, value: float, case: PiecewiseMotion) -> None:
         self._family, self._value, self._case = family, value, ref(case)
+        family.hold(case)
 
     def __call__(self) -> PiecewiseMotion:
         """The case."""
@@ -44,6 +45,7 @@ class HeldCase:
         if case is None:
             case = self._family.at(self._value)
             self._case = ref(case)
+            self._family.hold(case)
         return case
 
 

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 SPEEDS, CLEARANCES = ("speed_ratio", "speed"), ("clearance_ratio", "clearance")
 MOST_KEPT = 6  # cases that are kept ready
+ROOM = 256_000_000  # bytes of the tables of further ones
 DIFFERENCE = 1e-6  # of the range, between the two cases of a derivative
 
 
@@ -95,6 +96,8 @@ class Family:
         self._frequency: tuple[Model, float] | None = None
         self._setups: OrderedDict[tuple[int, float, bool], ModalSetup] = OrderedDict()
         self._cases: OrderedDict[float, PiecewiseMotion] = OrderedDict()
+        self._held: OrderedDict[int, tuple[PiecewiseMotion, int]] = OrderedDict()  # by id, with their sizes
+        self._n_byte = 0
 
     def at(self, value: float) -> PiecewiseMotion:
         """The case at a value of the parameter.
@@ -117,6 +120,17 @@ class Family:
                 self._forget(self._cases.popitem(last=False)[1])
         self._cases.move_to_end(value)
         return self._cases[value]
+
+    def hold(self, case: PiecewiseMotion) -> None:
+        """Keep a case ready as long as there is room, the last ones first."""
+        if id(case) in self._held:
+            self._held.move_to_end(id(case))
+            return
+        size = sum(table.nbytes for table in case.march.tables if isinstance(table, np.ndarray))
+        self._held[id(case)] = case, size
+        self._n_byte += size
+        while self._n_byte > ROOM:
+            self._n_byte -= self._held.popitem(last=False)[1][1]
 
     def settings(self, value: float, *, is_measured: bool = True) -> tuple[ModalSetup, float, float]:
         """Set-up, clearance (m) and friction at a value; to be recorded, or to be followed alone."""

@@ -10,6 +10,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.branches.arclength import follow
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.initial_state import fit_to_gaps
+from rubhpc.integrate.periodic_motions import family as family_module
 from rubhpc.integrate.periodic_motions.family import MOST_KEPT, Family, Operation, flow
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.reduced_model.truncation import SMOOTH
@@ -73,8 +74,9 @@ def test_points_are_periodic_motions(found):
             assert motion.multipliers[0] == pytest.approx(point.multipliers[0], abs=1e-6)
 
 
-def test_points_let_go_of_the_tables_of_their_cases():
-    """Some cases are kept ready, whatever the length of a branch; others are set up anew, alike."""
+def test_points_let_go_of_the_tables_of_their_cases(monkeypatch):
+    """Without room some cases are kept, whatever the length of a branch; others are set up anew, alike."""
+    monkeypatch.setattr(family_module, "ROOM", 0)
     family = family_of("clearance", (1.05e-4, 1.2e-4))
     motion = rubhpc.periodic("mokhtar2017", clearance=1.06e-4, period=2, keep=(), **CASE)
     setup, clearance, friction = family.settings(1.06e-4)
