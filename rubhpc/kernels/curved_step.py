@@ -23,7 +23,7 @@ from rubhpc.kernels.curved_contact import (
     is_closed,
 )
 from rubhpc.kernels.curved_forces import evaluate, find_gaps, find_lone_forces
-from rubhpc.kernels.curved_joint import fill_answers, find_joint_system, move_jointly, take_joint_states
+from rubhpc.kernels.curved_joint import find_joint_system, move_jointly, take_joint_states
 from rubhpc.kernels.curved_loads import (
     FORCES,
     GUESS,
@@ -48,6 +48,7 @@ from rubhpc.kernels.curved_response import (
     respond,
     take_motion,
 )
+from rubhpc.kernels.curved_slopes import fill_answers
 
 if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from rubhpc.kernels import curved_joint
+from rubhpc.kernels import curved_slopes
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.curved_contact import ALL, N_NODE, curved_work, is_closed
-from rubhpc.kernels.curved_joint import fill_answers, find_joint_system, move_jointly
+from rubhpc.kernels.curved_joint import find_joint_system, move_jointly
 from rubhpc.kernels.curved_loads import LOADS, MISSED, MOVE
+from rubhpc.kernels.curved_slopes import fill_answers
 
 RADIUS, CLEARANCE, ASIDE, FRICTION = 0.05, 1e-4, 2e-5, 0.3
 CLOSED = (0, 2)  # of three pairs
@@ -22,7 +23,7 @@ N_STATE = 3
 def _uncompiled(monkeypatch):
     """Whatever the kernels call of their own module."""
     for name in ("add_multiple", "invert", "combine", "fill_gradients", "fill_force_gradient"):
-        monkeypatch.setattr(curved_joint, name, plain(getattr(curved_joint, name)))
+        monkeypatch.setattr(curved_slopes, name, plain(getattr(curved_slopes, name)))
 
 
 class Pairs:
