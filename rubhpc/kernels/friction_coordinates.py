@@ -95,6 +95,9 @@ def read_energies(tables: ModeTables, mode: int, z: Floats, entry: Floats) -> No
     """
     m, used, first = z.shape[1], used_width(tables, mode), tables.n_eigenmode[mode]
     form, z_re, z_im = tables.loss[mode], z[0, :used], z[1, :used]
+    if form.shape[0] == 0:  # tables without energies
+        entry[0], entry[1] = 0.0, 0.0
+        return
     loss = 0.0
     for k in range(0, used, 4):  # four rows at a time: one would wait for its sum
         block = k - k % LANES  # where the block on the diagonal begins

@@ -102,7 +102,7 @@ def advance_friction_pieces(
                 return CONTACT_UNSOLVED
             progress.wanted, at[STAGE] = states, TO_ENTER
         if at[STAGE] == TO_ENTER:
-            if not begin_piece(tables, reduced, begun, progress, z):
+            if not begin_piece(tables, reduced, pieces, clock.sample_level, progress, z):
                 return MODE_WANTED
             at[PART], at[STAGE] = 0, PART_TO_BEGIN
         while at[PART] < n_part:
@@ -148,7 +148,7 @@ def advance_friction_pieces(
             at[PART] += 1
             at[STAGE] = PART_TO_BEGIN
         read_pressing(tables, bodies, progress.mode, z, pieces.pressing[piece + 1])
-        end_piece(pieces, piece, progress.n_step, samples)
+        end_piece(pieces, piece, progress.n_step, tables.mask[progress.mode], z, samples)
     return FINISHED
 
 

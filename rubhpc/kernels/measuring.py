@@ -151,6 +151,9 @@ def energy_forms(
     The arrays are `loss`, `work_re` and `work_im` of the tables, `first` is the mode's number of eigenmodes.
     """
     m = z.shape[1]
+    if loss_form.shape[1] == 0:  # tables without energies
+        entry[0], entry[1] = 0.0, 0.0
+        return
     loss = 0.0
     for part in range(2):
         for k in range(m):

@@ -84,7 +84,7 @@ def advance_pieces(
             progress.wanted = first_set(reduced, pieces.motion[piece], pieces.pressing[piece])
             at[STAGE] = TO_ENTER
         if at[STAGE] == TO_ENTER:
-            if not begin_piece(tables, reduced, pieces.motion[piece], progress, z):
+            if not begin_piece(tables, reduced, pieces, clock.sample_level, progress, z):
                 return MODE_WANTED
             at[PART], at[STAGE] = 0, PART_TO_BEGIN
         while at[PART] < n_part:
@@ -127,7 +127,7 @@ def advance_pieces(
             at[PART] += 1
             at[STAGE] = PART_TO_BEGIN
         read_forces(tables, progress.mode, z, pieces.pressing[piece + 1])
-        end_piece(pieces, piece, progress.n_step, samples)
+        end_piece(pieces, piece, progress.n_step, tables.mask[progress.mode], z, samples)
     return FINISHED
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import Accumulator
 from rubhpc.kernels.case_progress import LONG_AGO, NONE, Clock, Progress
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, enter, find_mode
+from rubhpc.kernels.contact_modes import DYING, ModeTables, Reduced, dot, enter, find_mode
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Samples
@@ -19,8 +19,11 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-PIECE, PART, STAGE = range(3)  # of `Pieces.at`
+PIECE, PART, STAGE, STANDING = range(4)  # of `Pieces.at`
 TO_BEGIN, TO_ENTER, PART_TO_BEGIN, IN_PART = range(4)  # stages of a piece
+# Frequency of a mode over the spin, and times the duration of a piece, above which it goes on as it is where
+# the speed changes.
+FAST, QUICK = 3.0, 0.5 * np.pi
 
 
 class Pieces(NamedTuple):
@@ -37,7 +40,9 @@ class Pieces(NamedTuple):
     n_sample: int  # of a piece
     n_part_sample: int  # of each of its parts, which have sums of their own
     energy_limit: float  # J
-    at: Ints  # (3,), which piece, which part of it, and the stage that it is in
+    at: Ints  # (4,), which piece, which part of it, the stage that it is in, the set of contacts before it
+    moved_by: int  # bits of a set that decide how bodies move; 0 where modes do not follow the speed
+    left: Floats  # (2, m), coordinates at the end of the piece before
     motion: Floats  # (k + 1, 2 n), at the beginning of each piece; of the first one given
     pressing: Floats  # (k + 1, q), N, contact forces there
     seen: Floats  # (2, 3 + places), `Recorder.last` at the beginning of the piece under way
@@ -76,9 +81,13 @@ def start_piece(reduced: Reduced, pieces: Pieces, piece: int, recorder: Recorder
 
 
 @jit_inline_sum
-def end_piece(pieces: Pieces, piece: int, n_step: int, samples: Samples) -> None:
+def end_piece(pieces: Pieces, piece: int, n_step: int, standing: int, z: Floats, samples: Samples) -> None:
     """Keep the samples of a piece, and go on to the next."""
     pieces.n_step[piece] = n_step
+    pieces.at[STANDING] = standing
+    for row in range(2):
+        for k in range(z.shape[1]):
+            pieces.left[row, k] = z[row, k]
     first = piece * pieces.n_sample
     for row in range(samples.whole.shape[0]):
         for j in range(pieces.n_sample):
@@ -94,12 +103,31 @@ def set_masks(mask: Ints, table: Ints, n_room: int, piece: int) -> None:
 
 
 @jit_lean_sum
-def begin_piece(tables: ModeTables, reduced: Reduced, motion: Floats, progress: Progress, z: Floats) -> bool:
-    """Begin in the set wanted, at the shaft's angle 0; False where it is not tuned."""
+def begin_piece(
+    tables: ModeTables,
+    reduced: Reduced,
+    pieces: Pieces,
+    sample_level: int,
+    progress: Progress,
+    z: Floats,
+) -> bool:
+    """Begin in the set wanted, at the shaft's angle 0; False where it is not tuned.
+
+    In the set of the piece before fast modes go on as they are: the speed changes evenly, and shapes that
+    follow it do not make them ring.
+    """
+    piece = pieces.at[PIECE]
+    lasts = pieces.n_sample * pieces.tick[piece] * (1 << sample_level)
+    least = max(FAST * abs(pieces.spin[piece]), QUICK / lasts)
     mode = find_mode(tables.mask, progress.wanted)
     if mode < 0:
         return False
-    enter(tables, mode, reduced.clearance, 1.0, 0.0, motion, z)
+    goes_on = pieces.moved_by != 0 and (pieces.at[STANDING] ^ progress.wanted) & pieces.moved_by == 0
+    enter(tables, mode, reduced.clearance, 1.0, 0.0, pieces.motion[piece], z)
+    if goes_on:
+        for k in range(tables.n_eigenmode[mode]):
+            if tables.pace[mode, k] > least or tables.pace[mode, k] == DYING:
+                z[0, k], z[1, k] = pieces.left[0, k], pieces.left[1, k]
     progress.tick, progress.mode, progress.wanted, progress.n_step = 0, mode, NONE, 0
     progress.n_event, progress.counted_from, progress.next_sample = 0, 0, 0
     progress.entered, progress.energy_from, progress.contact_age = LONG_AGO, NONE, NONE

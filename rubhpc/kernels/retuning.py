@@ -1,4 +1,4 @@
-"""Tables of a contact mode at another spin speed, its matrices staying what they are.
+"""Tables of a contact mode at another spin speed, its matrices staying what they are or going with it.
 
 Eigenmodes belong to the matrices. The spin speed changes the response to the unbalance, which follows from
 them in closed form, and with the tick the exponentials.
@@ -19,6 +19,7 @@ from rubhpc.kernels.contact_modes import (
     ModeTables,
 )
 from rubhpc.kernels.retuning_laws import RimPart, Springs, follow_growth, move_rim, stretch_springs
+from rubhpc.kernels.varying import Varying, vary, vary_rates
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -53,6 +54,7 @@ class HeldMode(NamedTuple):
     row: Complexes  # (o, width), output rows; that of the response is filled in
     rim: RimPart
     springs: Springs
+    varying: Varying
 
 
 class Speeds(NamedTuple):
@@ -60,6 +62,7 @@ class Speeds(NamedTuple):
 
     spin: Floats  # (k,), rad/s
     share: Floats  # (k,), of the speed at which the matrices are
+    within: Floats  # (k,), place in the range of the matrices, from -1 to 1
     factor: Complexes  # (k,), by which the unbalance at unit speed acts: spin^2 exp(i angle) if steady, 1/s^2
     growth: Floats  # (k,), 1/s, of the unbalance force; the factor is that at the beginning
     tick: Floats  # (k,), s, resolution of events
@@ -79,6 +82,7 @@ def retune(tables: ModeTables, place: int, held: HeldMode, speeds: Speeds, first
             held,
             complex(speeds.growth[j], speeds.spin[j]),
             speeds.share[j],
+            speeds.within[j],
             speeds.factor[j],
             speeds.tick[j],
             speeds.interval[j],
@@ -92,6 +96,7 @@ def retune_to(
     held: HeldMode,
     turning: complex,
     share: float,
+    within: float,
     factor: complex,
     tick: float,
     interval: float,
@@ -103,6 +108,9 @@ def retune_to(
     """
     m, width = held.is_pair.size, held.exponent.size
     n, end = held.slip.shape[1], held.n_coordinate
+    if held.varying.kept.size > 0:
+        vary(tables, mode, held.varying, within)
+        vary_rates(tables, mode, held.exponent, m)
     if held.rim.one >= 0:
         move_rim(tables, mode, held.rim, share, held.rate, held.resisting, held.row, held.work)
     exponent = held.exponent
@@ -159,6 +167,8 @@ def retune_to(
                 tables.output[mode, k, later * n_output + o] = value.real
                 tables.output[mode, width + k, later * n_output + o] = -value.imag
             ahead *= onward
+    if tables.loss.shape[1] == 0:  # no energies
+        return
     _retune_energies(tables, mode, held, x, factor)
     if held.rim.one >= 0:
         follow_growth(tables, mode, held.rim, share, turning, m, x, held.resisting)

@@ -62,7 +62,7 @@ def move_rim(
 
     `velocity` and `resisting` (m, n), `row` (o, m) and `work` (2, m) are those of the mode.
     """
-    one, width = rim.one, tables.loss.shape[1] // 2
+    one, width = rim.one, tables.pace.shape[1]
     for a in range(rim.motion.size):
         tables.motion_re[mode, a, one] = share * rim.motion[a].real
         tables.motion_im[mode, a, one] = share * rim.motion[a].imag
@@ -76,7 +76,7 @@ def move_rim(
         entered = share * rim.entered[k]
         tables.enter_constant[mode, last, 0, k] = entered.real
         tables.enter_constant[mode, last, 1, k] = entered.imag
-    for part in range(2):
+    for part in range(2 if tables.loss.shape[1] > 0 else 0):
         place = part * width + one
         for k in range(2 * width):
             tables.loss[mode, place, k] = tables.loss[mode, k, place] = share * rim.loss[part, k]

@@ -83,7 +83,8 @@ def carried(
     march.begin(setup, begun)
     library, mask = march.library, march.mask
     assert isinstance(library, RetunedLibrary)
-    was, now = before.library.eigenmodes(mask), library.eigenmodes(mask)
+    was = before.library.eigenmodes(mask, before.setup.within)
+    now = library.eigenmodes(mask, setup.within)
     if was is None or now is None:
         return begun
     old, factor = _turning(before.setup)
@@ -111,7 +112,7 @@ def carried(
         steady = Parts(parts.exponent[-2:], parts.shape[:, -2:])
         real[..., -2:] = _pushed(steady, exponent, enter, change.jump * setup.held.momentum)
     longest = TOUCH * 2.0 * np.pi / spin if mask else np.inf
-    spans = np.minimum(_spans(before.setup, setup, change), longest)
+    spans = np.minimum(_spans(before, setup, change), longest)
     taken = 1.0 - left_over(_apart(parts, exponent), *spans, has_touched=has_touched)
     if has_touched:
         taken[..., :-2] *= np.abs(was.exponent) <= LOWEST * spin
@@ -135,8 +136,15 @@ def left_over(exponent: Complexes, before: float, after: float, *, has_touched: 
     return turned
 
 
-def _spans(old: PieceSetup, new: PieceSetup, change: Change) -> tuple[float, float]:
-    """Times, s, since the speed was that of the matrices before, and until it is that of those to come."""
+def _spans(before: Standing, new: PieceSetup, change: Change) -> tuple[float, float]:
+    """Times, s, since the speed was that of the matrices before, and until it is that of those to come.
+
+    Matrices that follow the speed change evenly: a revolution before and after tells slow from fast.
+    """
+    old = before.setup
+    if old.held.is_followed and new.held.is_followed:
+        turn = 2.0 * np.pi / abs(new.spin)
+        return turn, turn
     speed = 0.5 * (old.spin + new.spin)
     since, until = (
         abs((speed - of.held.reduced.spin) / of.held.acceleration) if of.held.acceleration else 0.0

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rubhpc.integrate.changing_speed.followed_modes import NOTHING
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
+from rubhpc.kernels.retuning import HeldMode, Speeds
 from rubhpc.kernels.retuning_laws import NO_RIM, RimPart
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.kernels.retuning_laws import Springs
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -59,3 +66,99 @@ def output_operators(reduced: ReducedModel) -> tuple[Floats, Floats, Floats]:
     rate.append(of_probes[1])
     acceleration.append(of_probes[2])
     return np.concatenate(position), np.concatenate(rate), np.concatenate(acceleration)
+
+
+def held_mode(
+    mode: ContactMode,
+    reduced: ReducedModel,
+    linear: Linear,
+    *,
+    slip: Floats,
+    phasor: Complexes,
+    output: Floats,
+    width: int,
+    springs: Springs,
+    is_balanced: bool,
+) -> HeldMode:
+    """What the spin speed leaves alone of a mode of m eigenmodes; its tables have a width.
+
+    Parameters
+    ----------
+    linear : Linear
+        What the set of states makes of the motion.
+    slip : (q, n)
+        Slip speed with the motion of pairs that the switch functions do not hold.
+    phasor : (n,), complex, kg m
+        Unbalance at unit speed.
+    output : (o, 3 n)
+        `output_operators`, side by side.
+    springs : Springs
+        Those that press.
+    is_balanced : bool
+        Whether energies are asked for; without, nothing resists.
+    """
+    m, n = mode.n_eigenmode, slip.shape[1]
+    motion = np.pad(mode.motion, ((0, 0), (0, width - mode.exponent.size)))
+    exponent = np.pad(mode.exponent, (0, width - mode.exponent.size))
+    position, velocity, acceleration = np.hsplit(output, 3)
+    seen = position @ motion[:n] + velocity @ motion[n:]
+    seen += (acceleration @ motion[n:]) * exponent
+    # An inverse shape times its shape is 2 where a mode stands for a conjugate pair, and is doubled.
+    enter = mode.enter[:m]
+    doubled = np.einsum("ka,ak->k", enter, mode.motion[:, :m]).real
+    resistance, resisting = np.zeros((n, 2 * n)), np.zeros_like(motion[:n])
+    if is_balanced:
+        skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
+        against = np.hstack([skew, linear.damping])
+        resistance, resisting = against - linear.across @ linear.switch, against @ motion
+        resisting[:, : mode.exponent.size] -= linear.across @ mode.switch
+    return HeldMode(
+        n_coordinate=mode.exponent.size,
+        exponent=exponent,
+        is_pair=doubled > 1.5,
+        motion=np.ascontiguousarray(mode.motion[:, :m].T),
+        drive=enter[:, n:] @ linear.seen,
+        mirrored_drive=enter[:, n:].conj() @ linear.seen,
+        switch=linear.switch,
+        reaction=linear.reaction,
+        slip=np.ascontiguousarray(slip),
+        resistance=resistance,
+        rate=np.ascontiguousarray(motion[n:].T),
+        rubbed=linear.across @ linear.reaction,
+        resisting=np.ascontiguousarray(resisting.T),
+        phasor=phasor,
+        work=np.stack([phasor @ motion[n:], phasor.conj() @ motion[n:]]),
+        output=output,
+        row=seen,
+        rim=WITHOUT_RIM,
+        springs=springs,
+        varying=NOTHING,
+    )
+
+
+def speeds_of(
+    spin: ArrayLike,
+    factor: ArrayLike,
+    growth: ArrayLike,
+    tick: ArrayLike,
+    held_spin: float,
+    sample_level: int,
+    reach: float = math.inf,
+) -> Speeds:
+    """Speeds (rad/s) to which modes are tuned whose matrices are those at `held_spin`, or within `reach`.
+
+    `factor` (1/s^2) is what the unbalance at unit speed acts by, which grows by `growth` (1/s), `tick` (s)
+    the resolution of events.
+    """
+    spins, ticks = np.asarray(spin, dtype=np.float64), np.asarray(tick, dtype=np.float64)
+    factors = np.asarray(factor, dtype=np.complex128)
+    grown = np.asarray(growth, dtype=np.float64)
+    return Speeds(
+        spin=spins,
+        share=np.abs(spins / held_spin),
+        within=(spins - held_spin) / reach,
+        factor=factors,
+        growth=grown,
+        tick=ticks,
+        interval=ticks * 2.0**sample_level,
+    )

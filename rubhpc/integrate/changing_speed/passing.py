@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rubhpc.integrate.case import march_of
 from rubhpc.integrate.changing_speed.carried_modes import Change, Standing, carried, standing
 from rubhpc.integrate.changing_speed.piece_setup import with_values
+from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
 from rubhpc.integrate.changing_speed.stretch import Stretch, take_stretch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
@@ -47,6 +48,7 @@ class Passing:
         self._case = clearance, friction
         self._check = check
         self._march: EventDrivenMarch | None = None
+        self._left: tuple[int, Floats] | None = None  # where the last piece has ended, in modes
         self._room: dict[int, Samples] = {}  # by how many samples a piece has
 
     def take(
@@ -57,15 +59,18 @@ class Passing:
         earlier: tuple[Accumulator, float],
         *,
         is_balanced: bool = False,
+        goes_on: bool = False,
     ) -> Passed:
         """Take one piece; `earlier` holds the contact forces before it, and how long ago they began, s.
 
-        `is_balanced`: its energies are asked for.
+        `is_balanced`: its energies are asked for. `goes_on`: the piece before was taken too, with the same
+        acceleration, and matrices of the same range.
         """
         if self._check is not None:
             self._check()
         try:
-            return self._pass(self._begin(setup, n_sample, begun), setup, n_sample, earlier, is_balanced)
+            march = self._begin(setup, n_sample, begun, goes_on=goes_on)
+            return self._pass(march, setup, n_sample, earlier, is_balanced)
         except NoClosedForm:  # contacts that chatter: short steps need no events
             self._march = None
             even = evenly_forced(setup, n_sample)
@@ -99,6 +104,8 @@ class Passing:
         n_sample: int,
         begun: State | Place,
         earlier: tuple[Accumulator, float],
+        *,
+        goes_on: bool = False,
     ) -> Stretch | None:
         """Take pieces with the same matrices from `first` on, as many as the kernel can; None for none."""
         if self._march is None or not isinstance(begun, Place):
@@ -106,13 +113,21 @@ class Passing:
         if self._check is not None:
             self._check()
         room = self._room_for(setups[first].model, n_sample)
-        return take_stretch(self._march, setups, first, room, begun, earlier, self._check)
+        left = self._left if goes_on else None
+        found = take_stretch(self._march, setups, first, room, begun, earlier, self._check, left)
+        if found is not None:
+            self._left = found.left
+        return found
 
-    def _begin(self, setup: PieceSetup, n_sample: int, begun: State | Place) -> ModalMarch:
+    def _begin(self, setup: PieceSetup, n_sample: int, begun: State | Place, *, goes_on: bool) -> ModalMarch:
         """The march that stands where a piece begins."""
         march = self._march
         if march is not None and isinstance(begun, Place):
             march.begin(setup, begun)
+            library = march.library
+            is_followed = isinstance(library, RetunedLibrary) and library.follows(march.mask)
+            if self._left is not None and goes_on and is_followed:
+                march.keep_fast(self._left, setup.spin, setup.interval * n_sample)
             return march
         kind = march_of(setup.scheme, setup)
         is_stepped = kind is ContactSteppingMarch
@@ -146,6 +161,7 @@ class Passing:
             if reason is not None:
                 break
         gained = march.energy() - before if is_balanced else math.nan
+        self._left = march.reached_in() if isinstance(march, EventDrivenMarch) else None
         return Passed(samples.whole, accumulators, march.n_step, march.reached(), gained, reason or "")
 
     def _room_for(self, model: Model, n_sample: int) -> Samples:

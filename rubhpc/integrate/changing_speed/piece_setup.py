@@ -1,4 +1,4 @@
-"""The set-ups of the pieces of a run-up: matrices held over a range of speeds, tables tuned to each piece."""
+"""The set-ups of the pieces of a run-up: matrices of a range of speeds, tables tuned to each piece."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from rubhpc.integrate.changing_speed.followed_modes import parabola
 from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
 from rubhpc.integrate.changing_speed.retuned_modes import Desk, RetunedLibrary
@@ -18,7 +19,7 @@ from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import directions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -41,10 +42,13 @@ D = TypeVar("D")
 class HeldMatrices:
     """Matrices at a speed, rad/s, and an acceleration, rad/s^2, and what has been solved of them.
 
-    `momentum` (n, n) is the change of the stiffness with the acceleration, per rad/s^2.
+    `momentum` (n, n) is the change of the stiffness with the acceleration, per rad/s^2. `beside` are the
+    model and its matrices at two other speeds of the range (`followed_modes.NODE`), through which they follow
+    the speed; none where they stay what they are.
     """
 
     template: PieceSetup  # of which a piece has another speed
+    is_balanced = True  # whether energies are asked for
 
     def __init__(
         self,
@@ -57,11 +61,15 @@ class HeldMatrices:
         reach: tuple[float, float],
         sample_level: int,
         desks: dict[tuple[object, ...], Desk],
+        beside: Sequence[tuple[Model, ReducedModel]] = (),
     ) -> None:
-        self._desks = desks
+        self._desks, self._beside = desks, beside
         self.model, self.reduced = model, reduced
         self.at_hand = reduced  # at the speed of the piece under way
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
+        self.sags: tuple[Floats, Floats, Floats] | None = (
+            None  # in the middle of the range, before and behind it
+        )
         self.kept = KeptParts()
         self.bodies: dict[float, Reduced] = {}  # of each friction, but for what a piece changes
         self.sample_level = sample_level  # of the lowest speed
@@ -70,7 +78,7 @@ class HeldMatrices:
         self._slope = slope  # N m s, of a drive's torque over the speed
         self._libraries: dict[tuple[str, float], RetunedLibrary] = {}
         self._pairs: dict[float, FrictionPairs] = {}
-        self._latest: tuple[tuple[float, float], Model] | None = None  # by what was asked
+        self._latest: tuple[tuple[float, ...], Model] | None = None  # by what was asked
         self.first: tuple[tuple[float, ...], list[PieceSetup]] | None = None  # of a case, by what was asked
 
     @property
@@ -84,12 +92,44 @@ class HeldMatrices:
         is_near = abs(speed - self.reduced.spin) <= far and abs(acceleration - self.acceleration) <= changed
         return is_near and slope == self._slope
 
-    def sagging(self, torque: float, acceleration: float) -> Model:
-        """The model with the sag under a drive's torque, N m, at an acceleration, rad/s^2."""
-        asked = torque, acceleration
+    @property
+    def reach(self) -> float:
+        """Half of the range of speeds, rad/s."""
+        return self._reach[0]
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether they follow the speed."""
+        return bool(self._beside)
+
+    def within(self, speed: float) -> float:
+        """Place of a speed (rad/s) in the range, from -1 to 1; 0 where nothing goes with it."""
+        return (speed - self.reduced.spin) / self.reach if self._beside else 0.0
+
+    def at_place(self, within: float) -> ReducedModel:
+        """The reduced model at a place in the range, its unbalance that of the middle."""
+        if not self._beside:
+            return self.reduced
+        one, (_, before), (_, behind) = self.reduced, *self._beside
+        return with_values(
+            one,
+            stiffness=parabola((one.stiffness, before.stiffness, behind.stiffness), within),
+            damping=parabola((one.damping, before.damping, behind.damping), within),
+            probe=parabola((one.probe, before.probe, behind.probe), within),
+        )
+
+    def sagging(self, torque: float, acceleration: float, speed: float) -> Model:
+        """The model with the sag under a drive's torque, N m, at an acceleration and a speed, rad/s."""
+        within = self.within(speed) if self.sags else 0.0
+        asked = torque, acceleration, within
         if self._latest is None or self._latest[0] != asked:
-            moved = torque * self.twist + acceleration * self.lean
-            self._latest = asked, sagging(self.model, self.model.sag + moved)
+            sag = parabola(self.sags, within) if self.sags else self.model.sag
+            sag = sag + torque * self.twist + acceleration * self.lean
+            rows = self.model.probe_rows[0]
+            if self.sags:
+                before, behind = (model.probe_rows[0] for model, _ in self._beside)
+                rows = parabola((rows, before, behind), within)
+            self._latest = asked, sagging(self.model, sag, rows)
         return self._latest[1]
 
     def tuned(
@@ -110,6 +150,9 @@ class HeldMatrices:
                 sample_level=piece.sample_level,
                 n_level=piece.n_level,
                 desks=self._desks,
+                beside=[reduced for _, reduced in self._beside],
+                at_place=self.at_place,
+                is_balanced=self.is_balanced,
                 **make(),
             )
         library = self._libraries[key]
@@ -144,6 +187,15 @@ class PieceSetup(ModalSetup):
         return self.held.sample_level
 
     @property
+    def within(self) -> float:
+        """Place of the speed in the range of the matrices, from -1 to 1."""
+        return float(self.speeds.within[self.place])
+
+    def goes_on_in(self, other: PieceSetup, acceleration: float, next_acceleration: float) -> bool:
+        """Whether another piece, after this one, has matrices that follow the speed as these do."""
+        return other.held is self.held and self.held.is_followed and next_acceleration == acceleration
+
+    @property
     def n_level(self) -> int:
         """Levels for which exponentials are tabulated."""
         return self._n_level
@@ -162,9 +214,13 @@ class PieceSetup(ModalSetup):
         if friction not in known or known[friction].clearance is not clearance:
             made = super().bodies(friction, clearance)
             known[friction] = made._replace(
-                force_cosine=made.force_cosine.copy(), force_sine=made.force_sine.copy()
+                force_cosine=made.force_cosine.copy(),
+                force_sine=made.force_sine.copy(),
+                stiffness=made.stiffness.copy(),
+                damping=made.damping.copy(),
             )
         of_pieces = known[friction]
+        of_pieces.stiffness[:], of_pieces.damping[:] = self.reduced.stiffness, self.reduced.damping
         of_pieces.force_cosine[:], of_pieces.force_sine[:] = self.reduced.force
         np.multiply(of_pieces.radius, abs(self.spin), out=of_pieces.rim_speed)
         return of_pieces
@@ -218,9 +274,9 @@ def with_values(instance: D, **values: Any) -> D:
     return other
 
 
-def sagging(model: Model, sag: Floats) -> Model:
-    """A model about another sag of its rotor, (n_rotor_dof,)."""
+def sagging(model: Model, sag: Floats, rows: Floats | None = None) -> Model:
+    """A model about another sag of its rotor, (n_rotor_dof,); `rows` are what probes see of displacements."""
     if model.probe is not None:
-        constant = model.probe_rows[0][:, : sag.size] @ sag
+        constant = (model.probe_rows[0] if rows is None else rows)[:, : sag.size] @ sag
         model = replace(model, probe=replace(model.probe, constant=constant))
     return replace(model, sag=sag)

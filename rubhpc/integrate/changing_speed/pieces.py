@@ -1,4 +1,4 @@
-"""Matrices held over ranges of speed and acceleration, and the set-ups of a run-up's pieces in them."""
+"""Matrices of ranges of speed and acceleration, and the set-ups of a run-up's pieces in them."""
 
 from __future__ import annotations
 
@@ -13,9 +13,17 @@ from rubhpc.fem.assemble import model_at
 from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.probes import probes_at
 from rubhpc.fem.statics import sag_under
-from rubhpc.integrate.changing_speed.held_matrices import WIDEST, WIDEST_TABULATED, held_range
+from rubhpc.integrate.changing_speed.followed_modes import NODE
+from rubhpc.integrate.changing_speed.followed_range import followed_reach, rotor_of
+from rubhpc.integrate.changing_speed.held_matrices import (
+    NARROWEST,
+    WIDEST,
+    WIDEST_TABULATED,
+    held_range,
+)
+from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, sagging, with_values
-from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE, Desk, speeds_of
+from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE, Desk
 from rubhpc.integrate.changing_speed.ripples import Linear, Ripples
 from rubhpc.integrate.packing import whole_system
 from rubhpc.kernels.case_progress import Clock
@@ -27,6 +35,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.modal_setup import ModalSetup
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
@@ -89,12 +98,17 @@ class Pieces:
             _RIPPLES[fastest] = Ripples(self._linear, fastest.accuracy)
         return _RIPPLES[fastest]
 
-    def _linear(self, speed: float) -> Linear:
-        """The rotor without contact at a speed, rad/s, as the output node and probes see it."""
+    def _linear(self, speed: float, *, is_whole: bool = False) -> Linear:
+        """The rotor without contact at a speed, rad/s, as the output node and probes see it.
+
+        `is_whole`: in all reduced degrees, not in those alone that unbalance moves.
+        """
         model, damping, stiffness = self._matrices(speed, 0.0, 0.0)
         output = self._fastest.reduced.output[:2]
         of_output = np.stack([output, 0.0 * output, 0.0 * output])
         seen = np.concatenate([of_output, model.probe_rows @ self._basis], axis=1)
+        if is_whole:
+            return Linear(stiffness, damping, self._phasor, seen)
         return Linear.of_moved(stiffness, damping, self._phasor, seen, speed)
 
     def setup(
@@ -138,13 +152,13 @@ class Pieces:
     def _in_held(self, held: HeldMatrices, columns: Floats, torque: float = 0.0) -> list[PieceSetup]:
         """The set-ups of pieces that all have the same matrices; columns as the arguments of `setup`.
 
-        Their sag is that of the first acceleration.
+        Their sag is that of the first acceleration and of the mean speed.
         """
         speed, acceleration, angle, duration = columns
         asked = (torque, *columns.ravel().tolist())
         if angle[0] == 0.0 and held.first is not None and held.first[0] == asked:
             return held.first[1]
-        model = held.sagging(torque, float(acceleration[0]))
+        model = held.sagging(torque, float(acceleration[0]), float(speed.mean()))
         lag = acceleration * duration**2 / 12.0
         growth = growth_of(speed, acceleration, duration)
         begins = np.exp(1j * (angle - lag) - 0.5 * growth * duration)
@@ -153,7 +167,7 @@ class Pieces:
         force = np.stack([phasor.real, -phasor.imag], axis=1)
         interval = 2.0 * math.pi / (np.abs(speed) * self._fastest.samples_per_revolution)
         tick = interval / (1 << held.sample_level)
-        speeds = speeds_of(speed, factor, growth, tick, held.reduced.spin, held.sample_level)
+        speeds = speeds_of(speed, factor, growth, tick, held.reduced.spin, held.sample_level, held.reach)
         template, found = held.template, []
         steady = template.clock
         longest = np.floor(np.log2(template.step / tick)).astype(int)
@@ -162,7 +176,7 @@ class Pieces:
         for place, (spin, every, resolution, search, grows, pushing) in enumerate(
             zip(*lists, force, strict=True)
         ):
-            reduced = with_values(held.reduced, spin=spin, force=pushing)
+            reduced = with_values(held.at_place(held.within(spin)), spin=spin, force=pushing)
             found.append(
                 with_values(
                     template,
@@ -201,45 +215,35 @@ class Pieces:
         That of a free spin, which may turn back, is in the middle of the range.
         """
         fastest, free = self._fastest, self._fastest.free_spin
-        model, damping, stiffness = self._matrices(speed, acceleration, slope)
-        _, next_damping, next_stiffness = self._matrices(speed * (1.0 + SPEED_STEP), acceleration, slope)
-        step = SPEED_STEP * speed
-        drift = (next_stiffness - stiffness) / step, (next_damping - damping) / step
-        reach, swing = held_range(
-            stiffness,
-            damping,
-            drift,
-            speed,
-            acceleration,
-            accuracy=fastest.accuracy if free is None else DRIVEN_SHARE * fastest.accuracy,
-            momentum=self._momentum,
-            widest=WIDEST_TABULATED if fastest.model.rotor.tabulated_speeds else WIDEST,
+        is_followed = free is None and not fastest.is_updated
+        reach, swing = (
+            self._followed_reach(speed, acceleration)
+            if is_followed
+            else self._held_reach(speed, acceleration, slope)
         )
         if free is None:
-            if acceleration > 0.0:  # no farther than the law goes
-                reach = min(reach, max(0.5 * (fastest.spin - speed), 0.0))
-            else:
-                reach = min(reach, LONGEST_FALL * speed)
             speed += np.sign(acceleration) * reach
-            model, damping, stiffness = self._matrices(speed, acceleration, slope)
-        model = sagging(model, sag_under(model.rotor, model.load))
-        phasor = self._phasor * speed**2
-        reduced = replace(
-            fastest.reduced,
-            spin=speed,
-            stiffness=stiffness,
-            damping=damping,
-            force=np.stack([phasor.real, -phasor.imag]),
-            probe=model.probe_rows @ self._basis,
-        )
-        for name in ("translations", "project"):  # which need no computing anew
-            reduced.__dict__[name] = getattr(fastest.reduced, name)
+        model, reduced = self._reduced(speed, acceleration, slope, speed)
+        beside = [
+            self._reduced(speed + place * reach, acceleration, slope, speed)
+            for place in ((-NODE, NODE) if is_followed else ())
+        ]
+        if all(np.array_equal(other.stiffness, reduced.stiffness) for _, other in beside) and all(
+            np.array_equal(other.damping, reduced.damping) for _, other in beside
+        ):
+            beside = []  # nothing goes with the speed
         near_end = reach * (1.0 + 1e-9)  # rounding apart
         slowest = replace(fastest, spin=abs(speed) - reach)
         ranges = near_end, swing
         desks = _DESKS.setdefault(fastest, {})
         at = acceleration, slope, ranges
-        held = HeldMatrices(model, reduced, self._phasor, self._momentum, *at, slowest.sample_level, desks)
+        held = HeldMatrices(
+            model, reduced, self._phasor, self._momentum, *at, slowest.sample_level, desks, beside
+        )
+        held.is_balanced = not is_followed
+        if beside and fastest.model.rotor.tabulated_speeds:
+            (before, _), (behind, _) = beside
+            held.sags = model.sag, before.sag, behind.sag
         held.template = PieceSetup(
             scheme=fastest.scheme,
             model=model,
@@ -266,6 +270,70 @@ class Pieces:
         else:
             held.lean = sag_under(model.rotor, -self._inertia - tilted)
         return held
+
+    def _reduced(
+        self, speed: float, acceleration: float, slope: float, of_force: float
+    ) -> tuple[Model, ReducedModel]:
+        """The model at a speed about its sag, and reduced, with spin and unbalance force of another speed."""
+        fastest = self._fastest
+        model, damping, stiffness = self._matrices(speed, acceleration, slope)
+        model = sagging(model, sag_under(model.rotor, model.load))
+        phasor = self._phasor * of_force**2
+        reduced = replace(
+            fastest.reduced,
+            spin=of_force,
+            stiffness=stiffness,
+            damping=damping,
+            force=np.stack([phasor.real, -phasor.imag]),
+            probe=model.probe_rows @ self._basis,
+        )
+        for name in ("translations", "project"):  # which need no computing anew
+            reduced.__dict__[name] = getattr(fastest.reduced, name)
+        return model, reduced
+
+    def _followed_reach(self, speed: float, acceleration: float) -> tuple[float, float]:
+        """Half of the ranges of speeds, rad/s, and accelerations, rad/s^2, in which modes follow the speed."""
+
+        def matrices(at: float) -> tuple[Floats, Floats]:
+            _, damping, stiffness = self._matrices(at, acceleration, 0.0)
+            return stiffness, damping
+
+        seen = self._linear(speed, is_whole=True).seen
+        rotor = rotor_of(self._fastest, matrices, self._phasor, seen)
+        widest = self._widest(speed, acceleration)
+        found = followed_reach(
+            rotor, speed, acceleration, self._momentum, widest, accuracy=self._fastest.accuracy
+        )
+        return found.half, found.swing
+
+    def _widest(self, speed: float, acceleration: float) -> float:
+        """Half of the widest range from a speed on, rad/s, no farther than the law goes."""
+        fastest = self._fastest
+        widest = (WIDEST_TABULATED if fastest.model.rotor.tabulated_speeds else WIDEST) * speed
+        if acceleration > 0.0:
+            return min(widest, max(0.5 * (fastest.spin - speed), NARROWEST * speed))
+        return min(widest, LONGEST_FALL * speed)
+
+    def _held_reach(self, speed: float, acceleration: float, slope: float) -> tuple[float, float]:
+        """The same over which matrices may be held."""
+        fastest, free = self._fastest, self._fastest.free_spin
+        _, damping, stiffness = self._matrices(speed, acceleration, slope)
+        _, next_damping, next_stiffness = self._matrices(speed * (1.0 + SPEED_STEP), acceleration, slope)
+        step = SPEED_STEP * speed
+        drift = (next_stiffness - stiffness) / step, (next_damping - damping) / step
+        reach, swing = held_range(
+            stiffness,
+            damping,
+            drift,
+            speed,
+            acceleration,
+            accuracy=fastest.accuracy if free is None else DRIVEN_SHARE * fastest.accuracy,
+            momentum=self._momentum,
+            widest=WIDEST_TABULATED if fastest.model.rotor.tabulated_speeds else WIDEST,
+        )
+        if free is None:
+            reach = min(reach, self._widest(speed, acceleration))
+        return reach, swing
 
     def _matrices(self, speed: float, acceleration: float, slope: float) -> tuple[Model, Floats, Floats]:
         """The model at a speed, within the tables of its bearings, its damping and its stiffness.

@@ -46,6 +46,8 @@ class RetunedPenaltyLibrary(RetunedLibrary):
         return solve_penalty_mode(self.reduced, self._penalty, self._opened, mask, self._known)
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> ModeTables:
+        if not self._is_measured:
+            return super()._tables_of(mode, reduced)
         tables = super()._tables_of(mode, self._penalty.damped(reduced, mode.mask))
         tables.loss[0] += self._penalty.stored_energy(mode, self.width)
         return tables
@@ -158,7 +160,7 @@ class RetunedFrictionLibrary(RetunedLibrary):
             switch=switch,
             fixed=fixed,
             rate=mode.switch[:, growing] @ mode.growth[growing].astype(np.complex128),
-            loss=row.loss[0][[one, self.width + one]].copy(),
+            loss=row.loss[0][[one, self.width + one]].copy() if row.loss.shape[1] else row.loss[0],
             power=float((held.rate[one] @ held.resisting[one]).real),
             velocity=held.rate[one].copy(),
             resisting=held.resisting[one].copy(),

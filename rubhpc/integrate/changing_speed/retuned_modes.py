@@ -1,36 +1,43 @@
-"""Contact modes whose matrices stay while the spin speed changes: only the unbalance response is renewed.
+"""Contact modes whose matrices stay or follow the spin speed: only the unbalance response is made anew.
 
-A library holds the contact modes of a set of matrices, and tunes them to the speeds of a run-up's pieces
+A library holds the contact modes of a range of speeds, and tunes them to the speeds of a run-up's pieces
 (`kernels.retuning`), several of them at once.
 """
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray  # noqa: TC002 - of a NamedTuple
 
 from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
-from rubhpc.integrate.changing_speed.mode_parts import WITHOUT_RIM, Linear, output_operators
+from rubhpc.integrate.changing_speed.followed_modes import Tabulated, followed, matched, taken
+from rubhpc.integrate.changing_speed.mode_parts import Linear, held_mode, output_operators, speeds_of
 from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.table_stack import TableStack
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
-from rubhpc.kernels.retuning import HeldMode, Speeds, retune
+from rubhpc.kernels.retuning import retune
 from rubhpc.kernels.retuning_laws import Springs
 from rubhpc.kernels.sampling import LANES
+from rubhpc.kernels.varying import take_course
 
 NOT_TUNED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
 AT_ONCE = 8  # pieces to whose speeds a contact mode is tuned at once
 MOST_BYTES = 2**22  # of its tables for so many pieces; where they are more, pieces take turns in one
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode, Solved
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.kernels.contact_modes import ModeTables
+    from rubhpc.kernels.retuning import HeldMode, Speeds
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -59,6 +66,14 @@ class RetunedLibrary(ModeLibrary):
         As in `ModeLibrary`; levels stay, the tick changes with the speed.
     desks : dict
         Of the libraries that take turns, by what they have in common.
+    beside : sequence of ReducedModel
+        The same at two other speeds of the range (`followed_modes.NODE`), through which modes follow the
+        speed; none where they stay what they are.
+    at_place : callable, optional
+        The same at a place in the range, from -1 to 1: for modes that cannot be followed, which are solved at
+        each piece.
+    is_balanced : bool
+        Whether energies are asked for, which stand in no table of modes that follow the speed.
     """
 
     at_once = AT_ONCE
@@ -76,17 +91,22 @@ class RetunedLibrary(ModeLibrary):
         sample_level: int,
         n_level: int,
         desks: dict[tuple[object, ...], Desk] | None = None,
+        beside: Sequence[ReducedModel] = (),
+        at_place: Callable[[float], ReducedModel] | None = None,
+        is_balanced: bool = True,
     ) -> None:
         """Start with every pair open."""
         self.reduced, self._known = reduced, known
+        self._is_measured, self._at_place = is_balanced, at_place
         self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self._phasor, self._output = phasor, np.hstack(output_operators(reduced))
         self._opened = self._solve(0)
         self.first_masks = [0]
         self.width = self._width_of(model, friction)
+        self._beside = [self._with(other) for other in beside]
         q = len(self.gap_jacobian)
-        kind: tuple[object, ...] = type(self), self.width, n_level
+        kind: tuple[object, ...] = type(self), self.width, n_level, is_balanced
         desk = Desk(TableStack(1 + q, self._most_modes))
         self._desk = desk if desks is None else desks.setdefault(kind, desk)
         self._tables = self._desk.tables
@@ -97,6 +117,7 @@ class RetunedLibrary(ModeLibrary):
         self._held: dict[int, tuple[ModeTables, HeldMode]] = {}
         self._place: dict[int, int] = {}
         self._tuned: dict[int, int] = {}
+        self._strange: set[int] = set()  # modes that cannot be followed
         self._speeds = speeds_of(
             [reduced.spin], [complex(reduced.spin**2)], [0.0], [tick], reduced.spin, sample_level
         )
@@ -131,6 +152,14 @@ class RetunedLibrary(ModeLibrary):
         """Whether there is no room for another contact mode."""
         return len(self._held) >= self.n_most
 
+    def follows(self, mask: int) -> bool:
+        """Whether a mode follows the speed, in coordinates that go on from piece to piece."""
+        return bool(self._beside) and mask not in self._strange
+
+    def has_strange(self) -> bool:
+        """Whether one of the modes cannot be followed, and is solved at each piece."""
+        return bool(self._strange)
+
     def unmet(self, met: set[int]) -> list[int]:
         """None: each piece begins with no mode."""
         return []
@@ -158,29 +187,40 @@ class RetunedLibrary(ModeLibrary):
         place = first + (at if self.n_room > 1 else 0)
         if self._tuned.get(mask, 0) <= at:
             end = min(speeds.spin.size, self.n_room) if self.n_room > 1 else at + 1
+            if mask in self._strange:
+                self._solve_at(mask, place, float(speeds.within[at]))
+                end = at + 1
             retune(self.tables(), place - at, self._held[mask][1], speeds, at, end)
             self._tuned[mask] = end
         self.masks[place] = self.tables().mask[place] = mask
         return True
 
-    def eigenmodes(self, mask: int) -> Eigenmodes | None:
-        """Those of a set of closed pairs; None where a speed changes what enters them, or it has no room."""
+    def eigenmodes(self, mask: int, within: float) -> Eigenmodes | None:
+        """Those of a set of closed pairs at a place in the range, from -1 to 1.
+
+        None where a speed changes what enters them otherwise, or it has no room.
+        """
         if mask not in self._held and self.is_full:
             self.forget()
         if not self._has(mask):
             return None
         (row, held), m = self._held[mask], self._held[mask][1].is_pair.size
-        if held.rim.one >= 0:
+        if held.rim.one >= 0 or mask in self._strange:
             return None
-        constant = row.enter_constant[0, :, :, :m]
+        varying = held.varying
+        for course in (varying.kept_shape, varying.kept_entry):
+            take_course(course, within, varying.kept)
+        constant = taken(varying.enter_constant, row.enter_constant[0], within)[:, :, :m]
+        enter_re = taken(varying.enter_re, row.enter_re[0], within)[:, :m]
+        enter_im = taken(varying.enter_im, row.enter_im[0], within)[:, :m]
         return Eigenmodes(
-            exponent=held.exponent[:m],
+            exponent=held.exponent[:m].copy(),
             is_pair=held.is_pair,
-            motion=held.motion.T,
-            enter=(row.enter_re[0, :, :m] + 1j * row.enter_im[0, :, :m]).T,
+            motion=held.motion.T.copy(),
+            enter=(enter_re + 1j * enter_im).T,
             constant=constant[:, 0] + 1j * constant[:, 1],
-            drive=held.drive,
-            mirrored_drive=held.mirrored_drive,
+            drive=held.drive.copy(),
+            mirrored_drive=held.mirrored_drive.copy(),
         )
 
     def tuned(self, met: set[int]) -> Ints:
@@ -211,13 +251,52 @@ class RetunedLibrary(ModeLibrary):
 
     def _tabulate(self, mode: ContactMode, row: ModeTables | None = None) -> None:
         self._note_exponents(mode)
+        _, row, held = middle = self._tabulated(mode, row)
+        others = [(library, matched(mode, library._solved(mode.mask))) for library in self._beside]
+        nodes = [library._tabulated(other) for library, other in others if other is not None]
+        if self._beside and len(nodes) < len(others):
+            self._strange.add(mode.mask)
+        elif nodes:
+            held = followed((middle, nodes[0], nodes[1]), self._linear(mode).seen)
+        self._held[mode.mask] = row, held
+
+    def _tabulated(self, mode: ContactMode, row: ModeTables | None = None) -> Tabulated:
+        """A mode of these matrices with what is renewed of its tables left out."""
         row = row or self._tables_of(mode, self.reduced)
+        if not self._is_measured:
+            slip = np.zeros((1, len(self._slip_rows()), self.width), dtype=np.complex128)
+            slip[0, :, : mode.exponent.size] = self._slip_rows() @ mode.motion[self.slip.shape[1] :]
+            rate = slip.copy()
+            rate[0, :, : mode.exponent.size] *= mode.exponent
+            row = row._replace(
+                slip_re=slip.real.copy(),
+                slip_im=slip.imag.copy(),
+                slip_rate_re=rate.real.copy(),
+                slip_rate_im=rate.imag.copy(),
+            )
         n_output = -(-SAMPLES_AT_ONCE * len(self._output) // LANES) * LANES
         shapes = {"output": (1, 2 * self.width, n_output)} | {
             name: getattr(row, name).shape for name in ("power_re", "power_im", "bound")
         }
         row = row._replace(**{name: np.broadcast_to(0.0, shape) for name, shape in shapes.items()})
-        self._held[mode.mask] = row, self._hold(mode, row)
+        return Tabulated(mode, row, self._hold(mode, row))
+
+    def _with(self, reduced: ReducedModel) -> RetunedLibrary:
+        """A library with other matrices that solves and tabulates as this one does, and holds nothing."""
+        other = copy(self)
+        other.reduced, other._output = reduced, np.hstack(output_operators(reduced))
+        other._beside, other._opened = [], other._solve(0)
+        return other
+
+    def _solve_at(self, mask: int, place: int, within: float) -> None:
+        """Solve a mode that cannot be followed at a place in the range, and put it on the desk."""
+        assert self._at_place is not None
+        library = self._with(self._at_place(within))
+        mode = library._solved(mask)
+        _, row, held = library._tabulated(mode)
+        self._held[mask] = row, held
+        for field, new in zip(self.tables(), row, strict=True):
+            field[place] = new[0]
 
     def _put(self, mask: int) -> None:
         """Put a mode on the desk."""
@@ -266,62 +345,18 @@ class RetunedLibrary(ModeLibrary):
 
     def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
         """What the spin speed leaves alone of a mode and its tables, (1, ...) each."""
-        reduced, m, width = self.reduced, mode.n_eigenmode, self.width
-        linear, slip = self._linear(mode), self._slip_rows()
-        n = slip.shape[1]
-        skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
-        resistance = np.hstack([skew, linear.damping]) - linear.across @ linear.switch
-        motion = np.pad(mode.motion, ((0, 0), (0, width - mode.exponent.size)))
-        exponent = np.pad(mode.exponent, (0, width - mode.exponent.size))
-        position, velocity, acceleration = np.hsplit(self._output, 3)
-        seen = position @ motion[:n] + velocity @ motion[n:]
-        seen += (acceleration @ motion[n:]) * exponent
-        # An inverse shape times its shape is 2 where a mode stands for a conjugate pair, and is doubled.
-        enter = mode.enter[:m]
-        doubled = np.einsum("ka,ak->k", enter, mode.motion[:, :m]).real
-        resisting = np.hstack([skew, linear.damping]) @ motion
-        resisting[:, : mode.exponent.size] -= linear.across @ mode.switch
-        return HeldMode(
-            n_coordinate=mode.exponent.size,
-            exponent=exponent,
-            is_pair=doubled > 1.5,
-            motion=np.ascontiguousarray(mode.motion[:, :m].T),
-            drive=enter[:, n:] @ linear.seen,
-            mirrored_drive=enter[:, n:].conj() @ linear.seen,
-            switch=linear.switch,
-            reaction=linear.reaction,
-            slip=np.ascontiguousarray(slip),
-            resistance=resistance,
-            rate=np.ascontiguousarray(motion[n:].T),
-            rubbed=linear.across @ linear.reaction,
-            resisting=np.ascontiguousarray(resisting.T),
+        return held_mode(
+            mode,
+            self.reduced,
+            self._linear(mode),
+            slip=self._slip_rows(),
             phasor=self._phasor,
-            work=np.stack([self._phasor @ motion[n:], self._phasor.conj() @ motion[n:]]),
             output=self._output,
-            row=seen,
-            rim=WITHOUT_RIM,
+            width=self.width,
             springs=self._springs_of(mode),
+            is_balanced=self._is_measured,
         )
 
     def _springs_of(self, mode: ContactMode) -> Springs:
         """Springs that press in a mode."""
         return Springs(0.0, self.gap_jacobian[:0], np.zeros((0, 2 * self.width)))
-
-
-def speeds_of(
-    spin: ArrayLike,
-    factor: ArrayLike,
-    growth: ArrayLike,
-    tick: ArrayLike,
-    held_spin: float,
-    sample_level: int,
-) -> Speeds:
-    """Speeds (rad/s) to which modes are tuned whose matrices are those at `held_spin`.
-
-    `factor` (1/s^2) is what the unbalance at unit speed acts by, which grows by `growth` (1/s), `tick` (s)
-    the resolution of events.
-    """
-    spins, ticks = np.asarray(spin, dtype=np.float64), np.asarray(tick, dtype=np.float64)
-    factors = np.asarray(factor, dtype=np.complex128)
-    grown = np.asarray(growth, dtype=np.float64)
-    return Speeds(spins, np.abs(spins / held_spin), factors, grown, ticks, ticks * 2.0**sample_level)

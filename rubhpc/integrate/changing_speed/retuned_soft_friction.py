@@ -21,6 +21,8 @@ class RetunedSoftFrictionLibrary(RetunedFrictionLibrary):
     """Contact modes of pairs that slide in either sense or stick, or are lifted, with springs and dampers."""
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> ModeTables:
+        if not self._is_measured:
+            return super()._tables_of(mode, reduced)
         return super()._tables_of(mode, self._pairs.damped(reduced, mode.mask))
 
     def _springs_of(self, mode: ContactMode) -> Springs:
@@ -30,6 +32,8 @@ class RetunedSoftFrictionLibrary(RetunedFrictionLibrary):
 
     def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
         held = super()._hold(mode, row)
+        if not self._is_measured:
+            return held
         m, one = held.is_pair.size, held.rim.one
         moving = [m, self.width + m] if one == NO_RIM else [m, one, self.width + m, self.width + one]
         still = held.springs.overlap.copy()

@@ -132,6 +132,9 @@ def integrate_run_up(
         if setup.model is not sagging:
             lift_samples(whole[:, begun : cuts[piece]], sagging)
             sagging, begun = setup.model, cuts[piece]
+        goes_on = last is not None and last[0].goes_on_in(
+            setup, float(accelerations[piece - 1]), float(accelerations[piece])
+        )
         if last is not None and reached is not None and last[0].held is not setup.held:
             ended = passing.standing(last[0], reached, last[1])
             # What an acceleration that jumps leaves to ring is no work of the matrices.
@@ -147,9 +150,11 @@ def integrate_run_up(
             if reached is None:
                 assert isinstance(initial, Initial)
                 reached = start_of(initial, setup, clearance, law.speed[0])
-            stretch = None
+            stretch, before_it, follows = None, (earlier, before[piece]), goes_on or place > 0
             if not late[piece]:
-                stretch = passing.take_several(setups, place, size, reached, (earlier, before[piece]))
+                stretch = passing.take_several(
+                    setups, place, size, reached, before_it, goes_on=goes_on or place > 0
+                )
             if stretch is not None:
                 part = min(size, per_revolution)
                 parts = np.arange(first, first + stretch.n_piece * size, part)
@@ -159,7 +164,7 @@ def integrate_run_up(
                 n_step += stretch.n_step
                 piece += stretch.n_piece
                 continue
-            passed = passing.take(setups[place], size, reached, (earlier, before[piece]))
+            passed = passing.take(setups[place], size, reached, before_it, goes_on=follows)
             reached, earlier = passed.end, passed.accumulators[-1]
             if late[piece]:  # the inertia of the twist does not follow at once
                 seen = model.probe_rows[2, :, : unit.size] @ unit

@@ -12,7 +12,7 @@ from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import stacked_accumulators
 from rubhpc.kernels.accumulators import Accumulator, Samples
 from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, PAUSED
-from rubhpc.kernels.pieces import PIECE, TO_BEGIN, Pieces
+from rubhpc.kernels.pieces import PIECE, STANDING, TO_BEGIN, Pieces
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -32,6 +32,7 @@ class Stretch(NamedTuple):
     last: Accumulator  # of the last part
     n_step: int
     end: Place
+    left: tuple[int, Floats]  # where the last piece has ended, as of `EventDrivenMarch.reached_in`
 
 
 def take_stretch(
@@ -42,6 +43,7 @@ def take_stretch(
     begun: Place,
     earlier: tuple[Accumulator, float],
     check: Callable[[], None] | None,
+    left: tuple[int, Floats] | None = None,
 ) -> Stretch | None:
     """Take the pieces from `first` on, as far as nothing stands against it; None where that is nowhere.
 
@@ -55,9 +57,14 @@ def take_stretch(
         Room for those of one piece.
     begun, earlier
         As in `Passing.take`.
+    left : tuple, optional
+        Where the piece before has ended (`EventDrivenMarch.reached_in`), of modes that follow the speed.
     """
     library = march.begin_tuned(setups[first], begun)
-    if not isinstance(library, RetunedLibrary) or library.n_room == 1:
+    is_followed = isinstance(library, RetunedLibrary) and library.follows(march.mask)
+    if left is not None and is_followed:
+        march.keep_fast(left, setups[first].spin, setups[first].interval * samples.whole.shape[1])
+    if not isinstance(library, RetunedLibrary) or library.n_room == 1 or library.has_strange():
         return None
     speeds, n_piece = setups[first].speeds, len(setups)
     n_row, n_sample = samples.whole.shape
@@ -77,7 +84,9 @@ def take_stretch(
         n_sample=n_sample,
         n_part_sample=part,
         energy_limit=setups[first].energy_limit,
-        at=np.array([first, 0, TO_BEGIN]),
+        at=np.array([first, 0, TO_BEGIN, march.mask]),
+        moved_by=march.moved_by(-1) if is_followed else 0,
+        left=march.reached_in()[1],
         motion=np.zeros((n_piece + 1, 2 * n)),
         pressing=np.zeros((n_piece + 1, q)),
         seen=np.empty((2, 3 + setups[first].model.n_place)),
@@ -86,8 +95,8 @@ def take_stretch(
     )
     pieces.motion[first], pieces.pressing[first] = march.begun_motion, begun.contact_force
     sums = stacked_accumulators(1 + n_piece * n_part, earlier[0])
-    for field, before in zip(sums, earlier[0], strict=True):
-        field[first * n_part] = before
+    for field, value in zip(sums, earlier[0], strict=True):
+        field[first * n_part] = value
     while True:
         outcome = march.advance_through(pieces, samples, sums)
         if outcome not in (MODE_WANTED, PAUSED):
@@ -97,6 +106,9 @@ def take_stretch(
         if outcome == MODE_WANTED:
             library.reach(int(pieces.at[PIECE]))
             march.find_wanted()
+            if library.has_strange():  # from here on piece by piece
+                march.step_back(pieces)
+                break
             pieces = pieces._replace(table=library.tuned(march.met))
     end = int(pieces.at[PIECE])
     assert end == n_piece or outcome != FINISHED
@@ -110,4 +122,5 @@ def take_stretch(
         last=Accumulator._make(field[end * n_part] for field in sums),
         n_step=int(pieces.n_step.sum()),
         end=Place(pieces.motion[end].copy(), setups[first].model.sag, pieces.pressing[end].copy()),
+        left=(march.moved_by(int(pieces.at[STANDING])), pieces.left),
     )

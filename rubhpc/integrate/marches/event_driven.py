@@ -17,10 +17,11 @@ from rubhpc.kernels.case_progress import (
     PAUSED,
     restart_clock,
 )
-from rubhpc.kernels.contact_modes import FORCED_LEVEL
+from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL
 from rubhpc.kernels.event_loop import advance, event_work
 from rubhpc.kernels.mode_change import change_contacts
 from rubhpc.kernels.piece_loop import advance_pieces
+from rubhpc.kernels.pieces import FAST, QUICK
 from rubhpc.kernels.sections_loop import advance_sections
 from rubhpc.kernels.trail import Trail, begin_trail, new_trail, no_trail
 
@@ -71,6 +72,30 @@ class EventDrivenMarch(ModalMarch):
             n = self.bodies.stiffness.shape[0]
             self._motion[:n] += setup.reduced.project[:, : moved.size] @ moved
         self._enter_first(place.contact_force)
+
+    def reached_in(self) -> tuple[int, Floats]:
+        """Set of contacts in which the case stands, and a copy of its modal coordinates (2, m)."""
+        return self.moved_by(self.mask), self._z.copy()
+
+    def keep_fast(self, before: tuple[int, Floats], spin: float, lasts: float) -> None:
+        """Let fast modes go on as they were before a piece began at another speed, in the same contacts.
+
+        `spin` (rad/s) is that of the piece, which `lasts` so long, s.
+
+        Modes follow the speed, which changes evenly, and do not ring for it (`kernels.pieces.begin_piece`).
+        """
+        mask, z = before
+        if self.moved_by(self.mask) != mask:
+            return
+        mode = int(self._bare_progress["mode"])
+        pace = self.tables.pace[mode]
+        fast = (pace > max(FAST * abs(spin), QUICK / lasts)) | (pace == DYING)
+        fast[int(self.tables.n_eigenmode[mode]) :] = False
+        self._z[:, fast] = z[:, fast]
+
+    def moved_by(self, mask: int) -> int:
+        """What of a set of contacts decides how the bodies move: all of it, but whether pairs are lifted."""
+        return mask
 
     def start_again(self, state: State) -> bool:
         """Start the same case anew at another state, with the contact modes that it has met."""
@@ -132,8 +157,12 @@ class EventDrivenMarch(ModalMarch):
         """
         outcome = self._advance_pieces(pieces, samples, sums)
         if outcome not in (FINISHED, MODE_WANTED, PAUSED):
-            self._recorder.last[:] = pieces.seen
+            self.step_back(pieces)
         return outcome
+
+    def step_back(self, pieces: Pieces) -> None:
+        """Forget what was seen of the piece under way."""
+        self._recorder.last[:] = pieces.seen
 
     def _advance_pieces(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
         return advance_pieces(

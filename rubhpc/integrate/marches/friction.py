@@ -81,6 +81,10 @@ class FrictionMarch(EventDrivenMarch):
         self._steps, self._n_short = None, 0
         super().begin(setup, place)
 
+    def moved_by(self, mask: int) -> int:
+        """What of a set of states decides how the bodies move: all of it, but whether pairs are lifted."""
+        return mask & ((1 << 2 * self._clearance.size) - 1)
+
     def start_again(self, state: State) -> bool:
         """Start the same case anew at another state, with the contact modes that it has met."""
         self._n_short = 0

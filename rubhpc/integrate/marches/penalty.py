@@ -27,6 +27,10 @@ class PenaltyMarch(EventDrivenMarch):
         """Take an event, which leaves `motion` (2 n,) as it is; returns the states that go on."""
         return int(self.take_change(self.bodies, mask, crossing, motion))
 
+    def moved_by(self, mask: int) -> int:
+        """What of a set of states decides how the bodies move: the pairs that press."""
+        return mask & ((1 << self._clearance.size) - 1)
+
     def opened(self, mask: int) -> NDArray[np.bool_]:
         """Which pairs are open, and not lifted, (q,)."""
         return ~self.closed(mask) & ~self.closed(mask >> self._clearance.size)

@@ -8,9 +8,10 @@ from trial_rig import trial_rig
 
 from rubhpc.case_arguments import case_of, read_probes
 from rubhpc.integrate.changing_speed.held_matrices import held_range
+from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
-from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary, speeds_of
+from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
 from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary

@@ -1,0 +1,233 @@
+"""Ranges of speed over which contact modes may follow those of three speeds (`followed_modes`).
+
+At both ends of a range, within it and where it meets a resonance the modes followed are held against the
+matrices themselves: by what unbalance and forces on the rotor at its contacts make of every signal. Held
+matrices err by the first order of a range, the modes followed by the third.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rubhpc.integrate.changing_speed.followed_modes import EQUAL, NODE, parabola
+from rubhpc.integrate.changing_speed.held_matrices import NARROWEST
+from rubhpc.integrate.reduced_model.coupling import coupled_rows
+from rubhpc.integrate.reduced_model.standstill import cutoff_frequency
+from rubhpc.kernels.contact_pairs import TORSION, V, W
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.modal_setup import ModalSetup
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+    Complexes = NDArray[np.complex128]
+    Matrices = Callable[[float], tuple[Floats, Floats]]  # stiffness and damping at a speed, rad/s
+
+PASSING = 0.01  # growth over the speed, 1/rad, at which a passage meets a resonance
+STRUCK = 0.1  # the same of motions that contacts excite, which they strike again and again
+ORDERS, HIGHEST = 0.5, 16.0  # of the speed: between frequencies at which these are judged, and at most
+AT_ENDS = 0.5  # error at the ends of a range over the accuracy, of which the third order leaves little inside
+BY_ACCELERATION = 1.0  # the same by the acceleration, at the ends of its range
+PLACES = -1.0, -0.5, 0.5, 1.0  # in a range, where it is judged beside resonances
+SAFE = 0.9  # share of the range that would just do
+LEAST, MOST = 0.2, 0.85  # factors by which a range shrinks
+
+
+class Rotor(NamedTuple):
+    """What moves with the speed's matrices, in reduced degrees, as signals and forces see it."""
+
+    matrices: Matrices
+    phasor: Complexes  # (n,), unbalance
+    force: Floats  # (n_force, n), unit forces of contacts
+    seen: Floats  # (3, n_signal, n), what signals see of displacements, velocities and accelerations
+    top: float  # rad/s, frequency up to which signals are to be met
+
+
+class Reach(NamedTuple):
+    """A range of speeds and of accelerations."""
+
+    half: float  # rad/s
+    swing: float  # rad/s^2
+    is_followed: bool  # or nothing in it goes with the speed
+
+
+def rotor_of(setup: ModalSetup, matrices: Matrices, phasor: Complexes, seen: Floats) -> Rotor:
+    """What moves with the speed's matrices, of a set-up; `seen` are its signals, to which contacts come."""
+    touched = setup.reduced.degree[:, [V, W, TORSION]].reshape(-1, phasor.size)
+    touched = np.unique(touched[np.any(touched != 0.0, axis=1)], axis=0)
+    near = np.stack([touched, 0.0 * touched, 0.0 * touched])
+    top = cutoff_frequency(setup.model, setup.spin, setup.accuracy)
+    return Rotor(matrices, phasor, touched, np.concatenate([seen, near], axis=1), top)
+
+
+def followed_reach(
+    rotor: Rotor, speed: float, acceleration: float, momentum: Floats, widest: float, *, accuracy: float
+) -> Reach:
+    """The widest range that begins at a speed (rad/s) and goes on as the acceleration does.
+
+    Parameters
+    ----------
+    acceleration : float, rad/s^2
+    momentum : (n, n)
+        Change of the stiffness with the acceleration, per rad/s^2.
+    widest : float, rad/s
+        Half of the range, at most.
+    accuracy : float
+        Relative error of each signal at the ends of the range of accelerations; half of it by the speed.
+    """
+    sense = float(np.sign(acceleration))
+    part = _part(rotor, speed, speed + (sense or 1.0) * widest)
+    if not part.size:
+        swing = _swing(rotor, speed, momentum, accuracy)
+        return Reach(widest, swing, is_followed=False)
+    of_part = _of_part(rotor, part)
+    half = widest
+    while True:
+        middle = speed + sense * half
+        error = _error(of_part, middle, half, abs(acceleration))
+        allowed = AT_ENDS * accuracy
+        if error <= allowed or half <= NARROWEST * speed:
+            break
+        half *= float(np.clip(SAFE * (allowed / error) ** (1.0 / 3.0), LEAST, MOST))
+    inside = np.ix_(part, part)
+    return Reach(half, _swing(of_part, middle, momentum[inside], accuracy), is_followed=True)
+
+
+def _part(rotor: Rotor, speed: float, other: float) -> Ints:
+    """Degrees that matrices which go with the speed couple."""
+    (stiffness, damping), (next_stiffness, next_damping) = rotor.matrices(speed), rotor.matrices(other)
+    moved = (stiffness != next_stiffness) | (damping != next_damping)
+    linked = (stiffness != 0.0) | (damping != 0.0) | moved
+    parts = [rows for rows in coupled_rows(linked) if moved[np.ix_(rows, rows)].any()]
+    return np.sort(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.int64)
+
+
+def _of_part(rotor: Rotor, part: Ints) -> Rotor:
+    inside = np.ix_(part, part)
+
+    def matrices(speed: float) -> tuple[Floats, Floats]:
+        stiffness, damping = rotor.matrices(speed)
+        return stiffness[inside], damping[inside]
+
+    force = rotor.force[:, part]
+    return rotor._replace(
+        matrices=matrices,
+        phasor=rotor.phasor[part],
+        force=force[np.any(force != 0.0, axis=1)],
+        seen=rotor.seen[..., part],
+    )
+
+
+def _error(rotor: Rotor, middle: float, half: float, acceleration: float) -> float:
+    """Relative error of the worst signal in a range; infinite where modes cannot be followed."""
+    nodes = [_modes(*rotor.matrices(middle + place * half)) for place in (0.0, -NODE, NODE)]
+    before, behind = (_in_order(nodes[0], other) for other in nodes[1:])
+    if before is None or behind is None:
+        return np.inf
+    nodes[1:] = before, behind
+    worst = 0.0
+    for place in (*PLACES, *_resonances(nodes, middle, half)):
+        speed = middle + place * half
+        growth = min(PASSING * speed, acceleration / half)
+        exponent = parabola((nodes[0][0], nodes[1][0], nodes[2][0]), place)
+        shape = parabola((nodes[0][1], nodes[1][1], nodes[2][1]), place)
+        at, load = _asked(rotor, speed, growth)
+        true = _signals(rotor, at, _answers(*rotor.matrices(speed), at, load))
+        n = rotor.phasor.size
+        modal = np.linalg.solve(shape, np.vstack([np.zeros_like(load), load]))
+        motion = shape @ (modal / (at[:, np.newaxis, np.newaxis] - exponent[:, np.newaxis]))
+        own = _signals(rotor, at, motion[:, :n], motion[:, n:])
+        worst = max(worst, _relative(own - true, true))
+    return worst
+
+
+def _resonances(nodes: list[tuple[Complexes, Complexes]], middle: float, half: float) -> list[float]:
+    """Places in the range at which the speed meets a frequency."""
+    places = np.linspace(-1.0, 1.0, 21)
+    exponents = nodes[0][0], nodes[1][0], nodes[2][0]
+    met = [parabola(exponents, place).imag - middle - place * half for place in places.tolist()]
+    apart = np.array(met)
+    before, mode = np.nonzero((apart[:-1] < 0.0) != (apart[1:] < 0.0))
+    low, high = apart[before, mode], apart[before + 1, mode]
+    found: list[float] = (places[before] + 0.1 * low / (low - high)).tolist()
+    return found
+
+
+def _swing(rotor: Rotor, speed: float, momentum: Floats, accuracy: float) -> float:
+    """By how much the acceleration may change, rad/s^2."""
+    stiffness, damping = rotor.matrices(speed)
+    if not momentum.any():
+        return np.inf
+    step = speed**2 * 1e-3
+    at, load = _asked(rotor, speed, PASSING * speed)
+    true = _signals(rotor, at, _answers(stiffness, damping, at, load))
+    other = _signals(rotor, at, _answers(stiffness + step * momentum, damping, at, load))
+    error = _relative(other - true, true)
+    return BY_ACCELERATION * accuracy * step / error if error > 0.0 else np.inf
+
+
+def _asked(rotor: Rotor, speed: float, growth: float) -> tuple[Complexes, Complexes]:
+    """Exponents (f,), that of the unbalance first, and loads (n, 1 + n_force), unbalance first."""
+    orders = np.arange(0.0, min(rotor.top, HIGHEST * speed), ORDERS * speed)
+    at = np.concatenate([[complex(growth, speed)], 1j * orders + STRUCK * speed])
+    return at, np.column_stack([rotor.phasor, rotor.force.T.astype(np.complex128)])
+
+
+def _answers(stiffness: Floats, damping: Floats, at: Complexes, load: Complexes) -> Complexes:
+    """Displacements (f, n, loads) under loads times exp(at t)."""
+    s = at[:, np.newaxis, np.newaxis]
+    matrices = stiffness + s * damping + s**2 * np.eye(len(stiffness))
+    found: Complexes = np.linalg.solve(matrices, np.broadcast_to(load, (at.size, *load.shape)))
+    return found
+
+
+def _signals(
+    rotor: Rotor, at: Complexes, displacement: Complexes, velocity: Complexes | None = None
+) -> Complexes:
+    """Signals (f, n_signal, loads)."""
+    s = at[:, np.newaxis, np.newaxis]
+    rate = s * displacement if velocity is None else velocity
+    positions, rates, accelerations = rotor.seen
+    found: Complexes = positions @ displacement + rates @ rate + s * (accelerations @ rate)
+    return found
+
+
+def _relative(error: Complexes, true: Complexes) -> float:
+    """Worst relative error: under unbalance at its speed, under forces over all frequencies."""
+    off, own = np.abs(error), np.abs(true)
+    pairs = (
+        (off[0, :, 0], own[0, :, 0]),
+        (np.linalg.norm(off[1:, :, 1:], axis=(0, 2)), np.linalg.norm(own[1:, :, 1:], axis=(0, 2))),
+    )
+    worst = 0.0
+    for lost, heard in pairs:
+        is_heard = heard > EQUAL * heard.max(initial=0.0)
+        worst = max(worst, float((lost[is_heard] / heard[is_heard]).max(initial=0.0)))
+    return worst
+
+
+def _modes(stiffness: Floats, damping: Floats) -> tuple[Complexes, Complexes]:
+    """Exponents and shapes of the first-order system."""
+    n = len(stiffness)
+    system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
+    exponent, shape = np.linalg.eig(system)
+    return exponent.astype(np.complex128), shape.astype(np.complex128)
+
+
+def _in_order(
+    middle: tuple[Complexes, Complexes], other: tuple[Complexes, Complexes]
+) -> tuple[Complexes, Complexes] | None:
+    """Another speed's modes in order, length and phase of those in the middle; None where they are others."""
+    seen = np.linalg.solve(middle[1], other[1])
+    order = np.abs(seen).argmax(axis=0)
+    place = np.argsort(order)
+    if not np.array_equal(order[place], np.arange(order.size)):
+        return None
+    turn = seen[order[place], place]
+    return other[0][place], other[1][:, place] / turn

@@ -1,0 +1,85 @@
+"""What of a contact mode goes with the speed: polynomials over a range of speeds."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit
+
+if TYPE_CHECKING:
+    from rubhpc.kernels.contact_modes import ModeTables
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Ints = NDArray[np.int64]
+
+
+class Course(NamedTuple):
+    """Entries of an array that go with the speed, k of them."""
+
+    at: Ints  # (k,), in the array, flat
+    value: Floats  # (p, k), factors of the powers 0, 1, ... of the place in the range, from -1 to 1
+
+
+class Varying(NamedTuple):
+    """What of a mode goes with the speed; none of it where matrices are held."""
+
+    kept: Floats  # (s,), the memory of what `HeldMode` has of it
+    kept_shape: Course
+    kept_entry: Course
+    motion_re: Course  # of the tables, as those that follow
+    motion_im: Course
+    switch_re: Course
+    switch_im: Course
+    slip_re: Course
+    slip_im: Course
+    enter_re: Course
+    enter_im: Course
+    enter_constant: Course
+
+
+@jit
+def take_course(course: Course, place: float, values: Floats) -> None:
+    """Bring an array (s,) to a place in the range."""
+    value = course.value
+    last = value.shape[0] - 1
+    for j in range(course.at.size):
+        total = value[last, j]
+        for p in range(last - 1, -1, -1):
+            total = total * place + value[p, j]
+        values[course.at[j]] = total
+
+
+@jit
+def vary(tables: ModeTables, mode: int, varying: Varying, place: float) -> None:
+    """Bring a mode and its tables to a place in the range, but for what follows from these."""
+    take_course(varying.kept_shape, place, varying.kept)
+    take_course(varying.kept_entry, place, varying.kept)
+    take_course(varying.motion_re, place, tables.motion_re[mode].reshape(-1))
+    take_course(varying.motion_im, place, tables.motion_im[mode].reshape(-1))
+    take_course(varying.switch_re, place, tables.switch_re[mode].reshape(-1))
+    take_course(varying.switch_im, place, tables.switch_im[mode].reshape(-1))
+    take_course(varying.slip_re, place, tables.slip_re[mode].reshape(-1))
+    take_course(varying.slip_im, place, tables.slip_im[mode].reshape(-1))
+    take_course(varying.enter_re, place, tables.enter_re[mode].reshape(-1))
+    take_course(varying.enter_im, place, tables.enter_im[mode].reshape(-1))
+    take_course(varying.enter_constant, place, tables.enter_constant[mode].reshape(-1))
+
+
+@jit
+def vary_rates(tables: ModeTables, mode: int, exponent: Complexes, n_eigenmode: int) -> None:
+    """Rates of what eigenmodes make of switch functions and slip, as their exponents are."""
+    for i in range(tables.switch_re.shape[1]):
+        for k in range(n_eigenmode):
+            rate = complex(tables.switch_re[mode, i, k], tables.switch_im[mode, i, k]) * exponent[k]
+            tables.rate_re[mode, i, k], tables.rate_im[mode, i, k] = rate.real, rate.imag
+            if i < tables.bend_re.shape[1]:
+                rate = rate * exponent[k]
+                tables.bend_re[mode, i, k], tables.bend_im[mode, i, k] = rate.real, rate.imag
+    for i in range(tables.slip_re.shape[1]):
+        for k in range(n_eigenmode):
+            rate = complex(tables.slip_re[mode, i, k], tables.slip_im[mode, i, k]) * exponent[k]
+            tables.slip_rate_re[mode, i, k], tables.slip_rate_im[mode, i, k] = rate.real, rate.imag
