@@ -139,7 +139,7 @@ def left_over(exponent: Complexes, before: float, after: float, *, has_touched: 
 def _spans(before: Standing, new: PieceSetup, change: Change) -> tuple[float, float]:
     """Times, s, since the speed was that of the matrices before, and until it is that of those to come.
 
-    Matrices that follow the speed change evenly: a revolution before and after tells slow from fast.
+    Matrices that follow the speed change evenly: a revolution before and after parts slow from fast.
     """
     old = before.setup
     if old.held.is_followed and new.held.is_followed:

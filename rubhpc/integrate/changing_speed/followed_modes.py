@@ -28,11 +28,14 @@ A = TypeVar("A", Floats, Complexes)
 
 NODE = 0.8  # places at either side, over half of the range: the error is greatest at its ends
 PLACES = np.array([0.0, -0.5, 0.5, -1.0, 1.0])  # where what enters is made exact
-_POWERS = np.linalg.inv(np.vander(PLACES, increasing=True))
-NEWTON = 2  # steps: what is left of an error of a hundredth is below rounding
+POWERS = np.linalg.inv(np.vander(PLACES, increasing=True))
+NEWTON, EXACT = 6, 1e-9  # steps at most, and share of a mode in another that needs no more than one
 FAR = 0.5  # share of a mode in another of a speed beside it, over its own, from which it is not the same
 EQUAL = 1e-9  # relative difference of two exponents that repeat
-STILL = 1e-11  # relative change below which an entry does not go with the speed
+STILL, LEAST = (
+    1e-13,
+    1e-16,
+)  # change of an entry over it, and over the greatest, below which it stays as it is
 NONE = Course(np.zeros(0, dtype=np.int64), np.zeros((1, 0)))
 NOTHING = Varying(np.zeros(0), *[NONE] * (len(Varying._fields) - 1))
 _TABLES = "motion_re", "motion_im", "switch_re", "switch_im", "slip_re", "slip_im"
@@ -64,18 +67,10 @@ def matched(mode: ContactMode, other: ContactMode) -> ContactMode | None:
     enter, motion = mode.enter[:m], other.motion[:, :m]
     weight = _weights(mode)
     seen = enter @ motion / weight[:, np.newaxis]
-    order = np.abs(seen).argmax(axis=0)
-    if np.unique(order).size < m:
+    if (found := aligned(seen, mode.exponent[:m])) is None:
         return None
-    place = np.argsort(order)
-    seen = seen[:, place]
-    turn = np.diag(np.diag(seen))
-    for group in _repeated(mode.exponent[:m]):
-        turn[np.ix_(group, group)] = seen[np.ix_(group, group)]
-    own = np.abs(np.diag(turn))
-    if np.any(np.abs(seen - turn).max(axis=0, initial=0.0) > FAR * own) or np.any(
-        _weights(other)[place] != weight
-    ):
+    place, turn = found
+    if np.any(_weights(other)[place] != weight):
         return None
     is_same = (motion[:, place] == mode.motion[:, :m]).all(axis=0)
     turn[:, is_same] = np.eye(m)[:, is_same]
@@ -90,6 +85,35 @@ def matched(mode: ContactMode, other: ContactMode) -> ContactMode | None:
     return replace(other, exponent=exponent, motion=shapes, enter=entered, take_off=take_off, switch=switch)
 
 
+def aligned(seen: Complexes, exponent: Complexes) -> tuple[NDArray[np.int64], Complexes] | None:
+    """Which modes (m,) of another speed are those seen here, and what they are of these, (m, m).
+
+    None where they are others.
+
+    Parameters
+    ----------
+    seen : (m, m)
+        Modes of the other speed in coordinates of those here, by columns.
+    exponent : (m,), 1/s
+        Of those here; modes whose exponents repeat are taken together.
+    """
+    groups, m = _groups(exponent), exponent.size
+    shares = np.array([np.linalg.norm(seen[group], axis=0) for group in groups])
+    of_group, place = shares.argmax(axis=0), np.zeros(m, dtype=np.int64)
+    for number, group in enumerate(groups):
+        members = np.flatnonzero(of_group == number)
+        if members.size != group.size:
+            return None
+        place[group] = members
+    seen, turn = seen[:, place], np.zeros_like(seen)
+    for group in groups:
+        turn[np.ix_(group, group)] = seen[np.ix_(group, group)]
+    own = np.linalg.norm(turn, axis=0)
+    if np.any(np.abs(seen - turn).max(axis=0, initial=0.0) > FAR * own):
+        return None
+    return place, turn
+
+
 def followed(nodes: tuple[Tabulated, Tabulated, Tabulated], seen: Complexes) -> HeldMode:
     """What is held of the mode in the middle, with what of it goes with the speed.
 
@@ -101,15 +125,15 @@ def followed(nodes: tuple[Tabulated, Tabulated, Tabulated], seen: Complexes) -> 
     courses: dict[str, Course] = {}
     for name in _TABLES:
         values = [getattr(node.row, name)[0] for node in nodes]
-        courses[name] = _course(_through(values, m), STILL)
+        courses[name] = _course(_through(values, m))
     enter, take_off = _entries(nodes)
     padded = np.zeros((len(PLACES), *middle.row.enter_re.shape[1:]), dtype=np.complex128)
     padded[:, :, :m] = enter.transpose(0, 2, 1)
-    courses["enter_re"] = _course(_POWERS @ padded.real.reshape(len(PLACES), -1), STILL)
-    courses["enter_im"] = _course(_POWERS @ padded.imag.reshape(len(PLACES), -1), STILL)
+    courses["enter_re"] = _course(POWERS @ padded.real.reshape(len(PLACES), -1))
+    courses["enter_im"] = _course(POWERS @ padded.imag.reshape(len(PLACES), -1))
     constant = np.zeros((len(PLACES), *middle.row.enter_constant.shape[1:]))
     constant[..., 0, :m], constant[..., 1, :m] = take_off.real, take_off.imag
-    courses["enter_constant"] = _course(_POWERS @ constant.reshape(len(PLACES), -1), STILL)
+    courses["enter_constant"] = _course(POWERS @ constant.reshape(len(PLACES), -1))
     shape = {name: [getattr(node.held, name) for node in nodes] for name in _HELD}
     entry = {"drive": enter[:, :, n:] @ seen, "mirrored_drive": enter[:, :, n:].conj() @ seen}
     of_rim: dict[str, list[Any]] = {}
@@ -120,10 +144,10 @@ def followed(nodes: tuple[Tabulated, Tabulated, Tabulated], seen: Complexes) -> 
     kept, views, places = _room({name: values[0] for name, values in (shape | entry).items()}, of_rim)
     shapes, entries = [], []
     for name, values in [*shape.items(), *(("rim " + key, value) for key, value in of_rim.items())]:
-        shapes.append(_moved(_course(_through(values, m, name in ("exponent", "row")), STILL), places[name]))
+        shapes.append(_moved(_course(_through(values, m, name in ("exponent", "row"))), places[name]))
     for name, value in entry.items():
         flat = np.ascontiguousarray(value).view(np.float64).reshape(len(PLACES), -1)
-        entries.append(_moved(_course(_POWERS @ flat, STILL), places[name]))
+        entries.append(_moved(_course(POWERS @ flat), places[name]))
     rim = {name.removeprefix("rim "): view for name, view in views.items() if name.startswith("rim ")}
     if "entered" in views:
         rim["entered"] = views.pop("entered")
@@ -146,11 +170,12 @@ def _weights(mode: ContactMode) -> Floats:
     return np.where(own > 1.5, 2.0, 1.0)
 
 
-def _repeated(exponent: Complexes) -> list[NDArray[np.int64]]:
-    """Places of exponents that repeat, of each apart."""
+def _groups(exponent: Complexes) -> list[NDArray[np.int64]]:
+    """Places of the exponents, those that repeat together."""
     near = np.abs(exponent[:, np.newaxis] - exponent) <= EQUAL * np.abs(exponent)
-    found = {tuple(np.flatnonzero(row)) for row in near if row.sum() > 1}
-    return [np.array(group) for group in found]
+    if near.sum() == exponent.size:
+        return list(np.arange(exponent.size)[:, np.newaxis])
+    return [np.array(group) for group in sorted({tuple(np.flatnonzero(row)) for row in near})]
 
 
 def _entries(nodes: tuple[Tabulated, Tabulated, Tabulated]) -> tuple[Complexes, Complexes]:
@@ -170,6 +195,8 @@ def _entries(nodes: tuple[Tabulated, Tabulated, Tabulated]) -> tuple[Complexes, 
             off = enter @ shape - np.eye(m)
             off_conjugate = np.where(weight > 1.5, enter @ shape.conj(), 0.0)
             enter = enter - off @ enter - off_conjugate @ enter.conj()
+            if max(np.abs(off).max(initial=0.0), np.abs(off_conjugate).max(initial=0.0)) < EXACT:
+                break
         for row in grips if place else ():
             enter = enter - np.outer(enter @ motion[:, row], mode.enter[row])
         enters.append(enter)
@@ -187,10 +214,10 @@ def _through(values: list[Any], m: int, skips_response: bool = True) -> Floats:
     return np.ascontiguousarray(factors).view(np.float64).reshape(3, -1)
 
 
-def _course(factors: Floats, still: float) -> Course:
+def _course(factors: Floats) -> Course:
     """The entries that go with the speed, of factors (p, s)."""
     change = np.abs(factors[1:]).sum(axis=0)
-    at = np.flatnonzero(change > still * np.maximum(np.abs(factors[0]), change.max(initial=0.0)))
+    at = np.flatnonzero(change > np.maximum(STILL * np.abs(factors[0]), LEAST * change.max(initial=0.0)))
     return Course(at, np.ascontiguousarray(factors[:, at]))
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.followed_modes import EQUAL, NODE, parabola
+from rubhpc.integrate.changing_speed.followed_modes import EQUAL, NODE, POWERS, aligned, parabola
+from rubhpc.integrate.changing_speed.followed_modes import PLACES as INVERSES
 from rubhpc.integrate.changing_speed.held_matrices import NARROWEST
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.integrate.reduced_model.standstill import cutoff_frequency
@@ -35,6 +36,8 @@ ORDERS, HIGHEST = 0.5, 16.0  # of the speed: between frequencies at which these 
 AT_ENDS = 0.5  # error at the ends of a range over the accuracy, of which the third order leaves little inside
 BY_ACCELERATION = 1.0  # the same by the acceleration, at the ends of its range
 PLACES = -1.0, -0.5, 0.5, 1.0  # in a range, where it is judged beside resonances
+BETWEEN = -0.8, 0.8  # where what enters the modes errs most
+LEAK = 0.2  # of it by which an event may change a motion, over the accuracy
 SAFE = 0.9  # share of the range that would just do
 LEAST, MOST = 0.2, 0.85  # factors by which a range shrinks
 
@@ -87,11 +90,10 @@ def followed_reach(
         swing = _swing(rotor, speed, momentum, accuracy)
         return Reach(widest, swing, is_followed=False)
     of_part = _of_part(rotor, part)
-    half = widest
+    half, allowed = widest, AT_ENDS * accuracy
     while True:
         middle = speed + sense * half
-        error = _error(of_part, middle, half, abs(acceleration))
-        allowed = AT_ENDS * accuracy
+        error = _error(of_part, middle, half, abs(acceleration), allowed)
         if error <= allowed or half <= NARROWEST * speed:
             break
         half *= float(np.clip(SAFE * (allowed / error) ** (1.0 / 3.0), LEAST, MOST))
@@ -124,14 +126,15 @@ def _of_part(rotor: Rotor, part: Ints) -> Rotor:
     )
 
 
-def _error(rotor: Rotor, middle: float, half: float, acceleration: float) -> float:
+def _error(rotor: Rotor, middle: float, half: float, acceleration: float, allowed: float) -> float:
     """Relative error of the worst signal in a range; infinite where modes cannot be followed."""
     nodes = [_modes(*rotor.matrices(middle + place * half)) for place in (0.0, -NODE, NODE)]
     before, behind = (_in_order(nodes[0], other) for other in nodes[1:])
     if before is None or behind is None:
         return np.inf
     nodes[1:] = before, behind
-    worst = 0.0
+    # Of the fifth order: as an error of the third that asks for the same range.
+    worst: float = allowed * (_leak(nodes, middle) * AT_ENDS / (LEAK * allowed)) ** 0.6
     for place in (*PLACES, *_resonances(nodes, middle, half)):
         speed = middle + place * half
         growth = min(PASSING * speed, acceleration / half)
@@ -144,6 +147,21 @@ def _error(rotor: Rotor, middle: float, half: float, acceleration: float) -> flo
         motion = shape @ (modal / (at[:, np.newaxis, np.newaxis] - exponent[:, np.newaxis]))
         own = _signals(rotor, at, motion[:, :n], motion[:, n:])
         worst = max(worst, _relative(own - true, true))
+    return worst
+
+
+def _leak(nodes: list[tuple[Complexes, Complexes]], speed: float) -> float:
+    """What a motion gains or loses, over it, as it enters shapes by what stands for their inverse."""
+    shapes = nodes[0][1], nodes[1][1], nodes[2][1]
+    inverse = np.linalg.inv(np.array([parabola(shapes, place) for place in INVERSES.tolist()]))
+    factors = np.tensordot(POWERS, inverse, axes=1)
+    n = len(shapes[0])
+    scale = np.repeat([speed, 1.0], n // 2)
+    worst = 0.0
+    for place in BETWEEN:
+        entered = np.tensordot(place ** np.arange(len(INVERSES)), factors, axes=1)
+        off = (parabola(shapes, place) @ entered - np.eye(n)) * scale[:, np.newaxis] / scale
+        worst = max(worst, float(np.abs(off).max()))
     return worst
 
 
@@ -175,7 +193,7 @@ def _swing(rotor: Rotor, speed: float, momentum: Floats, accuracy: float) -> flo
 def _asked(rotor: Rotor, speed: float, growth: float) -> tuple[Complexes, Complexes]:
     """Exponents (f,), that of the unbalance first, and loads (n, 1 + n_force), unbalance first."""
     orders = np.arange(0.0, min(rotor.top, HIGHEST * speed), ORDERS * speed)
-    at = np.concatenate([[complex(growth, speed)], 1j * orders + STRUCK * speed])
+    at: Complexes = np.concatenate([[complex(growth, speed)], 1j * orders + STRUCK * speed])
     return at, np.column_stack([rotor.phasor, rotor.force.T.astype(np.complex128)])
 
 
@@ -183,8 +201,8 @@ def _answers(stiffness: Floats, damping: Floats, at: Complexes, load: Complexes)
     """Displacements (f, n, loads) under loads times exp(at t)."""
     s = at[:, np.newaxis, np.newaxis]
     matrices = stiffness + s * damping + s**2 * np.eye(len(stiffness))
-    found: Complexes = np.linalg.solve(matrices, np.broadcast_to(load, (at.size, *load.shape)))
-    return found
+    loads = np.broadcast_to(load, (at.size, *load.shape))
+    return np.asarray(np.linalg.solve(matrices, loads), dtype=np.complex128)
 
 
 def _signals(
@@ -224,10 +242,9 @@ def _in_order(
     middle: tuple[Complexes, Complexes], other: tuple[Complexes, Complexes]
 ) -> tuple[Complexes, Complexes] | None:
     """Another speed's modes in order, length and phase of those in the middle; None where they are others."""
-    seen = np.linalg.solve(middle[1], other[1])
-    order = np.abs(seen).argmax(axis=0)
-    place = np.argsort(order)
-    if not np.array_equal(order[place], np.arange(order.size)):
+    seen: Complexes = np.linalg.solve(middle[1], other[1]).astype(np.complex128)
+    found = aligned(seen, middle[0])
+    if found is None:
         return None
-    turn = seen[order[place], place]
-    return other[0][place], other[1][:, place] / turn
+    place, turn = found
+    return other[0][place], other[1][:, place] @ np.linalg.inv(turn)

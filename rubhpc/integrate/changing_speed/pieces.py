@@ -292,7 +292,7 @@ class Pieces:
         return model, reduced
 
     def _followed_reach(self, speed: float, acceleration: float) -> tuple[float, float]:
-        """Half of the ranges of speeds, rad/s, and accelerations, rad/s^2, in which modes follow the speed."""
+        """Half of the ranges of speeds, rad/s, and accelerations, rad/s^2, in which modes follow them."""
 
         def matrices(at: float) -> tuple[Floats, Floats]:
             _, damping, stiffness = self._matrices(at, acceleration, 0.0)
