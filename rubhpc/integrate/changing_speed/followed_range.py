@@ -37,7 +37,7 @@ AT_ENDS = 0.5  # error at the ends of a range over the accuracy, of which the th
 BY_ACCELERATION = 1.0  # the same by the acceleration, at the ends of its range
 PLACES = -1.0, -0.5, 0.5, 1.0  # in a range, where it is judged beside resonances
 BETWEEN = -0.8, 0.8  # where what enters the modes errs most
-LEAK = 0.2  # of it by which an event may change a motion, over the accuracy
+LEAK = 1.0  # of it by which an event may change a motion, over the accuracy
 SAFE = 0.9  # share of the range that would just do
 LEAST, MOST = 0.2, 0.85  # factors by which a range shrinks
 
