@@ -19,6 +19,7 @@ from rubhpc.integrate.reduced_model.contact_mode import (
     solve_parts,
 )
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
+from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.friction_library import FrictionLibrary
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_library import (
@@ -30,6 +31,7 @@ from rubhpc.integrate.reduced_model.mode_library import (
 from rubhpc.integrate.reduced_model.mode_tables import tabulate
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies
+from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
 from rubhpc.integrate.reduced_model.truncation import (
     MOST_MODES,
     kept_modes,
@@ -185,7 +187,13 @@ class ModalSetup:
             "sample_level": self.sample_level,
             "n_level": self._n_level,
             "is_measured": self.is_measured,
+            "among": self._among,
         }
+
+    @cached_property
+    def _among(self) -> OpenBodies | None:
+        """Several stators while open."""
+        return open_bodies(self.reduced, self.model, self._opened)
 
     @cached_property
     def _known(self) -> Solved:
@@ -218,7 +226,8 @@ class ModalSetup:
         if friction not in self._friction_libraries:
             pairs = self.friction_pairs(friction)
             opened = solve_friction_mode(self.reduced, pairs, 0, self._known)
-            shared: Shared = {**self._shared, "opened": opened, "known": self._known}
+            among = open_bodies(self.reduced, self.model, opened)
+            shared: Shared = {**self._shared, "opened": opened, "known": self._known, "among": among}
             self._friction_libraries[friction] = FrictionLibrary(self.reduced, self.model, pairs, **shared)
         return self._friction_libraries[friction]
 
@@ -266,13 +275,21 @@ class ModalSetup:
         """Tables of the mode with every pair open alone, as wide as those of the friction's library."""
         if friction not in self._open_tables:
             library = self._libraries.get(friction)
+            width = (
+                library.width
+                if library
+                else width_without_modes(self.reduced, self.model, friction, self._opened.exponent.size)
+            )
+            if self._among is None:
+                energies = energies_of(self._opened, self.reduced, None, width)
+            else:
+                energies = self._among.opened_energies.padded(width)
             self._open_tables[friction] = tabulate(
                 self._opened,
                 self.reduced,
                 directions(self.reduced, self.model, friction)[2],
-                width=library.width
-                if library
-                else width_without_modes(self.reduced, self.model, friction, self._opened.exponent.size),
+                energies=energies,
+                width=width,
                 tick=self.tick,
                 sample_level=self.sample_level,
                 n_level=self._n_level,

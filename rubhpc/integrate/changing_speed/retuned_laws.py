@@ -10,9 +10,10 @@ from rubhpc.integrate.changing_speed.mode_parts import Linear
 from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
 from rubhpc.integrate.reduced_model.contact_mode import confine
 from rubhpc.integrate.reduced_model.friction_library import MOST_FRICTION_MODES
-from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, solve_friction_mode, states_of
+from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, states_of
 from rubhpc.integrate.reduced_model.mode_library import SPARE
-from rubhpc.integrate.reduced_model.penalty_mode import overlap_rows, solve_penalty_mode
+from rubhpc.integrate.reduced_model.penalty_mode import overlap_rows
+from rubhpc.integrate.reduced_model.touching import friction_mode_among, penalty_mode_among
 from rubhpc.kernels.friction_coordinates import LANES
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, lifted_place
 from rubhpc.kernels.retuning_laws import RimPart, Springs
@@ -43,7 +44,10 @@ class RetunedPenaltyLibrary(RetunedLibrary):
     def _solve(self, mask: int) -> ContactMode:
         if mask == 0:
             return super()._solve(0)
-        return solve_penalty_mode(self.reduced, self._penalty, self._opened, mask, self._known)
+        return penalty_mode_among(self._among, self.reduced, self._penalty, self._opened, mask, self._known)
+
+    def _closed_pairs(self, mask: int) -> list[int]:
+        return self._penalty.pressed(mask)
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> ModeTables:
         if not self._is_measured:
@@ -81,7 +85,10 @@ class RetunedFrictionLibrary(RetunedLibrary):
         super().__init__(*args, **keys)
 
     def _solve(self, mask: int) -> ContactMode:
-        return solve_friction_mode(self.reduced, self._pairs, mask, self._known)
+        return friction_mode_among(self._among, self.reduced, self._pairs, mask, self._known)
+
+    def _closed_pairs(self, mask: int) -> list[int]:
+        return self._pairs.closed(mask)
 
     def _width_of(self, model: Model, friction: float) -> int:
         return -(-(self._opened.exponent.size + SPARE) // LANES) * LANES

@@ -14,10 +14,11 @@ import numpy as np
 from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
 from rubhpc.integrate.changing_speed.followed_modes import Tabulated, followed, matched, taken
 from rubhpc.integrate.changing_speed.mode_parts import Linear, held_mode, output_operators, speeds_of
-from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode
+from rubhpc.integrate.reduced_model.contact_mode import confine
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.table_stack import TableStack
+from rubhpc.integrate.reduced_model.touching import OpenBodies, contact_mode_among, open_bodies
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.retuning import retune
 from rubhpc.kernels.retuning_laws import Springs
@@ -101,7 +102,9 @@ class RetunedLibrary(ModeLibrary):
         self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self._phasor, self._output = phasor, np.hstack(output_operators(reduced))
+        self._among: OpenBodies | None = None
         self._opened = self._solve(0)
+        self._among = open_bodies(reduced, model, self._opened)
         self.first_masks = [0]
         self.width = self._width_of(model, friction)
         self._beside = [self._with(other) for other in beside]
@@ -286,6 +289,7 @@ class RetunedLibrary(ModeLibrary):
         other = copy(self)
         other.reduced, other._output = reduced, np.hstack(output_operators(reduced))
         other._beside, other._opened = [], other._solve(0)
+        other._among = self._among.at(reduced, other._opened) if self._among else None
         return other
 
     def _solve_at(self, mask: int, place: int, within: float) -> None:
@@ -319,7 +323,8 @@ class RetunedLibrary(ModeLibrary):
 
     def _solve(self, mask: int) -> ContactMode:
         """The mode of a set of states."""
-        return solve_contact_mode(self.reduced, self.gap_jacobian, self.force_direction, mask, self._known)
+        directions = self.gap_jacobian, self.force_direction
+        return contact_mode_among(self._among, self.reduced, directions, mask, self._known)
 
     def _solved(self, mask: int) -> ContactMode:
         return self._opened if mask == 0 else self._solve(mask)

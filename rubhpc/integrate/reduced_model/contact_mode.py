@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import blake2b
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
 from scipy.linalg import null_space
 
 from rubhpc.errors import InputError
@@ -17,11 +18,10 @@ from rubhpc.integrate.reduced_model.products import expanded, real_times
 from rubhpc.integrate.reduced_model.repeated_exponents import real_ones, separate
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
     Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
     Complexes = NDArray[np.complex128]
     Solved = dict[bytes, tuple[Complexes, Complexes, Complexes]]  # parts, by their names (`_name_of`)
 
@@ -52,6 +52,14 @@ def _size(part: bytes, solved: tuple[Complexes, Complexes, Complexes]) -> int:
     return len(part) + sum(values.nbytes for values in solved)
 
 
+class Places(NamedTuple):
+    """Where a contact mode of some pairs stands in that of all bodies."""
+
+    coordinate: Ints  # ascending
+    take_off: Ints  # rows
+    switch: Ints  # rows
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ContactMode:
     """Motion with one set of pairs closed: `x = Re(motion @ z)`, x (2 n,) displacements, then velocities.
@@ -75,6 +83,17 @@ class ContactMode:
     def drift(self) -> Floats:
         """How fast coordinates grow linearly, their unit per second: none does here."""
         return np.zeros(self.exponent.size)
+
+    @classmethod
+    def places(cls, own: int, m: int, q: int, pairs: Ints) -> Places:
+        """Places of `own` eigenmodes and these pairs (r,) among m eigenmodes and q pairs."""
+        return Places(
+            np.concatenate([np.arange(own), [m], m + 1 + pairs]), np.append([0, 1], 2 + pairs), pairs
+        )
+
+    def other_fields(self, columns: Ints, m: int, end: int) -> dict[str, Any]:
+        """What else changes where m eigenmodes are in a contact mode of `end` coordinates."""
+        return {}
 
 
 def solve_contact_mode(

@@ -5,19 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
+from numpy.typing import NDArray
 
-from rubhpc.integrate.reduced_model.coupling import coupled_rows
-from rubhpc.integrate.reduced_model.products import real_times
+from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 
 if TYPE_CHECKING:
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
-    Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
     Complexes = NDArray[np.complex128]
 
-FEW_PAIRS = 5  # of which there is little to take apart
+Floats = NDArray[np.float64]
+
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
 
 
@@ -28,6 +28,66 @@ class Growth(NamedTuple):
     speed: NDArray[np.float64] = np.zeros(0)  # 1/s times their unit
     steady: int = -1  # the coordinate that is 1
 
+    def among(self, columns: NDArray[np.int64]) -> Growth:
+        """The same counted among some of the coordinates, in ascending order."""
+        which, steady = np.searchsorted(columns, self.which), int(np.searchsorted(columns, self.steady))
+        return Growth(which, self.speed, steady)
+
+
+class Energies(NamedTuple):
+    """Primitives of the powers of damping and unbalance, by the coordinates of a mode."""
+
+    loss: Floats  # (2 m, 2 m), form of their real and imaginary parts, J
+    work: NDArray[np.complex128]  # (2, m), J
+    steady: Floats  # (2,), W, that no form holds
+
+    def add(self, columns: NDArray[np.int64], part: Energies) -> None:
+        """Add those of a part of the bodies, which has some of the coordinates."""
+        both = np.concatenate([columns, self.work.shape[1] + columns])
+        self.loss[both[:, None], both] += part.loss
+        self.work[:, columns] += part.work
+        self.steady[:] += part.steady
+
+    def of(self, columns: NDArray[np.int64]) -> Energies:
+        """Of some of the coordinates, which nothing drives."""
+        both = np.concatenate([columns, self.work.shape[1] + columns])
+        return Energies(self.loss[both[:, None], both], self.work[:, columns], np.zeros(2))
+
+    def padded(self, width: int) -> Energies:
+        """The same among more coordinates, in whose motion there is no energy."""
+        found = Energies.none(width)
+        found.add(np.arange(self.work.shape[1]), self)
+        return found
+
+    @classmethod
+    def none(cls, width: int) -> Energies:
+        """Zeros."""
+        return cls(np.zeros((2 * width, 2 * width)), np.zeros((2, width), dtype=complex), np.zeros(2))
+
+
+def energies_of(mode: ContactMode, reduced: ReducedModel, friction: Complexes | None, width: int) -> Energies:
+    """Of a contact mode, its coordinates padded to `width`.
+
+    Parameters
+    ----------
+    friction : (n, m), N, optional
+        Friction forces on the motion with each coordinate; what they take is counted with the damping.
+    """
+    spare = width - mode.exponent.size
+    exponent, motion = np.pad(mode.exponent, (0, spare)), np.pad(mode.motion, ((0, 0), (0, spare)))
+    rubbing = np.zeros((len(motion) // 2, width), dtype=complex)
+    if friction is not None:
+        rubbing[:, : mode.exponent.size] = friction
+    return energy_forms(reduced, exponent, motion, rubbing, mode.n_eigenmode, growth_of(mode))
+
+
+def growth_of(mode: ContactMode) -> Growth:
+    """The coordinates of a mode that grow linearly."""
+    if not isinstance(mode, FrictionMode):
+        return Growth()
+    which = np.flatnonzero(mode.growth)
+    return Growth(which, mode.growth[which], mode.n_eigenmode + 1 + len(mode.switch) // 2)
+
 
 def energy_forms(
     reduced: ReducedModel,
@@ -36,8 +96,8 @@ def energy_forms(
     friction: Complexes,
     n_eigenmode: int,
     growing: Growth,
-) -> tuple[Floats, Complexes, Floats]:
-    """Primitives of the powers of damping and unbalance: (2 m, 2 m), (2, m) and steady (2,), W.
+) -> Energies:
+    """Primitives of the powers of damping and unbalance.
 
     With the damping counts `friction` (n, m), whose power on the motion is what the drive gives for it less
     what it turns into heat.
@@ -48,13 +108,12 @@ def energy_forms(
     n = reduced.stiffness.shape[0]
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
     shape, rate = motion[:n], motion[n:]
-    parts = parts_of(motion, n_eigenmode) if len(reduced.degree) > FEW_PAIRS else []
-    resisting = _times(reduced.damping, rate, parts) + _times(skew, shape, parts) - friction
+    resisting = reduced.damping @ rate + skew @ shape - friction
     phasor = reduced.force[0] - 1j * reduced.force[1]
     turning = np.full(exponent.shape, 1j * reduced.spin)
     forms = []
     for partner, other in ((resisting, exponent), (resisting.conj(), exponent.conj())):
-        power = _power(rate, partner, parts)
+        power = rate.T @ partner
         form = _primitive(power, exponent[:, None] + other)
         if growing.which.size:
             _follow_growth(form, power, exponent, n_eigenmode, growing)
@@ -72,56 +131,13 @@ def energy_forms(
             _primitive(phasor.conj() @ rate, exponent - turning),
         ]
     )
-    response = rate[:, n_eigenmode]
-    steady = np.array([response @ resisting[:, n_eigenmode].conj(), response @ phasor.conj()])
+    steady = np.zeros(2, dtype=complex)
+    if exponent.size > n_eigenmode:
+        response = rate[:, n_eigenmode]
+        steady[:] = response @ resisting[:, n_eigenmode].conj(), response @ phasor.conj()
     if growing.which.size:
         steady[0] += 2.0 * rate[:, growing.steady] @ resisting[:, growing.steady]
-    return 0.5 * (loss + loss.T), work, 0.5 * steady.real
-
-
-def parts_of(motion: Complexes, n_eigenmode: int) -> list[tuple[Ints, Ints]]:
-    """Rows and columns of a motion (2 n, m) that belong together: (parts, r) and (parts, c) for each size.
-
-    An open stator moves in its own modes alone. Parts of one size, none of which moves otherwise than in
-    eigenmodes, are taken together.
-    """
-    n = len(motion) // 2
-    is_moved = (motion[:n] != 0.0) | (motion[n:] != 0.0)
-    shared = is_moved.astype(np.float32)
-    found: list[tuple[Ints, Ints]] = []
-    alike: dict[tuple[int, int], list[tuple[Ints, Ints]]] = {}
-    for rows in coupled_rows(shared @ shared.T > 0.0):
-        columns = np.flatnonzero(is_moved[rows].any(axis=0))
-        if columns.size and columns[-1] < n_eigenmode:
-            alike.setdefault((rows.size, columns.size), []).append((rows, columns))
-        else:
-            found.append((rows[np.newaxis], columns[np.newaxis]))
-    return found + [
-        (np.array(rows), np.array(columns))
-        for rows, columns in (zip(*of, strict=True) for of in alike.values())
-    ]
-
-
-def _times(matrix: Floats, motion: Complexes, parts: list[tuple[Ints, Ints]]) -> Complexes:
-    """Product of a matrix (n, n) with a motion (n, m), where parts are given part by part."""
-    if not parts:
-        return np.asarray(matrix @ motion)
-    product = np.zeros_like(motion)
-    for rows, columns in parts:
-        at = rows[:, :, np.newaxis], columns[:, np.newaxis]
-        product[at] = real_times(matrix[rows[:, :, np.newaxis], rows[:, np.newaxis]], motion[at])
-    return product
-
-
-def _power(rate: Complexes, partner: Complexes, parts: list[tuple[Ints, Ints]]) -> Complexes:
-    """Products (m, m) of the columns of two motions (n, m), where parts are given part by part."""
-    if not parts:
-        return np.asarray(rate.T @ partner)
-    power = np.zeros((rate.shape[1], rate.shape[1]), dtype=np.complex128)
-    for rows, columns in parts:
-        at = rows[:, :, np.newaxis], columns[:, np.newaxis]
-        power[columns[:, :, np.newaxis], columns[:, np.newaxis]] += rate[at].transpose(0, 2, 1) @ partner[at]
-    return power
+    return Energies(0.5 * (loss + loss.T), work, 0.5 * steady.real)
 
 
 def _follow_growth(

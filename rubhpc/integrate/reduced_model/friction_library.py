@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Unpack
 
-from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, solve_friction_mode
+from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 from rubhpc.integrate.reduced_model.mode_library import SPARE, ModeLibrary, Shared
+from rubhpc.integrate.reduced_model.touching import friction_mode_among
 from rubhpc.kernels.friction_coordinates import LANES
 from rubhpc.kernels.friction_states import FORWARD
 
@@ -52,7 +53,10 @@ class FrictionLibrary(ModeLibrary):
     def _solved(self, mask: int) -> ContactMode:
         if mask == 0:
             return self._opened
-        return solve_friction_mode(self.reduced, self._pairs, mask, self._known)
+        return friction_mode_among(self._among, self.reduced, self._pairs, mask, self._known)
+
+    def _closed_pairs(self, mask: int) -> list[int]:
+        return self._pairs.closed(mask)
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> ModeTables:
         if not self._pairs.stiffness or not self._is_measured:

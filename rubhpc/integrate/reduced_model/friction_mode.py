@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rubhpc.integrate.reduced_model.contact_mode import (
     ContactMode,
+    Places,
     confine,
     modes_of,
     parts_of,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
     Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
     Complexes = NDArray[np.complex128]
 
 
@@ -53,16 +55,34 @@ class FrictionMode(ContactMode):
         """How fast coordinates grow linearly, m/s."""
         return self.growth
 
+    @classmethod
+    def places(cls, own: int, m: int, q: int, pairs: Ints) -> Places:
+        """Places of `own` eigenmodes and these pairs (r,) among m eigenmodes and q pairs."""
+        one = m + 1 + q
+        return Places(
+            coordinate=np.concatenate([np.arange(own), [m], m + 1 + pairs, [one], one + 1 + pairs]),
+            take_off=np.concatenate([[0, 1], 2 + pairs, [2 + q]]),
+            switch=(2 * pairs[:, None] + np.arange(2)).ravel(),
+        )
+
+    def other_fields(self, columns: Ints, m: int, end: int) -> dict[str, Any]:
+        """What else changes where m eigenmodes are in a contact mode of `end` coordinates."""
+        growth = np.zeros(end)
+        growth[columns] = self.growth
+        return {"n_mode": m, "growth": growth}
+
     def friction_forces(self, pairs: FrictionPairs) -> Complexes:
         """Friction forces on the motion with each coordinate, (n, m + 2 + 2 q), N."""
-        traction = np.zeros((len(pairs.gap_jacobian), self.exponent.size), dtype=np.complex128)
-        for i, state in enumerate(states_of(self.mask, len(traction))):
+        closed = pairs.closed(self.mask)
+        traction = np.zeros((len(closed), self.exponent.size), dtype=np.complex128)
+        states = states_of(self.mask, len(pairs.gap_jacobian))
+        for along, i in zip(traction, closed, strict=True):
             first, second = self.switch[2 * i], self.switch[2 * i + 1]
-            if state == STUCK:
-                traction[i] = 0.5 * (second - first)
-            elif state != OPEN:
-                traction[i] = (-pairs.friction if state == BACKWARD else pairs.friction) * first
-        forces: Complexes = pairs.friction_direction.T @ traction
+            if states[i] == STUCK:
+                along[:] = 0.5 * (second - first)
+            else:
+                along[:] = (-pairs.friction if states[i] == BACKWARD else pairs.friction) * first
+        forces: Complexes = pairs.friction_direction[closed].T @ traction
         return forces
 
 
@@ -102,7 +122,10 @@ def mask_of(states: Sequence[int]) -> int:
 
 
 def solve_friction_mode(
-    reduced: ReducedModel, pairs: FrictionPairs, mask: int, known: Solved | None = None
+    reduced: ReducedModel,
+    pairs: FrictionPairs,
+    mask: int,
+    known: Solved | None = None,
 ) -> FrictionMode:
     """Solve the linear system with the pairs in the states of `mask`.
 
@@ -189,13 +212,7 @@ def solve_friction_mode(
             slip = -pairs.friction_direction[i] @ motion[n:]
             slip[one] += pairs.rim_speed[i]
             switch[2 * i], switch[2 * i + 1] = forces[a], sense[a] * slip
-    for i in np.flatnonzero(states == OPEN):
-        switch[2 * i] = pairs.gap_jacobian[i] @ motion[:n]
-        switch[2 * i, m + 1 + i] += 1.0
-        if mask >> lifted_place(q, int(i)) & 1:
-            gap_rate = pairs.gap_jacobian[i] @ motion[n:]
-            switch[2 * i] = pairs.stiffness * switch[2 * i] + pairs.damping * gap_rate
-        switch[2 * i + 1, one] = 1.0
+    watch_open_pairs(switch, motion, pairs, mask, m)
     return FrictionMode(
         mask=mask,
         exponent=np.concatenate([exponent, [1j * reduced.spin], np.zeros(1 + 2 * q)]),
@@ -206,3 +223,16 @@ def solve_friction_mode(
         n_mode=m,
         growth=growth,
     )
+
+
+def watch_open_pairs(switch: Complexes, motion: Complexes, pairs: FrictionPairs, mask: int, m: int) -> None:
+    """Fill in the switch functions of open pairs: their gaps, of lifted ones the tension, and 1."""
+    q, n = pairs.gap_jacobian.shape
+    watched = np.flatnonzero(np.array(states_of(mask, q)) == OPEN)
+    switch[2 * watched] = pairs.gap_jacobian[watched] @ motion[:n]
+    switch[2 * watched, m + 1 + watched] += 1.0
+    switch[2 * watched + 1, m + 1 + q] = 1.0
+    for i in watched:
+        if mask >> lifted_place(q, int(i)) & 1:
+            gap_rate = pairs.gap_jacobian[i] @ motion[n:]
+            switch[2 * i] = pairs.stiffness * switch[2 * i] + pairs.damping * gap_rate

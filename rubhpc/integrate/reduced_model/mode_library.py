@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
-from rubhpc.integrate.reduced_model.contact_mode import ContactMode, count_coordinates, solve_contact_mode
+from rubhpc.integrate.reduced_model.contact_mode import ContactMode, count_coordinates
+from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.mode_tables import bytes_ahead, mode_of, tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
+from rubhpc.integrate.reduced_model.touching import contact_mode_among, open_bodies, penalty_mode_among
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.friction_coordinates import LANES
 
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import Solved
+    from rubhpc.integrate.reduced_model.energy_forms import Energies
+    from rubhpc.integrate.reduced_model.penalty_mode import Penalty
+    from rubhpc.integrate.reduced_model.touching import OpenBodies
     from rubhpc.kernels import contact_modes as kernel
 
     Floats = NDArray[np.float64]
@@ -42,6 +46,7 @@ class Shared(TypedDict, total=False):
     sample_level: int
     n_level: int
     is_measured: bool
+    among: OpenBodies | None
 
 
 class ModeLibrary:
@@ -59,6 +64,8 @@ class ModeLibrary:
         2^(n_level - 1) ticks.
     is_measured : bool
         Whether the tables hold slip, outputs and energies, or what a motion is followed with alone.
+    among : OpenBodies, optional
+        The bodies with every pair open, where they are known.
     """
 
     def __init__(
@@ -73,6 +80,7 @@ class ModeLibrary:
         sample_level: int,
         n_level: int,
         is_measured: bool = True,
+        among: OpenBodies | None = None,
     ) -> None:
         """Start with every pair open; of one pair also with it closed."""
         self.reduced = reduced
@@ -82,6 +90,7 @@ class ModeLibrary:
         self._is_measured = is_measured
         self._opened, self._known = opened, known
         q = len(self.gap_jacobian)
+        self._among = open_bodies(reduced, model, opened) if among is None else among
         self.first_masks = [0] if q > 1 else [0, self._closed]
         modes = [self._solved(mask) for mask in self.first_masks]
         self.width = self._width([mode.exponent.size for mode in modes])
@@ -232,7 +241,19 @@ class ModeLibrary:
     def _solved(self, mask: int) -> ContactMode:
         if mask == 0:
             return self._opened
-        return solve_contact_mode(self.reduced, self.gap_jacobian, self.force_direction, mask, self._known)
+        directions = self.gap_jacobian, self.force_direction
+        return contact_mode_among(self._among, self.reduced, directions, mask, self._known)
+
+    def _closed_pairs(self, mask: int) -> list[int]:
+        """Pairs that act in a set."""
+        return [i for i in range(len(self.gap_jacobian)) if mask >> i & 1]
+
+    def _energies_of(self, mode: ContactMode, reduced: ReducedModel) -> Energies:
+        """Energies of a mode."""
+        friction = self._friction_of(mode)
+        if self._among is None:
+            return energies_of(mode, reduced, friction, self.width)
+        return self._among.energies(mode, reduced, friction, self._closed_pairs(mode.mask), self.width)
 
     def _slip_rows(self) -> Floats:
         """Slip speed with the motion of each pair that the switch functions do not hold."""
@@ -240,7 +261,7 @@ class ModeLibrary:
 
     def _friction_of(self, mode: ContactMode) -> Complexes | None:
         """Friction forces on the motion with each coordinate of a mode (n, m), N; None: not counted."""
-        closed = [i for i in range(len(self.gap_jacobian)) if mode.mask >> i & 1]
+        closed = self._closed_pairs(mode.mask)
         friction: Complexes = (self.force_direction - self.gap_jacobian)[closed].T @ mode.switch[closed]
         return friction
 
@@ -260,7 +281,7 @@ class ModeLibrary:
             mode,
             reduced,
             self._slip_rows(),
-            friction=self._friction_of(mode) if self._is_measured else None,
+            energies=self._energies_of(mode, reduced) if self._is_measured else None,
             width=self.width,
             tick=self._tick,
             sample_level=self._sample_level,
@@ -290,7 +311,10 @@ class PenaltyLibrary(ModeLibrary):
         super().__init__(reduced, model, friction, **shared)
 
     def _solved(self, mask: int) -> ContactMode:
-        return solve_penalty_mode(self.reduced, self._penalty, self._opened, mask, self._known)
+        return penalty_mode_among(self._among, self.reduced, self._penalty, self._opened, mask, self._known)
+
+    def _closed_pairs(self, mask: int) -> list[int]:
+        return self._penalty.pressed(mask)
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
         if not self._is_measured:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.reduced_model.energy_forms import Growth, energy_forms
+from rubhpc.integrate.reduced_model.energy_forms import Energies, growth_of
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 from rubhpc.kernels import contact_modes as kernel
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 GONE = -40.0  # exponent of what has died away
+NO_ENERGIES = Energies(np.zeros((0, 0)), np.zeros((2, 0), dtype=complex), np.zeros(2))
 
 
 def tabulate(
@@ -29,7 +30,7 @@ def tabulate(
     reduced: ReducedModel,
     slip: Floats,
     *,
-    friction: Complexes | None = None,
+    energies: Energies | None = None,
     width: int,
     tick: float,
     sample_level: int,
@@ -43,13 +44,13 @@ def tabulate(
     ----------
     slip : (q, n)
         Slip speed of each pair with the motion; none where the switch functions hold it.
-    friction : (n, m), N, optional
-        Friction forces on the motion with each coordinate; what they take is counted with the damping.
+    energies : Energies, optional
+        Of coordinates padded to `width`; none where nothing is measured.
     tick : float, s
     sample_level, n_level : int
         As in `mode_library.ModeLibrary`.
     is_measured : bool
-        Slip, outputs and energies are empty where not.
+        Slip and outputs are empty where not.
     n_ahead : int
         Samples whose outputs are read from one set of coordinates; with one, no step may pass a sample. With
         none, outputs are left to others.
@@ -69,23 +70,14 @@ def tabulate(
     power = np.exp(exponent * steps[:, None]) * used
     rate = switch * exponent
     sliding = (slip if is_measured else slip[:0]) @ motion[n:]
-    growing, bend = Growth(), np.zeros((0, m), dtype=complex)
+    bend = np.zeros((0, m), dtype=complex)
     if isinstance(mode, FrictionMode):
-        bend = switch * exponent**2
-        growing = Growth(
-            np.flatnonzero(mode.growth),
-            mode.growth[mode.growth != 0.0],
-            mode.n_eigenmode + 1 + len(mode.switch) // 2,
-        )
+        bend, growing = switch * exponent**2, growth_of(mode)
         rate[:, growing.steady] += switch[:, growing.which] @ growing.speed
-    rubbing = np.zeros((n, m), dtype=complex)
-    if friction is not None:
-        rubbing[:, :end] = friction
-    output, loss = np.zeros((2 * m, 0)), np.zeros((0, 0))
-    work, steady_power = np.zeros((2, 0), dtype=complex), np.zeros(2)
+    output = np.zeros((2 * m, 0))
     if is_measured:
         output = _outputs(reduced, exponent, motion, tick * 2.0**sample_level, n_ahead)
-        loss, work, steady_power = energy_forms(reduced, exponent, motion, rubbing, mode.n_eigenmode, growing)
+    loss, work, steady_power = energies or NO_ENERGIES
     halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q or more, 2, m)
     row = kernel.ModeTables(
         mask=np.array(mode.mask),

@@ -49,39 +49,53 @@ def solve_penalty_mode(
 ) -> ContactMode:
     """Solve the linear system with the pairs of `mask` pressed; bits from q on are those that are lifted.
 
-    With `Q` the gap Jacobian and `P` the contact-force directions of the pressed pairs, it is that of
-    `K + k P Q` and `C + c P Q` under the load `-k P` of their clearances. The switch function of a pressed
-    pair is its force, of an open one its gap, of a lifted one the tension that its spring and damper would
-    have. `opened` is the mode in which every pair is open.
+    `opened` is the mode in which every pair is open.
     """
-    pressed, lifted = penalty.pressed(mask), penalty.lifted(mask)
-    n, q = reduced.stiffness.shape[0], len(penalty.gap_jacobian)
-    if pressed:
-        rows, directions = penalty.gap_jacobian[pressed], penalty.force_direction[pressed].T
-        stiffness = reduced.stiffness + penalty.stiffness * directions @ rows
-        damping = reduced.damping + penalty.damping * directions @ rows
-        system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
-        exponent, shape, inverse = modes_of(system, known)
-        phasor = reduced.force[0] - 1j * reduced.force[1]
-        turned = 1j * reduced.spin * np.eye(2 * n) - system
-        response = np.linalg.solve(turned, np.concatenate([np.zeros(n), phasor]))
-        still = np.zeros((2 * n, q))
-        still[:n, pressed] = -penalty.stiffness * np.linalg.solve(stiffness, directions)
-        mode = replace(
-            opened,
-            mask=mask,
-            exponent=np.concatenate([exponent, [1j * reduced.spin], np.zeros(q)]),
-            motion=np.hstack([shape, response[:, None], still]),
-            enter=inverse,
-            take_off=np.vstack([inverse @ response.real, -inverse @ response.imag, (inverse @ still).T]),
-        )
-    else:
-        mode = replace(opened, mask=mask)
+    pressed = penalty.pressed(mask)
+    return watched(pressed_mode(reduced, penalty, pressed, known) if pressed else opened, penalty, mask)
+
+
+def watched(mode: ContactMode, penalty: Penalty, mask: int) -> ContactMode:
+    """The motion of a mode with the switch functions of a set of states.
+
+    That of a pressed pair is its force, of an open one its gap, of a lifted one the tension that its spring
+    and damper would have.
+    """
+    pressed, lifted, (q, n) = penalty.pressed(mask), penalty.lifted(mask), penalty.gap_jacobian.shape
     clear = np.hstack([np.zeros((q, mode.exponent.size - q)), np.eye(q)])
     switch = penalty.gap_jacobian @ mode.motion[:n] + clear
     tension = penalty.stiffness * switch + penalty.damping * (penalty.gap_jacobian @ mode.motion[n:])
     switch[pressed], switch[lifted] = -tension[pressed], tension[lifted]
-    return replace(mode, switch=switch)
+    return replace(mode, mask=mask, switch=switch)
+
+
+def pressed_mode(
+    reduced: ReducedModel, penalty: Penalty, pressed: list[int], known: Solved | None
+) -> ContactMode:
+    """The motion with these pairs pressed, without switch functions.
+
+    With `Q` the gap Jacobian and `P` the contact-force directions of the pressed pairs, it is that of
+    `K + k P Q` and `C + c P Q` under the load `-k P` of their clearances.
+    """
+    n, q = reduced.stiffness.shape[0], len(penalty.gap_jacobian)
+    rows, directions = penalty.gap_jacobian[pressed], penalty.force_direction[pressed].T
+    stiffness = reduced.stiffness + penalty.stiffness * directions @ rows
+    damping = reduced.damping + penalty.damping * directions @ rows
+    system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
+    exponent, shape, inverse = modes_of(system, known)
+    phasor = reduced.force[0] - 1j * reduced.force[1]
+    turned = 1j * reduced.spin * np.eye(2 * n) - system
+    response = np.linalg.solve(turned, np.concatenate([np.zeros(n), phasor]))
+    still = np.zeros((2 * n, q))
+    still[:n, pressed] = -penalty.stiffness * np.linalg.solve(stiffness, directions)
+    return ContactMode(
+        mask=0,
+        exponent=np.concatenate([exponent, [1j * reduced.spin], np.zeros(q)]),
+        motion=np.hstack([shape, response[:, None], still]),
+        enter=inverse,
+        take_off=np.vstack([inverse @ response.real, -inverse @ response.imag, (inverse @ still).T]),
+        switch=np.zeros((q, exponent.size + 1 + q), dtype=np.complex128),
+    )
 
 
 def damped(reduced: ReducedModel, damping: float, along: Floats) -> ReducedModel:

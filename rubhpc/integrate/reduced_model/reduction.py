@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -80,6 +80,21 @@ class ReducedModel:
     def project(self) -> Floats:
         """`basis.T @ mass` (n, n_all), which takes a motion to its coordinates."""
         return self.basis.T @ self.mass
+
+    def part(self, rows: Ints, pairs: Ints) -> ReducedModel:
+        """The model in some of the coordinates, with some of the pairs."""
+        at = rows[:, None], rows
+        return replace(
+            self,
+            basis=self.basis[:, rows],
+            stiffness=self.stiffness[at],
+            damping=self.damping[at],
+            force=self.force[:, rows],
+            degree=self.degree[pairs][:, :, rows],
+            output=self.output[:, rows],
+            carrier=self.carrier[:, :, rows],
+            probe=self.probe[:, :, rows],
+        )
 
 
 def reduce_model(

@@ -15,10 +15,17 @@ from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
 from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
+from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_tables import tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import Penalty, solve_penalty_mode
+from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import directions
+from rubhpc.integrate.reduced_model.touching import (
+    contact_mode_among,
+    friction_mode_among,
+    open_bodies,
+    penalty_mode_among,
+)
 from rubhpc.kernels.contact_modes import enter
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, lifted_place
 from rubhpc.kernels.measuring import energy_forms
@@ -33,6 +40,12 @@ def setup(q):
     ).setup
 
 
+def measured(mode, reduced, slip, friction, *, width, **levels):
+    """Tables of a mode with its energies."""
+    energies = energies_of(mode, reduced, friction, width)
+    return tabulate(mode, reduced, slip, energies=energies, width=width, **levels)
+
+
 class Sliding:
     """Gaps closed by multipliers, steady sliding."""
 
@@ -42,8 +55,13 @@ class Sliding:
         return {}
 
     def tables(self, library, reduced, base, mask, levels):
-        mode = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, mask)
-        return tabulate(mode, reduced, library.slip, friction=library._friction_of(mode), **levels)
+        opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
+        along, among = (
+            (library.gap_jacobian, library.force_direction),
+            open_bodies(reduced, base.model, opened),
+        )
+        mode = contact_mode_among(among, reduced, along, mask, None)
+        return measured(mode, reduced, library.slip, library._friction_of(mode), **levels)
 
 
 STATES = {
@@ -67,8 +85,9 @@ class Sticking:
 
     def tables(self, library, reduced, base, mask, levels):
         pairs = self.pairs(base, reduced.spin)
-        mode = solve_friction_mode(reduced, pairs, mask)
-        return tabulate(mode, reduced, library.slip[:0], friction=mode.friction_forces(pairs), **levels)
+        among = open_bodies(reduced, base.model, solve_friction_mode(reduced, pairs, 0))
+        mode = friction_mode_among(among, reduced, pairs, mask, None)
+        return measured(mode, reduced, library.slip[:0], mode.friction_forces(pairs), **levels)
 
 
 class Springs:
@@ -83,9 +102,10 @@ class Springs:
     def tables(self, library, reduced, base, mask, levels):
         penalty = self.keys(base)["penalty"]
         opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
-        mode = solve_penalty_mode(reduced, penalty, opened, mask)
+        among = open_bodies(reduced, base.model, opened)
+        mode = penalty_mode_among(among, reduced, penalty, opened, mask, None)
         damped, friction = penalty.damped(reduced, mask), library._friction_of(mode)
-        tables = tabulate(mode, damped, library.slip, friction=friction, **levels)
+        tables = measured(mode, damped, library.slip, friction, **levels)
         tables.loss[0] += penalty.stored_energy(mode, library.width)
         return tables
 
@@ -101,9 +121,10 @@ class StickingSprings(Sticking):
 
     def tables(self, library, reduced, base, mask, levels):
         pairs = self.pairs(base, reduced.spin)
-        mode = solve_friction_mode(reduced, pairs, mask)
+        among = open_bodies(reduced, base.model, solve_friction_mode(reduced, pairs, 0))
+        mode = friction_mode_among(among, reduced, pairs, mask, None)
         damped, friction = pairs.damped(reduced, mask), mode.friction_forces(pairs)
-        tables = tabulate(mode, damped, library.slip[:0], friction=friction, **levels)
+        tables = measured(mode, damped, library.slip[:0], friction, **levels)
         tables.loss[0] += pairs.stored_energy(mode, library.width)
         return tables
 

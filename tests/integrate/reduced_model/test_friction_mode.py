@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
+from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.friction_mode import (
     FrictionPairs,
     mask_of,
@@ -110,7 +111,9 @@ def test_motion_obeys_constraints_and_equations(bodies, states):
 def test_tables_hold_rates_and_the_work_of_damping_and_unbalance(bodies, states):
     reduced, pairs = bodies
     mode = solve_friction_mode(reduced, pairs, mask_of(states))
-    tables = tabulate(mode, reduced, np.zeros((0, N)), width=WIDTH, tick=1e-9, sample_level=10, n_level=12)
+    levels = {"tick": 1e-9, "sample_level": 10, "n_level": 12}
+    energies = energies_of(mode, reduced, None, WIDTH)
+    tables = tabulate(mode, reduced, np.zeros((0, N)), energies=energies, width=WIDTH, **levels)
     z = entered(mode, np.random.default_rng(3).normal(size=2 * N))
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
 

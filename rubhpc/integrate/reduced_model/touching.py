@@ -1,0 +1,260 @@
+"""Contact modes of several stators: what touches moves with the rotor, the rest as with every pair open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.integrate.reduced_model import reduction
+from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
+from rubhpc.integrate.reduced_model.coupling import coupled_rows
+from rubhpc.integrate.reduced_model.energy_forms import (
+    Energies,
+    Growth,
+    energies_of,
+    energy_forms,
+    growth_of,
+)
+from rubhpc.integrate.reduced_model.friction_mode import (
+    FrictionMode,
+    mask_of,
+    solve_friction_mode,
+    states_of,
+    watch_open_pairs,
+)
+from rubhpc.integrate.reduced_model.penalty_mode import pressed_mode, solve_penalty_mode, watched
+from rubhpc.integrate.reduced_model.products import real_times
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rubhpc.fem.model import Model
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode, Solved
+    from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
+    from rubhpc.integrate.reduced_model.penalty_mode import Penalty
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
+
+    Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
+    M = TypeVar("M", bound="ContactMode")
+
+Ints = NDArray[np.int64]
+
+
+class Touching(NamedTuple):
+    """What closed pairs couple and the unbalance drives, and the eigenmodes of the open set that stay."""
+
+    pairs: Ints  # (r,), that are closed
+    rows: Ints  # (n_own,), reduced coordinates
+    spared: Ints  # eigenmodes of the open set, those of all other coordinates
+
+    def model(self, reduced: ReducedModel) -> ReducedModel:
+        """The model of these coordinates and pairs alone."""
+        return reduced.part(self.rows, self.pairs)
+
+    def of_pairs(self, rows: Floats) -> Floats:
+        """Rows of the closed pairs (r, n_own), from those of all (q, n)."""
+        return np.ascontiguousarray(rows[self.pairs[:, None], self.rows])
+
+    def among_all(self, own: M, opened: M, n: int, q: int) -> M:
+        """The contact mode of all bodies, from that of these alone and that with every pair open.
+
+        Switch functions of open pairs are left at zero. `n` and `q` count the coordinates and pairs of all.
+        """
+        first, states = own.n_eigenmode, _states(self.rows, n)
+        m = first + self.spared.size
+        place = own.places(first, m, q, self.pairs)
+        columns, entered = place.coordinate, place.coordinate[: len(own.enter)]
+        end, n_entered = (size - opened.n_eigenmode + m for size in (opened.exponent.size, len(opened.enter)))
+        exponent, motion = np.zeros(end, dtype=np.complex128), np.zeros((2 * n, end), dtype=np.complex128)
+        exponent[columns], motion[states[:, None], columns] = own.exponent, own.motion
+        exponent[first:m], motion[:, first:m] = opened.exponent[self.spared], opened.motion[:, self.spared]
+        enter = np.zeros((n_entered, 2 * n), dtype=np.complex128)
+        enter[entered[:, None], states], enter[first:m] = own.enter, opened.enter[self.spared]
+        take_off = np.zeros((len(opened.take_off), n_entered), dtype=np.complex128)
+        take_off[place.take_off[:, None], entered] = own.take_off
+        switch = np.zeros((len(opened.switch), end), dtype=np.complex128)
+        switch[place.switch[:, None], columns] = own.switch
+        return replace(
+            own,
+            exponent=exponent,
+            motion=motion,
+            enter=enter,
+            take_off=take_off,
+            switch=switch,
+            **own.other_fields(columns, m, end),
+        )
+
+
+class OpenBodies:
+    """Bodies that nothing couples while every pair is open.
+
+    Parameters
+    ----------
+    opened : ContactMode
+        With every pair open.
+    seen : (q, n)
+        Not zero where a pair sees or moves a coordinate.
+    """
+
+    def __init__(self, reduced: ReducedModel, opened: ContactMode, seen: Floats) -> None:
+        self.opened, self._reduced, self._rows = opened, reduced, seen
+        n = len(reduced.stiffness)
+        self._parts = coupled_rows((reduced.stiffness != 0.0) | (reduced.damping != 0.0))
+        self._part = np.empty(n, dtype=np.int64)  # of each coordinate
+        for number, rows in enumerate(self._parts):
+            self._part[rows] = number
+        is_driven, is_seen = np.any(reduced.force != 0.0, axis=0), seen != 0.0
+        self._driven = np.array([is_driven[rows].any() for rows in self._parts])
+        self._seen = np.stack([is_seen[:, rows].any(axis=1) for rows in self._parts], axis=1)
+        is_moved = opened.motion[:, : opened.n_eigenmode] != 0.0
+        self._of_mode = self._part[(is_moved[:n] | is_moved[n:]).argmax(axis=0)]  # part of each eigenmode
+
+    def at(self, reduced: ReducedModel, opened: ContactMode) -> OpenBodies:
+        """The same bodies with other matrices."""
+        return OpenBodies(reduced, opened, self._rows)
+
+    def touching(self, pairs: Sequence[int] | Ints) -> Touching | None:
+        """What moves together when these pairs are closed; None where that is everything."""
+        closed = np.array(pairs, dtype=np.int64)
+        own = self._driven | self._seen[closed].any(axis=0)
+        if own.all():
+            return None
+        return Touching(closed, np.flatnonzero(own[self._part]), np.flatnonzero(~own[self._of_mode]))
+
+    def energies(
+        self,
+        mode: ContactMode,
+        reduced: ReducedModel,
+        friction: Complexes | None,
+        pairs: Sequence[int],
+        width: int,
+    ) -> Energies:
+        """Energies of a contact mode of these pairs, its coordinates padded to `width`.
+
+        `reduced` and `friction` (n, m), N, are those of `energies_of`.
+        """
+        if not pairs:
+            return self.opened_energies.padded(width)
+        touching = self.touching(pairs)
+        if touching is None:
+            return energies_of(mode, reduced, friction, width)
+        n, own = len(self._part), mode.n_eigenmode - touching.spared.size
+        columns = mode.places(own, mode.n_eigenmode, len(self._seen), touching.pairs).coordinate
+        found, growing = Energies.none(width), growth_of(mode)
+        rubbing = np.zeros((touching.rows.size, columns.size), dtype=np.complex128)
+        if friction is not None:
+            rubbing += friction[touching.rows[:, None], columns]
+        part = energy_forms(
+            touching.model(reduced),
+            mode.exponent[columns],
+            mode.motion[_states(touching.rows, n)[:, None], columns],
+            rubbing,
+            own,
+            growing.among(columns),
+        )
+        found.add(columns, part)
+        found.add(np.arange(own, mode.n_eigenmode), self.opened_energies.of(touching.spared))
+        return found
+
+    @cached_property
+    def opened_energies(self) -> Energies:
+        """Of the set with every pair open, coordinates as they are; what is alike is computed once."""
+        opened, n = self.opened, len(self._part)
+        found, known = Energies.none(opened.exponent.size), dict[bytes, Energies]()
+        for number, rows in enumerate(self._parts):
+            columns = np.flatnonzero(self._of_mode == number)
+            n_eigenmode = columns.size
+            if self._driven[number]:
+                columns = np.append(columns, opened.n_eigenmode)
+            model = self._reduced.part(rows, np.zeros(0, dtype=np.int64))
+            exponent, motion = opened.exponent[columns], opened.motion[_states(rows, n)[:, None], columns]
+            name = b"".join(
+                values.tobytes() for values in (model.stiffness, model.damping, model.force, exponent, motion)
+            )
+            if name not in known:
+                still = np.zeros((rows.size, columns.size), dtype=np.complex128)
+                known[name] = energy_forms(model, exponent, motion, still, n_eigenmode, Growth())
+            found.add(columns, known[name])
+        return found
+
+
+def contact_mode_among(
+    among: OpenBodies | None,
+    reduced: ReducedModel,
+    directions: tuple[Floats, Floats],
+    mask: int,
+    known: Solved | None,
+) -> ContactMode:
+    """The contact mode of `solve_contact_mode`; `directions` are gap Jacobian and forces."""
+    gap_jacobian, force = directions
+    q, n = gap_jacobian.shape
+    closed = [i for i in range(q) if mask >> i & 1]
+    touching = among.touching(closed) if among and closed else None
+    if among is None or touching is None:
+        return solve_contact_mode(reduced, gap_jacobian, force, mask, known)
+    rates, forces = touching.of_pairs(gap_jacobian), touching.of_pairs(force)
+    own = solve_contact_mode(touching.model(reduced), rates, forces, (1 << len(closed)) - 1, known)
+    mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
+    watched_pairs = np.setdiff1d(np.arange(q), closed)
+    mode.switch[watched_pairs] = real_times(gap_jacobian[watched_pairs], mode.motion[:n])
+    mode.switch[watched_pairs, mode.n_eigenmode + 1 + watched_pairs] += 1.0
+    return mode
+
+
+def penalty_mode_among(
+    among: OpenBodies | None,
+    reduced: ReducedModel,
+    penalty: Penalty,
+    opened: ContactMode,
+    mask: int,
+    known: Solved | None,
+) -> ContactMode:
+    """The contact mode of `solve_penalty_mode`."""
+    pressed, (q, n) = penalty.pressed(mask), penalty.gap_jacobian.shape
+    touching = among.touching(pressed) if among and pressed else None
+    if touching is None:
+        return solve_penalty_mode(reduced, penalty, opened, mask, known)
+    rates, forces = touching.of_pairs(penalty.gap_jacobian), touching.of_pairs(penalty.force_direction)
+    own_penalty = penalty._replace(gap_jacobian=rates, force_direction=forces)
+    every = list(range(len(pressed)))
+    own = pressed_mode(touching.model(reduced), own_penalty, every, known)
+    return watched(touching.among_all(own, opened, n, q), penalty, mask)
+
+
+def friction_mode_among(
+    among: OpenBodies | None, reduced: ReducedModel, pairs: FrictionPairs, mask: int, known: Solved | None
+) -> FrictionMode:
+    """The contact mode of `solve_friction_mode`."""
+    closed, (q, n) = pairs.closed(mask), pairs.gap_jacobian.shape
+    touching = among.touching(closed) if among and closed else None
+    if among is None or touching is None:
+        return solve_friction_mode(reduced, pairs, mask, known)
+    own_pairs = replace(
+        pairs,
+        gap_jacobian=touching.of_pairs(pairs.gap_jacobian),
+        friction_direction=touching.of_pairs(pairs.friction_direction),
+        rim_speed=pairs.rim_speed[closed],
+    )
+    states = states_of(mask, q)
+    own_mask = mask_of([states[i] for i in closed])
+    own = solve_friction_mode(touching.model(reduced), own_pairs, own_mask, known)
+    assert isinstance(among.opened, FrictionMode)
+    mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
+    watch_open_pairs(mode.switch, mode.motion, pairs, mask, mode.n_mode)
+    return mode
+
+
+def open_bodies(reduced: ReducedModel, model: Model, opened: ContactMode) -> OpenBodies | None:
+    """What several stators are while open; of one there is nothing to spare."""
+    gap_jacobian, _, slip = reduction.directions(reduced, model, 0.0)
+    return OpenBodies(reduced, opened, np.abs(gap_jacobian) + np.abs(slip)) if len(slip) > 1 else None
+
+
+def _states(rows: Ints, n: int) -> Ints:
+    """Coordinates and their rates among displacements, then velocities, of n coordinates."""
+    return np.concatenate([rows, n + rows])
