@@ -13,10 +13,8 @@ import numpy as np
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.reduced_model.contact_mode import (
     ContactMode,
-    KeptParts,
     confine,
     solve_contact_mode,
-    solve_parts,
 )
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.energy_forms import energies_of
@@ -24,13 +22,14 @@ from rubhpc.integrate.reduced_model.friction_library import FrictionLibrary
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_library import (
     ModeLibrary,
-    PenaltyLibrary,
     Shared,
     width_without_modes,
 )
 from rubhpc.integrate.reduced_model.mode_tables import tabulate
+from rubhpc.integrate.reduced_model.penalty_library import PenaltyLibrary
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies
+from rubhpc.integrate.reduced_model.system_modes import KeptParts, solve_parts
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
 from rubhpc.integrate.reduced_model.truncation import (
     MOST_MODES,
@@ -49,7 +48,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.free_spin import FreeSpin
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import Solved
+    from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.kernels.contact_modes import ModeTables, Reduced
     from rubhpc.kernels.laws import Law
 

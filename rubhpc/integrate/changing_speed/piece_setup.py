@@ -14,9 +14,9 @@ from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary,
 from rubhpc.integrate.changing_speed.retuned_modes import Desk, RetunedLibrary
 from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
 from rubhpc.integrate.modal_setup import ModalSetup
-from rubhpc.integrate.reduced_model.contact_mode import KeptParts
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import directions
+from rubhpc.integrate.reduced_model.system_modes import KeptParts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import Solved
     from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
     from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.kernels.contact_modes import Reduced
     from rubhpc.kernels.retuning import Speeds
 

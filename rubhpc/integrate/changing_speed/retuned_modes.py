@@ -35,8 +35,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import ContactMode, Solved
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.retuning import HeldMode, Speeds
 

@@ -2,54 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
-from hashlib import blake2b
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
 from scipy.linalg import null_space
 
-from rubhpc.errors import InputError
-from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.integrate.reduced_model.products import expanded, real_times
-from rubhpc.integrate.reduced_model.repeated_exponents import real_ones, separate
+from rubhpc.integrate.reduced_model.system_modes import count_modes, modes_of, parts_of
 
 if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
     Complexes = NDArray[np.complex128]
-    Solved = dict[bytes, tuple[Complexes, Complexes, Complexes]]  # parts, by their names (`_name_of`)
-
-WORST_CONDITION = 1e11  # of the eigenvectors; beyond it their sum loses its digits, and they are set apart
-SMALL = 64  # states of a part that is kept
-MOST_BYTES = 2**29  # of parts that are kept
-
-
-class KeptParts(dict[bytes, "tuple[Complexes, Complexes, Complexes]"]):
-    """Parts as they are known to `modes_of`, to which it adds those that it solves; the oldest make room."""
-
-    def __init__(self, parts: Solved | None = None) -> None:
-        super().__init__()
-        self.n_byte = 0
-        for part, solved in (parts or {}).items():
-            self.keep(part, solved)
-
-    def keep(self, part: bytes, solved: tuple[Complexes, Complexes, Complexes]) -> None:
-        """Add a part that is new."""
-        self[part] = solved
-        self.n_byte += _size(part, solved)
-        while self.n_byte > MOST_BYTES and len(self) > 1:
-            oldest = next(iter(self))
-            self.n_byte -= _size(oldest, self.pop(oldest))
-
-
-def _size(part: bytes, solved: tuple[Complexes, Complexes, Complexes]) -> int:
-    return len(part) + sum(values.nbytes for values in solved)
 
 
 class Places(NamedTuple):
@@ -156,11 +126,6 @@ def solve_contact_mode(
     )
 
 
-def parts_of(system: Floats, q: int) -> list[NDArray[np.int64]]:
-    """Rows of each part that nothing couples to the rest; of one pair there is little to take apart."""
-    return _parts(system) if q > 1 else [np.arange(len(system))]
-
-
 def steady_response(
     system: Floats, spin: float, load: Complexes, parts: list[NDArray[np.int64]]
 ) -> Complexes:
@@ -177,11 +142,7 @@ def count_coordinates(reduced: ReducedModel, gap_jacobian: Floats, force_directi
     """Count the coordinates of the contact mode with the pairs of `mask` closed, m + 1 + q."""
     closed = [i for i in range(len(gap_jacobian)) if mask >> i & 1]
     _, _, system = confine(reduced, gap_jacobian[closed], force_direction[closed].T)
-    n_mode = 0
-    for rows in _parts(system):
-        exponent = np.linalg.eigvals(system[np.ix_(rows, rows)]).astype(np.complex128)
-        n_mode += int(np.count_nonzero(_kept(exponent)[1]))
-    return n_mode + 1 + len(gap_jacobian)
+    return count_modes(system) + 1 + len(gap_jacobian)
 
 
 def confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats, Floats, Floats]:
@@ -232,104 +193,3 @@ def _null_space(rows: Floats) -> Floats:
     columns[seen, : inside.shape[1]] = inside
     columns[unseen, np.arange(inside.shape[1], columns.shape[1])] = 1.0
     return columns
-
-
-def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Complexes, Complexes]:
-    """Exponents, shapes and inverse shapes of a first-order system; one of each conjugate pair, doubled.
-
-    What nothing couples is solved by itself: of a ring of stators only those that touch move with the rotor.
-    Parts among those `known`, such as open stators, are not solved again; `KeptParts` keeps the others.
-    """
-    n_state = len(system)
-    exponents: list[Complexes] = [np.zeros(0, dtype=np.complex128)]  # a mass on a rigid wall has no modes
-    shapes: list[Complexes] = [np.zeros((n_state, 0), dtype=np.complex128)]
-    inverses: list[Complexes] = [np.zeros((0, n_state), dtype=np.complex128)]
-    for rows in _parts(system):
-        part = system[np.ix_(rows, rows)]
-        name = _name_of(part) if known else b""
-        solved = known.get(name) if known else None
-        if solved is None:
-            solved = solve_part(part)
-            if isinstance(known, KeptParts):
-                known.keep(name or _name_of(part), solved)
-        exponent, shape, inverse = solved
-        wide, tall = np.zeros((2, n_state, exponent.size), dtype=np.complex128)
-        wide[rows], tall[rows] = shape, inverse.T
-        exponents.append(exponent)
-        shapes.append(wide)
-        inverses.append(tall.T)
-    return np.concatenate(exponents), np.hstack(shapes), np.vstack(inverses)
-
-
-def solve_part(part: Floats) -> tuple[Complexes, Complexes, Complexes]:
-    """Exponents, shapes and inverse shapes of a part of a system that nothing couples to the rest.
-
-    Small ones, such as an open stator, which is the same at every speed, are not solved again.
-    """
-    worst = WORST_CONDITION
-    return _recalled(part.tobytes(), worst) if len(part) <= SMALL else _solve_part(part, worst)
-
-
-@lru_cache(maxsize=32)
-def _recalled(part: bytes, worst: float) -> tuple[Complexes, Complexes, Complexes]:
-    """The same of a part (n, n) as bytes."""
-    n = math.isqrt(len(part) // 8)
-    return _solve_part(np.frombuffer(part).reshape(n, n), worst)
-
-
-def _solve_part(part: Floats, worst: float) -> tuple[Complexes, Complexes, Complexes]:
-    exponent, shape = np.linalg.eig(part)
-    inverse = _inverse(shape, worst)
-    if inverse is None and (separated := separate(part)) is not None:
-        exponent, shape, inverse = separated
-    if inverse is None:
-        raise InputError(
-            "[integrator] method: modal cannot separate the modes of this rig, some of which coincide (a "
-            'free body, critical damping); take method = "central-difference"'
-        )
-    is_real, keep = _kept(exponent)
-    weight = np.where(is_real, 1.0, 2.0)
-    return (
-        exponent[keep].astype(np.complex128),
-        (shape * weight)[:, keep].astype(np.complex128),
-        inverse[keep].astype(np.complex128),
-    )
-
-
-def _inverse(shape: Complexes, worst: float) -> Complexes | None:
-    """Inverse of eigenvectors whose condition is not worse; the bound by Frobenius norms is tried first."""
-    try:
-        inverse = np.linalg.inv(shape)
-    except np.linalg.LinAlgError:
-        return None
-    bound = np.linalg.norm(shape) * np.linalg.norm(inverse)
-    return np.asarray(inverse) if bound <= worst or np.linalg.cond(shape) <= worst else None
-
-
-def solve_parts(system: Floats) -> Solved:
-    """All parts of a system, solved: what `modes_of` looks up."""
-    parts = (system[np.ix_(rows, rows)] for rows in _parts(system))
-    return {name: solve_part(part) for name, part in {_name_of(part): part for part in parts}.items()}
-
-
-def _name_of(part: Floats) -> bytes:
-    """What a part is known by: its bytes, or of a large one a digest of them."""
-    values = part.tobytes()
-    return values if len(part) <= SMALL else blake2b(values, digest_size=32).digest()
-
-
-def _parts(system: Floats) -> list[NDArray[np.int64]]:
-    """Rows of each part of a system that nothing couples to the rest."""
-    return _rows_of_parts((system != 0.0).tobytes(), len(system))
-
-
-@lru_cache(maxsize=32)
-def _rows_of_parts(linked: bytes, n: int) -> list[NDArray[np.int64]]:
-    """The same from which entries (n, n) are not zero."""
-    return coupled_rows(np.frombuffer(linked, dtype=bool).reshape(n, n))
-
-
-def _kept(exponent: Complexes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which exponents of an uncoupled part are real, and which are kept: one of each conjugate pair."""
-    is_real = real_ones(exponent)
-    return is_real, is_real | (exponent.imag > 0.0)

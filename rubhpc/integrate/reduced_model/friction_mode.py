@@ -11,12 +11,11 @@ from rubhpc.integrate.reduced_model.contact_mode import (
     ContactMode,
     Places,
     confine,
-    modes_of,
-    parts_of,
     steady_response,
 )
 from rubhpc.integrate.reduced_model.penalty_mode import damped, stored_energy
 from rubhpc.integrate.reduced_model.products import expanded, real_times
+from rubhpc.integrate.reduced_model.system_modes import modes_of, parts_of
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, lifted_place
 
 if TYPE_CHECKING:
@@ -24,8 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.reduced_model.contact_mode import Solved
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from copy import copy
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.mode_tables import bytes_ahead, mode_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
-from rubhpc.integrate.reduced_model.touching import contact_mode_among, open_bodies, penalty_mode_among
+from rubhpc.integrate.reduced_model.touching import contact_mode_among, open_bodies
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.friction_coordinates import LANES
 
@@ -21,9 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import Solved
     from rubhpc.integrate.reduced_model.energy_forms import Energies
-    from rubhpc.integrate.reduced_model.penalty_mode import Penalty
+    from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.integrate.reduced_model.touching import OpenBodies
     from rubhpc.kernels import contact_modes as kernel
 
@@ -289,39 +288,6 @@ class ModeLibrary:
             is_measured=self._is_measured,
             n_ahead=self._n_ahead,
         )
-
-
-class PenaltyLibrary(ModeLibrary):
-    """Contact modes of pairs that press, by spring and damper, or are lifted; masks hold q bits for each.
-
-    What dampers take and springs hold is counted with the loss by damping.
-    """
-
-    def __init__(
-        self,
-        reduced: ReducedModel,
-        model: Model,
-        friction: float,
-        *,
-        penalty: Penalty,
-        **shared: Unpack[Shared],
-    ) -> None:
-        """Start as `ModeLibrary` does."""
-        self._penalty = penalty
-        super().__init__(reduced, model, friction, **shared)
-
-    def _solved(self, mask: int) -> ContactMode:
-        return penalty_mode_among(self._among, self.reduced, self._penalty, self._opened, mask, self._known)
-
-    def _closed_pairs(self, mask: int) -> list[int]:
-        return self._penalty.pressed(mask)
-
-    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
-        if not self._is_measured:
-            return super()._tables_of(mode, reduced)
-        tables = super()._tables_of(mode, self._penalty.damped(reduced, mode.mask))
-        tables.loss[0] += self._penalty.stored_energy(mode, self.width)
-        return tables
 
 
 def padded_width(widest: int, q: int) -> int:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.reduced_model.contact_mode import ContactMode, modes_of
+from rubhpc.integrate.reduced_model.contact_mode import ContactMode
+from rubhpc.integrate.reduced_model.system_modes import modes_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.reduced_model.contact_mode import Solved
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
 

@@ -33,10 +33,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import ContactMode, Solved
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
     from rubhpc.integrate.reduced_model.penalty_mode import Penalty
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]

@@ -11,10 +11,11 @@ from trial_rig import trial_rig
 
 from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.reduced_model import mode_library
-from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode, solve_parts
+from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.mode_tables import bytes_ahead
 from rubhpc.integrate.reduced_model.reduction import directions, reduce_model
+from rubhpc.integrate.reduced_model.system_modes import solve_parts
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.contact_modes import (
     LATERAL_RATE,

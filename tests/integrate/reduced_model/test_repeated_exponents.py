@@ -9,10 +9,11 @@ from trial_rig import trial_rig
 
 from rubhpc import Carrier, assemble
 from rubhpc.errors import InputError
-from rubhpc.integrate.reduced_model import contact_mode
-from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode, solve_part
+from rubhpc.integrate.reduced_model import system_modes
+from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode
 from rubhpc.integrate.reduced_model.reduction import directions, reduce_model
 from rubhpc.integrate.reduced_model.repeated_exponents import separate
+from rubhpc.integrate.reduced_model.system_modes import solve_part
 from rubhpc.rig.parts import Damping
 
 N_STATOR, FRICTION = 12, 0.1
@@ -50,7 +51,7 @@ def test_equal_exponents_have_an_orthonormal_basis_and_the_motion_is_exact(ring)
 def test_contact_mode_is_that_of_the_plain_eigenvectors(ring, monkeypatch):
     """Coordinates differ; what they give of any state, and its gaps and forces later, does not."""
     plain = solve_contact_mode(*ring, 1 << 4)
-    monkeypatch.setattr(contact_mode, "WORST_CONDITION", 0.0)
+    monkeypatch.setattr(system_modes, "WORST_CONDITION", 0.0)
     found = solve_contact_mode(*ring, 1 << 4)
     assert found.exponent.size == plain.exponent.size
     n = len(ring[0].stiffness)
