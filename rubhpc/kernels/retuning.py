@@ -106,8 +106,7 @@ def retune_to(
     `turning` (1/s) is the exponent of the unbalance force, its growth and i times the spin; the rest are as
     in `Speeds`.
     """
-    m, width = held.is_pair.size, held.exponent.size
-    n, end = held.slip.shape[1], held.n_coordinate
+    m, n, end = held.is_pair.size, held.slip.shape[1], held.n_coordinate
     if held.varying.kept.size > 0:
         vary(tables, mode, held.varying, within)
         vary_rates(tables, mode, held.exponent, m)
@@ -158,15 +157,7 @@ def retune_to(
                 + (held.output[o, n + a] + held.output[o, 2 * n + a] * turning) * x[n + a]
             )
         held.row[o, m] = total
-    n_output = held.output.shape[0]
-    for k in range(end):
-        onward, ahead = _exponential(exponent[k], interval), 1.0 + 0j
-        for later in range(SAMPLES_AT_ONCE):
-            for o in range(n_output):
-                value = ahead * held.row[o, k]
-                tables.output[mode, k, later * n_output + o] = value.real
-                tables.output[mode, width + k, later * n_output + o] = -value.imag
-            ahead *= onward
+    _retune_outputs(tables.output[mode], held.row, exponent, end, interval)
     if tables.loss.shape[1] == 0:  # no energies
         return
     _retune_energies(tables, mode, held, x, factor)
@@ -204,6 +195,31 @@ def _retune_powers(tables: ModeTables, mode: int, exponent: Complexes, end: int,
                 tables.turn[mode, i, k] = bound * size
         is_gone = exponent[k].real * tick * 2.0**FORCED_LEVEL < GONE
         tables.pace[mode, k] = DYING if is_gone else size
+
+
+@jit
+def _retune_outputs(output: Floats, row: Complexes, exponent: Complexes, end: int, interval: float) -> None:
+    """Outputs at coming samples by the first `end` coordinates; zeros that stay are left.
+
+    Most are: a coordinate of an open stator is seen by the outputs of this stator alone.
+    """
+    n_output, width = row.shape
+    seen = np.empty(n_output, dtype=np.int64)
+    for k in range(end):
+        real, imaginary = output[k], output[width + k]
+        count = 0
+        for o in range(n_output):
+            if row[o, k] != 0.0 or real[o] != 0.0 or imaginary[o] != 0.0:
+                seen[count] = o
+                count += 1
+        onward, ahead = _exponential(exponent[k], interval), 1.0 + 0j
+        for later in range(SAMPLES_AT_ONCE):
+            for i in range(count):
+                o = seen[i]
+                value = ahead * row[o, k]
+                real[later * n_output + o] = value.real
+                imaginary[later * n_output + o] = -value.imag
+            ahead *= onward
 
 
 @jit

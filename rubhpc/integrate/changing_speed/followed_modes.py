@@ -98,15 +98,19 @@ def aligned(seen: Complexes, exponent: Complexes) -> tuple[NDArray[np.int64], Co
         Of those here; modes whose exponents repeat are taken together.
     """
     groups, m = _groups(exponent), exponent.size
-    shares = np.array([np.linalg.norm(seen[group], axis=0) for group in groups])
-    of_group, place = shares.argmax(axis=0), np.zeros(m, dtype=np.int64)
-    for number, group in enumerate(groups):
-        members = np.flatnonzero(of_group == number)
-        if members.size != group.size:
-            return None
-        place[group] = members
-    seen, turn = seen[:, place], np.zeros_like(seen)
-    for group in groups:
+    first = np.array([group[0] for group in groups])
+    squares = np.abs(seen) ** 2
+    repeated = [group for group in groups if group.size > 1]
+    for group in repeated:
+        squares[group[0]] = squares[group].sum(axis=0)
+    of_group = squares[first].argmax(axis=0)
+    if np.any(np.bincount(of_group, minlength=len(groups)) != [group.size for group in groups]):
+        return None
+    place = np.empty(m, dtype=np.int64)
+    place[np.concatenate(groups)] = np.argsort(of_group, kind="stable")
+    seen = seen[:, place]
+    turn = np.diag(np.diag(seen))
+    for group in repeated:
         turn[np.ix_(group, group)] = seen[np.ix_(group, group)]
     own = np.linalg.norm(turn, axis=0)
     if np.any(np.abs(seen - turn).max(axis=0, initial=0.0) > FAR * own):
