@@ -48,11 +48,6 @@ class Energies(NamedTuple):
         self.work[:, columns] += part.work
         self.steady[:] += part.steady
 
-    def of(self, columns: NDArray[np.int64]) -> Energies:
-        """Of some of the coordinates, which nothing drives."""
-        both = np.concatenate([columns, self.work.shape[1] + columns])
-        return Energies(self.loss[both[:, None], both], self.work[:, columns], np.zeros(2))
-
     def padded(self, width: int) -> Energies:
         """The same among more coordinates, in whose motion there is no energy."""
         found = Energies.none(width)

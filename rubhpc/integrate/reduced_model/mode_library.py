@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.integrate.reduced_model.contact_mode import ContactMode, count_coordinates
 from rubhpc.integrate.reduced_model.energy_forms import energies_of
-from rubhpc.integrate.reduced_model.mode_tables import bytes_ahead, mode_of, tabulate
+from rubhpc.integrate.reduced_model.mode_tables import Spared, bytes_ahead, mode_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
 from rubhpc.integrate.reduced_model.touching import contact_mode_among, open_bodies
@@ -276,7 +276,7 @@ class ModeLibrary:
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
         """Tables of one mode."""
-        return tabulate(
+        tables = tabulate(
             mode,
             reduced,
             self._slip_rows(),
@@ -287,7 +287,19 @@ class ModeLibrary:
             n_level=self._n_level,
             is_measured=self._is_measured,
             n_ahead=self._n_ahead,
+            spared=self._spared(mode) if self._is_measured else None,
         )
+        if mode.mask == 0:
+            self._open_output = tables.output[0]
+        return tables
+
+    def _spared(self, mode: ContactMode) -> Spared | None:
+        """What a mode leaves of the outputs of the open set."""
+        closed = self._closed_pairs(mode.mask)
+        touching = self._among.touching(closed) if self._among and closed and self._n_ahead else None
+        if touching is None:
+            return None
+        return Spared(mode.n_eigenmode - touching.spared.size, touching.spared, self._open_output)
 
 
 def padded_width(widest: int, q: int) -> int:

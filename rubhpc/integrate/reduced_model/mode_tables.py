@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rubhpc.integrate.reduced_model.energy_forms import Energies, growth_of
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
@@ -13,16 +14,22 @@ from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 from rubhpc.kernels.sampling import LANES
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
-    Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
+Floats = NDArray[np.float64]
 GONE = -40.0  # exponent of what has died away
 NO_ENERGIES = Energies(np.zeros((0, 0)), np.zeros((2, 0), dtype=complex), np.zeros(2))
+
+
+class Spared(NamedTuple):
+    """Eigenmodes of the open set that stay in another one."""
+
+    first: int  # place of the first of them there
+    modes: NDArray[np.int64]  # places in the open set
+    output: Floats  # (2 m, samples o), of the open set
 
 
 def tabulate(
@@ -37,6 +44,7 @@ def tabulate(
     n_level: int,
     is_measured: bool = True,
     n_ahead: int = kernel.SAMPLES_AT_ONCE,
+    spared: Spared | None = None,
 ) -> kernel.ModeTables:
     """Tables of one mode, (1, ...) each, its coordinates padded to `width`.
 
@@ -54,6 +62,8 @@ def tabulate(
     n_ahead : int
         Samples whose outputs are read from one set of coordinates; with one, no step may pass a sample. With
         none, outputs are left to others.
+    spared : Spared, optional
+        Eigenmodes of the open set that stay, and its outputs, where they are known.
     """
     n, m = reduced.stiffness.shape[0], width
     end, n_filled = mode.exponent.size, len(mode.enter)
@@ -76,7 +86,8 @@ def tabulate(
         rate[:, growing.steady] += switch[:, growing.which] @ growing.speed
     output = np.zeros((2 * m, 0))
     if is_measured:
-        output = _outputs(reduced, exponent, motion, tick * 2.0**sample_level, n_ahead)
+        interval = tick * 2.0**sample_level
+        output = _outputs_beside(spared, reduced, exponent, motion, interval, n_ahead)
     loss, work, steady_power = energies or NO_ENERGIES
     halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q or more, 2, m)
     row = kernel.ModeTables(
@@ -153,6 +164,28 @@ def _joined(real: Floats, imaginary: Floats) -> Complexes:
     joined = np.empty(real.shape, dtype=np.complex128)
     joined.real, joined.imag = real, imaginary
     return joined
+
+
+def _outputs_beside(
+    spared: Spared | None,
+    reduced: ReducedModel,
+    exponent: Complexes,
+    motion: Complexes,
+    interval: float,
+    n_ahead: int,
+) -> Floats:
+    """Output rows as of `_outputs`; those of eigenmodes that stay are copied."""
+    if spared is None:
+        return _outputs(reduced, exponent, motion, interval, n_ahead)
+    width, first, last = exponent.size, spared.first, spared.first + spared.modes.size
+    own = np.concatenate([np.arange(first), np.arange(last, width)])
+    found = np.zeros_like(spared.output)
+    part = _outputs(reduced, exponent[own], motion[:, own], interval, n_ahead).reshape(2, own.size, -1)
+    for half in range(2):
+        rows = found[half * width : (half + 1) * width]
+        rows[own] = part[half]
+        rows[first:last] = spared.output[half * width + spared.modes]
+    return found
 
 
 def _outputs(

@@ -159,8 +159,20 @@ class OpenBodies:
             growing.among(columns),
         )
         found.add(columns, part)
-        found.add(np.arange(own, mode.n_eigenmode), self.opened_energies.of(touching.spared))
+        place = np.full(self.opened.exponent.size, -1)
+        place[touching.spared] = np.arange(own, mode.n_eigenmode)
+        at, value = self._opened_loss
+        row, column = (place[k % place.size] + k // place.size * width for k in at)
+        are_spared = (place[at % place.size] >= 0).all(axis=0)
+        found.loss[row[are_spared], column[are_spared]] = value[are_spared]
         return found
+
+    @cached_property
+    def _opened_loss(self) -> tuple[Ints, Floats]:
+        """Where energies of the open set are not zero, (2, k), and what they are."""
+        loss = self.opened_energies.loss
+        at = np.array(np.nonzero(loss))
+        return at, loss[tuple(at)]
 
     @cached_property
     def opened_energies(self) -> Energies:
