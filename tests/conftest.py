@@ -50,6 +50,7 @@ SLOW = (
     "integrate/marches/test_curved_march.py",
     "integrate/changing_speed/test_carried_modes.py",
     "integrate/changing_speed/test_driven.py",
+    "integrate/changing_speed/test_unfollowed_modes.py",
     "integrate/marches/test_event_driven_march.py::test_dry_whip_diverges_and_says_so",
     "integrate/marches/test_event_driven_march.py::test_endless_events_are_left_to_short_steps",
     "integrate/marches/test_event_driven_march.py::test_run_goes_on_from_its_final_state",

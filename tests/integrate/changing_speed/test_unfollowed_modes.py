@@ -1,0 +1,58 @@
+"""Contact modes that cannot be followed are solved at each piece: the motion is the same."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from overhung_pump import SEGMENT, pump
+
+from rubhpc import LumpedStator
+from rubhpc.integrate.changing_speed import retuned_modes
+from rubhpc.integrate.changing_speed.case import record_run_up
+from rubhpc.integrate.setup import prepare
+from rubhpc.study.initial import CONTACT_FREE, Initial
+from rubhpc.study.speed_law import SpeedLaw
+from rubhpc.study.study import Contact, Integrator, Recording
+
+SAMPLES, Q = 64, 6
+LAW = SpeedLaw(time=(0.0, 0.15), speed=(300.0, 360.0))
+CASE = {"clearance": 1.5e-4, "friction": 0.05, "initial": Initial(from_=CONTACT_FREE)}
+
+
+def run(contact):
+    angles = 0.2 + 2.0 * math.pi / Q * np.arange(Q)
+    tips = tuple(LumpedStator(node=6, angle=float(angle), **SEGMENT) for angle in angles)
+    setup = prepare(
+        replace(pump(), stator=tips),
+        360.0,
+        contact=contact,
+        integrator=Integrator(),
+        samples_per_revolution=SAMPLES,
+    )
+    recording = Recording(transient=0, revolutions=LAW.n_revolution, samples_per_revolution=SAMPLES)
+    return record_run_up(setup, LAW, recording=recording, **CASE).arrays
+
+
+@pytest.mark.parametrize(
+    "contact", [Contact(), Contact(law="penalty", stiffness=1e6, damping=50.0)], ids=["rigid", "penalty"]
+)
+@pytest.mark.parametrize("refused", ["every other", "all"])
+def test_modes_that_are_solved_at_each_piece(monkeypatch, contact, refused):
+    followed, matched = run(contact), retuned_modes.matched
+    n_refused = 0
+
+    def none_for_some(mode, other):
+        nonlocal n_refused
+        if refused == "all" or mode.mask.bit_count() % 2:
+            n_refused += 1
+            return None
+        return matched(mode, other)
+
+    monkeypatch.setattr(retuned_modes, "matched", none_for_some)
+    solved = run(contact)
+    assert n_refused > 0
+    assert followed["contact_force"].max() > 0.0
+    for name in ("vertical", "horizontal", "torsion"):
+        size = np.sqrt(np.mean(followed[name] ** 2))
+        assert np.sqrt(np.mean((solved[name] - followed[name]) ** 2)) < 1e-4 * size, name
