@@ -32,10 +32,7 @@ POWERS = np.linalg.inv(np.vander(PLACES, increasing=True))
 NEWTON, EXACT = 6, 1e-9  # steps at most, and share of a mode in another that needs no more than one
 FAR = 0.5  # share of a mode in another of a speed beside it, over its own, from which it is not the same
 EQUAL = 1e-9  # relative difference of two exponents that repeat
-STILL, LEAST = (
-    1e-13,
-    1e-16,
-)  # change of an entry over it, and over the greatest, below which it stays as it is
+STILL, LEAST = 1e-13, 1e-16  # change of an entry over it, and over the greatest, below which it stays
 NONE = Course(np.zeros(0, dtype=np.int64), np.zeros((1, 0)))
 NOTHING = Varying(np.zeros(0), *[NONE] * (len(Varying._fields) - 1))
 _TABLES = "motion_re", "motion_im", "switch_re", "switch_im", "slip_re", "slip_im"
