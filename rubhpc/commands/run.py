@@ -151,6 +151,8 @@ def verify(store: Path) -> int:
     from rubhpc.storage.verify import verify as verify_store
 
     damage = verify_store(store)
+    for line in damage.warnings():
+        click.echo(line)
     if not damage:
         click.echo(f"{damage.n_checked} cases checked, no damage")
         return 0

@@ -44,8 +44,8 @@ class Ledger:
         Measures of the cases, missing (NaN, -1) where a case has none; None where the replay left them out.
     reasons : dict
         Flat index -> why a case failed or diverged.
-    n_damaged : int
-        Lines that were skipped because they are damaged or truncated.
+    skipped : Counter
+        Name of a journal -> its lines that are damaged or truncated.
     damaged_cases : set
         Flat indices that can still be read in such lines.
     n_lines : Counter
@@ -59,7 +59,7 @@ class Ledger:
     is_known: NDArray[np.bool_]
     measures: NDArray[np.void] | None
     reasons: dict[int, str] = field(default_factory=dict)
-    n_damaged: int = 0
+    skipped: Counter[str] = field(default_factory=Counter)
     damaged_cases: set[int] = field(default_factory=set)
     n_lines: Counter[int] = field(default_factory=Counter)
     state: str = ""
@@ -104,7 +104,7 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
     try:
         opened = open_regular(path)
     except NotRegular:  # what was in it is lost
-        ledger.n_damaged += 1
+        ledger.skipped[path.name] += 1
         return 0
     with opened as file:
         first = file.readline(LONGEST)
@@ -113,12 +113,12 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
         kind = header.type_in(about) if about is not None else None
         if is_sound and kind is None:
             return 0
-        ledger.n_damaged += not is_sound
+        n_skipped = int(not is_sound)
         n_line = 0
         while line := file.readline(LONGEST):
             text = line[9:-1]
             if line[:8] != b"%08x" % crc32(text) or line[-1:] != b"\n":
-                ledger.n_damaged += 1
+                n_skipped += 1
                 ledger.damaged_cases |= _still_legible(text, n_case)
                 continue
             if line == first:  # the header once more
@@ -138,7 +138,7 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
             except (ValueError, RecursionError):
                 is_fit = False
             if not is_fit or (is_sound and measures and kind is not None and len(measures) != kind.itemsize):
-                ledger.n_damaged += 1
+                n_skipped += 1
                 continue
             if not is_sound:  # then a line counts only if its id is that of its case
                 if measures and kind is None:
@@ -160,6 +160,8 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
             elif reasons:
                 reasons.pop(flat, None)
     _enter(ledger, kind, cases, records)
+    if n_skipped:
+        ledger.skipped[path.name] = n_skipped
     return n_line
 
 

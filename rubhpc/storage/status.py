@@ -145,7 +145,7 @@ def read_status(path: Path) -> StoreStatus:
         counts=count(ledger.status),
         holder=holder,
         n_recent=ledger.n_recent,
-        n_damaged=ledger.n_damaged,
+        n_damaged=ledger.skipped.total(),
         failures=tuple(
             (
                 f"{manifest.case_id(i)[:12]} {manifest.name_case(i)}: {STATUS[ledger.status[i]]}",

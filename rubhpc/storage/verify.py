@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,6 +37,8 @@ class Damage:
         Metadata, coordinates, settings and packed arrays; the next run rewrites them without computing.
     n_checked : int
         Cases that have been compared with their checksum.
+    skipped : dict
+        Name of a journal -> its damaged lines, which count for nothing: no damage, where no case is named.
     note : str
         Why the damage could not be marked for the next run; empty where it was, or where there is none.
     """
@@ -45,10 +47,17 @@ class Damage:
     cases: dict[int, str]
     arrays: tuple[str, ...]
     n_checked: int
+    skipped: dict[str, int] = field(default_factory=dict)
     note: str = ""
 
     def __bool__(self) -> bool:
         return bool(self.cases or self.arrays)
+
+    def warnings(self) -> list[str]:
+        """What is odd and harms nothing by itself, a line each."""
+        return [
+            f"warning: {n} damaged line{'s' * (n > 1)} in {name}: skipped" for name, n in self.skipped.items()
+        ]
 
     def lines(self) -> list[str]:
         """What is damaged, a line each."""
@@ -101,6 +110,7 @@ def verify(path: Path) -> Damage:
             )
         ),
         n_checked=n_checked,
+        skipped=dict(ledger.skipped),
         note=note,
     )
 

@@ -103,6 +103,20 @@ def test_a_line_of_the_journal_is_changed(store, finished):
     assert repaired_by_run(store, finished) == 1
 
 
+def test_lines_of_no_case_behind_a_journal_are_named(store, finished):
+    """They cost nothing: a warning with their number, and exit code 0."""
+    (path,) = (store / ".rubhpc" / "journal").iterdir()
+    with path.open("ab") as journal:
+        journal.writelines(b"%08x 3 junk %d\n" % (k, k) for k in range(50))
+        journal.write(b"\xff\xfe cut short")
+    done = run("verify", store)
+    warning, checked = done.stdout.splitlines()
+    assert warning == f"warning: 51 damaged lines in {path.name}: skipped"
+    assert checked == "12 cases checked, no damage"
+    assert (done.returncode, done.stderr) == (0, "")
+    assert repaired_by_run(store, finished) == 0
+
+
 @pytest.mark.parametrize("name", ["period", "status", "speed_ratio", "clearance", "revolution"])
 def test_what_is_no_case_is_written_anew_without_computing(store, finished, name):
     (chunk,) = (path for path in (store / name / "c").rglob("*") if path.is_file())
