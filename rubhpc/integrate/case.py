@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.ahead import compile_ahead
-from rubhpc.integrate.closed_form_case import exponents_of, neighbours_of, solver_of, trail_of
+from rubhpc.integrate.closed_form_case import (
+    exponents_of,
+    give_back,
+    neighbours_of,
+    solver_of,
+    trail_of,
+)
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
 from rubhpc.integrate.lyapunov import Growth
@@ -237,6 +243,7 @@ def _integrate(
             record.measures.update(exponents_of(march, begin, final, recording.lyapunov))
         if "waveform" not in recording.keep:
             record.signals.clear()
+        give_back(march, trail)
     record.measures.update(transient_revolutions=n_transient, steps=n_step, left_closed_form=n_left)
     return record
 

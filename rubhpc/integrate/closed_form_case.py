@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from rubhpc.kernels.trail import Trail
     from rubhpc.study.study import Recording
 
+_spare: list[Trail] = []  # that of the last case, if no other has taken it
+
 
 def exponents_of(
     march: March, begin: Callable[[State], PiecewiseMotion], final: State, n_exponent: int
@@ -60,10 +62,30 @@ def trail_of(march: March, recording: Recording) -> Trail | None:
         and march.has_closed_form
         and recording.revolutions >= LEAST_REVOLUTIONS
     ):
-        trail = march.new_trail()
+        trail = _kept(march) or march.new_trail()
         march.keep(trail)
         return trail
     return None
+
+
+def give_back(march: March, trail: Trail | None) -> None:
+    """Keep the room of a trail for the next case, once nothing reads or writes it any more.
+
+    The system clears new memory page by page, which takes longer than to follow the tangent.
+    """
+    if trail is not None:
+        cast("EventDrivenMarch", march).keep(None)
+        _spare[:] = [trail]
+
+
+def _kept(march: EventDrivenMarch) -> Trail | None:
+    """Room that was given back, where it is as wide as that of a march."""
+    try:
+        trail = _spare.pop()
+    except IndexError:
+        return None
+    m, n = march.width
+    return trail if (trail.begun.shape[2], trail.velocity.shape[2]) == (m, n) else None
 
 
 def neighbours_of(

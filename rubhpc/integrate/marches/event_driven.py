@@ -213,7 +213,12 @@ class EventDrivenMarch(ModalMarch):
 
     def new_trail(self) -> Trail:
         """Room for a trail of the case."""
-        return new_trail(self._z.shape[1], self.bodies.stiffness.shape[0])
+        return new_trail(*self.width)
+
+    @property
+    def width(self) -> tuple[int, int]:
+        """How many modal coordinates and reduced degrees a trail of the case has."""
+        return self._z.shape[1], self.bodies.stiffness.shape[0]
 
     def keep(self, trail: Trail | None) -> None:
         """Have the events from here on noted in a trail, or in none."""
