@@ -12,7 +12,7 @@ from rubhpc.integrate.case import march_of
 from rubhpc.integrate.changing_speed.carried_modes import Change, Standing, carried, standing
 from rubhpc.integrate.changing_speed.piece_setup import with_values
 from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
-from rubhpc.integrate.changing_speed.stretch import Stretch, take_stretch
+from rubhpc.integrate.changing_speed.stretch import Stretch, begin_stretch, take_stretch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
@@ -50,6 +50,7 @@ class Passing:
         self._march: EventDrivenMarch | None = None
         self._left: tuple[int, Floats] | None = None  # where the last piece has ended, in modes
         self._room: dict[int, Samples] = {}  # by how many samples a piece has
+        self._at: PieceSetup | None = None  # the piece at whose beginning the march stands
 
     def take(
         self,
@@ -114,15 +115,25 @@ class Passing:
             self._check()
         room = self._room_for(setups[first].model, n_sample)
         left = self._left if goes_on else None
-        found = take_stretch(self._march, setups, first, room, begun, earlier, self._check, left)
+        march, setup = self._march, setups[first]
+        try:
+            library = begin_stretch(march, setup, n_sample, begun, left)
+        except NoClosedForm:
+            return None
+        if library is None:
+            self._at = setup if march.has_piece_loop else None
+            return None
+        found = take_stretch(march, library, setups, first, room, begun, earlier, self._check)
         if found is not None:
             self._left = found.left
         return found
 
     def _begin(self, setup: PieceSetup, n_sample: int, begun: State | Place, *, goes_on: bool) -> ModalMarch:
         """The march that stands where a piece begins."""
-        march = self._march
+        march, at, self._at = self._march, self._at, None
         if march is not None and isinstance(begun, Place):
+            if at is setup:
+                return march
             march.begin(setup, begun)
             library = march.library
             is_followed = isinstance(library, RetunedLibrary) and library.follows(march.mask)

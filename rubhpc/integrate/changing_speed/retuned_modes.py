@@ -136,6 +136,11 @@ class RetunedLibrary(ModeLibrary):
         return self
 
     @property
+    def is_tuned_ahead(self) -> bool:  # type: ignore[override]
+        """Whether a mode is tuned to several pieces at once: pieces begin with those met before."""
+        return self.n_room > 1
+
+    @property
     def n_byte(self) -> int:
         """Memory that its contact modes hold."""
         fields = (field for kept in self._held.values() for part in kept for field in part)

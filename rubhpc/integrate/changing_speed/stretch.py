@@ -35,37 +35,50 @@ class Stretch(NamedTuple):
     left: tuple[int, Floats]  # where the last piece has ended, as of `EventDrivenMarch.reached_in`
 
 
+def begin_stretch(
+    march: EventDrivenMarch,
+    setup: PieceSetup,
+    n_sample: int,
+    begun: Place,
+    left: tuple[int, Floats] | None = None,
+) -> RetunedLibrary | None:
+    """Begin a piece, with others to follow in the same kernel call; None where it is to be taken by itself.
+
+    It has begun either way, but where the march is none that takes several (`has_piece_loop`). `left` is
+    where the piece before has ended (`EventDrivenMarch.reached_in`), of modes that follow the speed.
+    """
+    library = march.begin_tuned(setup, begun)
+    if not isinstance(library, RetunedLibrary):
+        return None
+    if left is not None and library.follows(march.mask):
+        march.keep_fast(left, setup.spin, setup.interval * n_sample)
+    return None if library.n_room == 1 or library.has_strange() else library
+
+
 def take_stretch(
     march: EventDrivenMarch,
+    library: RetunedLibrary,
     setups: Sequence[PieceSetup],
     first: int,
     samples: Samples,
     begun: Place,
     earlier: tuple[Accumulator, float],
     check: Callable[[], None] | None,
-    left: tuple[int, Floats] | None = None,
 ) -> Stretch | None:
     """Take the pieces from `first` on, as far as nothing stands against it; None where that is nowhere.
 
     Parameters
     ----------
     march : EventDrivenMarch
-        Whose case it is; it stands nowhere afterwards, until it begins anew.
+        Whose case it is, at the beginning of the first of them (`begin_stretch`, whose library this is); it
+        stands nowhere afterwards, until it begins anew.
     setups : sequence of PieceSetup
         Of pieces of the same matrices.
     samples : Samples
         Room for those of one piece.
     begun, earlier
         As in `Passing.take`.
-    left : tuple, optional
-        Where the piece before has ended (`EventDrivenMarch.reached_in`), of modes that follow the speed.
     """
-    library = march.begin_tuned(setups[first], begun)
-    is_followed = isinstance(library, RetunedLibrary) and library.follows(march.mask)
-    if left is not None and is_followed:
-        march.keep_fast(left, setups[first].spin, setups[first].interval * samples.whole.shape[1])
-    if not isinstance(library, RetunedLibrary) or library.n_room == 1 or library.has_strange():
-        return None
     speeds, n_piece = setups[first].speeds, len(setups)
     n_row, n_sample = samples.whole.shape
     part = min(n_sample, setups[first].samples_per_revolution)
@@ -85,7 +98,7 @@ def take_stretch(
         n_part_sample=part,
         energy_limit=setups[first].energy_limit,
         at=np.array([first, 0, TO_BEGIN, march.mask]),
-        moved_by=march.moved_by(-1) if is_followed else 0,
+        moved_by=march.moved_by(-1) if library.follows(march.mask) else 0,
         left=march.reached_in()[1],
         motion=np.zeros((n_piece + 1, 2 * n)),
         pressing=np.zeros((n_piece + 1, q)),

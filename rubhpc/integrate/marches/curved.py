@@ -39,7 +39,6 @@ class CurvedMarch(EventDrivenMarch):
 
     has_closed_form = False
     has_piece_loop = False
-    is_foreseeing = False  # their tables take long to make
 
     def __init__(
         self,

@@ -46,7 +46,6 @@ class EventDrivenMarch(ModalMarch):
 
     has_closed_form = True  # of its closed contacts
     has_piece_loop = True  # whether a kernel begins pieces of a changing speed
-    is_foreseeing = True  # whether pieces begin with sets of contacts that those before have met
     take_change: ClassVar[Callable[..., int]] = staticmethod(change_contacts)  # kernel that takes an event
 
     def __init__(
@@ -60,7 +59,7 @@ class EventDrivenMarch(ModalMarch):
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(setup, clearance, friction, initial, check)
         self._event_work = event_work(self._clearance.size)
-        self._modes = MetModes(is_foreseeing=self.is_foreseeing)
+        self._modes = MetModes()
         self._enter_first(initial.contact_force)
 
     def begin(self, setup: ModalSetup, place: Place) -> None:

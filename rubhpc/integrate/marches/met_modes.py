@@ -26,9 +26,8 @@ class MetModes:
     those that this case has met.
     """
 
-    def __init__(self, *, is_foreseeing: bool) -> None:
-        """Begin with no library; `is_foreseeing` if a piece begins with sets that those before have met."""
-        self._is_foreseeing = is_foreseeing
+    def __init__(self) -> None:
+        """Begin with no library."""
         self._n_piece = -1
         self._asked: dict[int, int] = {}  # piece in which each set of contacts was last asked for
 
@@ -39,7 +38,7 @@ class MetModes:
         self._measured = measured
         self.library = measured.followed
         self.met = set(self.library.first_masks)
-        if self._is_foreseeing:
+        if measured.is_tuned_ahead:
             for foreseen in list(self._asked)[-MOST_FORESEEN:]:
                 self._add(foreseen)
 

@@ -222,6 +222,7 @@ class ModeLibrary:
         """Of the coordinates of a mode, 1/s: (2, m), real and imaginary, and the drift (m,) of those of 0."""
         return self._exponents[mask]
 
+    is_tuned_ahead = False  # whether modes are tuned to several pieces of a changing speed at once
     _n_solved = 0
     _other: ModeLibrary | None = None  # of a large one's: that which is followed, or which is measured
     _is_large = False  # so that memory does not hold as many as may be wanted
