@@ -31,7 +31,7 @@ PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 9  # method = "modal" with gaps that are curved
 CURVED_RINGS = 1  # the same with several stators
-SEVERAL_STATORS = 1  # method = "modal" with more than one
+SEVERAL_STATORS = 2  # method = "modal" with more than one
 MANY_STATORS = 8  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 8  # [branch]
 MANY_EVENTS = 2  # restitution, or method = "modal" where a case may have 200 000 events

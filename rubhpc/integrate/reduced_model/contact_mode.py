@@ -10,11 +10,15 @@ import numpy as np
 from numpy.typing import NDArray  # noqa: TC002 - of a NamedTuple
 from scipy.linalg import null_space
 
-from rubhpc.integrate.reduced_model.products import expanded, real_times
+from rubhpc.integrate.reduced_model.products import expanded, real_times, times_real
+from rubhpc.integrate.reduced_model.secular_modes import FEWEST, Contact
 from rubhpc.integrate.reduced_model.system_modes import count_modes, modes_of, parts_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.secular_modes import Eigenmodes
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
@@ -72,13 +76,14 @@ def solve_contact_mode(
     force_direction: Floats,
     mask: int,
     known: Solved | None = None,
+    opened: Eigenmodes | None = None,
 ) -> ContactMode:
     """Solve the linear system with the pairs of `mask` closed.
 
     With J the gap Jacobian and F the contact-force directions of the closed pairs, closed gaps confine the
     motion to `x = x0 + T y` with `J T = 0`; the contact forces drop out of the equations projected on L with
     `L^T F^T = 0`, and follow from the accelerations of the gaps being zero (the constraint of Eq. 18 of the
-    paper, differentiated twice).
+    paper, differentiated twice). `opened` are the eigenmodes with every pair open.
 
     Raises
     ------
@@ -93,22 +98,19 @@ def solve_contact_mode(
     if closed.size:
         offset[closed] = _closing(rate.tobytes(), *rate.shape)
     n_free = tangent.shape[1]
-    exponent, shape, inverse = modes_of(system, known)
+    contacts = list(map(Contact, rate, force.T))
+    exponent, moved, inverse = confined_modes(tangent, system, contacts, opened, known)
     phasor = reduced.force[0] - 1j * reduced.force[1]
     lower = np.concatenate([np.zeros(n_free), project @ phasor])
-    parts = parts_of(system, q)
-    response = steady_response(system, reduced.spin, lower, parts)
+    response = steady_response(system, reduced.spin, lower, q)
     constant = np.zeros((q, 2 * n_free))
     if closed.size:
         load = -project @ reduced.stiffness @ offset[closed].T
-        loads = np.vstack([np.zeros_like(load), load])
-        for rows in parts:
-            if np.any(loads[rows] != 0.0):
-                constant[np.ix_(closed, rows)] = -np.linalg.solve(system[np.ix_(rows, rows)], loads[rows]).T
+        constant[closed] = _at_rest(system, load, q).T
     expand = np.zeros((2 * n, 2 * n_free))
     expand[:n, :n_free] = expand[n:, n_free:] = tangent
     still = constant @ expand.T + np.hstack([offset, np.zeros((q, n))])  # (q, 2 n)
-    motion = np.hstack([expanded(tangent, shape), (expand @ response)[:, None], still.T])
+    motion = np.hstack([moved, (expand @ response)[:, None], still.T])
     clear = np.hstack([np.zeros((q, exponent.size + 1)), np.eye(q)])
     switch = gap_jacobian @ motion[:n] + clear
     if closed.size:
@@ -126,16 +128,59 @@ def solve_contact_mode(
     )
 
 
-def steady_response(
-    system: Floats, spin: float, load: Complexes, parts: list[NDArray[np.int64]]
-) -> Complexes:
-    """Coordinates and rates (2 n_free,) under a load (2 n_free,) that turns with the shaft, part by part."""
-    response = np.zeros(len(system), dtype=np.complex128)
-    for rows in parts:
+def confined_modes(
+    tangent: Floats,
+    system: Floats,
+    contacts: Sequence[Contact],
+    opened: Eigenmodes | None,
+    known: Solved | None,
+) -> tuple[Complexes, Complexes, Complexes]:
+    """Exponents (m,), motions (2 n, m) and inverse by the coordinates of `tangent` (m, 2 n_free).
+
+    `system` is that of these coordinates, `contacts` are what distinguishes it from the one whose eigenmodes
+    are `opened`: a large one is solved by way of them.
+    """
+    n, n_free = tangent.shape
+    is_large = n_free**2 >= FEWEST**2 * len(contacts)
+    found = opened.with_contacts(contacts) if opened and contacts and is_large else None
+    if found is None:
+        exponent, shape, inverse = modes_of(system, known)
+        return exponent, expanded(tangent, shape), inverse
+    motion = np.vstack([found.shape, found.shape * found.exponent])
+    halves = [times_real(found.inverse[:, :n], tangent), times_real(found.inverse[:, n:], tangent)]
+    return found.exponent, motion, np.hstack(halves)
+
+
+def steady_response(system: Floats, spin: float, load: Complexes, q: int) -> Complexes:
+    """Coordinates and rates (2 n_free,) under a load (2 n_free,) that turns with the shaft.
+
+    The load drives rates alone. Of several pairs (q) each part is solved by itself, for its coordinates.
+    """
+    response, n = np.zeros(len(system), dtype=np.complex128), len(system) // 2
+    if q <= 1:
+        whole = 1j * spin * np.eye(2 * n) - system
+        return np.asarray(np.linalg.solve(whole, load)) if np.any(load) else response
+    for rows in parts_of(system, q):
         if np.any(load[rows] != 0.0):
-            turned = 1j * spin * np.eye(rows.size) - system[np.ix_(rows, rows)]
-            response[rows] = np.linalg.solve(turned, load[rows])
+            first = rows[rows < n]
+            second = n + first
+            stiffness, damping = -system[second[:, None], first], -system[second[:, None], second]
+            turned = stiffness + 1j * spin * damping - spin**2 * np.eye(first.size)
+            response[first] = np.linalg.solve(turned, load[second])
+            response[second] = 1j * spin * response[first]
     return response
+
+
+def _at_rest(system: Floats, load: Floats, q: int) -> Floats:
+    """Coordinates and rates (2 n_free, k) at rest under loads (n_free, k), each part by itself."""
+    found, n = np.zeros((len(system), load.shape[1])), len(load)
+    if q <= 1:
+        return -np.asarray(np.linalg.solve(system, np.vstack([np.zeros_like(load), load])))
+    for rows in parts_of(system, q):
+        first = rows[rows < n]
+        if np.any(load[first] != 0.0):
+            found[first] = np.linalg.solve(-system[n + first[:, None], first], load[first])
+    return found
 
 
 def count_coordinates(reduced: ReducedModel, gap_jacobian: Floats, force_direction: Floats, mask: int) -> int:

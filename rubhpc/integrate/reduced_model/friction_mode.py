@@ -11,11 +11,12 @@ from rubhpc.integrate.reduced_model.contact_mode import (
     ContactMode,
     Places,
     confine,
+    confined_modes,
     steady_response,
 )
 from rubhpc.integrate.reduced_model.penalty_mode import damped, stored_energy
 from rubhpc.integrate.reduced_model.products import expanded, real_times
-from rubhpc.integrate.reduced_model.system_modes import modes_of, parts_of
+from rubhpc.integrate.reduced_model.secular_modes import Contact
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, lifted_place
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.secular_modes import Eigenmodes
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
@@ -125,6 +127,7 @@ def solve_friction_mode(
     pairs: FrictionPairs,
     mask: int,
     known: Solved | None = None,
+    opened: Eigenmodes | None = None,
 ) -> FrictionMode:
     """Solve the linear system with the pairs in the states of `mask`.
 
@@ -132,7 +135,8 @@ def solve_friction_mode(
     displacements phi that grow as the rims move. With `x = T y + E c`, `R T = 0`, the forces drop out of the
     equations projected on L, `L^T B = 0`, B being their directions: that of a sliding pair's normal force has
     its friction, that of a pair that sticks has none. Under a penalty gaps are no constraints: `k P Q` and
-    `c P Q` join the matrices, and `-k P` is the load of the clearances, as in `penalty_mode`.
+    `c P Q` join the matrices, and `-k P` is the load of the clearances, as in `penalty_mode`. `opened` are
+    the eigenmodes with every pair open.
     """
     n, q = reduced.stiffness.shape[0], len(pairs.gap_jacobian)
     states = np.array(states_of(mask, q))
@@ -141,7 +145,12 @@ def solve_friction_mode(
     sense = np.where(states == STUCK, 0.0, np.where(states == BACKWARD, -1.0, 1.0))[closed]
     rows = np.vstack([pairs.gap_jacobian[held], pairs.friction_direction[stuck]])
     pressed = pairs.gap_jacobian[closed] + pairs.friction * sense[:, None] * pairs.friction_direction[closed]
+    contacts: list[Contact] = []
     if soft.size:
+        spring = pairs.stiffness, pairs.damping
+        contacts += [
+            Contact(pairs.gap_jacobian[i], along, *spring) for i, along in zip(soft, pressed, strict=True)
+        ]
         along = pressed.T @ pairs.gap_jacobian[soft]
         reduced = replace(
             reduced,
@@ -150,12 +159,13 @@ def solve_friction_mode(
         )
     force = np.vstack([pressed[: held.size], pairs.friction_direction[stuck]]).T
     tangent, project, system = confine(reduced, rows, force)
+    contacts += map(Contact, rows, force.T)
     n_free, n_held, n_row = tangent.shape[1], held.size, len(rows)
-    exponent, shape, inverse = modes_of(system, known)
+    exponent, moved, inverse = confined_modes(tangent, system, contacts, opened, known)
     m = exponent.size
     phasor = reduced.force[0] - 1j * reduced.force[1]
     lower = np.concatenate([np.zeros(n_free), project @ phasor])
-    response = steady_response(system, reduced.spin, lower, parts_of(system, q))
+    response = steady_response(system, reduced.spin, lower, q)
     expand = np.zeros((2 * n, 2 * n_free))
     expand[:n, :n_free] = expand[n:, n_free:] = tangent
     end = m + 2 + 2 * q
@@ -163,7 +173,7 @@ def solve_friction_mode(
     growth = np.zeros(end)
     growth[ahead] = pairs.rim_speed[stuck]
     motion = np.zeros((2 * n, end), dtype=np.complex128)
-    motion[:, :m], motion[:, m] = expanded(tangent, shape), expand @ response
+    motion[:, :m], motion[:, m] = moved, expand @ response
     enter, take_off = np.zeros((end, 2 * n), dtype=np.complex128), np.zeros((3 + q, end), dtype=np.complex128)
     enter[:m] = expanded(tangent, inverse.T).T
     take_off[0, :m], take_off[1, :m] = inverse @ response.real, -inverse @ response.imag

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.reduced_model.contact_mode import ContactMode
-from rubhpc.integrate.reduced_model.system_modes import modes_of
+from rubhpc.integrate.reduced_model.contact_mode import ContactMode, confined_modes
+from rubhpc.integrate.reduced_model.secular_modes import Contact
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.secular_modes import Eigenmodes
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
@@ -46,14 +47,20 @@ class Penalty(NamedTuple):
 
 
 def solve_penalty_mode(
-    reduced: ReducedModel, penalty: Penalty, opened: ContactMode, mask: int, known: Solved | None = None
+    reduced: ReducedModel,
+    penalty: Penalty,
+    opened: ContactMode,
+    mask: int,
+    known: Solved | None = None,
+    eigenmodes: Eigenmodes | None = None,
 ) -> ContactMode:
     """Solve the linear system with the pairs of `mask` pressed; bits from q on are those that are lifted.
 
-    `opened` is the mode in which every pair is open.
+    `opened` is the mode in which every pair is open, `eigenmodes` are its eigenmodes.
     """
     pressed = penalty.pressed(mask)
-    return watched(pressed_mode(reduced, penalty, pressed, known) if pressed else opened, penalty, mask)
+    mode = pressed_mode(reduced, penalty, pressed, known, eigenmodes) if pressed else opened
+    return watched(mode, penalty, mask)
 
 
 def watched(mode: ContactMode, penalty: Penalty, mask: int) -> ContactMode:
@@ -71,19 +78,26 @@ def watched(mode: ContactMode, penalty: Penalty, mask: int) -> ContactMode:
 
 
 def pressed_mode(
-    reduced: ReducedModel, penalty: Penalty, pressed: list[int], known: Solved | None
+    reduced: ReducedModel,
+    penalty: Penalty,
+    pressed: list[int],
+    known: Solved | None,
+    opened: Eigenmodes | None = None,
 ) -> ContactMode:
     """The motion with these pairs pressed, without switch functions.
 
     With `Q` the gap Jacobian and `P` the contact-force directions of the pressed pairs, it is that of
-    `K + k P Q` and `C + c P Q` under the load `-k P` of their clearances.
+    `K + k P Q` and `C + c P Q` under the load `-k P` of their clearances. `opened` are the eigenmodes with
+    every pair open.
     """
     n, q = reduced.stiffness.shape[0], len(penalty.gap_jacobian)
     rows, directions = penalty.gap_jacobian[pressed], penalty.force_direction[pressed].T
     stiffness = reduced.stiffness + penalty.stiffness * directions @ rows
     damping = reduced.damping + penalty.damping * directions @ rows
     system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
-    exponent, shape, inverse = modes_of(system, known)
+    springs = penalty.stiffness, penalty.damping
+    contacts = [Contact(*pair, *springs) for pair in zip(rows, directions.T, strict=True)]
+    exponent, moved, inverse = confined_modes(np.eye(n), system, contacts, opened, known)
     phasor = reduced.force[0] - 1j * reduced.force[1]
     turned = 1j * reduced.spin * np.eye(2 * n) - system
     response = np.linalg.solve(turned, np.concatenate([np.zeros(n), phasor]))
@@ -92,7 +106,7 @@ def pressed_mode(
     return ContactMode(
         mask=0,
         exponent=np.concatenate([exponent, [1j * reduced.spin], np.zeros(q)]),
-        motion=np.hstack([shape, response[:, None], still]),
+        motion=np.hstack([moved, response[:, None], still]),
         enter=inverse,
         take_off=np.vstack([inverse @ response.real, -inverse @ response.imag, (inverse @ still).T]),
         switch=np.zeros((q, exponent.size + 1 + q), dtype=np.complex128),

@@ -23,6 +23,12 @@ def real_times(matrix: Floats, values: Complexes) -> Complexes:
     return product
 
 
+def times_real(values: Complexes, matrix: Floats) -> Complexes:
+    """Product of complex values (k, m) with a real matrix or vector, (m, n) or (m,)."""
+    product: Complexes = (values.real @ matrix) + 1j * (values.imag @ matrix)
+    return product
+
+
 def expanded(tangent: Floats, values: Complexes) -> Complexes:
     """Displacements, then velocities, (2 n, k), of coordinates and their rates (2 m, k) by a basis (n, m)."""
     m = tangent.shape[1]

@@ -28,6 +28,7 @@ from rubhpc.integrate.reduced_model.friction_mode import (
 )
 from rubhpc.integrate.reduced_model.penalty_mode import pressed_mode, solve_penalty_mode, watched
 from rubhpc.integrate.reduced_model.products import real_times
+from rubhpc.integrate.reduced_model.secular_modes import Eigenmodes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,6 +57,11 @@ class Touching(NamedTuple):
     def model(self, reduced: ReducedModel) -> ReducedModel:
         """The model of these coordinates and pairs alone."""
         return reduced.part(self.rows, self.pairs)
+
+    def eigenmodes(self, opened: ContactMode) -> Eigenmodes:
+        """The eigenmodes of these coordinates in the open set."""
+        own = np.setdiff1d(np.arange(opened.n_eigenmode), self.spared)
+        return _eigenmodes(opened, self.rows, own)
 
     def of_pairs(self, rows: Floats) -> Floats:
         """Rows of the closed pairs (r, n_own), from those of all (q, n)."""
@@ -168,6 +174,12 @@ class OpenBodies:
         return found
 
     @cached_property
+    def eigenmodes(self) -> Eigenmodes:
+        """The eigenmodes of all coordinates."""
+        opened = self.opened
+        return _eigenmodes(opened, np.arange(len(self._part)), np.arange(opened.n_eigenmode))
+
+    @cached_property
     def _opened_loss(self) -> tuple[Ints, Floats]:
         """Where energies of the open set are not zero, (2, k), and what they are."""
         loss = self.opened_energies.loss
@@ -209,9 +221,12 @@ def contact_mode_among(
     closed = [i for i in range(q) if mask >> i & 1]
     touching = among.touching(closed) if among and closed else None
     if among is None or touching is None:
-        return solve_contact_mode(reduced, gap_jacobian, force, mask, known)
+        return solve_contact_mode(
+            reduced, gap_jacobian, force, mask, known, among.eigenmodes if among else None
+        )
     rates, forces = touching.of_pairs(gap_jacobian), touching.of_pairs(force)
-    own = solve_contact_mode(touching.model(reduced), rates, forces, (1 << len(closed)) - 1, known)
+    every, own_open = (1 << len(closed)) - 1, touching.eigenmodes(among.opened)
+    own = solve_contact_mode(touching.model(reduced), rates, forces, every, known, own_open)
     mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
     watched_pairs = np.setdiff1d(np.arange(q), closed)
     mode.switch[watched_pairs] = real_times(gap_jacobian[watched_pairs], mode.motion[:n])
@@ -231,11 +246,11 @@ def penalty_mode_among(
     pressed, (q, n) = penalty.pressed(mask), penalty.gap_jacobian.shape
     touching = among.touching(pressed) if among and pressed else None
     if touching is None:
-        return solve_penalty_mode(reduced, penalty, opened, mask, known)
+        return solve_penalty_mode(reduced, penalty, opened, mask, known, among.eigenmodes if among else None)
     rates, forces = touching.of_pairs(penalty.gap_jacobian), touching.of_pairs(penalty.force_direction)
     own_penalty = penalty._replace(gap_jacobian=rates, force_direction=forces)
     every = list(range(len(pressed)))
-    own = pressed_mode(touching.model(reduced), own_penalty, every, known)
+    own = pressed_mode(touching.model(reduced), own_penalty, every, known, touching.eigenmodes(opened))
     return watched(touching.among_all(own, opened, n, q), penalty, mask)
 
 
@@ -246,7 +261,7 @@ def friction_mode_among(
     closed, (q, n) = pairs.closed(mask), pairs.gap_jacobian.shape
     touching = among.touching(closed) if among and closed else None
     if among is None or touching is None:
-        return solve_friction_mode(reduced, pairs, mask, known)
+        return solve_friction_mode(reduced, pairs, mask, known, among.eigenmodes if among else None)
     own_pairs = replace(
         pairs,
         gap_jacobian=touching.of_pairs(pairs.gap_jacobian),
@@ -255,7 +270,8 @@ def friction_mode_among(
     )
     states = states_of(mask, q)
     own_mask = mask_of([states[i] for i in closed])
-    own = solve_friction_mode(touching.model(reduced), own_pairs, own_mask, known)
+    own_open = touching.eigenmodes(among.opened)
+    own = solve_friction_mode(touching.model(reduced), own_pairs, own_mask, known, own_open)
     assert isinstance(among.opened, FrictionMode)
     mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
     watch_open_pairs(mode.switch, mode.motion, pairs, mask, mode.n_mode)
@@ -266,6 +282,16 @@ def open_bodies(reduced: ReducedModel, model: Model, opened: ContactMode) -> Ope
     """What several stators are while open; of one there is nothing to spare."""
     gap_jacobian, _, slip = reduction.directions(reduced, model, 0.0)
     return OpenBodies(reduced, opened, np.abs(gap_jacobian) + np.abs(slip)) if len(slip) > 1 else None
+
+
+def _eigenmodes(opened: ContactMode, rows: Ints, columns: Ints) -> Eigenmodes:
+    """Eigenmodes of the open set (`columns`) that move these coordinates and no others."""
+    shape = opened.motion[rows[:, None], columns]
+    return Eigenmodes(
+        opened.exponent[columns],
+        shape,
+        opened.enter[columns[:, None], _states(rows, len(opened.motion) // 2)],
+    )
 
 
 def _states(rows: Ints, n: int) -> Ints:

@@ -1,0 +1,236 @@
+"""Eigenmodes with one more contact, from those without it: zeros of a secular function."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.integrate.reduced_model.products import times_real
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Complexes = NDArray[np.complex128]
+
+FEWEST = 28  # coordinates from which this is the quicker way with one contact
+WEAK = 0.25  # an exponent that moves by less than this part of its distance to the next is found from itself
+MOST_STRONG = 0.5  # of the eigenmodes; with more, the whole system is as quick
+PASSES = 12
+CONVERGED = 1e-9  # of a step, whose error Newton's method squares
+SAME = 1e-13  # of an exponent: no distance
+WORST = 1e-8  # cosine between a shape and its inverse below which exponents coincide
+ROUNDING = 8.0 * np.finfo(np.float64).eps
+
+
+class Contact(NamedTuple):
+    """A closed pair, or a slip that sticks."""
+
+    row: Floats  # (n,), of what is held or pressed, by displacements
+    force: Floats  # (n,), of a unit contact force
+    stiffness: float = 0.0  # N/m; with neither, `row` is held
+    damping: float = 0.0  # N s/m
+
+
+class Eigenmodes(NamedTuple):
+    """Eigenmodes of n coordinates, one of each pair: `x = Re(shape @ z)`, `z = inverse @ (x, v)`."""
+
+    exponent: Complexes  # (m,), 1/s
+    shape: Complexes  # (n, m), displacements, doubled for one of a pair
+    inverse: Complexes  # (m, 2 n)
+
+    def with_contacts(self, contacts: Sequence[Contact]) -> Eigenmodes | None:
+        """The eigenmodes with these contacts; None where they are not found this way."""
+        modes: Eigenmodes | None = self
+        for contact in contacts:
+            modes = _with_contact(modes, contact) if modes else None
+        return modes
+
+
+def _with_contact(modes: Eigenmodes, contact: Contact) -> Eigenmodes | None:
+    """Eigenmodes with one more contact.
+
+    With `A` the system without it, `b` the input of its force and `c` its row, the force is that of a
+    constraint `c x = 0`, or `-(k + d s) c x`. Exponents are then the zeros of
+
+        a + sum over j of r_j / (s - l_j),    r_j = (k + d l_j) c_j b_j,   a = 1,
+
+    over all exponents `l_j` of A, b and c by its eigenmodes; of a constraint a = 0 and `r_j = c_j b_j`, and
+    two zeros are infinite. At a zero s the shape is `inv(s - A) b` and the inverse `c inv(s - A)`. Zeros are
+    kept as distances to an exponent, which makes both as accurate as the eigenmodes of A are (Gu and
+    Eisenstat, SIAM J. Matrix Anal. Appl. 15 (1994) 1266-1276). Converged zeros that differ from one another
+    and are as many as there must be are all of them.
+    """
+    n = len(contact.row)
+    is_held = contact.stiffness == 0.0 and contact.damping == 0.0
+    half = np.where(modes.exponent.imag == 0.0, 1.0, 0.5)
+    seen = _without_rounding(contact.row, modes.shape.T) * half
+    moved = _without_rounding(contact.force, modes.inverse[:, n:])
+    if not is_held:
+        seen = seen * (contact.stiffness + contact.damping * modes.exponent)
+    active, rest = (
+        np.flatnonzero((seen != 0.0) | (moved != 0.0)),
+        np.flatnonzero((seen == 0.0) & (moved == 0.0)),
+    )
+    poles = _Poles.of(modes.exponent[active], seen[active], moved[active], is_held)
+    zeros = poles.zeros() if poles else None
+    if poles is None or zeros is None:
+        return None
+    found = poles.shapes(zeros)
+    if found is None:
+        return None
+    right, left = found
+    shape, inverse = (
+        poles.combined(right, (modes.shape[:, active] * half[active]).T),
+        poles.combined(left, modes.inverse[active]),
+    )
+    size = np.sqrt((np.abs(shape) ** 2).sum(axis=1) * (1.0 + np.abs(zeros.exponent) ** 2))
+    shape *= (np.where(zeros.is_real, 1.0, 2.0) / size)[:, None]
+    inverse *= (size / (right * left).sum(axis=1))[:, None]
+    return Eigenmodes(
+        np.concatenate([zeros.exponent, modes.exponent[rest]]),
+        np.hstack([shape.T, modes.shape[:, rest]]),
+        np.vstack([inverse, modes.inverse[rest]]),
+    )
+
+
+def _without_rounding(row: Floats, values: Complexes) -> Complexes:
+    """Products of a row (n,) with values (m, n), zero where only rounding differs from it."""
+    product = times_real(values, row)
+    product[np.abs(product) <= ROUNDING * (np.abs(values) @ np.abs(row))] = 0.0
+    return product
+
+
+class _Zeros(NamedTuple):
+    """Zeros of a secular function, the upper one of each conjugate pair."""
+
+    exponent: Complexes  # (z,)
+    distance: Complexes  # (z,), to the exponent at `own`
+    own: Ints  # (z,)
+    is_real: NDArray[np.bool_]  # (z,)
+
+
+class _Poles(NamedTuple):
+    """A secular function: its k poles and the conjugates of those that are complex, p in all."""
+
+    upper: Complexes  # (k,)
+    every: Complexes  # (p,)
+    turned: Ints  # of the k, those with a conjugate
+    seen: Complexes  # (p,), c_j
+    moved: Complexes  # (p,), b_j
+    residue: Complexes  # (p,), r_j
+    constant: float  # a
+    apart: Complexes  # (k, p), differences; infinite to itself and to what coincides
+
+    @classmethod
+    def of(cls, upper: Complexes, seen: Complexes, moved: Complexes, is_held: bool) -> _Poles | None:
+        """None where poles coincide and are coupled."""
+        turned = np.flatnonzero(upper.imag != 0.0)
+        every, every_seen, every_moved = (
+            np.concatenate([values, values[turned].conj()]) for values in (upper, seen, moved)
+        )
+        apart = upper[:, None] - every
+        same = np.abs(apart) <= SAME * np.abs(upper)[:, None]
+        own = np.arange(upper.size)
+        same[own, own] = False
+        if np.any(same & ((seen[:, None] * every_moved != 0.0) | (moved[:, None] * every_seen != 0.0))):
+            return None
+        same[own, own] = True
+        apart[same] = np.inf
+        return cls(
+            upper,
+            every,
+            turned,
+            every_seen,
+            every_moved,
+            every_seen * every_moved,
+            0.0 if is_held else 1.0,
+            apart,
+        )
+
+    def zeros(self) -> _Zeros | None:
+        """All zeros by Newton's method; None where it does not converge to as many."""
+        n_pole = self.upper.size
+        first = -self.residue[:n_pole] / (self.constant + (1.0 / self.apart) @ self.residue)
+        weak = np.abs(first) <= WEAK * np.abs(self.apart).min(axis=1, initial=np.inf)
+        strong = np.flatnonzero(~weak)
+        started = self._start(strong)
+        if started is None:
+            return None
+        distances = np.abs(started[:, None] - self.upper[strong])
+        nearest = strong[distances.argmin(axis=1)] if strong.size else strong
+        own = np.concatenate([np.flatnonzero(weak), nearest])
+        distance = np.concatenate([first[weak], started - self.upper[nearest]])
+        is_real = np.concatenate([self.upper[weak].imag == 0.0, started.imag == 0.0])
+        residue = self.residue[own]
+        moving = np.flatnonzero(residue != 0.0)
+        left = moving
+        for _ in range(PASSES):
+            inverse = 1.0 / (self.apart[own[left]] + distance[left, None])
+            value, slope = self.constant + inverse @ self.residue, -(inverse * inverse) @ self.residue
+            at_zero = distance[left] * value + residue[left]
+            rate = value + distance[left] * slope
+            shared = left >= own.size - started.size
+            if np.any(shared):
+                others = self._from_others(own, distance, is_real, left[shared])
+                rate[shared] += at_zero[shared] * (inverse[shared].sum(axis=1) - others)
+            step = at_zero / rate
+            distance[left] -= step
+            left = left[np.abs(step) > CONVERGED * np.abs(distance[left])]
+            if not left.size:
+                break
+        exponent = self.upper[own] + distance
+        exponent.imag[is_real] = 0.0
+        away = np.abs(exponent[moving, None] - exponent[moving])
+        np.fill_diagonal(away, np.inf)
+        are_new = np.all(away > SAME * np.abs(exponent[moving])[:, None])
+        are_complex = np.all(exponent.imag[~is_real] > CONVERGED * np.abs(exponent[~is_real]))
+        return _Zeros(exponent, distance, own, is_real) if not left.size and are_new and are_complex else None
+
+    def _from_others(self, own: Ints, distance: Complexes, is_real: NDArray[np.bool_], at: Ints) -> Complexes:
+        """Sum of 1 / (z - z_j) over all zeros other than z, and their conjugates, for the zeros `at`."""
+        zeros = self.upper[own] + distance
+        away = zeros[at, None] - np.concatenate([zeros, zeros[~is_real].conj()])
+        away[np.arange(at.size), at] = np.inf
+        return np.asarray((1.0 / away).sum(axis=1))
+
+    def _start(self, strong: Ints) -> Complexes | None:
+        """Zeros among the strong poles, the others' sum taken as it is at rest: those of a small system."""
+        if strong.size > MOST_STRONG * self.upper.size:
+            return None
+        partners = self.upper.size + np.flatnonzero(np.isin(self.turned, strong))
+        chosen = np.concatenate([strong, partners])
+        others = np.ones(self.every.size, dtype=bool)
+        others[chosen] = False
+        still = self.residue / self.every
+        constant = self.constant - still[others].sum().real
+        n_zero = chosen.size - (2 if self.constant == 0.0 else 0)
+        if n_zero < 0 or np.abs(constant) <= CONVERGED * np.abs(still).sum():
+            return None
+        found = np.linalg.eigvals(np.diag(self.every[chosen]) - self.residue[chosen] / constant)
+        found = found[np.argsort(np.abs(found), kind="stable")[:n_zero]]
+        are_real = np.abs(found.imag) <= CONVERGED * np.abs(found)
+        real, upper = found[are_real].real.astype(np.complex128), found[~are_real & (found.imag > 0.0)]
+        return np.concatenate([real, upper]) if real.size + 2 * upper.size == n_zero else None
+
+    def shapes(self, zeros: _Zeros) -> tuple[Complexes, Complexes] | None:
+        """Shapes and inverses by the poles' own, (z, p) each; None where they are all but orthogonal."""
+        inverse = 1.0 / (self.apart[zeros.own] + zeros.distance[:, None])
+        value = self.constant + inverse @ self.residue
+        right = (-self.seen[zeros.own] / value)[:, None] * self.moved * inverse
+        left = (-self.moved[zeros.own] / value)[:, None] * self.seen * inverse
+        at = np.arange(zeros.own.size), zeros.own
+        right[at] = left[at] = 1.0
+        sizes = np.linalg.norm(right, axis=1) * np.linalg.norm(left, axis=1)
+        return (right, left) if np.all(np.abs((right * left).sum(axis=1)) > WORST * sizes) else None
+
+    def combined(self, weights: Complexes, values: Complexes) -> Complexes:
+        """Sum over all poles of weights (z, p) times values (k, n) and their conjugates: (z, n)."""
+        k = self.upper.size
+        together, apart = weights[:, :k].copy(), weights[:, :k].copy()
+        together[:, self.turned] += weights[:, k:]
+        apart[:, self.turned] -= weights[:, k:]
+        return times_real(together, values.real) + 1j * times_real(apart, values.imag)
