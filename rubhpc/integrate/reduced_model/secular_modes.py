@@ -97,6 +97,12 @@ def _with_contact(modes: Eigenmodes, contact: Contact) -> Eigenmodes | None:
     )
 
 
+def _upper(zeros: Complexes) -> Complexes:
+    """The real ones among zeros, and the upper one of each conjugate pair."""
+    are_real = np.abs(zeros.imag) <= CONVERGED * np.abs(zeros)
+    return np.concatenate([zeros[are_real].real, zeros[~are_real & (zeros.imag > 0.0)]])
+
+
 def _without_rounding(row: Floats, values: Complexes) -> Complexes:
     """Products of a row (n,) with values (m, n), zero where only rounding differs from it."""
     product = times_real(values, row)
@@ -198,7 +204,10 @@ class _Poles(NamedTuple):
         return np.asarray((1.0 / away).sum(axis=1))
 
     def _start(self, strong: Ints) -> Complexes | None:
-        """Zeros among the strong poles, the others' sum taken as it is at rest: those of a small system."""
+        """Zeros among the strong poles: those of a small system, the others' sum taken as it is at rest.
+
+        Beyond all other poles their sum is next to nothing.
+        """
         if strong.size > MOST_STRONG * self.upper.size:
             return None
         partners = self.upper.size + np.flatnonzero(np.isin(self.turned, strong))
@@ -211,10 +220,20 @@ class _Poles(NamedTuple):
         if n_zero < 0 or np.abs(constant) <= CONVERGED * np.abs(still).sum():
             return None
         found = np.linalg.eigvals(np.diag(self.every[chosen]) - self.residue[chosen] / constant)
-        found = found[np.argsort(np.abs(found), kind="stable")[:n_zero]]
-        are_real = np.abs(found.imag) <= CONVERGED * np.abs(found)
-        real, upper = found[are_real].real.astype(np.complex128), found[~are_real & (found.imag > 0.0)]
-        return np.concatenate([real, upper]) if real.size + 2 * upper.size == n_zero else None
+        far = np.abs(self.every[others]).max(initial=0.0)
+        beyond = self._zeros_alone(chosen) if np.any(np.abs(self.every[chosen]) > far) else found[:0]
+        merged = np.concatenate([found[np.abs(found) <= far], beyond[np.abs(beyond) > far]])
+        nearest = found[np.argsort(np.abs(found), kind="stable")[:n_zero]]
+        started = _upper(merged if merged.size == n_zero else nearest)
+        return started if started.size + np.count_nonzero(started.imag) == n_zero else None
+
+    def _zeros_alone(self, chosen: Ints) -> Complexes:
+        """Zeros of the function with these poles alone, and one at zero so that residues sum to zero."""
+        pole, residue = self.every[chosen], self.residue[chosen]
+        if self.constant:
+            return np.linalg.eigvals(np.diag(pole) - residue / self.constant)
+        weight = residue * pole
+        return np.linalg.eigvals(np.diag(pole) - np.outer(pole, weight / weight.sum()))
 
     def shapes(self, zeros: _Zeros) -> tuple[Complexes, Complexes] | None:
         """Shapes and inverses by the poles' own, (z, p) each; None where they are all but orthogonal."""
