@@ -230,10 +230,9 @@ class _Poles(NamedTuple):
     def _zeros_alone(self, chosen: Ints) -> Complexes:
         """Zeros of the function with these poles alone, and one at zero so that residues sum to zero."""
         pole, residue = self.every[chosen], self.residue[chosen]
-        if self.constant:
-            return np.linalg.eigvals(np.diag(pole) - residue / self.constant)
         weight = residue * pole
-        return np.linalg.eigvals(np.diag(pole) - np.outer(pole, weight / weight.sum()))
+        coupling = residue / self.constant if self.constant else np.outer(pole, weight / weight.sum())
+        return np.asarray(np.linalg.eigvals(np.diag(pole) - coupling), dtype=np.complex128)
 
     def shapes(self, zeros: _Zeros) -> tuple[Complexes, Complexes] | None:
         """Shapes and inverses by the poles' own, (z, p) each; None where they are all but orthogonal."""
