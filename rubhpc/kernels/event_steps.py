@@ -131,23 +131,39 @@ def end_record(
     accumulator: Accumulator,
 ) -> None:
     """Close the record where it ends: its last interval between samples, and the energies."""
-    if progress.tick == clock.n_sample << clock.sample_level:
-        if is_sample:
-            count = clock.n_sample + 1 - progress.next_sample
-            interval = clock.tick * (1 << clock.sample_level)
-            take_samples(
-                tables,
-                progress.mode,
-                z[0],
-                z[1],
-                clock.n_sample,
-                count,
-                interval,
-                recorder,
-                samples,
-                accumulator,
-            )
+    if end_samples(tables, clock, is_sample, z, progress, recorder, samples, accumulator):
         end_span(tables, clock, z, progress, recorder, accumulator)
+
+
+@jit_inline_sum
+def end_samples(
+    tables: ModeTables,
+    clock: Clock,
+    is_sample: bool,
+    z: Floats,
+    progress: Progress,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> bool:
+    """Take the last interval between samples; whether the record ends at the tick reached."""
+    is_end = progress.tick == clock.n_sample << clock.sample_level
+    if is_end and is_sample:
+        count = clock.n_sample + 1 - progress.next_sample
+        interval = clock.tick * (1 << clock.sample_level)
+        take_samples(
+            tables,
+            progress.mode,
+            z[0],
+            z[1],
+            clock.n_sample,
+            count,
+            interval,
+            recorder,
+            samples,
+            accumulator,
+        )
+    return bool(is_end)
 
 
 @jit_inline_sum

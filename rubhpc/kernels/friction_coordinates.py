@@ -1,6 +1,6 @@
 """Coordinates of a contact mode under set-valued friction: entered, left, and their energies.
 
-As `contact_modes.enter` and `measuring.energy_forms`, of the coordinates that a set of states uses alone:
+As `contact_modes.enter` and `measuring.end_span`, of the coordinates that a set of states uses alone:
 pairs that stick leave a quarter of the tables' width empty, and events cost what is read of them.
 """
 
@@ -88,52 +88,68 @@ def leave_states(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> No
 
 
 @jit_lean_sum
-def read_energies(tables: ModeTables, mode: int, z: Floats, entry: Floats) -> None:
-    """Fill `entry` (2,), J, with what grows by damping loss and unbalance work in a contact mode.
+def energies_gained(tables: ModeTables, mode: int, begun: Floats, z: Floats, gained: Floats) -> None:
+    """Fill `gained` (2,), J, with damping loss and unbalance work between coordinates (2, m) of a mode.
 
-    The form of the loss is symmetric: what is beside its diagonal is read once.
+    The form of the loss is read once for both, and what is beside its diagonal, which is symmetric, once.
     """
-    m, used, first = z.shape[1], used_width(tables, mode), tables.n_eigenmode[mode]
+    m, used = z.shape[1], used_width(tables, mode)
     form, z_re, z_im = tables.loss[mode], z[0, :used], z[1, :used]
+    y_re, y_im = begun[0, :used], begun[1, :used]
     if form.shape[0] == 0:  # tables without energies
-        entry[0], entry[1] = 0.0, 0.0
+        gained[0], gained[1] = 0.0, 0.0
         return
     loss = 0.0
     for k in range(0, used, 4):  # four rows at a time: one would wait for its sum
         block = k - k % LANES  # where the block on the diagonal begins
         one, two, three, four = form[k], form[k + 1], form[k + 2], form[k + 3]
         a, b, c, d = z_re[k], z_re[k + 1], z_re[k + 2], z_re[k + 3]
+        e, f, g, h = y_re[k], y_re[k + 1], y_re[k + 2], y_re[k + 3]
         aside, within = 0.0, 0.0
         for j in range(block):
             aside += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * z_re[j]
+            aside -= (e * one[j] + f * two[j] + g * three[j] + h * four[j]) * y_re[j]
         for j in range(block, block + LANES):
             within += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * z_re[j]
+            within -= (e * one[j] + f * two[j] + g * three[j] + h * four[j]) * y_re[j]
         one, two, three, four = form[m + k], form[m + k + 1], form[m + k + 2], form[m + k + 3]
         a, b, c, d = z_im[k], z_im[k + 1], z_im[k + 2], z_im[k + 3]
-        if a != 0.0 or b != 0.0 or c != 0.0 or d != 0.0:
+        e, f, g, h = y_im[k], y_im[k + 1], y_im[k + 2], y_im[k + 3]
+        if abs(a) + abs(b) + abs(c) + abs(d) + abs(e) + abs(f) + abs(g) + abs(h) != 0.0:
             for j in range(used):
                 aside += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * z_re[j]
+                aside -= (e * one[j] + f * two[j] + g * three[j] + h * four[j]) * y_re[j]
             for j in range(block):
                 aside += (a * one[m + j] + b * two[m + j] + c * three[m + j] + d * four[m + j]) * z_im[j]
+                aside -= (e * one[m + j] + f * two[m + j] + g * three[m + j] + h * four[m + j]) * y_im[j]
             for j in range(block, block + LANES):
                 within += (a * one[m + j] + b * two[m + j] + c * three[m + j] + d * four[m + j]) * z_im[j]
+                within -= (e * one[m + j] + f * two[m + j] + g * three[m + j] + h * four[m + j]) * y_im[j]
         loss += 2.0 * aside + within
-    cosine, sine = z[0, first], z[1, first]
+    gained[0], gained[1] = loss, work_form(tables, mode, z_re, z_im) - work_form(tables, mode, y_re, y_im)
+
+
+@jit_inline_sum
+def work_form(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
+    """What grows by the work of the unbalance, J."""
+    first = tables.n_eigenmode[mode]
+    cosine, sine = z_re[first], z_im[first]
     work = 0.0
     for part in range(2):  # exp(i angle), then its conjugate
         re, im = tables.work_re[mode, part], tables.work_im[mode, part]
         real, imaginary = 0.0, 0.0
-        for k in range(used):
+        for k in range(z_re.size):
             real += re[k] * z_re[k] - im[k] * z_im[k]
             imaginary += re[k] * z_im[k] + im[k] * z_re[k]
         work += cosine * real - (sine if part == 0 else -sine) * imaginary
-    entry[0], entry[1] = loss, work
+    return work
 
 
 @jit_inline_sum
 def begin_energies(tables: ModeTables, z: Floats, progress: Progress, recorder: Recorder) -> None:
     """Begin to add up energies at the tick reached, in the contact mode entered."""
-    read_energies(tables, progress.mode, z, recorder.entry)
+    for k in range(used_width(tables, progress.mode)):
+        recorder.begun[0, k], recorder.begun[1, k] = z[0, k], z[1, k]
     progress.energy_from = progress.tick
 
 
@@ -149,8 +165,7 @@ def end_energies(
     """Add what damping took and the unbalance gave since they began, in one contact mode all along."""
     mode = progress.mode
     time = (progress.tick - progress.energy_from) * clock.tick
-    loss, work = recorder.entry[0], recorder.entry[1]
-    read_energies(tables, mode, z, recorder.entry)
-    accumulator.energy[DAMPING_LOSS] += recorder.entry[0] - loss + tables.steady_power[mode, 0] * time
-    accumulator.energy[UNBALANCE_WORK] += recorder.entry[1] - work + tables.steady_power[mode, 1] * time
+    energies_gained(tables, mode, recorder.begun, z, recorder.entry)
+    accumulator.energy[DAMPING_LOSS] += recorder.entry[0] + tables.steady_power[mode, 0] * time
+    accumulator.energy[UNBALANCE_WORK] += recorder.entry[1] + tables.steady_power[mode, 1] * time
     progress.energy_from = NONE

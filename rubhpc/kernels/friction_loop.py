@@ -39,7 +39,7 @@ from rubhpc.kernels.event_steps import (
     choose_step,
     contact_age,
     count_event,
-    end_record,
+    end_samples,
     longest_step,
     note_resolved,
     record_event,
@@ -65,6 +65,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+FEW_BITS = 2  # of a count of ticks, behind the first
 WORTH_ASKING = 4  # of an interval free of events: its last share, in which it is bounded anew
 MOST_EVENTS = 65536  # in a revolution; more are left to short steps
 
@@ -130,8 +131,10 @@ def advance_with_friction(
                 observe_states(mask[progress.mode], accumulator)
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
         if progress.tick >= last_tick:
-            if is_recorded:
-                end_record(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
+            if is_recorded and end_samples(
+                tables, clock, is_sample, z, progress, recorder, samples, accumulator
+            ):
+                end_energies(tables, clock, z, progress, recorder, accumulator)
             return FINISHED
         is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
         if progress.n_step > last_step and not is_at_event:
@@ -252,14 +255,18 @@ def advance_with_friction(
 def measured_step(clock: Clock, last_tick: int, finest: int, sure_to: int, progress: Progress) -> int:
     """Ticks of the next step of a closed pair that is recorded: on to the next sample in equal steps.
 
-    None is longer than 2^finest ticks, nor, but for a search for events, ends after the tick `sure_to`.
+    None is longer than 2^finest ticks, nor, but for a search for events, ends after the tick `sure_to`. They
+    are taken by powers of two of ticks, and so counts of few digits are chosen.
     """
     now = progress.tick
     next_sample = ((now >> clock.sample_level) + 1) << clock.sample_level
     ahead = min(last_tick, next_sample) - now
     most = min(1 << finest, max(sure_to - now, 1 << clock.search_level))
     n_step = (ahead + most - 1) // most
-    return (ahead + n_step - 1) // n_step
+    count = (ahead + n_step - 1) // n_step
+    unit = max(1, (1 << finest) >> FEW_BITS)
+    whole = (count + unit - 1) // unit * unit
+    return min(ahead, whole if whole <= most else max(most // unit * unit, count % unit))
 
 
 @jit_inline_sum

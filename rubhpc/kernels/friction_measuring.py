@@ -57,7 +57,7 @@ def resolved_friction(tables: ModeTables, mode: int, age: float, z_re: Floats, z
 
     As `contact_modes.resolved_time`, but for what an event has set off less than a share of the averaging
     time ago: of that, impulses and works are asked for, not values, and the shorter the `age` (s) of the
-    contact, the less of them can be missed.
+    contact, the less of them can be missed. Sizes are bounded by those of real and imaginary parts.
     """
     fourth, pace = np.inf, tables.pace[mode]
     for i in range(tables.switch_re.shape[1] // 2):
@@ -68,15 +68,15 @@ def resolved_friction(tables: ModeTables, mode: int, age: float, z_re: Floats, z
             # Of the slip, but for that of the steady spin.
             least = DYING if state == STUCK or j == 2 * i else 0.0
             re, im = tables.switch_re[mode, j], tables.switch_im[mode, j]
-            size, bend = 0.0, 0.0
+            whole, bend = 0.0, 0.0
             for k in range(z_re.size):
                 if pace[k] > least:
-                    part = np.sqrt((re[k] * re[k] + im[k] * im[k]) * (z_re[k] * z_re[k] + z_im[k] * z_im[k]))
+                    part = (abs(re[k]) + abs(im[k])) * (abs(z_re[k]) + abs(z_im[k]))
                     square = pace[k] * pace[k]
-                    size += part
+                    whole += part
                     bend += part * square * square
             if bend > 0.0:
-                fourth = min(fourth, size / bend)
+                fourth = min(fourth, whole / bend)
     spared = max(1.0, SETTLED * AVERAGING_TIME / age)
     return float(np.sqrt(np.sqrt(RESOLVED * spared * fourth)))
 

@@ -38,6 +38,7 @@ class Recorder(NamedTuple):
     last: Floats  # (2, 3 + q), watched signals and their rates at the last sample; NaN before the first
     node: Floats  # (4, q), force, slip speed (N, m/s) and their rates of closed pairs at the last step
     entry: Floats  # (2,), J, forms of damping loss and unbalance work where the span began
+    begun: Floats  # (2, m), under set-valued friction: coordinates where the span began
 
 
 def recorder(q: int, n_probe: int = 0) -> Recorder:
@@ -48,6 +49,7 @@ def recorder(q: int, n_probe: int = 0) -> Recorder:
         last=np.full((2, 3 + q), np.nan),
         node=np.zeros((4, q)),
         entry=np.zeros(2),
+        begun=np.zeros((2, 0)),
     )
 
 

@@ -26,7 +26,7 @@ PHYSICS = 22  # version of the physics: raised whenever a study gives other resu
 MODAL = 3  # method = "modal": modes kept, and `modal_error`
 DIRECT = 5  # transient = "direct"
 CHANGING_SPEED = 19  # run-ups and drives
-COULOMB = 8  # set-valued friction
+COULOMB = 9  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 9  # method = "modal" with gaps that are curved

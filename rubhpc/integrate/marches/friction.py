@@ -145,6 +145,8 @@ class FrictionMarch(EventDrivenMarch):
     def _use(self, tables: ModeTables) -> None:
         super()._use(tables)
         self._z_kept = np.zeros_like(self._z)
+        if self._recorder.begun.shape != self._z.shape:
+            self._recorder = self._recorder._replace(begun=np.zeros_like(self._z))
 
     def _soften(self, solver: Workspace) -> None:
         """Change how normal forces follow from gaps: here they hold them, and nothing changes."""
