@@ -6,6 +6,8 @@ import math
 import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from rubhpc.integrate.branches.case import record_branches
 from rubhpc.integrate.case import compile_kernels
 from rubhpc.integrate.changing_speed.case import RunUpRecord
@@ -54,6 +56,8 @@ class Pilots:
     ----------
     was_cut : bool
         The branches of the last one were not followed to their ends.
+    covered : float
+        Share of the range of the parameter that they had come by.
     loading : float
         Processor seconds in which kernels were loaded.
     shortened : dict
@@ -81,7 +85,7 @@ class Pilots:
         self._kept: dict[tuple[int, ...], FollowedCase] = {}  # that may be finished
         self._usual = 0.0  # revolutions behind the record
         self._longest = 0.0  # s, of the dearest case, as far as it was run
-        self.was_cut = False
+        self.was_cut, self.covered = False, 0.0
         self.loading = 0.0
         self.alike: dict[tuple[int, ...], tuple[int, ...]] = {}
         self.shortened: dict[tuple[int, ...], Forecast] = {}
@@ -246,18 +250,28 @@ class Pilots:
         return followed.forecast().whole(self.n_behind), False
 
     def _branches(self, case: Case) -> float:
-        """Time of the branches of a case; `was_cut` where they were not followed to their ends."""
+        """Time of the branches of a case; where they were not followed to their ends it is foreseen.
+
+        The first branch goes from where it begins to one end of the range, then to the other. What it has
+        come by when it `was_cut` is taken for a sample of the whole range; that it turns, and that others
+        follow, is not foreseen.
+        """
         study = self._study
         branch = study.branch
         assert branch is not None
+        axis = study.axis(branch.along)
+        span = axis.drawn_from
+        assert span is not None
+        seen: list[float] = []
         taken, record = self._stopwatch.timed(
             lambda check: record_branches(
-                operation_of(self._grid, case), branch, study.axis(branch.along), study.recording, check
+                operation_of(self._grid, case), branch, axis, study.recording, check, note=seen.append
             ),
             _LONGEST_BRANCHES,
         )
         self.was_cut = record is None
-        return taken
+        self.covered = float(np.ptp(seen) / abs(span.stop - span.start)) if seen else 0.0
+        return taken / self.covered if self.was_cut and self.covered > 0.0 else taken
 
 
 def bytes_of_modes(setup: Setup) -> int:

@@ -31,6 +31,7 @@ _AGREED = 0.25  # standard error of the mean pace, as a share of it, where cases
 _LONGEST = 75.0  # s, in which cases that were shortened are run whole, together
 _LEAST, _SHARE = 15.0, 0.5  # s that all may take, or that share of the time foreseen where it is more
 _DEAREST = 0.2  # of the time foreseen, for the dearest case in any case
+_OF_A_BRANCH = 0.3  # standard error, as a share, of a time foreseen from part of the first branch
 _LEAST_EACH = 1.0  # s, for each case
 _PATIENCE = 2.0  # times as long as foreseen, for a case that is finished
 _FEWEST = 3  # cases, timed in any case
@@ -137,14 +138,14 @@ def time_pilots(
                     steps,
                     probability,
                     pace.step * steps,
-                    is_whole=one not in pilots.shortened,
+                    is_whole=one not in pilots.shortened and not pilots.was_cut,
                     is_irregular=one in pilots.irregular,
                 )
         except Exception as error:  # whatever is wrong with the case: the others are timed all the same
             where = manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))
             failures.append(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}")
         if pilots.was_cut:  # another would take as long
-            is_bound = True
+            is_bound = pilots.covered == 0.0
             break
     if pilots.shortened:
         say(f"timing cases: {len(paces)} so far, the dearest of them to their end")
@@ -159,7 +160,7 @@ def time_pilots(
     return Timing(
         pace=mean._replace(step=step, case=case, block=block),
         n_pilot=len(paces),
-        spread=_spread(sample),
+        spread=_OF_A_BRANCH if pilots.was_cut and not is_bound else _spread(sample),
         known=sample.known,
         is_bound=is_bound,
         seconds=seconds,

@@ -27,8 +27,10 @@ if TYPE_CHECKING:
 FIRST, LEAST, LONGEST = 0.1, 1e-4, 1.0  # lengths of a step
 GOOD, POOR = 0.03, 0.15  # distance from a prediction over the step's length: go on with more, with less
 STRAIGHT = 0.75  # cosine of the angle between two steps, at least
+MOST_OFF = 3  # motions off a prediction by the last steps, after which the tangent is asked
 SHORT = 0.02  # length of the step in which a branch may pass a motion of half its period
 FEWEST = 6  # points of a branch that is closed
+ANYWHERE = 1e-3  # of a step, within which it does not matter where it ends
 SHORTEST = 1e-3  # length of a step in which several contacts may come and go at once
 BEYOND = (0.02, 0.1, 0.5)  # steps past a grazing at which the branch is sought again
 
@@ -77,7 +79,7 @@ def follow(
     heading, has_turned = None, False  # where it goes from a single point; whether its contacts are new
 
     def add(event: Event, point: Point) -> None:
-        points.append(point)
+        points.append(point.note_state())
         events.append(event)
 
     try:
@@ -90,7 +92,7 @@ def follow(
                 if len(history) > 1:
                     toward = branching.difference(*history[-2:])
                 heading, history, has_turned = branching.tangent(base, toward), [base], False
-            edge, found, guess, happened = 0.0, None, None, []
+            edge, found, guess, happened, n_off = 0.0, None, None, [], 0
             while length >= LEAST:
                 if heading is not None:
                     guess, along = length * heading, heading
@@ -103,13 +105,19 @@ def follow(
                     along = np.zeros_like(along)
                     along[-1] = 1.0
                 try:
-                    trial = branching.correct(base, guess, along)
+                    trial = branching.correct(base, guess, along, in_plane=ANYWHERE * length)
                 except NotConverged:
                     length *= 0.5
                     continue
                 is_back = _is_half(trial) or (trial.sequence == base.sequence and _is_back(trial, base))
                 is_last = length <= SHORTEST
-                if _is_near(branching, history, guess, trial) and (length <= SHORT or not is_back):
+                is_near = _is_near(branching, history, guess, trial)
+                n_off += not is_near
+                if n_off == MOST_OFF and heading is None:  # the last step ended behind a fold
+                    heading = branching.tangent(base, branching.difference(*history[-2:]))
+                    length = FIRST
+                    continue
+                if is_near and (length <= SHORT or not is_back):
                     events_between = passed(branching, base, trial, is_last=is_last)
                     if events_between is not None or is_last:
                         found, happened = trial, events_between or []

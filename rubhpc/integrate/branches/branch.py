@@ -154,14 +154,11 @@ def branch_of(branching: Branching, track: Track, recording: Recording) -> Branc
 
 
 def _point(point: Point, event: Event) -> BranchPoint:
-    case = point.case
-    motion, states, _ = point.after((1.0 - point.phase) % 1.0)
-    state = case.march.state_of(motion, case.contact_force(states, motion))
     return BranchPoint(
         value=point.value,
         event=event.name.lower(),
         multipliers=point.multipliers,
-        state=state,
+        state=point.state,
         least_gap=np.min([revolution.least_gap for revolution in point.revolutions], axis=0),
         least_force=np.min([revolution.least_force for revolution in point.revolutions], axis=0),
         touches=sum(piece.touching.size for revolution in point.revolutions for piece in revolution.pieces),

@@ -30,6 +30,7 @@ FAST = 0.02  # ratio of two residuals below which a derivative serves once more
 LESS = 0.7  # ratio of a residual to the least before it that is progress
 MORE, PATIENCE = (2.0, 10.0), (2, 3)  # ratio to the one before, and iterations without progress, borne
 ROUNDING = 1e-8  # residual below which want of progress may be rounding
+IN_PLANE = 1e-7  # steps, by which a motion may lie off its plane
 STEEP = 0.4  # share of the parameter in a step below which it is an unknown
 
 
@@ -143,6 +144,7 @@ class Branching:
         period: int = 0,
         most: int = MOST_ITERATIONS,
         is_free: bool = False,
+        in_plane: float = IN_PLANE,
     ) -> Point:
         """Find the motion in the plane through a guess across a direction.
 
@@ -159,6 +161,9 @@ class Branching:
             Iterations; up to twice as many where the end is near.
         is_free : bool
             The parameter is never held: between two points around a fold several motions have one parameter.
+        in_plane : float
+            Steps by which the motion may lie off the plane: the last iterations hold the parameter where it
+            moves by less, since every new value needs contact modes of its own.
 
         Raises
         ------
@@ -169,16 +174,24 @@ class Branching:
         is_asked = not np.any(along[:-1])
         if is_asked or (abs(along[-1]) > STEEP and not is_free and not base.is_near_fold):
             try:
-                found = self._corrected(base, guess, along, period, most, is_held=True)
+                found = self._corrected(base, guess, along, period, most, is_held=True, in_plane=0.0)
                 if is_asked or not found.is_near_fold:
                     return found
             except NotConverged:
                 if is_asked or not base.may_fold:
                     raise
-        return self._corrected(base, guess, along, period, most, is_held=False)
+        return self._corrected(base, guess, along, period, most, is_held=False, in_plane=in_plane)
 
     def _corrected(
-        self, base: Point, guess: Floats, along: Floats, period: int, most: int, *, is_held: bool
+        self,
+        base: Point,
+        guess: Floats,
+        along: Floats,
+        period: int,
+        most: int,
+        *,
+        is_held: bool,
+        in_plane: float,
     ) -> Point:
         """Newton's method, with the parameter held or an unknown."""
         family, phase, states = self.family, base.phase, base.states
@@ -215,13 +228,17 @@ class Branching:
                 if derivative is None or residual > FAST * last:
                     derivative = monodromy(case, revolutions) - np.eye(motion.size)
                 last = residual
-                if is_held or (residual <= ROUNDING and not base.may_fold):  # other cases round otherwise
+                if is_held:
                     motion = motion - np.linalg.solve(derivative, defect)
+                    continue
+                if scale.size != motion.size:
+                    break
+                here = np.linalg.solve(derivative, -defect)
+                if np.linalg.norm(scale * here) <= in_plane:  # other cases round otherwise
+                    motion = motion + here
                     continue
                 if rate is None or rate.size != motion.size:
                     rate = family.derivative(value, motion, states, revolutions, phase) * self.step
-                if scale.size != motion.size:
-                    break
                 ahead = np.append(
                     scale * (motion - family.carry(base.motion, base.case, case)),
                     (value - base.value) / self.step,
@@ -229,6 +246,9 @@ class Branching:
                 row = np.append(along[:-1] * scale, along[-1])
                 matrix = np.block([[derivative, rate[:, None]], [row[None, :]]])
                 change = np.linalg.solve(matrix, np.append(-defect, along @ (guess - ahead)))
+                if n_worse and residual <= ROUNDING:  # at a fold: what is left is this case's rounding
+                    motion = motion + change[:-1]
+                    continue
                 value += float(change[-1]) * self.step
                 moved = motion + change[:-1]
                 case, origin = family.at(value), case

@@ -58,6 +58,7 @@ def record_branches(
     recording: Recording,
     check: Callable[[], None] | None = None,
     say: Callable[[str], None] | None = None,
+    note: Callable[[float], None] | None = None,
 ) -> BranchRecord:
     """Find the branches of a case and measure every point.
 
@@ -71,11 +72,15 @@ def record_branches(
         Called several times a second; what it raises ends the case.
     say : callable, optional
         Called with how far it has come, in words.
+    note : callable, optional
+        Called then with the value of the parameter there.
     """
     began, span = time.perf_counter() - seconds_compiling(), axis.drawn_from
     assert span is not None
 
     def say_found(n_found: int, value: float) -> None:
+        if note is not None:
+            note(value)
         if say is not None:
             say(f"{n_found} motions of branches found, now at {written(axis.name, value, axis.unit)}")
 

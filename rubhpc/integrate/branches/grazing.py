@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.branches.branching import STEEP
+from rubhpc.integrate.branches.branching import IN_PLANE, STEEP
 from rubhpc.integrate.branches.events import LOCATED, Event, crossings, tolerance_of
 from rubhpc.integrate.branches.weak_impact import DEPTH, weakly_impacting
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
@@ -29,6 +29,7 @@ LOOK = 0.05  # of the way to a motion beyond a grazing, at which the first trial
 NEXT_TO = 0.01  # of the way, within which a motion found beyond a grazing is next to it
 HOPELESS, STILL = 0.01, 0.3  # of the way that is left, and of the gap: it falls smoothly
 CERTAIN = 3.0  # times the error of a secant, that a trial stays short of where it leads
+MISPLACED = 1e-4  # of its length, by which a trial may lie elsewhere
 MOST_TRIALS = 40
 CLOSE = 1e-4  # steps before a grazing at which its point may lie
 BESIDE = (
@@ -167,8 +168,10 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
             return impacts[-1][1]
         end, depth = 1.0 if is_first_free else 0.0, DEPTH
         most = MEETING * float(np.linalg.norm(branching.difference(free[-1][1], other)))
+        shares = _shares(first, free[-1][1], more)
+        is_gap = shares[0].min() <= shares.min()  # what vanishes: else both sides are alike
         with suppress(NotConverged):
-            for _ in range(2):
+            for _ in range(2 if is_gap else 0):
                 found = weakly_impacting(branching, [point for _, point in free], depth)
                 length = float(np.linalg.norm(branching.difference(free[-1][1], found)))
                 if touches(found) == touches(other) and length <= most:
@@ -187,7 +190,9 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
     more = list((touches(other) - touches(first)).keys())
     for _ in range(MOST_TRIALS):
         near = free[-1][0]
-        if root is not None and abs(root - near) < tolerance and not _falls(free[-2:], more):
+        shares = [_shares(first, point, more) for _, point in free[-2:]]
+        kept = [float(share.min()) for share in shares]
+        if root is not None and abs(root - near) < tolerance and kept[-1] >= kept[0]:
             return Grazing(free[-1][1], impacting(near))  # a gap of rounding is not seen any more
         ahead_of = _root(free[-2:], more)
         if _between(near, ahead_of, far) or (ahead_of is not None and not _between(near, root, far)):
@@ -203,14 +208,18 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
         else:  # not beyond it, where the motion has the contact
             left = max(0.5 * tolerance, CERTAIN * error)
             share = root + np.sign(near - root) * min(left, APPROACH * abs(near - root))
-        if abs(near - far) < HOPELESS and _least(free[-1][1], more) > STILL * _least(first, more):
+        if abs(near - far) < HOPELESS and STILL < shares[-1][:2].min() < np.inf:
             return None  # it would have to fall all at once
         if abs(near - far) < tolerance:
             is_missed = missing > MISSED and _is_apart(free[-1][1], other)
             return None if is_missed else Grazing(free[-1][1], impacting(near))
         try:
             ahead = _ahead(branching, free[-2:], change, measure)
-            trial = branching.correct(free[-1][1], (share - near) * ahead, measure / np.linalg.norm(measure))
+            guess = (share - near) * ahead
+            off = MISPLACED * float(np.linalg.norm(guess))
+            trial = branching.correct(
+                free[-1][1], guess, measure / np.linalg.norm(measure), in_plane=max(off, IN_PLANE)
+            )
         except NotConverged:
             trial = None
         if trial is not None and touches(trial) == touches(first):  # in any order
@@ -299,16 +308,15 @@ def _root(free: list[tuple[float, Point]], pairs: list[int] | None = None) -> fl
     return float(y + (y - x) * ahead.min()) if np.isfinite(ahead.min()) else None
 
 
-def _falls(free: list[tuple[float, Point]], pairs: list[int]) -> bool:
-    """Whether the least of the gaps and forces of some pairs falls from one point to the next."""
-    return _least(free[-1][1], pairs) < _least(free[0][1], pairs)
-
-
-def _least(point: Point, pairs: list[int]) -> float:
-    return float(_turning(point, pairs).min())
+def _shares(first: Point, point: Point, pairs: list[int]) -> Floats:
+    """What is left of the distances (4, k) of some pairs that a first point had; 0 where one is new."""
+    was, now = (_turning(one, pairs).reshape(4, -1) for one in (first, point))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(np.isfinite(was) & (was > 0.0), now / was, 0.0)
+    return np.where(np.isfinite(now), share, np.inf)
 
 
 def _turning(point: Point, pairs: list[int] | None) -> Floats:
-    """Least gaps and forces, of some pairs or of all."""
-    found = distances(point)[: 2 * point.case.q].reshape(2, -1)
+    """Least gaps and forces, and distances from parting at a touch, of some pairs or of all."""
+    found = np.concatenate([distances(point)[: 2 * point.case.q].reshape(2, -1), point.staying_closed])
     return found.ravel() if pairs is None else found[:, pairs].ravel()

@@ -9,6 +9,7 @@ from weakref import ref
 
 import numpy as np
 
+from rubhpc.integrate.branches.closing import staying_closed
 from rubhpc.integrate.periodic_motions.saltation import tangents
 from rubhpc.integrate.periodic_motions.shooting import floquet_multipliers
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.periodic_motions.family import Family
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Revolution
+    from rubhpc.integrate.record import State
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -97,6 +99,17 @@ class Point:
         return floquet_multipliers(self.monodromy)
 
     @cached_property
+    def state(self) -> State:
+        """The motion with the shaft at its angle 0."""
+        motion, states, _ = self.after((1.0 - self.phase) % 1.0)
+        return self.case.march.state_of(motion, self.case.contact_force(states, motion))
+
+    def note_state(self) -> Point:
+        """Find what is asked of every point of a branch as long as its case is ready; returns the point."""
+        _ = self.state, self.multipliers
+        return self
+
+    @cached_property
     def scale(self) -> Floats:
         """Steps (2 n,) for a unit of each coordinate."""
         spin, size = abs(self.case.setup.spin), max(self.case.size(self.motion), np.finfo(float).tiny)
@@ -117,6 +130,11 @@ class Point:
     def n_unstable(self) -> int:
         """Multipliers beyond the unit circle."""
         return int((np.abs(self.multipliers) > 1.0).sum())
+
+    @cached_property
+    def staying_closed(self) -> Floats:
+        """How far pairs are from parting at a touch, (2, q): `closing.staying_closed`."""
+        return staying_closed(self.case, self.revolutions)
 
     def after(self, ahead: float) -> tuple[Floats, int, float]:
         """The motion (2 n,) some revolutions ahead, the states of the pairs, and the phase there."""

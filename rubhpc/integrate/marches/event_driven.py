@@ -272,10 +272,18 @@ class EventDrivenMarch(ModalMarch):
         """What is kept of the contact modes as long as their tables are (`ModeLibrary.derived`)."""
         return self.library.derived
 
-    def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
+    @property
+    def moment(self) -> float:
+        """Time, s: a pair that would part for less than that at an event stays closed."""
+        return float(self.clock.tick * 2**FORCED_LEVEL)
+
+    def change(
+        self, mask: int, crossing: int, angle: float, motion: Floats, moment: float | None = None
+    ) -> int:
         """Take an event: `motion` (2 n,) after it, in place, and the contact mode that goes on, or -1.
 
-        `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft.
+        `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft; `moment` (s) is
+        `self.moment` where it is not given.
         """
         return int(
             self.take_change(
@@ -283,7 +291,7 @@ class EventDrivenMarch(ModalMarch):
                 mask,
                 crossing,
                 self.clock.spin,
-                self.clock.tick * 2**FORCED_LEVEL,
+                self.moment if moment is None else moment,
                 np.cos(angle),
                 np.sin(angle),
                 motion,

@@ -22,7 +22,6 @@ from rubhpc.kernels.case_progress import (
     follow,
     shaft_angle,
 )
-from rubhpc.kernels.contact_modes import FORCED_LEVEL
 from rubhpc.kernels.friction_change import change_states
 from rubhpc.kernels.friction_events import friction_work
 from rubhpc.kernels.friction_loop import advance_with_friction
@@ -170,7 +169,9 @@ class FrictionMarch(EventDrivenMarch):
             raise NoClosedForm
         return found
 
-    def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
+    def change(
+        self, mask: int, crossing: int, angle: float, motion: Floats, moment: float | None = None
+    ) -> int:
         """Take an event: `motion` (2 n,) after it, in place, and the states that go on, or -1."""
         return int(
             self.take_change(
@@ -178,7 +179,7 @@ class FrictionMarch(EventDrivenMarch):
                 self._friction,
                 mask,
                 crossing,
-                self.clock.tick * 2**FORCED_LEVEL,
+                self.moment if moment is None else moment,
                 np.cos(angle),
                 np.sin(angle),
                 motion,

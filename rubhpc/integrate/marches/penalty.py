@@ -23,8 +23,13 @@ class PenaltyMarch(EventDrivenMarch):
 
     take_change = staticmethod(change_pressed)
 
-    def change(self, mask: int, crossing: int, angle: float, motion: Floats) -> int:
-        """Take an event, which leaves `motion` (2 n,) as it is; returns the states that go on."""
+    def change(
+        self, mask: int, crossing: int, angle: float, motion: Floats, moment: float | None = None
+    ) -> int:
+        """Take an event, which leaves `motion` (2 n,) as it is; returns the states that go on.
+
+        Nothing impacts here: no `moment` decides whether a pair parts.
+        """
         return int(self.take_change(self.bodies, mask, crossing, motion))
 
     def moved_by(self, mask: int) -> int:

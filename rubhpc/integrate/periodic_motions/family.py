@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 SPEEDS, CLEARANCES = ("speed_ratio", "speed"), ("clearance_ratio", "clearance")
 MOST_KEPT = 6  # cases that are kept ready
 ROOM = 256_000_000  # bytes of the tables of further ones
+WITH_MODES = 2.2  # bytes of tables, modes as they were solved and as pieces take them, over those of tables
 DIFFERENCE = 1e-6  # of the range, between the two cases of a derivative
 
 
@@ -96,8 +97,7 @@ class Family:
         self._frequency: tuple[Model, float] | None = None
         self._setups: OrderedDict[tuple[int, float, bool], ModalSetup] = OrderedDict()
         self._cases: OrderedDict[float, PiecewiseMotion] = OrderedDict()
-        self._held: OrderedDict[int, tuple[PiecewiseMotion, int]] = OrderedDict()  # by id, with their sizes
-        self._n_byte = 0
+        self._held: OrderedDict[int, PiecewiseMotion] = OrderedDict()  # by id
 
     def at(self, value: float) -> PiecewiseMotion:
         """The case at a value of the parameter.
@@ -123,14 +123,11 @@ class Family:
 
     def hold(self, case: PiecewiseMotion) -> None:
         """Keep a case ready as long as there is room, the last ones first."""
-        if id(case) in self._held:
-            self._held.move_to_end(id(case))
-            return
-        size = sum(table.nbytes for table in case.march.tables if isinstance(table, np.ndarray))
-        self._held[id(case)] = case, size
-        self._n_byte += size
-        while self._n_byte > ROOM:
-            self._n_byte -= self._held.popitem(last=False)[1][1]
+        self._held[id(case)] = case
+        self._held.move_to_end(id(case))
+        room = ROOM - sum(map(_size, self._held.values()))  # they grow while they are followed
+        while room < 0 and len(self._held) > 1:
+            room += _size(self._held.popitem(last=False)[1])
 
     def settings(self, value: float, *, is_measured: bool = True) -> tuple[ModalSetup, float, float]:
         """Set-up, clearance (m) and friction at a value; to be recorded, or to be followed alone."""
@@ -247,6 +244,11 @@ class Family:
             if len(self._setups) > MOST_KEPT:
                 self._setups.popitem(last=False)
         return self._setups[key]
+
+
+def _size(case: PiecewiseMotion) -> float:
+    """Bytes of its tables and of the modes behind them."""
+    return WITH_MODES * sum(table.nbytes for table in case.march.tables if isinstance(table, np.ndarray))
 
 
 def flow(

@@ -31,7 +31,7 @@ class Curve:
         return SimpleNamespace(
             value=float(self._value(x)), phase=0.0, period=1, motion=np.array([x]), sequence=events,
             multipliers=np.array([multiplier], dtype=complex), n_unstable=int(abs(multiplier) > 1.0),
-            may_fold=False,
+            may_fold=False, staying_closed=np.full((2, 1), np.inf),
             revolutions=[SimpleNamespace(least_gap=least, least_force=np.array([np.inf]), pieces=[])],
             case=SimpleNamespace(
                 q=1, setup=SimpleNamespace(spin=1.0), bodies=SimpleNamespace(clearance=np.ones(1))
@@ -41,7 +41,7 @@ class Curve:
     def difference(self, a, b):
         return np.array([b.motion[0] - a.motion[0], b.value - a.value])
 
-    def correct(self, base, guess, along, *, is_free=False):
+    def correct(self, base, guess, along, *, is_free=False, in_plane=0.0):
         self.n_corrected += 1
         at = base.motion[0]
 
