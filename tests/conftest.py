@@ -46,6 +46,7 @@ SLOW = (
     "figures/test_run_up_figures.py::test_a_waterfall_stacks_them_at_their_speeds",
     "input/test_reading.py::test_pint_stays_away_until_it_is_needed",
     "integrate/branches/test_branch.py",
+    "integrate/branches/test_touch_that_vanishes.py",
     "integrate/marches/test_contact_stepping_march.py",
     "integrate/marches/test_curved_march.py",
     "integrate/changing_speed/test_carried_modes.py",
