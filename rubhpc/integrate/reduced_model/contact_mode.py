@@ -17,8 +17,8 @@ from rubhpc.integrate.reduced_model.system_modes import count_modes, modes_of, p
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rubhpc.integrate.reduced_model.closings import Within
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
-    from rubhpc.integrate.reduced_model.secular_modes import Eigenmodes
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
@@ -76,14 +76,14 @@ def solve_contact_mode(
     force_direction: Floats,
     mask: int,
     known: Solved | None = None,
-    opened: Eigenmodes | None = None,
+    opened: Within | None = None,
 ) -> ContactMode:
     """Solve the linear system with the pairs of `mask` closed.
 
     With J the gap Jacobian and F the contact-force directions of the closed pairs, closed gaps confine the
     motion to `x = x0 + T y` with `J T = 0`; the contact forces drop out of the equations projected on L with
     `L^T F^T = 0`, and follow from the accelerations of the gaps being zero (the constraint of Eq. 18 of the
-    paper, differentiated twice). `opened` are the eigenmodes with every pair open.
+    paper, differentiated twice). `opened` are the bodies with every pair open.
 
     Raises
     ------
@@ -132,13 +132,13 @@ def confined_modes(
     tangent: Floats,
     system: Floats,
     contacts: Sequence[Contact],
-    opened: Eigenmodes | None,
+    opened: Within | None,
     known: Solved | None,
 ) -> tuple[Complexes, Complexes, Complexes]:
     """Exponents (m,), motions (2 n, m) and inverse by the coordinates of `tangent` (m, 2 n_free).
 
-    `system` is that of these coordinates, `contacts` are what distinguishes it from the one whose eigenmodes
-    are `opened`: a large one is solved by way of them.
+    `system` is that of these coordinates, `contacts` are what distinguishes it from that of the bodies
+    `opened`: a large one is solved by way of theirs.
     """
     n, n_free = tangent.shape
     is_large = n_free**2 >= FEWEST**2 * len(contacts)

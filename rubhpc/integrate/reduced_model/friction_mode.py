@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.reduced_model.closings import Within
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
-    from rubhpc.integrate.reduced_model.secular_modes import Eigenmodes
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
@@ -127,7 +127,7 @@ def solve_friction_mode(
     pairs: FrictionPairs,
     mask: int,
     known: Solved | None = None,
-    opened: Eigenmodes | None = None,
+    opened: Within | None = None,
 ) -> FrictionMode:
     """Solve the linear system with the pairs in the states of `mask`.
 
@@ -136,7 +136,7 @@ def solve_friction_mode(
     equations projected on L, `L^T B = 0`, B being their directions: that of a sliding pair's normal force has
     its friction, that of a pair that sticks has none. Under a penalty gaps are no constraints: `k P Q` and
     `c P Q` join the matrices, and `-k P` is the load of the clearances, as in `penalty_mode`. `opened` are
-    the eigenmodes with every pair open.
+    the bodies with every pair open.
     """
     n, q = reduced.stiffness.shape[0], len(pairs.gap_jacobian)
     states = np.array(states_of(mask, q))

@@ -13,8 +13,8 @@ from rubhpc.integrate.reduced_model.secular_modes import Contact
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.reduced_model.closings import Within
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
-    from rubhpc.integrate.reduced_model.secular_modes import Eigenmodes
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
@@ -52,14 +52,14 @@ def solve_penalty_mode(
     opened: ContactMode,
     mask: int,
     known: Solved | None = None,
-    eigenmodes: Eigenmodes | None = None,
+    bodies: Within | None = None,
 ) -> ContactMode:
     """Solve the linear system with the pairs of `mask` pressed; bits from q on are those that are lifted.
 
-    `opened` is the mode in which every pair is open, `eigenmodes` are its eigenmodes.
+    `opened` is the mode in which every pair is open, `bodies` are those that move in it.
     """
     pressed = penalty.pressed(mask)
-    mode = pressed_mode(reduced, penalty, pressed, known, eigenmodes) if pressed else opened
+    mode = pressed_mode(reduced, penalty, pressed, known, bodies) if pressed else opened
     return watched(mode, penalty, mask)
 
 
@@ -82,12 +82,12 @@ def pressed_mode(
     penalty: Penalty,
     pressed: list[int],
     known: Solved | None,
-    opened: Eigenmodes | None = None,
+    opened: Within | None = None,
 ) -> ContactMode:
     """The motion with these pairs pressed, without switch functions.
 
     With `Q` the gap Jacobian and `P` the contact-force directions of the pressed pairs, it is that of
-    `K + k P Q` and `C + c P Q` under the load `-k P` of their clearances. `opened` are the eigenmodes with
+    `K + k P Q` and `C + c P Q` under the load `-k P` of their clearances. `opened` are the bodies with
     every pair open.
     """
     n, q = reduced.stiffness.shape[0], len(penalty.gap_jacobian)

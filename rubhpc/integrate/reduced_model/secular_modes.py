@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.reduced_model.products import times_real
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,16 +39,9 @@ class Eigenmodes(NamedTuple):
     shape: Complexes  # (n, m), displacements, doubled for one of a pair
     inverse: Complexes  # (m, 2 n)
 
-    def with_contacts(self, contacts: Sequence[Contact]) -> Eigenmodes | None:
-        """The eigenmodes with these contacts; None where they are not found this way."""
-        modes: Eigenmodes | None = self
-        for contact in contacts:
-            modes = _with_contact(modes, contact) if modes else None
-        return modes
 
-
-def _with_contact(modes: Eigenmodes, contact: Contact) -> Eigenmodes | None:
-    """Eigenmodes with one more contact.
+def with_contact(modes: Eigenmodes, contact: Contact) -> Eigenmodes | None:
+    """Eigenmodes with one more contact; None where they are not found this way.
 
     With `A` the system without it, `b` the input of its force and `c` its row, the force is that of a
     constraint `c x = 0`, or `-(k + d s) c x`. Exponents are then the zeros of
@@ -110,6 +100,11 @@ def _without_rounding(row: Floats, values: Complexes) -> Complexes:
     return product
 
 
+def _squares(values: Complexes) -> Floats:
+    """Squares of absolute values, without their roots."""
+    return np.asarray(values.real**2 + values.imag**2)
+
+
 class _Zeros(NamedTuple):
     """Zeros of a secular function, the upper one of each conjugate pair."""
 
@@ -130,6 +125,7 @@ class _Poles(NamedTuple):
     residue: Complexes  # (p,), r_j
     constant: float  # a
     apart: Complexes  # (k, p), differences; infinite to itself and to what coincides
+    nearest: Floats  # (k,), least distance to another pole
 
     @classmethod
     def of(cls, upper: Complexes, seen: Complexes, moved: Complexes, is_held: bool) -> _Poles | None:
@@ -139,13 +135,14 @@ class _Poles(NamedTuple):
             np.concatenate([values, values[turned].conj()]) for values in (upper, seen, moved)
         )
         apart = upper[:, None] - every
-        same = np.abs(apart) <= SAME * np.abs(upper)[:, None]
+        square = _squares(apart)
+        same = square <= (SAME * np.abs(upper)[:, None]) ** 2
         own = np.arange(upper.size)
         same[own, own] = False
         if np.any(same & ((seen[:, None] * every_moved != 0.0) | (moved[:, None] * every_seen != 0.0))):
             return None
         same[own, own] = True
-        apart[same] = np.inf
+        apart[same] = square[same] = np.inf
         return cls(
             upper,
             every,
@@ -155,13 +152,14 @@ class _Poles(NamedTuple):
             every_seen * every_moved,
             0.0 if is_held else 1.0,
             apart,
+            np.sqrt(square.min(axis=1, initial=np.inf)),
         )
 
     def zeros(self) -> _Zeros | None:
         """All zeros by Newton's method; None where it does not converge to as many."""
         n_pole = self.upper.size
         first = -self.residue[:n_pole] / (self.constant + (1.0 / self.apart) @ self.residue)
-        weak = np.abs(first) <= WEAK * np.abs(self.apart).min(axis=1, initial=np.inf)
+        weak = np.abs(first) <= WEAK * self.nearest
         strong = np.flatnonzero(~weak)
         started = self._start(strong)
         if started is None:
@@ -190,9 +188,9 @@ class _Poles(NamedTuple):
                 break
         exponent = self.upper[own] + distance
         exponent.imag[is_real] = 0.0
-        away = np.abs(exponent[moving, None] - exponent[moving])
+        away = _squares(exponent[moving, None] - exponent[moving])
         np.fill_diagonal(away, np.inf)
-        are_new = np.all(away > SAME * np.abs(exponent[moving])[:, None])
+        are_new = np.all(away > (SAME * np.abs(exponent[moving])[:, None]) ** 2)
         are_complex = np.all(exponent.imag[~is_real] > CONVERGED * np.abs(exponent[~is_real]))
         return _Zeros(exponent, distance, own, is_real) if not left.size and are_new and are_complex else None
 
@@ -247,8 +245,13 @@ class _Poles(NamedTuple):
 
     def combined(self, weights: Complexes, values: Complexes) -> Complexes:
         """Sum over all poles of weights (z, p) times values (k, n) and their conjugates: (z, n)."""
-        k = self.upper.size
+        (z, _), (k, n) = weights.shape, values.shape
         together, apart = weights[:, :k].copy(), weights[:, :k].copy()
         together[:, self.turned] += weights[:, k:]
         apart[:, self.turned] -= weights[:, k:]
-        return times_real(together, values.real) + 1j * times_real(apart, values.imag)
+        factor, parts = np.empty((2 * z, 2 * k)), np.empty((2 * k, n))
+        factor[:z, :k], factor[:z, k:] = together.real, -apart.imag
+        factor[z:, :k], factor[z:, k:] = together.imag, apart.real
+        parts[:k], parts[k:] = values.real, values.imag
+        halves = factor @ parts
+        return np.asarray(halves[:z] + 1j * halves[z:])

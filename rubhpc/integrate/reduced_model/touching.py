@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.reduced_model import reduction
+from rubhpc.integrate.reduced_model.closings import Closings, Within
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.integrate.reduced_model.energy_forms import (
@@ -57,11 +58,6 @@ class Touching(NamedTuple):
     def model(self, reduced: ReducedModel) -> ReducedModel:
         """The model of these coordinates and pairs alone."""
         return reduced.part(self.rows, self.pairs)
-
-    def eigenmodes(self, opened: ContactMode) -> Eigenmodes:
-        """The eigenmodes of these coordinates in the open set."""
-        own = np.setdiff1d(np.arange(opened.n_eigenmode), self.spared)
-        return _eigenmodes(opened, self.rows, own)
 
     def of_pairs(self, rows: Floats) -> Floats:
         """Rows of the closed pairs (r, n_own), from those of all (q, n)."""
@@ -173,11 +169,15 @@ class OpenBodies:
         found.loss[row[are_spared], column[are_spared]] = value[are_spared]
         return found
 
+    def within(self, rows: Ints | None = None) -> Within:
+        """The bodies of these coordinates, default all, to be closed together."""
+        return self._closings.within(np.arange(len(self._part)) if rows is None else rows)
+
     @cached_property
-    def eigenmodes(self) -> Eigenmodes:
-        """The eigenmodes of all coordinates."""
-        opened = self.opened
-        return _eigenmodes(opened, np.arange(len(self._part)), np.arange(opened.n_eigenmode))
+    def _closings(self) -> Closings:
+        n, m = len(self._part), self.opened.n_eigenmode
+        exponent, shape = self.opened.exponent[:m], self.opened.motion[:n, :m]
+        return Closings(Eigenmodes(exponent, shape, self.opened.enter[:m]), self._part)
 
     @cached_property
     def _opened_loss(self) -> tuple[Ints, Floats]:
@@ -222,10 +222,10 @@ def contact_mode_among(
     touching = among.touching(closed) if among and closed else None
     if among is None or touching is None:
         return solve_contact_mode(
-            reduced, gap_jacobian, force, mask, known, among.eigenmodes if among else None
+            reduced, gap_jacobian, force, mask, known, among.within() if among else None
         )
     rates, forces = touching.of_pairs(gap_jacobian), touching.of_pairs(force)
-    every, own_open = (1 << len(closed)) - 1, touching.eigenmodes(among.opened)
+    every, own_open = (1 << len(closed)) - 1, among.within(touching.rows)
     own = solve_contact_mode(touching.model(reduced), rates, forces, every, known, own_open)
     mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
     watched_pairs = np.setdiff1d(np.arange(q), closed)
@@ -245,12 +245,12 @@ def penalty_mode_among(
     """The contact mode of `solve_penalty_mode`."""
     pressed, (q, n) = penalty.pressed(mask), penalty.gap_jacobian.shape
     touching = among.touching(pressed) if among and pressed else None
-    if touching is None:
-        return solve_penalty_mode(reduced, penalty, opened, mask, known, among.eigenmodes if among else None)
+    if among is None or touching is None:
+        return solve_penalty_mode(reduced, penalty, opened, mask, known, among.within() if among else None)
     rates, forces = touching.of_pairs(penalty.gap_jacobian), touching.of_pairs(penalty.force_direction)
     own_penalty = penalty._replace(gap_jacobian=rates, force_direction=forces)
     every = list(range(len(pressed)))
-    own = pressed_mode(touching.model(reduced), own_penalty, every, known, touching.eigenmodes(opened))
+    own = pressed_mode(touching.model(reduced), own_penalty, every, known, among.within(touching.rows))
     return watched(touching.among_all(own, opened, n, q), penalty, mask)
 
 
@@ -261,7 +261,7 @@ def friction_mode_among(
     closed, (q, n) = pairs.closed(mask), pairs.gap_jacobian.shape
     touching = among.touching(closed) if among and closed else None
     if among is None or touching is None:
-        return solve_friction_mode(reduced, pairs, mask, known, among.eigenmodes if among else None)
+        return solve_friction_mode(reduced, pairs, mask, known, among.within() if among else None)
     own_pairs = replace(
         pairs,
         gap_jacobian=touching.of_pairs(pairs.gap_jacobian),
@@ -270,7 +270,7 @@ def friction_mode_among(
     )
     states = states_of(mask, q)
     own_mask = mask_of([states[i] for i in closed])
-    own_open = touching.eigenmodes(among.opened)
+    own_open = among.within(touching.rows)
     own = solve_friction_mode(touching.model(reduced), own_pairs, own_mask, known, own_open)
     assert isinstance(among.opened, FrictionMode)
     mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
@@ -282,16 +282,6 @@ def open_bodies(reduced: ReducedModel, model: Model, opened: ContactMode) -> Ope
     """What several stators are while open; of one there is nothing to spare."""
     gap_jacobian, _, slip = reduction.directions(reduced, model, 0.0)
     return OpenBodies(reduced, opened, np.abs(gap_jacobian) + np.abs(slip)) if len(slip) > 1 else None
-
-
-def _eigenmodes(opened: ContactMode, rows: Ints, columns: Ints) -> Eigenmodes:
-    """Eigenmodes of the open set (`columns`) that move these coordinates and no others."""
-    shape = opened.motion[rows[:, None], columns]
-    return Eigenmodes(
-        opened.exponent[columns],
-        shape,
-        opened.enter[columns[:, None], _states(rows, len(opened.motion) // 2)],
-    )
 
 
 def _states(rows: Ints, n: int) -> Ints:

@@ -9,8 +9,9 @@ from overhung_pump import SEGMENT, pump
 
 from rubhpc import LumpedStator
 from rubhpc.integrate.reduced_model import contact_mode
+from rubhpc.integrate.reduced_model.closings import Closings, Within
 from rubhpc.integrate.reduced_model.friction_mode import mask_of
-from rubhpc.integrate.reduced_model.secular_modes import Contact, Eigenmodes
+from rubhpc.integrate.reduced_model.secular_modes import Contact, Eigenmodes, with_contact
 from rubhpc.integrate.reduced_model.system_modes import modes_of
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, STUCK
@@ -69,7 +70,7 @@ def test_motions_are_those_of_the_whole(kind, spring, seed):
     stiffness, damping, row, across = rotor_and_stator(seed=seed, **KINDS[kind])
     spring = SPRINGS[spring]
     force = row + 0.3 * across
-    found = opened(stiffness, damping).with_contacts([Contact(row, force, *spring)])
+    found = with_contact(opened(stiffness, damping), Contact(row, force, *spring))
     assert found is not None
     if any(spring):
         basis = np.eye(N)
@@ -97,7 +98,8 @@ def test_contacts_follow_one_another_in_any_order():
     stiffness, damping, row, across = rotor_and_stator(gyroscopic=5.0)
     contacts = [Contact(row, row + 0.3 * across), Contact(across, across, 1e5, 3.0)]
     modes = opened(stiffness, damping)
-    one, other = modes.with_contacts(contacts), modes.with_contacts(contacts[::-1])
+    bodies = Closings(modes, np.zeros(N, dtype=int)).within(np.arange(N))
+    one, other = bodies.with_contacts(contacts), bodies.with_contacts(contacts[::-1])
     assert np.sort_complex(one.exponent) == pytest.approx(np.sort_complex(other.exponent), rel=1e-10)
     assert abs(row @ one.shape).max() < 1e-12 * abs(one.shape).max()
 
@@ -105,14 +107,14 @@ def test_contacts_follow_one_another_in_any_order():
 def test_the_force_leaves_held_modes_alone():
     stiffness, damping, row, across = rotor_and_stator()
     force = row + 0.3 * across
-    found = opened(stiffness, damping).with_contacts([Contact(row, force)])
+    found = with_contact(opened(stiffness, damping), Contact(row, force))
     assert abs(found.inverse[:, N:] @ force).max() < 1e-9 * abs(found.inverse[:, N:] * force).max()
 
 
 def test_modes_that_a_contact_does_not_see_stay():
     stiffness, damping, row, across = rotor_and_stator()
     row[5] = row[8] = across[8] = 0.0  # the fifth is moved by friction alone
-    found = opened(stiffness, damping).with_contacts([Contact(row, row + 0.3 * across)])
+    found = with_contact(opened(stiffness, damping), Contact(row, row + 0.3 * across))
     known = modes_of(system_of(stiffness, damping))[0]
     for at in (5, 8):
         natural = known[abs(known.imag - math.sqrt(stiffness[at, at] * (1.0 - 1e-4))).argmin()]
@@ -124,7 +126,7 @@ def test_coupled_exponents_that_coincide_are_left_to_the_whole():
     found = Eigenmodes(
         np.full(6, -1.0 + 50.0j), np.eye(6, dtype=complex), np.hstack([np.eye(6), np.eye(6)]).astype(complex)
     )
-    assert found.with_contacts([Contact(row, row + 0.3 * across)]) is None
+    assert with_contact(found, Contact(row, row + 0.3 * across)) is None
 
 
 SETS = {
@@ -143,11 +145,11 @@ def test_contact_modes_of_a_ring_are_those_of_the_whole(law, monkeypatch):
     tips = [LumpedStator(node=6, angle=0.2 + i * math.pi / 4.0, **SEGMENT) for i in range(8)]
     rig, (keys, masks) = replace(pump(), stator=tuple(tips)), SETS[law]
     found, ways = [], []
-    known = Eigenmodes.with_contacts
+    known = Within.with_contacts
     monkeypatch.setattr(
-        Eigenmodes,
+        Within,
         "with_contacts",
-        lambda modes, contacts: ways.append(known(modes, contacts)) or ways[-1],
+        lambda bodies, contacts: ways.append(known(bodies, contacts)) or ways[-1],
     )
     for fewest in (1, 1000):
         monkeypatch.setattr(contact_mode, "FEWEST", fewest)
