@@ -11,6 +11,7 @@ from rubhpc.integrate.following import n_followed
 from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN
 from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS, N_ALL, N_FIRST, N_MOST
 from rubhpc.integrate.modal_setup import ModalSetup
+from rubhpc.running.met_modes import USUAL, MetModes, sum_of_powers
 
 if TYPE_CHECKING:
     from rubhpc.integrate.record import Record, State
@@ -23,7 +24,6 @@ _LONG = 0.25  # s: cases that take less are run twice
 _PATIENCE = 15.0  # s that a part may take in any case: a whip that begins meets 300 contact modes
 _LITTLE = 0.5  # of what a case has taken: as much more is worth knowing better what is to come
 _FIRST, _FIRST_STEPS = 1 / 16, 50_000  # of a case, and predicted steps: its first part
-_GROWING = 0.01  # new contact modes over those of all revolutions before: beyond, a motion is irregular
 _LATE = 0.25  # least pace of a part without its contact modes, over that with them
 _REPEATED = 1.25  # revolutions counted over a length: two motions that take over from a tangent align anew
 _PROBED = 8  # revolutions at most, of those that show what is left of a case will take
@@ -38,10 +38,12 @@ class Forecast(NamedTuple):
         Up to the end of the record, and for each revolution that is followed behind it.
     least : float, s
         What it takes at least.
-    modes, before : float, s
-        Of contact modes that as many revolutions as were run would meet, and how many those were.
+    modes, fading : float, s
+        Of contact modes that the last doubling of its revolutions met, and their ratio to those of the next.
+    before : float
+        Revolutions by then.
     n_left : float
-        Revolutions that are left up to the end of the record.
+        Revolutions that are left then up to the end of the record.
     n_behind : int
         Revolutions behind the record, at least.
     lengths : tuple of int
@@ -52,6 +54,7 @@ class Forecast(NamedTuple):
     per_revolution: float = 0.0
     least: float = 0.0
     modes: float = 0.0
+    fading: float = USUAL
     before: float = 1.0
     n_left: float = 0.0
     n_behind: int = 0
@@ -60,12 +63,12 @@ class Forecast(NamedTuple):
     def whole(self, n_behind: float) -> float:
         """Time of the case, s, if so many revolutions are followed behind its record.
 
-        Where it still meets contact modes, each doubling of its revolutions is taken to meet half as many
-        as the last: the sets of contacts that a whip comes to are many, but not without end.
+        Where it still meets contact modes, each doubling of its revolutions is taken to meet a share of those
+        of the last (`MetModes`).
         """
         n = self._behind(n_behind)
-        n_doubling = math.log2(1.0 + (self.n_left + n) / self.before)
-        to_come = self.modes * (1.0 - math.exp2(-n_doubling))
+        left = max(self.n_left + n, 0.0)
+        to_come = self.modes * sum_of_powers(self.fading, math.log2(1.0 + left / self.before))
         return max(self.least, self.seconds + n * self.per_revolution + to_come)
 
     def _behind(self, usual: float) -> float:
@@ -108,7 +111,8 @@ class FollowedCase:
         self._n_motion = n_motion(setup)
         self._n_passed = 0  # revolutions of the transient
         self._pace = 0.0  # s a revolution of the latest part, without its contact modes
-        self._n_new = 0  # contact modes that it met
+        self._met = MetModes()
+        self._part = 1  # revolutions of the first part
         self._cut = 0.0  # s, after which the next part was cut off, without its contact modes
         self._cut_behind = 0  # revolutions behind the record by then
 
@@ -136,19 +140,39 @@ class FollowedCase:
         limit : float, s
         """
         recording, most = self._recording, max(_PATIENCE, limit)
-        n_transient = recording.longest_transient
-        part = max(1, round(min(_FIRST, _FIRST_STEPS / steps) * n_transient))
-        while self._n_passed < n_transient:
-            n = min(max(part, self._n_passed), n_transient - self._n_passed)
+        self._part = max(1, round(min(_FIRST, _FIRST_STEPS / steps) * recording.longest_transient))
+        while n := self._next:
             if not self._is_worth(n, limit) or not self._pass(n, most):
                 return
         if self._is_worth(recording.revolutions + self._n_motion * n_behind, limit):
             self.finish(most)
 
+    @property
+    def _next(self) -> int:
+        """Revolutions of the next part; 0 where the transient has been passed."""
+        return min(max(self._part, self._n_passed), self._recording.longest_transient - self._n_passed)
+
     def _is_worth(self, n: float, limit: float) -> bool:
         """Whether so many revolutions more are within a limit, s, or cost little beside those before."""
-        more = n * self._pace
+        more = self._seconds_of(n)
         return self.seconds + more <= limit or more <= _LITTLE * self.seconds
+
+    def _seconds_of(self, n: float) -> float:
+        """About what so many revolutions more take, with the contact modes that they meet."""
+        further = max(self._n_passed + n - self._met.revolutions, 0.0)
+        return n * self._pace + self.a_mode * self._met.to_come(further)
+
+    @property
+    def seconds_of_next(self) -> float:
+        """About what `go_on` takes, behind the record nothing."""
+        return self._seconds_of(self._next or self._recording.revolutions)
+
+    def go_on(self, limit: float) -> bool:
+        """Run the next part, as long as all before, or what is left; False where that took over `limit` s."""
+        if n := self._next:
+            return self._pass(n, limit)
+        self.finish(limit)
+        return self.is_whole
 
     def run_at_once(self) -> None:
         """Run it whole; once more where that takes little, for what contact modes take."""
@@ -179,9 +203,10 @@ class FollowedCase:
             seconds=self.seconds + n_left * pace,
             per_revolution=self._n_motion * pace if recording.revolutions >= LEAST_REVOLUTIONS else 0.0,
             least=least,
-            modes=self._n_new * self.a_mode if self.is_irregular else 0.0,
-            before=max(self._n_passed, 1),
-            n_left=n_left,
+            modes=self._met.n_new * self.a_mode,
+            fading=self._met.fading,
+            before=self._met.revolutions,
+            n_left=n_left + self._n_passed - self._met.revolutions,
         )
 
     def _pass(self, n: int, most: float) -> bool:
@@ -192,28 +217,33 @@ class FollowedCase:
         if record is None:
             self._leave(taken, before)
             return False
-        self._n_new = self.n_solved - before
+        n_new = self.n_solved - before
         pace = taken / n
         if is_first:
             again, _ = self._timed(part, math.inf)
             pace = min(pace, again / n)
             if self.is_in_ring:
-                self.a_mode = max(taken - again, 0.0) / max(self._n_new, 1)
+                self.a_mode = max(taken - again, 0.0) / max(n_new, 1)
             else:
                 self.modes = max(taken - again, 0.0)
         else:
-            pace = max(taken - self._n_new * self.a_mode, _LATE * taken) / n
+            pace = max(taken - n_new * self.a_mode, _LATE * taken) / n
         self._pace, self._state, self.record = pace, record.final, record
         self.seconds += taken
-        self.is_irregular = self._n_new > _GROWING * before
         self._n_passed += n
+        self._meet(self._n_passed, n_new)
         return True
+
+    def _meet(self, revolutions: float, n_new: int) -> None:
+        """Take in new contact modes by these revolutions."""
+        self._met.enter(revolutions, n_new)
+        self.is_irregular = self._met.is_growing
 
     def _leave(self, taken: float, before: int) -> None:
         """Take in a part that was cut off, with so many contact modes solved before: they stay solved."""
-        self._n_new = self.n_solved - before
-        self.is_irregular = self._n_new > _GROWING * before
-        modes = min(self._n_new * self.a_mode, (1.0 - _LATE) * taken)
+        n_new = self.n_solved - before
+        self._meet(2 * max(self._n_passed, 1), n_new)
+        modes = min(n_new * self.a_mode, (1.0 - _LATE) * taken)
         self.seconds += modes
         self._cut = taken - modes
 
@@ -243,14 +273,15 @@ class FollowedCase:
             transient=round(share * recording.longest_transient),
             revolutions=min(round(share * recording.revolutions) or 1, LEAST_REVOLUTIONS - 1),
         )
-        before = self.n_solved
+        before, n_new = self.n_solved, 0
         taken, _ = self._timed(part, math.inf)
         if self.n_solved > before:
+            n_new = self.n_solved - before
             again, _ = self._timed(part, math.inf)
-            if self.n_solved - before > _GROWING * before:  # a whip has just begun
-                self._n_new, self.is_irregular = self.n_solved - before, True
             self.seconds, taken = self.seconds + max(taken - again, 0.0), again
-        return taken / (part.longest_transient + part.revolutions)
+        n_revolution = part.longest_transient + part.revolutions
+        self._meet(self._n_passed + n_revolution, n_new)
+        return taken / n_revolution
 
     def _timed(self, recording: Recording, most: float) -> tuple[float, Record | None]:
         case = self._case

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 _STATUS = Path("/proc/self/status")
+_MACHINE = Path("/proc/meminfo")
 _PEAK = "VmHWM:"  # of the program itself: what getrusage says begins with that of the process that started it
 
 
@@ -17,3 +18,11 @@ def peak_memory() -> float:
         from resource import RUSAGE_SELF, getrusage
 
         return getrusage(RUSAGE_SELF).ru_maxrss * (1.0 if sys.platform == "darwin" else 1024.0)
+
+
+def free_memory() -> float:
+    """Bytes that may still be asked for on this machine; 0 where that is unknown."""
+    try:
+        return 1024.0 * float(_MACHINE.read_text().split("MemAvailable:")[1].split()[0])
+    except (OSError, IndexError, ValueError):
+        return 0.0

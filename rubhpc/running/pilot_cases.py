@@ -16,7 +16,7 @@ from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.running.case_setup import operation_of, set_up, set_up_for_kernels
 from rubhpc.running.followed_case import FollowedCase, Forecast, is_ring, usual_behind
 from rubhpc.running.kept_setups import MOST_BYTES
-from rubhpc.running.memory import peak_memory
+from rubhpc.running.memory import free_memory, peak_memory
 from rubhpc.running.stopwatch import Stopwatch
 from rubhpc.running.timed_run_ups import time_run_up
 from rubhpc.schema import FINAL_STATE
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from rubhpc.study.contact_keys import Contact
 
 _LONG = 0.25  # s: cases that take longer are run part by part, and left where there is no time for the whole
+_MOST_KEPT, _OF_FREE = 3 * MOST_BYTES, 0.25  # of cases that may be finished, and of the memory that is free
 _LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
 
 
@@ -65,7 +66,9 @@ class Pilots:
     alike : dict
         The other case that was timed after a case in a ring, by their indices.
     irregular : set of tuple of int
-        Those of them that still met new contact modes where they ended.
+        Those of them that still met new contact modes where they were left.
+    ended : set of tuple of int
+        Those of them that went on to their ends.
     arrays : dict
         Signals and the like of the latest case that was run, by name.
     modes : list of int
@@ -83,6 +86,8 @@ class Pilots:
         self._stopwatch = Stopwatch()
         self._followed: list[tuple[int, float]] = []  # of whole cases: revolutions behind the record, and s
         self._kept: dict[tuple[int, ...], FollowedCase] = {}  # that may be finished
+        self._spent: dict[tuple[int, ...], float] = {}  # s, on cases that were shortened
+        self._first: dict[tuple[int, ...], tuple[Forecast, float]] = {}  # what was foreseen then, and spent
         self._usual = 0.0  # revolutions behind the record
         self._longest = 0.0  # s, of the dearest case, as far as it was run
         self.was_cut, self.covered = False, 0.0
@@ -90,6 +95,7 @@ class Pilots:
         self.alike: dict[tuple[int, ...], tuple[int, ...]] = {}
         self.shortened: dict[tuple[int, ...], Forecast] = {}
         self.irregular: set[tuple[int, ...]] = set()
+        self.ended: set[tuple[int, ...]] = set()
         self.arrays: dict[str, NDArray[Any]] = {}
         self.modes: list[int] = []
         self.memory = 0.0
@@ -173,23 +179,26 @@ class Pilots:
 
     def _left(self, case: Case, followed: FollowedCase) -> float:
         """Take in a case that was not run whole; returns how long it will take, s."""
-        self.shortened[case.index] = followed.forecast()
-        if followed.is_irregular:
-            self.irregular.add(case.index)
-        self._longest = max(self._longest, self.foreseen(case.index))
+        self._foresee(case.index, followed)
+        self._first[case.index] = self.shortened[case.index], followed.seconds
         self._kept[case.index] = followed
         self._kept = self._affordable()
         return self.foreseen(case.index)
+
+    def _foresee(self, index: tuple[int, ...], followed: FollowedCase) -> None:
+        self.shortened[index], self._spent[index] = followed.forecast(), followed.seconds
+        (self.irregular.add if followed.is_irregular else self.irregular.discard)(index)
+        self._longest = max(self._longest, self.foreseen(index))
 
     def _affordable(self) -> dict[tuple[int, ...], FollowedCase]:
         """The dearest of the cases that may be finished, and others while contact modes leave memory."""
         kept: dict[tuple[int, ...], FollowedCase] = {}
         held: set[int] = set()
-        n_byte = 0
+        n_byte, most = 0, min(_MOST_KEPT, max(MOST_BYTES, _OF_FREE * free_memory()))
         for index in sorted(self._kept, key=self.foreseen, reverse=True):
             setup = self._kept[index].setup
             more = 0 if id(setup) in held else bytes_of_modes(setup)
-            if not kept or n_byte + more <= MOST_BYTES:
+            if not kept or n_byte + more <= most:
                 kept[index] = self._kept[index]
                 held.add(id(setup))
                 n_byte += more
@@ -229,25 +238,34 @@ class Pilots:
         self._usual = usual_behind(setup, self._study.recording)
         return max(0.0, middle - began - prepared), prepared, setup
 
+    def spent(self, index: tuple[int, ...]) -> float:
+        """What a shortened case has taken so far, s."""
+        return self._spent[index]
+
+    def first(self, index: tuple[int, ...]) -> tuple[float, float]:
+        """What a case had taken when it was shortened, and what was foreseen to come then, s."""
+        forecast, spent = self._first[index]
+        return spent, forecast.whole(self.n_behind) - spent
+
     def left(self, index: tuple[int, ...]) -> float:
-        """Time that it takes to finish a shortened case, s; infinite where it is kept no longer."""
-        return self.foreseen(index) - self._kept[index].seconds if index in self._kept else math.inf
+        """Time that it takes to finish a shortened case, s; nothing where it is kept no longer."""
+        return self.foreseen(index) - self._kept[index].seconds if index in self._kept else 0.0
 
-    def left_of_record(self, index: tuple[int, ...]) -> float:
-        """The same up to the end of its record."""
-        return (
-            self.shortened[index].whole(0.0) - self._kept[index].seconds if index in self._kept else math.inf
-        )
+    def seconds_of_next(self, index: tuple[int, ...]) -> float:
+        """About what the next part of a shortened case takes, s."""
+        return self._kept[index].seconds_of_next
 
-    def finish(self, index: tuple[int, ...], limit: float) -> tuple[float, bool]:
-        """Time of a shortened case that goes on, s, and whether it came to its end within `limit` s more."""
-        followed = self._kept.pop(index)
-        followed.finish(limit)
-        self._take_in(followed)
+    def go_on(self, index: tuple[int, ...], limit: float) -> bool:
+        """Run the next part of a shortened case; whether that came to its end within `limit` s."""
+        followed = self._kept[index]
+        is_done = followed.go_on(limit)
         if followed.is_whole:
-            self.irregular.discard(index)
-            return followed.seconds, True
-        return followed.forecast().whole(self.n_behind), False
+            self._take_in(followed)
+            self.ended.add(index)
+        self._foresee(index, followed)
+        if followed.is_whole or not is_done:
+            del self._kept[index]
+        return is_done
 
     def _branches(self, case: Case) -> float:
         """Time of the branches of a case; where they were not followed to their ends it is foreseen.

@@ -32,10 +32,12 @@ class Sample:
         Of each case: predicted steps, probability that a draw picks it, and the time it takes.
     is_whole : list of bool
         Whether it was run to its end; the time of others is foreseen from a part.
+    spent : list of float
+        What that part took, s.
     is_irregular : list of bool
         Whether its motion still met contact modes where that part ended.
     checked : list of (float, float)
-        Times foreseen from a part of a case, and what the whole took, s.
+        Of cases that went on to their ends: what a part had foreseen to come, and what came, s.
     """
 
     n_case: int
@@ -44,6 +46,7 @@ class Sample:
     probability: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     is_whole: list[bool] = field(default_factory=list)
+    spent: list[float] = field(default_factory=list)
     is_irregular: list[bool] = field(default_factory=list)
     checked: list[tuple[float, float]] = field(default_factory=list)
 
@@ -54,6 +57,7 @@ class Sample:
         seconds: float,
         *,
         is_whole: bool,
+        spent: float = 0.0,
         is_irregular: bool = False,
     ) -> None:
         """Take in a case."""
@@ -61,16 +65,17 @@ class Sample:
         self.probability.append(probability)
         self.seconds.append(seconds)
         self.is_whole.append(is_whole)
+        self.spent.append(spent)
         self.is_irregular.append(is_irregular)
 
     @property
     def known(self) -> float:
-        """Seconds of the cases that were run whole."""
-        return float(sum(t for t, is_whole in zip(self.seconds, self.is_whole, strict=True) if is_whole))
+        """Seconds that cases have taken."""
+        return float(np.where(self.is_whole, self.seconds, self.spent).sum())
 
     @property
     def correction(self) -> float:
-        """What a time foreseen from part of a case is multiplied with: a ratio estimate, drawn towards 1."""
+        """What is to come of a case by a part of it is multiplied with this: a ratio, drawn towards 1."""
         if not self.checked:
             return 1.0
         foreseen, taken = np.sum(self.checked, axis=0)
@@ -88,7 +93,8 @@ class Sample:
         """
         n = len(self.steps)
         steps = np.array(self.steps)
-        seconds = np.where(self.is_whole, 1.0, self.correction) * np.array(self.seconds)
+        to_come = np.where(self.is_whole, 0.0, self.correction * (np.array(self.seconds) - self.spent))
+        seconds = np.where(self.is_whole, self.seconds, self.spent + to_come)
         weight = 1.0 / (n * np.array(self.probability))
         base, slope = _line(steps, seconds, weight)
         n_unseen = max(self.n_case - n, 0)
@@ -105,8 +111,8 @@ class Sample:
         else:
             residual = weight * (seconds - base - slope * steps)
             error = math.sqrt(share * n / n_free * float(residual @ residual))
-        off = np.where(self.is_whole, 0.0, np.where(self.is_irregular, _OFF_IRREGULAR, _OFF))
-        mean_off = float(off @ seconds / seconds.sum()) if seconds.sum() > 0.0 else 0.0
+        off = np.where(self.is_irregular, _OFF_IRREGULAR, _OFF)
+        mean_off = float(off @ to_come / seconds.sum()) if seconds.sum() > 0.0 else 0.0
         of_parts = mean_off * whole / math.sqrt(1 + len(self.checked))
         return base * scale, slope * scale, math.hypot(error, of_parts)
 

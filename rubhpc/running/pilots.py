@@ -29,11 +29,11 @@ _MOST_PILOTS, _FEW_PILOTS, _FEW_BRANCHED = 64, 6, 2  # cases; timed even if slow
 _ENOUGH, _MOST = 3.0, 15.0  # processor seconds after which no more are begun: where they agree, and at all
 _AGREED = 0.25  # standard error of the mean pace, as a share of it, where cases agree
 _LONGEST = 75.0  # s, in which cases that were shortened are run whole, together
-_LEAST, _SHARE = 15.0, 0.5  # s that all may take, or that share of the time foreseen where it is more
-_DEAREST = 0.2  # of the time foreseen, for the dearest case in any case
 _OF_A_BRANCH = 0.3  # standard error, as a share, of a time foreseen from part of the first branch
+_LEAST, _SHARE = 15.0, 0.4  # s that all may take, or that share of the time foreseen where it is more
+_HALF = 0.5  # of the time foreseen, or `_LEAST`, for cases that go on, at least
 _LEAST_EACH = 1.0  # s, for each case
-_PATIENCE = 2.0  # times as long as foreseen, for a case that is finished
+_SMALL = 24  # cases: of a study of no more all are begun
 _FEWEST = 3  # cases, timed in any case
 # Positions that spread evenly over a square, however many (R. Kronecker; steps of M. Roberts' R2 sequence).
 _AMONG_BLOCKS, _WITHIN_BLOCK = 0.7548776662466927, 0.5698402909980532
@@ -53,7 +53,7 @@ class Timing:
         Standard error of the time of all cases, as a share of it: 0 where all were timed, NaN where one of
         several was.
     known : float
-        Seconds of the cases that were run whole.
+        Seconds that cases took, whole or as far as they were run.
     is_bound : bool
         Whether a case took longer than is waited for, so that the pace is a lower bound.
     seconds : float
@@ -105,17 +105,19 @@ def time_pilots(
     is_bound = False
     began = time.process_time()
     pilots = Pilots(grid)
-    few = _FEW_PILOTS if grid.study.branch is None else _FEW_BRANCHED
     n_case = int(missing.sum())
+    few = max(_FEW_PILOTS, n_case * (n_case <= _SMALL)) if grid.study.branch is None else _FEW_BRANCHED
     sample = Sample(n_case, sum(block.cost * float(share_of(block, missing).mean()) for block in blocks))
 
     def spent() -> float:
         return time.process_time() - began - pilots.loading - pilots.compiling
 
+    def foreseen() -> float:
+        return n_case * float(np.mean(sample.seconds)) if paces else 0.0
+
     def allowed() -> float:
         """Seconds that are left."""
-        foreseen = n_case * float(np.mean(sample.seconds)) if paces else 0.0
-        return min(max(_LEAST, _SHARE * foreseen), _MOST + _LONGEST) - spent()
+        return min(max(_LEAST, _SHARE * foreseen()), _MOST + _LONGEST) - spent()
 
     for k, (index, steps, probability) in enumerate(_picked(blocks, missing)):
         if k >= few and spent() > (_ENOUGH if _spread(sample) <= _AGREED else _MOST):
@@ -139,6 +141,7 @@ def time_pilots(
                     probability,
                     pace.step * steps,
                     is_whole=one not in pilots.shortened and not pilots.was_cut,
+                    spent=pilots.spent(one) if one in pilots.shortened else 0.0,
                     is_irregular=one in pilots.irregular,
                 )
         except Exception as error:  # whatever is wrong with the case: the others are timed all the same
@@ -149,8 +152,8 @@ def time_pilots(
             break
     if pilots.shortened:
         say(f"timing cases: {len(paces)} so far, the dearest of them to their end")
-    left = max(allowed(), _DEAREST * n_case * float(np.mean(sample.seconds))) if paces else 0.0
-    _finish(pilots, picked, sample, min(_LONGEST, left))
+    # The beginnings alone may have taken all that is allowed.
+    _finish(pilots, picked, sample, max(allowed(), min(_LEAST, _HALF * foreseen())))
     block = time_block(manifest, pilots.arrays) if pilots.arrays else 0.0
     seconds = time.process_time() - began - pilots.loading
     if not paces:
@@ -171,31 +174,32 @@ def time_pilots(
     )
 
 
-def _finish(pilots: Pilots, picked: list[tuple[int, ...]], sample: Sample, left: float) -> None:
-    """Finish cases that were shortened, the dearest first, in some `left` seconds together.
+def _finish(pilots: Pilots, picked: list[tuple[int, ...]], sample: Sample, seconds: float) -> None:
+    """Go on with cases that were shortened, part by part, for some seconds together.
 
     What such a case comes to is hardly known from its beginning: more and more sets of contacts, a tangent
-    that is carried on and on. A case whose record alone has room is finished too: it is not known whether
-    anything is followed behind it. The others are foreseen anew, and corrected by what it came to.
+    that is carried on and on. The next part is always that of the case of which most is to come. A record
+    that has room is run too: it is not known whether anything is followed behind it. Cases that are not
+    finished are foreseen anew, and corrected by what the others came to.
     """
-    shortened = [k for k, index in enumerate(picked) if index in pilots.shortened]
-    for k in sorted(shortened, key=lambda k: -sample.seconds[k]):
-        if left <= pilots.left_of_record(picked[k]):
-            continue
-        to_come = pilots.left(picked[k])
-        began = time.process_time()
-        limit = left if left <= to_come else max(left, _PATIENCE * to_come)
-        seconds, has_ended = pilots.finish(picked[k], limit)
-        left -= time.process_time() - began
-        sample.seconds[k], sample.is_whole[k] = seconds, True  # or nearly so
-        if not has_ended:
+    shortened = {index: k for k, index in enumerate(picked) if index in pilots.shortened}
+    end = time.process_time() + min(seconds, _LONGEST)
+    while True:
+        left = end - time.process_time()
+        going = [i for i in shortened if pilots.left(i) > 0.0 and pilots.seconds_of_next(i) < left]
+        if not going:
             break
-    for k in shortened:
-        foreseen = pilots.foreseen(picked[k])
-        if sample.is_whole[k]:
-            sample.checked.append((foreseen, sample.seconds[k]))
-        else:
-            sample.seconds[k] = foreseen
+        index = max(going, key=pilots.left)
+        is_done = pilots.go_on(index, left)
+        sample.seconds[shortened[index]] = pilots.foreseen(index)
+        if not is_done:
+            break
+    for index, k in shortened.items():
+        sample.seconds[k], sample.spent[k] = pilots.foreseen(index), pilots.spent(index)
+        if index in pilots.ended:
+            sample.is_whole[k] = True
+            spent, to_come = pilots.first(index)
+            sample.checked.append((to_come, sample.seconds[k] - spent))
 
 
 def _spread(sample: Sample) -> float:

@@ -9,6 +9,7 @@ import pytest
 from rubhpc.integrate.following import count_followed, n_followed
 from rubhpc.running import followed_case, pilot_cases
 from rubhpc.running.followed_case import FollowedCase, Forecast
+from rubhpc.running.met_modes import MetModes
 from rubhpc.study.study import Recording
 
 RECORDING = Recording(transient=60, revolutions=32, samples_per_revolution=16)
@@ -108,13 +109,61 @@ def test_a_tangent_that_was_cut_off_is_carried_to_its_next_length(monkeypatch, c
     assert found.forecast().whole(usual) == pytest.approx(60 * CALM + (32 + length) * pace)
 
 
-def test_each_doubling_of_an_irregular_motion_meets_half_as_many_new_modes():
+def test_each_doubling_of_an_irregular_motion_meets_a_share_of_the_last():
     """With those of its tangent."""
-    forecast = Forecast(20.0, 0.1, modes=3.0, before=60, n_left=32)
-    doublings = math.log2((60 + 32 + 80) / 60)
-    series = 3.0 * sum(0.5**k for k in range(1, 60)) * (1 - 0.5**doublings)
-    assert forecast.whole(80) == pytest.approx(20.0 + 8.0 + series)
+    forecast = Forecast(20.0, 0.1, modes=3.0, fading=1.0, before=60, n_left=32)
+    assert forecast.whole(80) == pytest.approx(20.0 + 8.0 + 3.0 * math.log2((60 + 32 + 80) / 60))
+    assert forecast.whole(4 * 60 - 60 - 32) == pytest.approx(20.0 + 14.8 + 2 * 3.0)
+    fading = forecast._replace(fading=0.5)
+    assert fading.whole(4 * 60 - 60 - 32) == pytest.approx(20.0 + 14.8 + 3.0 * (0.5 + 0.25))
     assert Forecast(20.0, 0.1, least=40.0).whole(80) == 40.0
+
+
+@pytest.mark.parametrize(
+    ("new", "n_new", "fading", "to_come"),
+    [
+        ([200], 200, 1.0, 400),  # the first contacts: nothing before
+        ([200, 100, 100, 100], 100, 1.0, 200),  # a whip
+        ([200, 100, 80, 76], 76, 0.95, 76 * (0.95 + 0.95**2)),
+        ([200, 100, 10, 0], 0, 0.9, 0),  # it has settled
+        ([200, 100, 10, 50], 50, 1.0, 100),
+        ([20, 10, 300], 300, 0.5, 300 * (0.5 + 0.25)),  # a whip begins
+    ],
+)
+def test_modes_to_come_are_those_of_the_last_doublings(new, n_new, fading, to_come):
+    met = MetModes()
+    for k, n in enumerate(new):
+        met.enter(2 ** (k + 1), n)
+    assert met.n_new == pytest.approx(n_new)
+    assert met.fading == pytest.approx(fading)
+    assert met.to_come(3 * met.revolutions) == pytest.approx(to_come)
+    assert met.is_growing == (n_new > 0)
+
+
+def test_a_part_that_is_run_again_is_no_doubling():
+    """A look ahead met its modes before; the last part of a transient may be shorter than all before."""
+    met, looked = MetModes(), MetModes()
+    for revolutions, n in ((2, 200), (4, 100), (8, 100)):
+        met.enter(revolutions, n)
+    for revolutions, n in ((2, 200), (4, 90), (4, 10), (8, 100), (8, 0)):
+        looked.enter(revolutions, n)
+    assert (looked.n_new, looked.fading) == (met.n_new, met.fading)
+    met.enter(8 * 2**0.25, 25)
+    assert met.n_new == pytest.approx(100)
+
+
+def test_a_case_goes_on_part_by_part(monkeypatch):
+    """As long as all before, then with the rest; what has been run is not run again."""
+    machine = Machine(begins=0)
+    found = followed(monkeypatch, machine, limit=1.0)
+    assert machine.ran == [(0, 4), (0, 4)]
+    seconds = []
+    while not found.is_whole:
+        assert found.go_on(math.inf)
+        seconds.append(found.seconds)
+    assert machine.ran[2:] == [(4, 8), (8, 16), (16, 32), (32, 60), (60, 172)]
+    assert seconds == pytest.approx([WHIP * n for n in (8, 16, 32, 60, 172)])
+    assert not followed(monkeypatch, Machine(begins=0), limit=1.0).go_on(0.5)  # 1 s is cut off
 
 
 def test_length_of_a_tangent_is_that_of_the_cases_that_ran_whole():

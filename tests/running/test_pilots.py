@@ -72,75 +72,103 @@ def test_part_of_a_drive_is_its_beginning():
     assert [part.n_revolution for part in parts(law, 64)] == [64]
 
 
-@pytest.mark.parametrize(
-    ("n_case", "left"), [(6, pilots._LEAST - 6 * 0.5), (180, 0.5 * 180 * 3.6 / 6 - 3.0), (10**5, 75.0)]
-)
-def test_dearest_case_is_finished(monkeypatch, n_case, left):
-    """What a shortened one comes to is not known from its beginning: it goes on, and then the others do.
+class Shortened:
+    """Cases that were left after some seconds: what parts of them take, and what is foreseen in between."""
 
-    All takes 15 s at most, or half of the time foreseen; another that is left takes what these say.
-    """
-    now, asked = [0.0], []
+    loading = compiling = 0.0
+    was_cut, arrays, alike = False, {}, {}
+    irregular, modes, memory = frozenset(), [], 0.0
+
+    def __init__(self, parts, forecasts, now):
+        self.parts, self.forecasts, self.now = parts, forecasts, now
+        self.shortened, self.ended, self.asked = dict(forecasts), set(), []
+        self._at = dict.fromkeys(forecasts, 0)
+
+    def spent(self, index):
+        return sum(self.parts[index][: self._at[index] + 1])
+
+    def foreseen(self, index):
+        return self.forecasts[index][self._at[index]]
+
+    def first(self, index):
+        return self.parts[index][0], self.forecasts[index][0] - self.parts[index][0]
+
+    def left(self, index):
+        return self.foreseen(index) - self.spent(index)
+
+    def seconds_of_next(self, index):
+        return self.parts[index][self._at[index] + 1]
+
+    def go_on(self, index, limit):
+        self.asked.append((index[0], limit))
+        self._at[index] += 1
+        taken = self.parts[index][self._at[index]]
+        self.now[0] += taken
+        if self._at[index] == len(self.parts[index]) - 1:
+            self.ended.add(index)
+        return taken <= limit
+
+
+def gone_on(monkeypatch, parts, forecasts, seconds):
+    """Which cases go on, with what limits, and the sample after that."""
+    now = [0.0]
+    found = Shortened(parts, forecasts, now)
+    monkeypatch.setattr(pilots, "time", SimpleNamespace(process_time=lambda: now[0]))
+    sample = Sample(len(parts), 1e3 * len(parts))
+    for index in parts:
+        sample.add(1e3, 1 / len(parts), found.foreseen(index), is_whole=False, spent=found.spent(index))
+    pilots._finish(found, list(parts), sample, seconds)
+    return found, sample
+
+
+def test_the_case_of_which_most_is_to_come_goes_on(monkeypatch):
+    """What it comes to is not known from its beginning; then it may be another one."""
+    parts = {(0,): [1.0, 1.0, 1.0], (1,): [1.0, 2.0, 4.0], (2,): [0.5, 0.5, 0.25]}
+    forecasts = {(0,): [9.0, 3.5, 3.0], (1,): [5.0, 8.0, 7.0], (2,): [1.0, 1.25, 1.25]}
+    found, sample = gone_on(monkeypatch, parts, forecasts, 100.0)
+    assert [k for k, _ in found.asked] == [0, 1, 1, 0, 2, 2]
+    assert sample.seconds == [3.0, 7.0, 1.25]
+    assert sample.is_whole == [True] * 3
+    assert sample.checked == [(8.0, 2.0), (4.0, 6.0), (0.5, 0.75)]
+
+
+def test_no_part_begins_that_has_no_room(monkeypatch):
+    """It may take all that is left; others that are shorter go on."""
+    parts = {(0,): [1.0, 2.0, 7.0], (1,): [1.0, 2.5, 1.0]}
+    forecasts = {(0,): [9.0, 10.0, 10.0], (1,): [3.5, 4.5, 4.5]}
+    found, sample = gone_on(monkeypatch, parts, forecasts, 5.0)
+    assert found.asked == [(0, 5.0), (1, 3.0)]
+    assert sample.seconds == [10.0, 4.5]
+    assert sample.spent == [3.0, 3.5]
+    assert sample.is_whole == [False, False]
+    assert sample.known == 6.5
+
+
+def test_all_cases_of_a_small_study_are_begun(monkeypatch):
+    """A whip among ten cases takes half of the time of a study, and nobody knows which it is."""
+    asked = []
 
     class Pilots:
         loading = compiling = 0.0
-        was_cut, arrays, alike = False, {}, {}
+        was_cut, arrays, alike, shortened = False, {}, {}, {}
         irregular, modes, memory = frozenset(), [], 0.0
 
         def __init__(self, grid):
-            self.shortened = {(0,): 3.0, (1,): 0.2, (2,): 0.1}
+            pass
 
         def pace(self, index, steps, limit):
-            now[0] += 0.5
-            return pilots.Pace(self.shortened.get(index, 0.1) / steps, 0.0, 0.0, 0.0)
-
-        def foreseen(self, index):
-            return self.shortened[index]
-
-        left = left_of_record = foreseen
-
-        def finish(self, index, limit):
-            asked.append((index, limit))
-            now[0] += limit - 0.15  # no time is left for the third
-            return 3.0 * self.shortened[index], True
+            asked.append(limit)
+            return pilots.Pace(0.6 / steps, 0.0, 0.0, 0.0)
 
     monkeypatch.setattr(pilots, "Pilots", Pilots)
-    monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3, 1 / n_case) for i in range(6)))
-    monkeypatch.setattr(pilots, "time", SimpleNamespace(process_time=lambda: now[0]))
+    monkeypatch.setattr(pilots, "_picked", lambda *_: (((i,), 1e3, 0.1) for i in range(10)))
+    monkeypatch.setattr(pilots, "time", SimpleNamespace(process_time=lambda: 0.6 * len(asked)))
+    monkeypatch.setattr(pilots, "share_of", lambda *_: np.ones(10))
     grid = SimpleNamespace(study=SimpleNamespace(branch=None))
-    monkeypatch.setattr(pilots, "share_of", lambda *_: np.ones(n_case))
-    monkeypatch.setattr(pilots, "time_block", lambda *_: 0.0)
-    block = SimpleNamespace(cost=n_case * 1e3)
-    timing = pilots.time_pilots(grid, None, [block], np.ones(n_case, dtype=bool))
-    assert [index for index, _ in asked] == [(0,), (2,)]  # 0.2 s are more than is left
-    assert asked[0][1] == pytest.approx(left)
-    known = 3 * 3.0 + 3 * 0.1 + 3 * 0.1
-    other = 0.2 * (known - 0.3 + 3.1 / 2) / (3.1 + 3.1 / 2)  # ratio of the two, and one of 1
-    assert timing.pace.step * 6e3 == pytest.approx(known + other)
-
-
-@pytest.mark.parametrize(("left", "limit"), [(0.9, None), (4.0, 4.0), (6.0, 10.0)])
-def test_a_case_whose_record_has_room_is_finished(left, limit):
-    """What may be followed behind it takes 4 s more; no more is spent on it than is left."""
-    asked = []
-
-    def finish(index, limit):
-        asked.append(limit)
-        return 1.5, True
-
-    found = SimpleNamespace(
-        shortened={(0,): None},
-        left=lambda _: 5.0,
-        left_of_record=lambda _: 1.0,
-        foreseen=lambda _: 6.0,
-        finish=finish,
-    )
-    sample = Sample(2, 2e3)
-    sample.add(1e3, 0.5, 6.0, is_whole=False)
-    pilots._finish(found, [(0,)], sample, left)
-    assert asked == ([] if limit is None else [limit])
-    assert sample.seconds == [6.0 if limit is None else 1.5]
-    assert sample.checked == ([] if limit is None else [(6.0, 1.5)])
+    timing = pilots.time_pilots(grid, None, [SimpleNamespace(cost=1e4)], np.ones(10, dtype=bool))
+    assert (timing.n_pilot, timing.spread) == (10, 0.0)
+    assert asked[0] == pilots._LEAST / 10  # each may take its share of what is left
+    assert asked[5] == (pilots._LEAST - 5 * 0.6) / 5
 
 
 def test_cases_of_a_ring_are_timed_in_pairs(monkeypatch):
@@ -243,6 +271,10 @@ def test_shortened_cases_of_a_ring_are_kept_while_memory_lasts(monkeypatch):
         monkeypatch.setattr(found, "foreseen", lambda index: cases[index[0]][1])
         return [found._kept[index].setup.name for index in found._affordable()]
 
+    monkeypatch.setattr(pilot_cases, "free_memory", lambda: 0.0)
     monkeypatch.setattr(pilot_cases, "bytes_of_modes", lambda setup: sizes[setup.name])
     assert kept(cases) == ["large"]
     assert kept(cases[1:]) == ["a", "a", "c"]
+    monkeypatch.setattr(pilot_cases, "free_memory", lambda: 2 * MOST_BYTES / pilot_cases._OF_FREE)
+    assert kept(cases[1:]) == ["a", "a", "b", "c"]
+    assert pilot_cases._MOST_KEPT > 2 * MOST_BYTES
