@@ -56,6 +56,7 @@ def draw_section(data: xr.Dataset, x: str, y: str, ax: Axes) -> Axes:
     dots = ax.scatter(xs, ys, c=np.arange(xs.size), cmap="viridis_r", s=9, linewidths=0, zorder=3)
     ax.figure.colorbar(dots, ax=ax, pad=0.02, aspect=25).set_label("Revolution")
     _widen(ax, xs, ys)
+    ax.locator_params(axis="x", nbins=4)  # four digits and a sign take their room
     ax.set(xlabel=x_label, ylabel=y_label)
     return ax
 
