@@ -26,10 +26,11 @@ PHYSICS = 22  # version of the physics: raised whenever a study gives other resu
 MODAL = 3  # method = "modal": modes kept, and `modal_error`
 DIRECT = 5  # transient = "direct"
 CHANGING_SPEED = 19  # run-ups and drives
-COULOMB = 9  # set-valued friction
+COULOMB = 10  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept
 SOFT_FRICTION = 1  # a penalty with set-valued friction
-CURVED = 9  # method = "modal" with gaps that are curved
+CURVED = 10  # method = "modal" with gaps that are curved
+RESTITUTION = 1  # method = "modal" with restitution, for whose sake modes are kept
 CURVED_RINGS = 1  # the same with several stators
 SEVERAL_STATORS = 2  # method = "modal" with more than one
 MANY_STATORS = 8  # more than five, whose sets of closed contacts or states may be more than 256
@@ -55,6 +56,7 @@ def physics_of(study: Study) -> int:
         + COULOMB * (friction_laws != {"sliding"})
         + PENALTY * (study.integrator.method == "modal" and is_soft)
         + SOFT_FRICTION * (is_soft and friction_laws != {"sliding"})
+        + RESTITUTION * (study.integrator.method == "modal" and _bounces(study))
         + CURVED * (study.integrator.method == "modal" and _is_curved(study))
         + CURVED_RINGS
         * (study.integrator.method == "modal" and _is_curved(study) and len(study.rig.stator) > 1)
@@ -72,14 +74,18 @@ def _is_curved(study: Study) -> bool:
     return has_bent_stator(study.rig.stator) or "updated" in _laws(study, "normal")
 
 
+def _bounces(study: Study) -> bool:
+    """Whether impacts of any case have restitution."""
+    name = contact_axes.PREFIX + "restitution"
+    return bool(study.contact.restitution) or any(axis.name == name for axis in study.axes)
+
+
 def _has_many_events(study: Study) -> bool:
     """Whether impacts have restitution, or more than 1000 revolutions are followed without a pause."""
-    name = contact_axes.PREFIX + "restitution"
-    bounces = bool(study.contact.restitution) or any(axis.name == name for axis in study.axes)
     recording = study.recording
     transient = 0 if recording.is_transient_auto else recording.longest_transient
     is_long = max(transient, recording.revolutions) > 1000
-    return bounces or (study.integrator.method == "modal" and is_long)
+    return _bounces(study) or (study.integrator.method == "modal" and is_long)
 
 
 def _laws(study: Study, key: str) -> set[str]:

@@ -14,7 +14,7 @@ from rubhpc.integrate.reduced_model.standstill import Modes, at_standstill, part
 from rubhpc.integrate.reduced_model.truncation import SMOOTH, kept_modes
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.contact_modes import Reduced
-from rubhpc.kernels.contact_pairs import N_DEGREE, TORSION, V, W, rim_sense
+from rubhpc.kernels.contact_pairs import LATERAL, N_DEGREE, TORSION, V, W, rim_sense
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,7 +110,8 @@ def reduce_model(
     The basis of each uncoupled part holds its undamped modes at standstill that `truncation.kept_modes`
     chooses, and residual attachment modes: the static responses of the others to a unit force on each degree
     that contact or outputs see, or on those together that a probe sees, and to what dampers and cross-coupled
-    springs draw from the modes kept. Gyroscopic and damping terms are then projected. Modes that nothing sees
+    springs draw from the modes kept; of bent stators to what an axial force does where they are bent
+    (`bending_loads`). Gyroscopic and damping terms are then projected. Modes that nothing sees
     are left out.
 
     Parameters
@@ -151,7 +152,7 @@ def reduce_to(
         ]
     )
     least = LEAST_RESPONSE * np.sqrt(accuracy)
-    patterns = model.probe_patterns
+    patterns = np.hstack([model.probe_patterns, bending_loads(model)])
     find = _attachments_once() if len(standstill.groups) > 1 else _attachment_modes
     basis = np.hstack([kept, *(find(those, seen, patterns, drawn, least) for those in modes)])
     grouped = Grouped(standstill.groups, basis)
@@ -173,6 +174,27 @@ def reduce_to(
         carrier=np.where((carrier >= 0)[:, :, None], basis[np.maximum(carrier, 0)], 0.0),
         probe=model.probe_rows @ basis,
     )
+
+
+def bending_loads(model: Model) -> Floats:
+    """Forces on each bent stator, (n_all, n_bent), where a lateral force at its tip meets an axial one.
+
+    An axial force N adds `-N S x` to the forces on a stator, with S its squared slope: a lateral load along
+    all of it, which static responses to forces at the tip do not follow. Here x is its static bending by a
+    lateral force of 1 N at the tip, and N is 1 N.
+    """
+    loads = []
+    for first, stator, degree in zip(model.stator_start, model.stators, degrees_of(model), strict=True):
+        if stator.squared_slope is None:
+            continue
+        rows = slice(int(first), int(first) + stator.body.n_dof)
+        bending = sum(
+            part.mode[rows] @ (part.mode[degree[LATERAL]] / part.frequency**2)
+            for part in at_standstill(model).parts
+        )
+        loads.append(np.zeros(len(model.probe_patterns)))
+        loads[-1][rows] = stator.squared_slope @ bending
+    return np.array(loads).reshape(-1, len(model.probe_patterns)).T
 
 
 def _attachment_modes(modes: Modes, seen: Ints, patterns: Floats, drawn: Floats, least: float) -> Floats:
@@ -209,7 +231,7 @@ def _attachments_once() -> Callable[[Modes, Ints, Floats, Floats, float], Floats
         place[rows] = np.arange(rows.size)
         own = modes._replace(rows=place[rows], kept=modes.kept[rows], rest=modes.rest[rows])
         seen, patterns, drawn = place[seen[place[seen] >= 0]], patterns[rows], drawn[rows]
-        drawn = drawn[:, drawn.any(axis=0)]
+        drawn, patterns = (forces[:, forces.any(axis=0)] for forces in (drawn, patterns))
         name = b"".join(a.tobytes() for a in (own.rest, own.rest_frequency, seen, patterns, drawn))
         if name not in known:
             known[name] = _attachment_modes(own, seen, patterns, drawn, least)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 MARGIN = 5.0  # estimates without it were up to 5.5 times too small: a case has many contacts, not one
 REBOUNDS = 3.0  # where modes are added, how much closer: a body that rebounds many times multiplies an error
+FINER = 0.5  # share of the accuracy under all laws but steady sliding along a fixed normal
 TURNED = 0.3  # share of motion along the rim that opens a curved gap: its normal turned, its stator bent
 COMPACT = 1e-6  # by how much more a body's static inertia is than its tip's mass, up to which it is a mass
 MOST_MODES = 400  # kept for the sake of the estimate; `cutoff_frequency` may ask for more
@@ -43,6 +44,13 @@ class Touch(NamedTuple):
     is_curved: bool = False  # gaps are: an updated normal, or a bent stator
     spring: float = 0.0  # of a penalty, N/m; 0 where contacts are rigid
     damper: float = 0.0  # beside it, N s/m
+    bounces: bool = False  # impacts have restitution
+
+    @property
+    def share(self) -> float:
+        """Of the accuracy asked for, which decides on modes; a penalty's contacts excite less of them."""
+        has_jumps = self.spring == 0.0 and (self.may_stick or self.bounces)
+        return FINER if self.is_curved or has_jumps else 1.0
 
 
 SMOOTH = Touch()
@@ -51,7 +59,8 @@ SMOOTH = Touch()
 def touch_of(model: Model, law: Law, *, is_updated: bool) -> Touch:
     """What contacts feel under a law, with the updated normal or the fixed one."""
     is_bent = any(stator.squared_slope is not None for stator in model.stators)
-    return Touch(plain(is_set_valued)(law), is_updated or is_bent, law.stiffness, law.damping)
+    curved, bounces = is_updated or is_bent, law.restitution > 0.0
+    return Touch(plain(is_set_valued)(law), curved, law.stiffness, law.damping, bounces)
 
 
 class Ringing(NamedTuple):
@@ -69,7 +78,7 @@ def kept_modes(model: Model, spin: float, accuracy: float, touch: Touch = SMOOTH
     are kept where a tip's own mass takes up more than the accuracy of the closing momentum (`struck_share`):
     its impacts excite modes of any frequency. At most MOST_MODES are kept for these reasons.
     """
-    parts = at_standstill(model).parts
+    parts, accuracy = at_standstill(model).parts, touch.share * accuracy
     cutoff = cutoff_frequency(model, spin, accuracy)
     are_kept = [modes_below(part, cutoff) for part in parts]
     is_kept = np.concatenate(are_kept)

@@ -258,3 +258,20 @@ def test_products_group_by_group():
         grouped = Grouped(those, columns)
         assert grouped.under(matrix) == pytest.approx(matrix @ columns)
         assert grouped.form(matrix) == pytest.approx(columns.T @ matrix @ columns)
+
+
+def test_a_bent_stator_follows_an_axial_force_along_all_its_length():
+    """Foreshortening by a tip's force, and by what an axial force adds to it, is that of all modes."""
+    packaged = read_rig("mokhtar2017")
+    model = assemble(replace(packaged, stator=(replace(packaged.stator[0], geometry="second_order"),)))
+    reduced, stiffness = reduce_model(model, SPIN, 1e-3), whole(model, SPIN)[2]
+    assert len(reduced.stiffness) < len(stiffness) / 2
+    first, slope = model.stator_start[0], model.stators[0].squared_slope
+    square = np.zeros_like(stiffness)
+    square[first : first + len(slope), first : first + len(slope)] = slope
+    force = np.eye(len(stiffness))[degrees_of(model)[0, LATERAL]]
+    answer = np.linalg.inv(stiffness)
+    known = reduced.basis @ np.linalg.solve(reduced.stiffness, reduced.basis.T)
+    for load in (force, square @ answer @ force):
+        found, full = known @ load, answer @ load
+        assert found @ square @ found == pytest.approx(full @ square @ full, rel=1e-9)

@@ -102,7 +102,7 @@ def test_forces_of_a_heavy_stator_are_those_of_all_modes():
         (
             {"node": 3, "youngs_modulus": 6.8e9, "length": 0.06, "geometry": "second_order"},
             {"normal": "updated", "speed_ratio": 1.2},
-            2e-3,
+            1e-3,
         ),
     ],
     ids=["sticks", "bent"],
@@ -172,6 +172,15 @@ def test_estimate_knows_what_contacts_feel_along_the_rim():
     assert touch_of(bent, MULTIPLIER, is_updated=False) == Touch(is_curved=True)
     soft = MULTIPLIER._replace(stiffness=1e7, damping=3.0)
     assert touch_of(model, soft, is_updated=False) == Touch(spring=1e7, damper=3.0)
+    assert touch_of(model, MULTIPLIER._replace(restitution=0.5), is_updated=False) == Touch(bounces=True)
+
+
+@pytest.mark.parametrize("touch", [Touch(is_curved=True), Touch(may_stick=True), Touch(bounces=True)])
+def test_modes_of_other_laws_than_steady_sliding_are_within_half_the_accuracy(touch):
+    model = assemble(at_node_5(radius=0.01, youngs_modulus=3e9))
+    found = kept_modes(model, 220.0, 1e-3, touch)
+    assert number(found) > number(kept_modes(model, 220.0, 1e-3))
+    assert modal_error(model, 220.0, found, touch) <= 5e-4
 
 
 @pytest.mark.parametrize(
