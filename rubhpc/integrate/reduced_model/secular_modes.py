@@ -61,10 +61,8 @@ def with_contact(modes: Eigenmodes, contact: Contact) -> Eigenmodes | None:
     moved = _without_rounding(contact.force, modes.inverse[:, n:])
     if not is_held:
         seen = seen * (contact.stiffness + contact.damping * modes.exponent)
-    active, rest = (
-        np.flatnonzero((seen != 0.0) | (moved != 0.0)),
-        np.flatnonzero((seen == 0.0) & (moved == 0.0)),
-    )
+    is_active = (seen != 0.0) | (moved != 0.0)
+    active, rest = np.flatnonzero(is_active), np.flatnonzero(~is_active)
     poles = _Poles.of(modes.exponent[active], seen[active], moved[active], is_held)
     zeros = poles.zeros() if poles else None
     if poles is None or zeros is None:
@@ -73,11 +71,9 @@ def with_contact(modes: Eigenmodes, contact: Contact) -> Eigenmodes | None:
     if found is None:
         return None
     right, left = found
-    shape, inverse = (
-        poles.combined(right, (modes.shape[:, active] * half[active]).T),
-        poles.combined(left, modes.inverse[active]),
-    )
-    size = np.sqrt((np.abs(shape) ** 2).sum(axis=1) * (1.0 + np.abs(zeros.exponent) ** 2))
+    shape = poles.combined(right, (modes.shape[:, active] * half[active]).T)
+    inverse = poles.combined(left, modes.inverse[active])
+    size = np.sqrt(_squares(shape).sum(axis=1) * (1.0 + _squares(zeros.exponent)))
     shape *= (np.where(zeros.is_real, 1.0, 2.0) / size)[:, None]
     inverse *= (size / (right * left).sum(axis=1))[:, None]
     return Eigenmodes(
@@ -245,13 +241,5 @@ class _Poles(NamedTuple):
 
     def combined(self, weights: Complexes, values: Complexes) -> Complexes:
         """Sum over all poles of weights (z, p) times values (k, n) and their conjugates: (z, n)."""
-        (z, _), (k, n) = weights.shape, values.shape
-        together, apart = weights[:, :k].copy(), weights[:, :k].copy()
-        together[:, self.turned] += weights[:, k:]
-        apart[:, self.turned] -= weights[:, k:]
-        factor, parts = np.empty((2 * z, 2 * k)), np.empty((2 * k, n))
-        factor[:z, :k], factor[:z, k:] = together.real, -apart.imag
-        factor[z:, :k], factor[z:, k:] = together.imag, apart.real
-        parts[:k], parts[k:] = values.real, values.imag
-        halves = factor @ parts
-        return np.asarray(halves[:z] + 1j * halves[z:])
+        found: Complexes = weights @ np.concatenate([values, values[self.turned].conj()])
+        return found
