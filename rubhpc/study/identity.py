@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 PHYSICS = 22  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
-MODAL = 3  # method = "modal": modes kept, and `modal_error`
+MODAL = 4  # method = "modal": modes kept, and `modal_error`
 DIRECT = 5  # transient = "direct"
 CHANGING_SPEED = 19  # run-ups and drives
 COULOMB = 10  # set-valued friction

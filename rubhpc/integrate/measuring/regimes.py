@@ -33,6 +33,7 @@ CLEAR = 0.05  # per revolution: an exponent beyond that over 16 spans keeps its 
 ZERO = 0.01  # per revolution: an exponent within that is none
 EQUAL = 1e-5  # of the orbit's size: cycles as near as that are the same where no motion can be solved for
 NOISE, ALIKE = 1e-9, 2.0  # of the orbit's size, and times the nearest return: a return as near as any
+REAL = 1e-6  # imaginary part of a multiplier that is taken for a real one
 SURE = 2.0  # standard errors: an exponent within that is none, too
 # A torus: the nearest return is that near, of the distance between cycles; that of twice as many revolutions
 # is twice as far, by 8 %; and neither half of the record has the farther ones.
@@ -121,7 +122,9 @@ def regime(
     if orbit.n_revolution < LEAST_REVOLUTIONS:
         return Verdict(periodic, orbit.closest_return) if repeats else Verdict(REGIME.index("undecided"), 0)
     is_closed = is_long and is_torus(orbit.distances)  # the curve on which the cycles lie
-    flag, exponent = by_growth(growth, within, is_closed=is_closed)
+    flag, exponent = by_growth(growth, within, is_closed=is_closed, is_cheap=solve is not None)
+    if search.turns_away and flag == periodic and exponent > -CLEAR:
+        flag = REGIME.index("quasi_periodic")  # a torus about it, too near yet to be seen as one
     if repeats and flag != REGIME.index("chaotic"):
         return Verdict(periodic, orbit.closest_return, exponent)
     is_regular = flag in (periodic, REGIME.index("quasi_periodic"))
@@ -206,6 +209,7 @@ class _Search:
     def __init__(self, orbit: _Orbit) -> None:
         self._orbit = orbit
         self.finds_nothing = True  # neither such a motion nor another one
+        self.turns_away = False  # from an unstable motion that the record agrees with, in two directions
 
     def proves(self, period: int, solve: Solve, later: Later | None = None) -> Verdict | None:
         """Judge by the motion of a period, by that of the closest return, and by what is found later on."""
@@ -239,10 +243,11 @@ class _Search:
         if found is None:
             return None
         self.finds_nothing = False
-        if abs(found.multiplier) >= 1.0:
-            return None
         apart = self._orbit.distances_from(found)
         first, last = apart[: found.period].max(), apart[-found.period :].max()
+        if abs(found.multiplier) >= 1.0:
+            self.turns_away |= bool(last <= PERIOD_TOLERANCE and abs(found.multiplier.imag) > REAL)
+            return None
         draws_near = found.is_led_to or (last <= MOST_DISTANT and last <= first)
         if last > PERIOD_TOLERANCE and not draws_near:
             return None
@@ -252,11 +257,16 @@ class _Search:
 
 
 def by_growth(
-    growth: Iterable[float], within: Within | None = None, *, is_closed: bool = False
+    growth: Iterable[float],
+    within: Within | None = None,
+    *,
+    is_closed: bool = False,
+    is_cheap: bool = False,
 ) -> tuple[int, float]:
     """Judge by how neighbours part: flag of `schema.REGIME`, and the largest Lyapunov exponent or NaN.
 
-    `is_closed` states that the cycles lie on a closed curve (`is_torus`).
+    `is_closed` states that the cycles lie on a closed curve (`is_torus`), `is_cheap` that spans may be asked
+    for until a displacement has found its direction: among many slow modes it falls a long way before.
     """
     grown = [] if within is None else list(within())
     if is_closed and grown and abs(np.mean(grown)) < CLEAR:
@@ -281,7 +291,13 @@ def by_growth(
         if abs(exponent) <= max(ZERO, SURE * standard_error(grown)):
             return REGIME.index("quasi_periodic"), exponent
     exponent = float(np.mean(grown))
-    return REGIME.index("chaotic" if exponent > 0.0 else "periodic"), exponent
+    if exponent > 0.0:
+        return REGIME.index("chaotic"), exponent
+    if is_cheap and reaches(N_ALL):
+        later = grown[len(grown) // 2 :]
+        if abs(np.mean(later)) <= ZERO:
+            return REGIME.index("quasi_periodic"), float(np.mean(later))
+    return REGIME.index("periodic"), exponent
 
 
 def standard_error(grown: list[float]) -> float:

@@ -341,3 +341,25 @@ def test_spans_of_the_record_count(n_within, n_read):
     assert REGIME[flag] == "chaotic"
     assert exponent == pytest.approx((0.3 * n_within + 0.5 * n_read) / max(n_within, 16))
     assert len(list(behind)) == 16 - n_read
+
+
+def test_displacement_that_falls_far_before_it_turns_along_a_torus_decays_no_more():
+    """By e^6 within 96 revolutions, then not at all: over 64 and 256 of them -0.09 and -0.02 a revolution."""
+    fall = [-0.25] * 8 + [-0.0625] * 16 + [0.001] * 300
+    for n_within in (4, 8, 12, 60):
+        growth = iter(fall[n_within:])
+        flag, exponent = by_growth(growth, lambda n=n_within: fall[:n], is_cheap=True)
+        assert (REGIME[flag], abs(exponent) < 0.05) == ("quasi_periodic", True)
+    steady = by_growth(iter([-0.02] * 100), is_cheap=True)
+    assert (REGIME[steady[0]], steady[1]) == ("periodic", pytest.approx(-0.02))
+
+
+@pytest.mark.parametrize(
+    ("multiplier", "rate", "expected"),
+    [(0.6 + 0.81j, -0.03, "quasi_periodic"), (0.6 + 0.81j, -0.1, "periodic"), (1.008, -0.03, "periodic")],
+)
+def test_record_beside_an_unstable_motion_with_two_frequencies_is_a_torus(multiplier, rate, expected):
+    """Unless neighbours close up at a rate that nothing but a locked motion has."""
+    whirl = torus(1 / 3)
+    name, verdict = judged(whirl, closing(3, multiplier, whirl), growth=iter([rate] * 64))
+    assert (name, verdict.period) == (expected, 0)
