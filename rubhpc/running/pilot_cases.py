@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rubhpc.study.contact_keys import Contact
 
 _LONG = 0.25  # s: cases that take longer are run part by part, and left where there is no time for the whole
-_MOST_KEPT, _OF_FREE = 3 * MOST_BYTES, 0.25  # of cases that may be finished, and of the memory that is free
+_MOST_KEPT, _OF_FREE = 2 * MOST_BYTES, 0.25  # of cases that may be finished, and of the memory that is free
 _LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
 
 

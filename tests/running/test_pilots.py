@@ -277,4 +277,4 @@ def test_shortened_cases_of_a_ring_are_kept_while_memory_lasts(monkeypatch):
     assert kept(cases[1:]) == ["a", "a", "c"]
     monkeypatch.setattr(pilot_cases, "free_memory", lambda: 2 * MOST_BYTES / pilot_cases._OF_FREE)
     assert kept(cases[1:]) == ["a", "a", "b", "c"]
-    assert pilot_cases._MOST_KEPT > 2 * MOST_BYTES
+    assert pilot_cases._MOST_KEPT >= 2 * MOST_BYTES
