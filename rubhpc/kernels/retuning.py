@@ -63,6 +63,7 @@ class Speeds(NamedTuple):
     spin: Floats  # (k,), rad/s
     share: Floats  # (k,), of the speed at which the matrices are
     within: Floats  # (k,), place in the range of the matrices, from -1 to 1
+    rise: Floats  # (k,), place of the acceleration, 0 for that of the matrices
     factor: Complexes  # (k,), by which the unbalance at unit speed acts: spin^2 exp(i angle) if steady, 1/s^2
     growth: Floats  # (k,), 1/s, of the unbalance force; the factor is that at the beginning
     tick: Floats  # (k,), s, resolution of events
@@ -83,6 +84,7 @@ def retune(tables: ModeTables, place: int, held: HeldMode, speeds: Speeds, first
             complex(speeds.growth[j], speeds.spin[j]),
             speeds.share[j],
             speeds.within[j],
+            speeds.rise[j],
             speeds.factor[j],
             speeds.tick[j],
             speeds.interval[j],
@@ -97,6 +99,7 @@ def retune_to(
     turning: complex,
     share: float,
     within: float,
+    rise: float,
     factor: complex,
     tick: float,
     interval: float,
@@ -108,7 +111,7 @@ def retune_to(
     """
     m, n, end = held.is_pair.size, held.slip.shape[1], held.n_coordinate
     if held.varying.kept.size > 0:
-        vary(tables, mode, held.varying, within)
+        vary(tables, mode, held.varying, within, rise)
         vary_rates(tables, mode, held.exponent, m)
     if held.rim.one >= 0:
         move_rim(tables, mode, held.rim, share, held.rate, held.resisting, held.row, held.work)

@@ -18,10 +18,11 @@ Ints = NDArray[np.int64]
 
 
 class Course(NamedTuple):
-    """Entries of an array that go with the speed, k of them."""
+    """Entries of an array that go with the speed and with its acceleration, k of them."""
 
     at: Ints  # (k,), in the array, flat
     value: Floats  # (p, k), factors of the powers 0, 1, ... of the place in the range, from -1 to 1
+    rise: Floats  # (k,), factors of the place of the acceleration
 
 
 class Varying(NamedTuple):
@@ -42,31 +43,31 @@ class Varying(NamedTuple):
 
 
 @jit
-def take_course(course: Course, place: float, values: Floats) -> None:
-    """Bring an array (s,) to a place in the range."""
+def take_course(course: Course, place: float, rise: float, values: Floats) -> None:
+    """Bring an array (s,) to a place in the range, and to that of an acceleration."""
     value = course.value
     last = value.shape[0] - 1
     for j in range(course.at.size):
         total = value[last, j]
         for p in range(last - 1, -1, -1):
             total = total * place + value[p, j]
-        values[course.at[j]] = total
+        values[course.at[j]] = total + rise * course.rise[j]
 
 
 @jit
-def vary(tables: ModeTables, mode: int, varying: Varying, place: float) -> None:
+def vary(tables: ModeTables, mode: int, varying: Varying, place: float, rise: float) -> None:
     """Bring a mode and its tables to a place in the range, but for what follows from these."""
-    take_course(varying.kept_shape, place, varying.kept)
-    take_course(varying.kept_entry, place, varying.kept)
-    take_course(varying.motion_re, place, tables.motion_re[mode].reshape(-1))
-    take_course(varying.motion_im, place, tables.motion_im[mode].reshape(-1))
-    take_course(varying.switch_re, place, tables.switch_re[mode].reshape(-1))
-    take_course(varying.switch_im, place, tables.switch_im[mode].reshape(-1))
-    take_course(varying.slip_re, place, tables.slip_re[mode].reshape(-1))
-    take_course(varying.slip_im, place, tables.slip_im[mode].reshape(-1))
-    take_course(varying.enter_re, place, tables.enter_re[mode].reshape(-1))
-    take_course(varying.enter_im, place, tables.enter_im[mode].reshape(-1))
-    take_course(varying.enter_constant, place, tables.enter_constant[mode].reshape(-1))
+    take_course(varying.kept_shape, place, rise, varying.kept)
+    take_course(varying.kept_entry, place, rise, varying.kept)
+    take_course(varying.motion_re, place, rise, tables.motion_re[mode].reshape(-1))
+    take_course(varying.motion_im, place, rise, tables.motion_im[mode].reshape(-1))
+    take_course(varying.switch_re, place, rise, tables.switch_re[mode].reshape(-1))
+    take_course(varying.switch_im, place, rise, tables.switch_im[mode].reshape(-1))
+    take_course(varying.slip_re, place, rise, tables.slip_re[mode].reshape(-1))
+    take_course(varying.slip_im, place, rise, tables.slip_im[mode].reshape(-1))
+    take_course(varying.enter_re, place, rise, tables.enter_re[mode].reshape(-1))
+    take_course(varying.enter_im, place, rise, tables.enter_im[mode].reshape(-1))
+    take_course(varying.enter_constant, place, rise, tables.enter_constant[mode].reshape(-1))
 
 
 @jit

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
 from rubhpc.integrate.marches.modal import Place
+from rubhpc.kernels.pieces import FAST, QUICK
 
 if TYPE_CHECKING:
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
@@ -83,8 +84,8 @@ def carried(
     march.begin(setup, begun)
     library, mask = march.library, march.mask
     assert isinstance(library, RetunedLibrary)
-    was = before.library.eigenmodes(mask, before.setup.within)
-    now = library.eigenmodes(mask, setup.within)
+    was = before.library.eigenmodes(mask, *before.setup.places)
+    now = library.eigenmodes(mask, *setup.places)
     if was is None or now is None:
         return begun
     old, factor = _turning(before.setup)
@@ -98,8 +99,11 @@ def carried(
     )
     has_touched = any(march.met)
     size, spin = np.abs(now.exponent.imag), abs(setup.spin)
+    goes_on = before.setup.held.is_followed and setup.held.is_followed and not change.jump
     fast = size > LOWEST * spin
-    if not has_touched:
+    if goes_on:  # as from piece to piece
+        fast = np.abs(now.exponent) > max(FAST * spin, QUICK / change.ahead)
+    elif not has_touched:
         fast |= (size > LOWEST_RINGING * spin) & (np.abs(now.exponent.real) < RINGING * size)
     exponent, enter = now.exponent[fast], now.enter[fast]
     left = 0.5 * np.stack([enter @ parts.shape, enter @ parts.shape.conj()])  # (2, modes, parts)

@@ -1,10 +1,12 @@
-"""Contact modes that follow the speed: polynomials through those of three speeds in a range.
+"""Contact modes that follow the speed: polynomials through those of three or five speeds in a range.
 
 Eigenvectors of the speeds at either side are brought to the length and phase that those in the middle see as
-theirs, so that exponents, shapes and what is made of them go smoothly: parabolas follow them, with errors of
-the third order in the range. What enters them, the inverse of the shapes, has to be their inverse exactly, or
-each event would lose or gain motion: Newton's method makes it so at five places of the range, and polynomials
-of the fourth order go through these.
+theirs (`near_modes`), so that exponents, shapes, their inverse and what is made of them go smoothly:
+parabolas follow them, with errors of the third order in the range, or polynomials of the fourth order, with
+errors of the fifth. The inverse has to be their inverse, or each event would lose or gain motion: it is exact
+at five places, and goes through these by polynomials of the fourth order. With the
+acceleration, which changes the matrices little, all of it goes evenly: from that in the middle to that of
+another acceleration there.
 """
 
 from __future__ import annotations
@@ -15,29 +17,33 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rubhpc.integrate.changing_speed.near_modes import entered_by, weights
 from rubhpc.kernels.varying import Course, Varying
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.retuning import HeldMode
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+Ints = NDArray[np.int64]
 A = TypeVar("A", Floats, Complexes)
 
-NODE = 0.8  # places at either side, over half of the range: the error is greatest at its ends
-PLACES = np.array([0.0, -0.5, 0.5, -1.0, 1.0])  # where what enters is made exact
-POWERS = np.linalg.inv(np.vander(PLACES, increasing=True))
-NEWTON, EXACT = 6, 1e-9  # steps at most, and share of a mode in another that needs no more than one
+# Places of three and of five speeds in the range, the middle first, about as Chebyshev's.
+FEW, NODES = (0.0, -0.87, 0.87), (0.0, -0.59, 0.59, -0.95, 0.95)
+POWERS = {len(places): np.linalg.inv(np.vander(places, increasing=True)) for places in (FEW, NODES)}
 FAR = 0.5  # share of a mode in another of a speed beside it, over its own, from which it is not the same
 EQUAL = 1e-9  # relative difference of two exponents that repeat
 STILL, LEAST = 1e-13, 1e-16  # change of an entry over it, and over the greatest, below which it stays
-NONE = Course(np.zeros(0, dtype=np.int64), np.zeros((1, 0)))
+NONE = Course(np.zeros(0, dtype=np.int64), np.zeros((1, 0)), np.zeros(0))
 NOTHING = Varying(np.zeros(0), *[NONE] * (len(Varying._fields) - 1))
 _TABLES = "motion_re", "motion_im", "switch_re", "switch_im", "slip_re", "slip_im"
 _HELD = "exponent", "motion", "switch", "output", "row"
-_RIM = "motion", "switch", "fixed", "rate", "row"
+_OF_RIM = "motion", "switch", "fixed", "rate", "row"
+_RIM = "rim "
 
 
 class Tabulated(NamedTuple):
@@ -48,11 +54,11 @@ class Tabulated(NamedTuple):
     held: HeldMode
 
 
-def parabola(values: tuple[A, A, A], place: float) -> A:
-    """What goes through values in the middle, before and behind it, at a place in the range."""
-    middle, before, behind = values
-    x = place / NODE
-    found: A = middle + 0.5 * x * (behind - before) + x * x * (0.5 * (behind + before) - middle)
+def between(values: Sequence[A], place: float) -> A:
+    """What goes through values at `FEW` or `NODES`, the middle first, at a place in the range."""
+    middle, *others = values
+    weight = place ** np.arange(len(values)) @ POWERS[len(values)]
+    found: A = middle + sum(share * (other - middle) for share, other in zip(weight[1:], others, strict=True))
     return found
 
 
@@ -62,12 +68,12 @@ def matched(mode: ContactMode, other: ContactMode) -> ContactMode | None:
     if other.n_eigenmode != m or other.exponent.size != mode.exponent.size:
         return None
     enter, motion = mode.enter[:m], other.motion[:, :m]
-    weight = _weights(mode)
+    weight = weights(mode)
     seen = enter @ motion / weight[:, np.newaxis]
     if (found := aligned(seen, mode.exponent[:m])) is None:
         return None
     place, turn = found
-    if np.any(_weights(other)[place] != weight):
+    if np.any(weights(other)[place] != weight):
         return None
     is_same = (motion[:, place] == mode.motion[:, :m]).all(axis=0)
     turn[:, is_same] = np.eye(m)[:, is_same]
@@ -115,60 +121,52 @@ def aligned(seen: Complexes, exponent: Complexes) -> tuple[NDArray[np.int64], Co
     return place, turn
 
 
-def followed(nodes: tuple[Tabulated, Tabulated, Tabulated], seen: Complexes) -> HeldMode:
-    """What is held of the mode in the middle, with what of it goes with the speed.
+def followed(nodes: Sequence[Tabulated], risen: Tabulated | None, seen: Complexes) -> HeldMode:
+    """What is held of the mode in the middle, with what of it goes with the speed and its acceleration.
 
-    `nodes` are those in the middle of the range, before and behind it; `seen` (n,) is what constraints leave
-    of the unbalance.
+    `nodes` are those at `FEW` or `NODES`, the middle first; `risen` is that in the middle at another
+    acceleration, if any; `seen` (n,) is what constraints leave of the unbalance.
     """
     middle, mode = nodes[0], nodes[0].mode
     held, m, n = middle.held, mode.n_eigenmode, seen.size
-    courses: dict[str, Course] = {}
-    for name in _TABLES:
-        values = [getattr(node.row, name)[0] for node in nodes]
-        courses[name] = _course(_through(values, m))
-    enter, take_off = _entries(nodes)
-    padded = np.zeros((len(PLACES), *middle.row.enter_re.shape[1:]), dtype=np.complex128)
+    of_all, n_node = [*nodes, *([risen] if risen else [])], len(nodes)
+    courses = {name: _through([getattr(node.row, name)[0] for node in of_all], m, n_node) for name in _TABLES}
+    enter, take_off = _entries(nodes, risen)
+    padded = np.zeros((len(enter), *middle.row.enter_re.shape[1:]), dtype=np.complex128)
     padded[:, :, :m] = enter.transpose(0, 2, 1)
-    courses["enter_re"] = _course(POWERS @ padded.real.reshape(len(PLACES), -1))
-    courses["enter_im"] = _course(POWERS @ padded.imag.reshape(len(PLACES), -1))
-    constant = np.zeros((len(PLACES), *middle.row.enter_constant.shape[1:]))
+    constant = np.zeros((len(enter), *middle.row.enter_constant.shape[1:]))
     constant[..., 0, :m], constant[..., 1, :m] = take_off.real, take_off.imag
-    courses["enter_constant"] = _course(POWERS @ constant.reshape(len(PLACES), -1))
-    shape = {name: [getattr(node.held, name) for node in nodes] for name in _HELD}
-    entry = {"drive": enter[:, :, n:] @ seen, "mirrored_drive": enter[:, :, n:].conj() @ seen}
-    of_rim: dict[str, list[Any]] = {}
+    for name, values in (("enter_re", padded.real), ("enter_im", padded.imag), ("enter_constant", constant)):
+        courses[name] = _through(values, m, len(NODES), skips_response=False)
+    shape: dict[str, Any] = {name: [getattr(node.held, name) for node in of_all] for name in _HELD}
+    entry: dict[str, Any] = {
+        "drive": enter[:, :, n:] @ seen,
+        "mirrored_drive": enter[:, :, n:].conj() @ seen,
+    }
     if held.rim.one >= 0:
-        of_rim = {name: [getattr(node.held.rim, name) for node in nodes] for name in _RIM}
-        last = constant[:, -1]
-        entry["entered"] = last[:, 0] + 1j * last[:, 1]
-    kept, views, places = _room({name: values[0] for name, values in (shape | entry).items()}, of_rim)
-    shapes, entries = [], []
-    for name, values in [*shape.items(), *(("rim " + key, value) for key, value in of_rim.items())]:
-        shapes.append(_moved(_course(_through(values, m, name in ("exponent", "row"))), places[name]))
-    for name, value in entry.items():
-        flat = np.ascontiguousarray(value).view(np.float64).reshape(len(PLACES), -1)
-        entries.append(_moved(_course(POWERS @ flat), places[name]))
-    rim = {name.removeprefix("rim "): view for name, view in views.items() if name.startswith("rim ")}
-    if "entered" in views:
-        rim["entered"] = views.pop("entered")
-    own = {name: view for name, view in views.items() if not name.startswith("rim ")}
-    varying = Varying(kept=kept, kept_shape=_joined(shapes, 3), kept_entry=_joined(entries, 5), **courses)
+        shape |= {_RIM + name: [getattr(node.held.rim, name) for node in of_all] for name in _OF_RIM}
+        entry[_RIM + "entered"] = constant[:, -1, 0] + 1j * constant[:, -1, 1]
+    kept, views, places = _room({name: values[0] for name, values in (shape | entry).items()})
+
+    def moved(arrays: dict[str, Any], count: int) -> Course:
+        found = []
+        for name, values in arrays.items():
+            course = _through(values, m, count, skips_response=name in ("exponent", "row"))
+            found.append(course._replace(at=course.at + places[name]))
+        return _joined(found)
+
+    shapes, entries = moved(shape, n_node), moved(entry, len(NODES))
+    varying = Varying(kept=kept, kept_shape=shapes, kept_entry=entries, **courses)
+    rim = {name.removeprefix(_RIM): view for name, view in views.items() if name.startswith(_RIM)}
+    own = {name: view for name, view in views.items() if not name.startswith(_RIM)}
     return held._replace(**own, rim=held.rim._replace(**rim), varying=varying)
 
 
-def taken(course: Course, values: Floats, place: float) -> Floats:
-    """A copy of an array with the entries that go with the speed at a place in the range."""
+def taken(course: Course, values: Floats, place: float, rise: float) -> Floats:
+    """A copy of an array with what goes with the speed at a place in the range, and of the acceleration."""
     found = values.copy()
-    found.reshape(-1)[course.at] = np.polynomial.polynomial.polyval(place, course.value)
+    found.reshape(-1)[course.at] = np.polynomial.polynomial.polyval(place, course.value) + rise * course.rise
     return found
-
-
-def _weights(mode: ContactMode) -> Floats:
-    """2 for modes that stand for a conjugate pair, 1 for others."""
-    m = mode.n_eigenmode
-    own = np.einsum("ka,ak->k", mode.enter[:m], mode.motion[:, :m]).real
-    return np.where(own > 1.5, 2.0, 1.0)
 
 
 def _groups(exponent: Complexes) -> list[NDArray[np.int64]]:
@@ -179,67 +177,78 @@ def _groups(exponent: Complexes) -> list[NDArray[np.int64]]:
     return [np.array(group) for group in sorted({tuple(np.flatnonzero(row)) for row in near})]
 
 
-def _entries(nodes: tuple[Tabulated, Tabulated, Tabulated]) -> tuple[Complexes, Complexes]:
-    """What enters a mode (5, m, 2 n), and what constants take off it (5, c, m), at `PLACES`."""
-    mode, before, behind = (node.mode for node in nodes)
+def _entries(nodes: Sequence[Tabulated], risen: Tabulated | None) -> tuple[Complexes, Complexes]:
+    """What enters a mode (5, m, 2 n), and what constants take off it (5, c, m), at `NODES`.
+
+    With that at another acceleration as a sixth.
+    """
+    modes = [node.mode for node in nodes]
+    mode, m = modes[0], modes[0].n_eigenmode
+    constants = slice(m + 1, m + 1 + len(mode.take_off) - 2)
+    if len(nodes) < len(NODES):
+        motions = [between([other.motion for other in modes], place) for place in NODES]
+        enters = _inverses(mode, motions)
+    else:
+        motions, enters = [other.motion for other in modes], [other.enter[:m] for other in modes]
+    if risen:
+        motions, enters = [*motions, risen.mode.motion], [*enters, risen.mode.enter[:m]]
+    found = zip(enters, motions, strict=True)
+    return np.array(enters), np.array([(enter @ motion[:, constants]).T for enter, motion in found])
+
+
+def _inverses(mode: ContactMode, motions: Sequence[Complexes]) -> list[Complexes]:
+    """What enters each of these motions, of which the first is that of a mode."""
     m = mode.n_eigenmode
-    weight = _weights(mode)
-    n_constant = len(mode.take_off) - 2
     gripped = range(len(mode.enter) - m)  # coordinates beside the eigenmodes that motion enters
     grips = [m + k for k in gripped if mode.enter[m + k].any()]
-    enters, take_off = [], []
-    for place in PLACES.tolist():
-        motion = parabola((mode.motion, before.motion, behind.motion), place)
-        enter = parabola((mode.enter[:m], before.enter[:m], behind.enter[:m]), place)
-        for _ in range(NEWTON if place else 0):
-            shape = motion[:, :m] / weight
-            off = enter @ shape - np.eye(m)
-            off_conjugate = np.where(weight > 1.5, enter @ shape.conj(), 0.0)
-            enter = enter - off @ enter - off_conjugate @ enter.conj()
-            if max(np.abs(off).max(initial=0.0), np.abs(off_conjugate).max(initial=0.0)) < EXACT:
-                break
-        for row in grips if place else ():
-            enter = enter - np.outer(enter @ motion[:, row], mode.enter[row])
-        enters.append(enter)
-        take_off.append((enter @ motion[:, m + 1 : m + 1 + n_constant]).T)
-    return np.array(enters), np.array(take_off)
+    inverse, weight = mode.enter[:m], weights(mode)
+    pushed = np.zeros((m, m), dtype=bool)
+    moved = np.any([motion[:, :m] != mode.motion[:, :m] for motion in motions], axis=(0, 1))
+    columns = np.flatnonzero(moved)
+    for motion in motions[1:]:
+        change = motion[:, columns] - mode.motion[:, columns]
+        seen = np.abs(inverse @ change) + np.abs(inverse @ change.conj())
+        pushed[:, columns] |= seen > LEAST
+    rows = np.flatnonzero(pushed.any(axis=1) | moved)
+    found = [inverse]
+    for motion in motions[1:]:
+        enter = inverse.copy()
+        entered_by(enter, motion, rows, weight)
+        for row in grips:
+            enter -= np.outer(enter @ motion[:, row], mode.enter[row])
+        found.append(enter)
+    return found
 
 
-def _through(values: list[Any], m: int, skips_response: bool = True) -> Floats:
-    """Factors (3, s) of the parabolas through arrays, flat; the response to unbalance, m, is left out."""
-    middle, before, behind = values
-    slope, bend = (behind - before) / (2.0 * NODE), (0.5 * (behind + before) - middle) / NODE**2
-    factors = np.array([middle, slope, bend])
-    if skips_response and middle.ndim and middle.shape[-1] > m:
-        factors[1:, ..., m] = 0.0
-    return np.ascontiguousarray(factors).view(np.float64).reshape(3, -1)
+def _through(values: Any, m: int, n_node: int, *, skips_response: bool = True) -> Course:
+    """What goes through the first `n_node` arrays, and to that at another acceleration if there is one more.
+
+    The response to unbalance, m, is left out.
+    """
+    values = np.array(values)
+    values[1:] -= values[0]
+    if skips_response and values.ndim > 1 and values.shape[-1] > m:
+        values[1:, ..., m] = 0.0
+    flat = values.view(np.float64).reshape(len(values), -1)
+    size = np.abs(flat[1:]).max(axis=0, initial=0.0)
+    at = np.flatnonzero(size > np.maximum(STILL * np.abs(flat[0]), LEAST * size.max(initial=0.0)))
+    moved = np.ascontiguousarray(flat[:, at])
+    factors = POWERS[n_node][:, 1:] @ moved[1:n_node]
+    factors[0] += moved[0]
+    return Course(at, factors, moved[n_node] if len(moved) > n_node else np.zeros(at.size))
 
 
-def _course(factors: Floats) -> Course:
-    """The entries that go with the speed, of factors (p, s)."""
-    change = np.abs(factors[1:]).sum(axis=0)
-    at = np.flatnonzero(change > np.maximum(STILL * np.abs(factors[0]), LEAST * change.max(initial=0.0)))
-    return Course(at, np.ascontiguousarray(factors[:, at]))
-
-
-def _moved(course: Course, first: int) -> Course:
-    return course._replace(at=course.at + first)
-
-
-def _joined(courses: list[Course], n_power: int) -> Course:
+def _joined(courses: list[Course]) -> Course:
     at = np.concatenate([course.at for course in courses])
-    value = np.concatenate([course.value for course in courses], axis=1).reshape(n_power, -1)
-    return Course(at, value)
+    value = np.concatenate([course.value for course in courses], axis=1)
+    return Course(at, value, np.concatenate([course.rise for course in courses]))
 
 
-def _room(
-    arrays: dict[str, Any], of_rim: dict[str, list[Any]]
-) -> tuple[Floats, dict[str, Any], dict[str, int]]:
+def _room(arrays: dict[str, Any]) -> tuple[Floats, dict[str, Any], dict[str, int]]:
     """One memory for arrays, with their values: it, the arrays in it, and where each begins."""
-    named = arrays | {"rim " + name: values[0] for name, values in of_rim.items()}
-    ends = np.cumsum([0, *(value.size * (2 if np.iscomplexobj(value) else 1) for value in named.values())])
+    ends = np.cumsum([0, *(value.size * (2 if np.iscomplexobj(value) else 1) for value in arrays.values())])
     memory, views, places = np.zeros(int(ends[-1])), {}, {}
-    for (name, value), first, end in zip(named.items(), ends[:-1], ends[1:], strict=True):
+    for (name, value), first, end in zip(arrays.items(), ends[:-1], ends[1:], strict=True):
         view = memory[first:end].view(value.dtype).reshape(value.shape)
         view[:] = value
         views[name], places[name] = view, int(first)

@@ -1,8 +1,8 @@
-"""Ranges of speed over which contact modes may follow those of three speeds (`followed_modes`).
+"""Ranges of speed over which contact modes may follow those of a few speeds (`followed_modes`).
 
 At both ends of a range, within it and where it meets a resonance the modes followed are held against the
 matrices themselves: by what unbalance and forces on the rotor at its contacts make of every signal. Held
-matrices err by the first order of a range, the modes followed by the third.
+matrices err by the first order of a range, the modes followed by the third or by the fifth.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.followed_modes import EQUAL, NODE, POWERS, aligned, parabola
-from rubhpc.integrate.changing_speed.followed_modes import PLACES as INVERSES
+from rubhpc.integrate.changing_speed.followed_modes import EQUAL, FEW, NODES, aligned, between
 from rubhpc.integrate.changing_speed.held_matrices import NARROWEST
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.integrate.reduced_model.standstill import cutoff_frequency
@@ -33,10 +32,9 @@ if TYPE_CHECKING:
 PASSING = 0.01  # growth over the speed, 1/rad, at which a passage meets a resonance
 STRUCK = 0.1  # the same of motions that contacts excite, which they strike again and again
 ORDERS, HIGHEST = 0.5, 16.0  # of the speed: between frequencies at which these are judged, and at most
-AT_ENDS = 0.5  # error at the ends of a range over the accuracy, of which the third order leaves little inside
+AT_ENDS = 0.5  # error at the ends of a range over the accuracy, of which the fifth order leaves little inside
 BY_ACCELERATION = 1.0  # the same by the acceleration, at the ends of its range
-PLACES = -1.0, -0.5, 0.5, 1.0  # in a range, where it is judged beside resonances
-BETWEEN = -0.8, 0.8  # where what enters the modes errs most
+PLACES = -1.0, -0.8, -0.3, 0.3, 0.8, 1.0  # between those of the modes, where a range is judged
 LEAK = 1.0  # of it by which an event may change a motion, over the accuracy
 SAFE = 0.9  # share of the range that would just do
 LEAST, MOST = 0.2, 0.85  # factors by which a range shrinks
@@ -56,8 +54,70 @@ class Reach(NamedTuple):
     """A range of speeds and of accelerations."""
 
     half: float  # rad/s
-    swing: float  # rad/s^2
-    is_followed: bool  # or nothing in it goes with the speed
+    swing: float  # rad/s^2, by which the acceleration may change where nothing goes with it
+    places: tuple[float, ...] = FEW  # of the speeds through whose modes they follow
+    judge: Judge | None = None  # where modes go with the acceleration too
+
+
+class Judge:
+    """Says which accelerations, rad/s^2, modes may follow that go evenly from one acceleration to another.
+
+    Parameters
+    ----------
+    nodes : list of (exponents, shapes)
+        Modes at `FEW` or `NODES`, the middle first, and last those in the middle at the other acceleration.
+    momentum : (n, n)
+        Change of the stiffness with the acceleration, per rad/s^2.
+    at : (float, float, float)
+        Speed in the middle and half of the range, rad/s, and acceleration there, rad/s^2.
+    rise : float, rad/s^2
+        Other acceleration less that.
+    accuracy : float
+        Relative error of each signal.
+    """
+
+    def __init__(
+        self,
+        rotor: Rotor,
+        nodes: list[tuple[Complexes, Complexes]],
+        momentum: Floats,
+        at: tuple[float, float, float],
+        *,
+        rise: float,
+        accuracy: float,
+    ) -> None:
+        self.rise = rise
+        self._rotor, self._nodes, self._momentum = rotor, nodes, momentum
+        self._middle, self._half, self._acceleration = at
+        self._accuracy = accuracy
+        self._known: dict[float, bool] = {}
+
+    def serves(self, acceleration: float) -> bool:
+        """Whether modes hold their accuracy all over the range."""
+        if acceleration not in self._known:
+            self._known[acceleration] = self.error(acceleration) <= BY_ACCELERATION * self._accuracy
+        return self._known[acceleration]
+
+    def error(self, acceleration: float) -> float:
+        """Relative error of the worst signal in the range."""
+        middle, half, nodes, risen = self._middle, self._half, self._nodes[:-1], self._nodes[-1]
+        change = acceleration - self._acceleration
+        share = change / self.rise
+        exponents, shapes = [node[0] for node in nodes], [node[1] for node in nodes]
+        inverses = _inverses(shapes)
+        risen_by = [share * (other - own) for other, own in zip(risen, nodes[0], strict=True)]
+        inverse_by = share * (_inverse(risen[1]) - inverses[0])
+        worst = 0.0
+        for place in (*PLACES, 0.0, *_resonances(nodes, middle, half)):
+            speed = middle + place * half
+            stiffness, damping = self._rotor.matrices(speed)
+            matrices = stiffness + change * self._momentum, damping
+            exponent = between(exponents, place) + risen_by[0]
+            shape = between(shapes, place) + risen_by[1]
+            worst = max(worst, _lost(shape, between(inverses, place) + inverse_by, middle) / LEAK)
+            growth = min(PASSING * speed, abs(acceleration) / half)
+            worst = max(worst, _off(self._rotor, matrices, (exponent, shape), speed, growth))
+        return worst
 
 
 def rotor_of(setup: ModalSetup, matrices: Matrices, phasor: Complexes, seen: Floats) -> Rotor:
@@ -70,7 +130,14 @@ def rotor_of(setup: ModalSetup, matrices: Matrices, phasor: Complexes, seen: Flo
 
 
 def followed_reach(
-    rotor: Rotor, speed: float, acceleration: float, momentum: Floats, widest: float, *, accuracy: float
+    rotor: Rotor,
+    speed: float,
+    acceleration: float,
+    momentum: Floats,
+    widest: float,
+    *,
+    accuracy: float,
+    others: tuple[float, float],
 ) -> Reach:
     """The widest range that begins at a speed (rad/s) and goes on as the acceleration does.
 
@@ -83,22 +150,37 @@ def followed_reach(
         Half of the range, at most.
     accuracy : float
         Relative error of each signal at the ends of the range of accelerations; half of it by the speed.
+    others : (float, float), rad/s^2
+        Least and greatest acceleration that may occur.
     """
     sense = float(np.sign(acceleration))
     part = _part(rotor, speed, speed + (sense or 1.0) * widest)
     if not part.size:
-        swing = _swing(rotor, speed, momentum, accuracy)
-        return Reach(widest, swing, is_followed=False)
+        return Reach(widest, _swing(rotor, speed, momentum, accuracy))
     of_part = _of_part(rotor, part)
     half, allowed = widest, AT_ENDS * accuracy
     while True:
         middle = speed + sense * half
-        error = _error(of_part, middle, half, abs(acceleration), allowed)
+        for places in (FEW, NODES):
+            nodes = _nodes(of_part, middle, half, places)
+            error = _error(of_part, nodes, middle, half, abs(acceleration), allowed) if nodes else np.inf
+            if error <= allowed:
+                break
         if error <= allowed or half <= NARROWEST * speed:
             break
-        half *= float(np.clip(SAFE * (allowed / error) ** (1.0 / 3.0), LEAST, MOST))
-    inside = np.ix_(part, part)
-    return Reach(half, _swing(of_part, middle, momentum[inside], accuracy), is_followed=True)
+        half *= float(np.clip(SAFE * (allowed / error) ** 0.2, LEAST, MOST))
+    turning = momentum[np.ix_(part, part)]
+    swing = _swing(of_part, middle, turning, accuracy)
+    rise = max((other - acceleration for other in others), key=abs)
+    if nodes is None or abs(rise) <= swing:
+        return Reach(half, swing, places)
+    stiffness, damping = of_part.matrices(middle)
+    risen = _in_order(nodes[0], _modes(stiffness + rise * turning, damping))
+    if risen is None:
+        return Reach(half, swing, places)
+    at = middle, half, acceleration
+    judge = Judge(of_part, [*nodes, risen], turning, at, rise=rise, accuracy=accuracy)
+    return Reach(half, swing, places, judge)
 
 
 def _part(rotor: Rotor, speed: float, other: float) -> Ints:
@@ -126,50 +208,85 @@ def _of_part(rotor: Rotor, part: Ints) -> Rotor:
     )
 
 
-def _error(rotor: Rotor, middle: float, half: float, acceleration: float, allowed: float) -> float:
-    """Relative error of the worst signal in a range; infinite where modes cannot be followed."""
-    nodes = [_modes(*rotor.matrices(middle + place * half)) for place in (0.0, -NODE, NODE)]
-    before, behind = (_in_order(nodes[0], other) for other in nodes[1:])
-    if before is None or behind is None:
-        return np.inf
-    nodes[1:] = before, behind
-    # Of the fifth order: as an error of the third that asks for the same range.
-    worst: float = allowed * (_leak(nodes, middle) * AT_ENDS / (LEAK * allowed)) ** 0.6
+def _nodes(
+    rotor: Rotor, middle: float, half: float, places: tuple[float, ...]
+) -> list[tuple[Complexes, Complexes]] | None:
+    """Modes at places, the middle first; None where they cannot be followed."""
+    first, *others = (_modes(*rotor.matrices(middle + place * half)) for place in places)
+    nodes = [first]
+    for other in others:
+        if (found := _in_order(first, other)) is None:
+            return None
+        nodes.append(found)
+    return nodes
+
+
+def _error(
+    rotor: Rotor,
+    nodes: list[tuple[Complexes, Complexes]],
+    middle: float,
+    half: float,
+    acceleration: float,
+    allowed: float,
+) -> float:
+    """Relative error of the worst signal in a range."""
+    exponents, shapes = [node[0] for node in nodes], [node[1] for node in nodes]
+    worst = _leak(shapes, middle) * AT_ENDS / LEAK
     for place in (*PLACES, *_resonances(nodes, middle, half)):
         speed = middle + place * half
         growth = min(PASSING * speed, acceleration / half)
-        exponent = parabola((nodes[0][0], nodes[1][0], nodes[2][0]), place)
-        shape = parabola((nodes[0][1], nodes[1][1], nodes[2][1]), place)
-        at, load = _asked(rotor, speed, growth)
-        true = _signals(rotor, at, _answers(*rotor.matrices(speed), at, load))
-        n = rotor.phasor.size
-        modal = np.linalg.solve(shape, np.vstack([np.zeros_like(load), load]))
-        motion = shape @ (modal / (at[:, np.newaxis, np.newaxis] - exponent[:, np.newaxis]))
-        own = _signals(rotor, at, motion[:, :n], motion[:, n:])
-        worst = max(worst, _relative(own - true, true))
+        modes = between(exponents, place), between(shapes, place)
+        worst = max(worst, _off(rotor, rotor.matrices(speed), modes, speed, growth))
     return worst
 
 
-def _leak(nodes: list[tuple[Complexes, Complexes]], speed: float) -> float:
+def _off(
+    rotor: Rotor,
+    matrices: tuple[Floats, Floats],
+    modes: tuple[Complexes, Complexes],
+    speed: float,
+    growth: float,
+) -> float:
+    """Relative error of the worst signal by exponents (2 n,) and shapes (2 n, 2 n) in place of matrices."""
+    exponent, shape = modes
+    n = rotor.phasor.size
+    at, load = _asked(rotor, speed, growth)
+    true = _signals(rotor, at, _answers(*matrices, at, load))
+    modal = np.linalg.solve(shape, np.vstack([np.zeros_like(load), load]))
+    motion = shape @ (modal / (at[:, np.newaxis, np.newaxis] - exponent[:, np.newaxis]))
+    own = _signals(rotor, at, motion[:, :n], motion[:, n:])
+    return _relative(own - true, true)
+
+
+def _leak(shapes: list[Complexes], speed: float) -> float:
     """What a motion gains or loses, over it, as it enters shapes by what stands for their inverse."""
-    shapes = nodes[0][1], nodes[1][1], nodes[2][1]
-    inverse = np.linalg.inv(np.array([parabola(shapes, place) for place in INVERSES.tolist()]))
-    factors = np.tensordot(POWERS, inverse, axes=1)
-    n = len(shapes[0])
+    inverses = _inverses(shapes)
+    return max(_lost(between(shapes, place), between(inverses, place), speed) for place in PLACES)
+
+
+def _inverses(shapes: list[Complexes]) -> list[Complexes]:
+    """Inverses at `NODES` of what goes through shapes."""
+    few = len(shapes) < len(NODES)
+    return [_inverse(shape) for shape in ([between(shapes, place) for place in NODES] if few else shapes)]
+
+
+def _inverse(shape: Complexes) -> Complexes:
+    return np.linalg.inv(shape).astype(np.complex128)
+
+
+def _lost(shape: Complexes, entered: Complexes, speed: float) -> float:
+    """The same of shapes (2 n, 2 n) and their inverse."""
+    n = len(shape)
     scale = np.repeat([speed, 1.0], n // 2)
-    worst = 0.0
-    for place in BETWEEN:
-        entered = np.tensordot(place ** np.arange(len(INVERSES)), factors, axes=1)
-        off = (parabola(shapes, place) @ entered - np.eye(n)) * scale[:, np.newaxis] / scale
-        worst = max(worst, float(np.abs(off).max()))
-    return worst
+    off = (shape @ entered - np.eye(n)) * scale[:, np.newaxis] / scale
+    return float(np.abs(off).max())
 
 
 def _resonances(nodes: list[tuple[Complexes, Complexes]], middle: float, half: float) -> list[float]:
     """Places in the range at which the speed meets a frequency."""
     places = np.linspace(-1.0, 1.0, 21)
-    exponents = nodes[0][0], nodes[1][0], nodes[2][0]
-    met = [parabola(exponents, place).imag - middle - place * half for place in places.tolist()]
+    exponents = [node[0] for node in nodes]
+    met = [between(exponents, place).imag - middle - place * half for place in places.tolist()]
     apart = np.array(met)
     before, mode = np.nonzero((apart[:-1] < 0.0) != (apart[1:] < 0.0))
     low, high = apart[before, mode], apart[before + 1, mode]

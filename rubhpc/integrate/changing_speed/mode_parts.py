@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from rubhpc.kernels.retuning_laws import NO_RIM, RimPart
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from rubhpc.integrate.changing_speed.near_modes import Linear
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.kernels.retuning_laws import Springs
@@ -40,16 +41,6 @@ WITHOUT_RIM = RimPart(
     growing=np.zeros(0, dtype=np.int64),
     speed=np.zeros(0),
 )
-
-
-class Linear(NamedTuple):
-    """What a set of states makes of the motion: n reduced degrees, r switch functions."""
-
-    seen: Complexes  # (n,), what the constraints leave of the unbalance at unit speed
-    switch: Floats  # (r, 2 n), switch functions of the motion
-    reaction: Complexes  # (r,), what they lose by the unbalance at unit speed
-    across: Floats  # (n, r), friction forces by switch functions
-    damping: Floats  # (n, n)
 
 
 def output_operators(reduced: ReducedModel) -> tuple[Floats, Floats, Floats]:
@@ -144,11 +135,12 @@ def speeds_of(
     held_spin: float,
     sample_level: int,
     reach: float = math.inf,
+    rise: float = 0.0,
 ) -> Speeds:
     """Speeds (rad/s) to which modes are tuned whose matrices are those at `held_spin`, or within `reach`.
 
     `factor` (1/s^2) is what the unbalance at unit speed acts by, which grows by `growth` (1/s), `tick` (s)
-    the resolution of events.
+    the resolution of events, `rise` the place of their acceleration (`followed_modes`).
     """
     spins, ticks = np.asarray(spin, dtype=np.float64), np.asarray(tick, dtype=np.float64)
     factors = np.asarray(factor, dtype=np.complex128)
@@ -157,6 +149,7 @@ def speeds_of(
         spin=spins,
         share=np.abs(spins / held_spin),
         within=(spins - held_spin) / reach,
+        rise=np.full(spins.size, rise),
         factor=factors,
         growth=grown,
         tick=ticks,

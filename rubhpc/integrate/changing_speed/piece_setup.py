@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.followed_modes import parabola
+from rubhpc.integrate.changing_speed.followed_modes import between
 from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
 from rubhpc.integrate.changing_speed.retuned_modes import Desk, RetunedLibrary
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
+    from rubhpc.integrate.changing_speed.followed_range import Judge
     from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
     from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
@@ -43,8 +44,8 @@ class HeldMatrices:
     """Matrices at a speed, rad/s, and an acceleration, rad/s^2, and what has been solved of them.
 
     `momentum` (n, n) is the change of the stiffness with the acceleration, per rad/s^2. `beside` are the
-    model and its matrices at two other speeds of the range (`followed_modes.NODE`), through which they follow
-    the speed; none where they stay what they are.
+    model and its matrices at other speeds of the range (`followed_modes.FEW` or `NODES`), through which they
+    follow the speed; none where they stay what they are. `judge` says which accelerations they follow.
     """
 
     template: PieceSetup  # of which a piece has another speed
@@ -62,14 +63,14 @@ class HeldMatrices:
         sample_level: int,
         desks: dict[tuple[object, ...], Desk],
         beside: Sequence[tuple[Model, ReducedModel]] = (),
+        judge: Judge | None = None,
     ) -> None:
+        self._judge = judge
         self._desks, self._beside = desks, beside
         self.model, self.reduced = model, reduced
         self.at_hand = reduced  # at the speed of the piece under way
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
-        self.sags: tuple[Floats, Floats, Floats] | None = (
-            None  # in the middle of the range, before and behind it
-        )
+        self.sags: list[Floats] = []  # at the same speeds, where they go with the speed
         self.kept = KeptParts()
         self.bodies: dict[float, Reduced] = {}  # of each friction, but for what a piece changes
         self.sample_level = sample_level  # of the lowest speed
@@ -89,8 +90,27 @@ class HeldMatrices:
     def serve(self, speed: float, acceleration: float, slope: float = 0.0) -> bool:
         """Whether a piece may use them."""
         far, changed = self._reach
-        is_near = abs(speed - self.reduced.spin) <= far and abs(acceleration - self.acceleration) <= changed
-        return is_near and slope == self._slope
+        if abs(speed - self.reduced.spin) > far or slope != self._slope:
+            return False
+        if self.risen is not None:
+            assert self._judge is not None
+            return acceleration == self.acceleration or self._judge.serves(acceleration)
+        return abs(acceleration - self.acceleration) <= changed
+
+    @cached_property
+    def risen(self) -> ReducedModel | None:
+        """The matrices in the middle of the range at another acceleration, with which they go too."""
+        change = self._judge.rise if self._judge and self._beside else 0.0
+        if not change:
+            return None
+        return with_values(self.reduced, stiffness=self.reduced.stiffness + change * self.momentum)
+
+    def rise(self, acceleration: float) -> float:
+        """Place of an acceleration, rad/s^2: 0 for that of the matrices, 1 for that of `risen`."""
+        if self.risen is None:
+            return 0.0
+        assert self._judge is not None
+        return (acceleration - self.acceleration) / self._judge.rise
 
     @property
     def reach(self) -> float:
@@ -106,16 +126,19 @@ class HeldMatrices:
         """Place of a speed (rad/s) in the range, from -1 to 1; 0 where nothing goes with it."""
         return (speed - self.reduced.spin) / self.reach if self._beside else 0.0
 
-    def at_place(self, within: float) -> ReducedModel:
-        """The reduced model at a place in the range, its unbalance that of the middle."""
+    def at_place(self, within: float, rise: float) -> ReducedModel:
+        """The model at a place in the range and of the acceleration; its unbalance is that of the middle."""
         if not self._beside:
             return self.reduced
-        one, (_, before), (_, behind) = self.reduced, *self._beside
+        nodes = [self.reduced, *(reduced for _, reduced in self._beside)]
+        stiffness = between([node.stiffness for node in nodes], within)
+        if self.risen is not None and rise:
+            stiffness = stiffness + rise * (self.risen.stiffness - self.reduced.stiffness)
         return with_values(
-            one,
-            stiffness=parabola((one.stiffness, before.stiffness, behind.stiffness), within),
-            damping=parabola((one.damping, before.damping, behind.damping), within),
-            probe=parabola((one.probe, before.probe, behind.probe), within),
+            self.reduced,
+            stiffness=stiffness,
+            damping=between([node.damping for node in nodes], within),
+            probe=between([node.probe for node in nodes], within),
         )
 
     def sagging(self, torque: float, acceleration: float, speed: float) -> Model:
@@ -123,12 +146,11 @@ class HeldMatrices:
         within = self.within(speed) if self.sags else 0.0
         asked = torque, acceleration, within
         if self._latest is None or self._latest[0] != asked:
-            sag = parabola(self.sags, within) if self.sags else self.model.sag
+            sag = between(self.sags, within) if self.sags else self.model.sag
             sag = sag + torque * self.twist + acceleration * self.lean
             rows = self.model.probe_rows[0]
             if self.sags:
-                before, behind = (model.probe_rows[0] for model, _ in self._beside)
-                rows = parabola((rows, before, behind), within)
+                rows = between([rows, *(model.probe_rows[0] for model, _ in self._beside)], within)
             self._latest = asked, sagging(self.model, sag, rows)
         return self._latest[1]
 
@@ -152,6 +174,7 @@ class HeldMatrices:
                 desks=self._desks,
                 beside=[reduced for _, reduced in self._beside],
                 at_place=self.at_place,
+                risen=self.risen,
                 is_balanced=self.is_balanced,
                 **make(),
             )
@@ -187,9 +210,9 @@ class PieceSetup(ModalSetup):
         return self.held.sample_level
 
     @property
-    def within(self) -> float:
-        """Place of the speed in the range of the matrices, from -1 to 1."""
-        return float(self.speeds.within[self.place])
+    def places(self) -> tuple[float, float]:
+        """Place of the speed in the range of the matrices, from -1 to 1, and that of the acceleration."""
+        return float(self.speeds.within[self.place]), float(self.speeds.rise[self.place])
 
     def goes_on_in(self, other: PieceSetup, acceleration: float, next_acceleration: float) -> bool:
         """Whether another piece, after this one, has matrices that follow the speed as these do."""

@@ -13,7 +13,6 @@ from rubhpc.fem.assemble import model_at
 from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.probes import probes_at
 from rubhpc.fem.statics import sag_under
-from rubhpc.integrate.changing_speed.followed_modes import NODE
 from rubhpc.integrate.changing_speed.followed_range import followed_reach, rotor_of
 from rubhpc.integrate.changing_speed.held_matrices import (
     NARROWEST,
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
+    from rubhpc.integrate.changing_speed.followed_range import Judge, Reach
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
@@ -47,9 +47,9 @@ DRIVEN_SHARE = 0.25  # of the accuracy, of matrices of a driven rotor, whose twi
 MOST_HELD = 4  # matrices at hand, of a spin that swings between them
 MOST_BYTES = 3 * 2**29  # of contact modes that are kept, with their matrices, for other cases
 
-# Of each set-up, the matrices by speed, acceleration and slope of the torque, the latest last, for other
-# cases too.
-_KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[float, float, float], HeldMatrices]] = WeakKeyDictionary()
+# Of each set-up, the matrices by speed, acceleration, slope of the torque and the accelerations to come, the
+# latest last, for other cases too.
+_KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], HeldMatrices]] = WeakKeyDictionary()
 
 _RIPPLES: WeakKeyDictionary[ModalSetup, Ripples] = WeakKeyDictionary()
 _DESKS: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], Desk]] = WeakKeyDictionary()
@@ -77,6 +77,7 @@ class Pieces:
         self._fastest = fastest
         self._basis = fastest.reduced.basis
         self._held: list[HeldMatrices] = []  # the latest first
+        self._accelerations: tuple[float, float] | None = None  # rad/s^2, least and greatest of the run-up
         model = fastest.model
         rotor = model.rotor
         self._inertia = rotor.mass @ unit_rotation(rotor)
@@ -135,6 +136,7 @@ class Pieces:
 
         As `setup`, (n_piece,) each; `n_sample` are the samples in each piece, the same in those together.
         """
+        self._accelerations = float(acceleration.min()), float(acceleration.max())
         first = 0
         while first < speed.size:
             held, last = self._find(float(speed[first]), float(acceleration[first])), first + 1
@@ -167,7 +169,10 @@ class Pieces:
         force = np.stack([phasor.real, -phasor.imag], axis=1)
         interval = 2.0 * math.pi / (np.abs(speed) * self._fastest.samples_per_revolution)
         tick = interval / (1 << held.sample_level)
-        speeds = speeds_of(speed, factor, growth, tick, held.reduced.spin, held.sample_level, held.reach)
+        rise = held.rise(float(acceleration[0]))
+        speeds = speeds_of(
+            speed, factor, growth, tick, held.reduced.spin, held.sample_level, held.reach, rise
+        )
         template, found = held.template, []
         steady = template.clock
         longest = np.floor(np.log2(template.step / tick)).astype(int)
@@ -176,7 +181,7 @@ class Pieces:
         for place, (spin, every, resolution, search, grows, pushing) in enumerate(
             zip(*lists, force, strict=True)
         ):
-            reduced = with_values(held.at_place(held.within(spin)), spin=spin, force=pushing)
+            reduced = with_values(held.at_place(held.within(spin), rise), spin=spin, force=pushing)
             found.append(
                 with_values(
                     template,
@@ -203,8 +208,8 @@ class Pieces:
                     self._held.insert(0, self._held.pop(i))
                 return held
         known = _KNOWN.setdefault(self._fastest, {})
-        asked = speed, acceleration, slope
-        found = known.pop(asked, None) or self._hold(*asked)
+        asked = speed, acceleration, slope, self._accelerations
+        found = known.pop(asked, None) or self._hold(speed, acceleration, slope)
         known[asked] = found
         self._held = [found, *self._held[: MOST_HELD - 1]]
         return found
@@ -216,18 +221,16 @@ class Pieces:
         """
         fastest, free = self._fastest, self._fastest.free_spin
         is_followed = free is None and not fastest.is_updated
-        reach, swing = (
-            self._followed_reach(speed, acceleration)
-            if is_followed
-            else self._held_reach(speed, acceleration, slope)
-        )
+        judge: Judge | None = None
+        places: tuple[float, ...] = ()
+        if is_followed:
+            reach, swing, places, judge = self._followed_reach(speed, acceleration)
+        else:
+            reach, swing = self._held_reach(speed, acceleration, slope)
         if free is None:
             speed += np.sign(acceleration) * reach
         model, reduced = self._reduced(speed, acceleration, slope, speed)
-        beside = [
-            self._reduced(speed + place * reach, acceleration, slope, speed)
-            for place in ((-NODE, NODE) if is_followed else ())
-        ]
+        beside = [self._reduced(speed + place * reach, acceleration, slope, speed) for place in places[1:]]
         if all(np.array_equal(other.stiffness, reduced.stiffness) for _, other in beside) and all(
             np.array_equal(other.damping, reduced.damping) for _, other in beside
         ):
@@ -238,12 +241,11 @@ class Pieces:
         desks = _DESKS.setdefault(fastest, {})
         at = acceleration, slope, ranges
         held = HeldMatrices(
-            model, reduced, self._phasor, self._momentum, *at, slowest.sample_level, desks, beside
+            model, reduced, self._phasor, self._momentum, *at, slowest.sample_level, desks, beside, judge
         )
         held.is_balanced = not is_followed
         if beside and fastest.model.rotor.tabulated_speeds:
-            (before, _), (behind, _) = beside
-            held.sags = model.sag, before.sag, behind.sag
+            held.sags = [model.sag, *(other.sag for other, _ in beside)]
         held.template = PieceSetup(
             scheme=fastest.scheme,
             model=model,
@@ -291,20 +293,27 @@ class Pieces:
             reduced.__dict__[name] = getattr(fastest.reduced, name)
         return model, reduced
 
-    def _followed_reach(self, speed: float, acceleration: float) -> tuple[float, float]:
-        """Half of the ranges of speeds, rad/s, and accelerations, rad/s^2, in which modes follow them."""
+    def _followed_reach(self, speed: float, acceleration: float) -> Reach:
+        """The range in which modes follow the speed."""
 
         def matrices(at: float) -> tuple[Floats, Floats]:
-            _, damping, stiffness = self._matrices(at, acceleration, 0.0)
+            rotor = fastest.model.rotor.at(self._tabulated(at))  # whose sag is not asked for
+            damping, stiffness = self._system(replace(fastest.model, rotor=rotor), at, acceleration, 0.0)
             return stiffness, damping
 
+        fastest = self._fastest
         seen = self._linear(speed, is_whole=True).seen
         rotor = rotor_of(self._fastest, matrices, self._phasor, seen)
         widest = self._widest(speed, acceleration)
-        found = followed_reach(
-            rotor, speed, acceleration, self._momentum, widest, accuracy=self._fastest.accuracy
+        return followed_reach(
+            rotor,
+            speed,
+            acceleration,
+            self._momentum,
+            widest,
+            accuracy=self._fastest.accuracy,
+            others=self._accelerations or (acceleration, acceleration),
         )
-        return found.half, found.swing
 
     def _widest(self, speed: float, acceleration: float) -> float:
         """Half of the widest range from a speed on, rad/s, no farther than the law goes."""
@@ -341,13 +350,21 @@ class Pieces:
         A torque that falls with the speed damps how the driven end turns about the mean.
         """
         model = self._fastest.model
-        if speeds := model.rotor.tabulated_speeds:
-            known = float(np.clip(speed, speeds[0], speeds[-1]))
+        if model.rotor.tabulated_speeds:
+            known = self._tabulated(speed)
             model = probes_at(model_at(model, known), known, self._fastest.spin)
+        return model, *self._system(model, speed, acceleration, slope)
+
+    def _tabulated(self, speed: float) -> float:
+        """The speed, rad/s, or that of the tables of bearings which is nearest to it."""
+        speeds = self._fastest.model.rotor.tabulated_speeds
+        return float(np.clip(speed, speeds[0], speeds[-1])) if speeds else speed
+
+    def _system(self, model: Model, speed: float, acceleration: float, slope: float) -> tuple[Floats, Floats]:
+        """Damping and stiffness of a model, as of `_matrices`."""
         _, damping, stiffness, _ = whole_system(model, speed)
         damping = self._basis.T @ damping @ self._basis - slope * np.outer(self._turning, self._turning)
-        stiffness = self._basis.T @ stiffness @ self._basis + acceleration * self._momentum
-        return model, damping, stiffness
+        return damping, self._basis.T @ stiffness @ self._basis + acceleration * self._momentum
 
 
 def growth_of(speed: Floats, acceleration: Floats, duration: Floats) -> Floats:

@@ -21,7 +21,7 @@ from rubhpc.kernels.curved_contact import CurvedTables
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rubhpc.integrate.changing_speed.mode_parts import Linear
+    from rubhpc.integrate.changing_speed.near_modes import Linear
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.kernels.contact_modes import ModeTables

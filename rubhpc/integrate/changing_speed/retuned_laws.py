@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.mode_parts import Linear
+from rubhpc.integrate.changing_speed.near_modes import Linear
 from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
 from rubhpc.integrate.reduced_model.contact_mode import confine
 from rubhpc.integrate.reduced_model.friction_library import MOST_FRICTION_MODES
@@ -66,7 +66,8 @@ class RetunedPenaltyLibrary(RetunedLibrary):
         across = np.zeros((n, q))
         across[:, pressed] = (self.force_direction - gap)[pressed].T
         damping = penalty.damped(self.reduced, mode.mask).damping
-        return Linear(self._phasor, switch, np.zeros(q, dtype=complex), across, damping)
+        reaction = np.zeros(q, dtype=complex)
+        return Linear(self._phasor, switch, reaction, across, damping, np.eye(n))
 
     def _springs_of(self, mode: ContactMode) -> Springs:
         penalty, pressed = self._penalty, self._penalty.pressed(mode.mask)
@@ -145,7 +146,8 @@ class RetunedFrictionLibrary(RetunedLibrary):
                 gap = pairs.gap_jacobian[i]
                 switch[2 * i] = np.concatenate([pairs.stiffness * gap, pairs.damping * gap])
         damping = pairs.damped(reduced, mode.mask).damping
-        return Linear(tangent @ (project @ self._phasor), switch, reaction, across, damping)
+        passed = tangent @ project
+        return Linear(passed @ self._phasor, switch, reaction, across, damping, passed)
 
     def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
         assert isinstance(mode, FrictionMode)

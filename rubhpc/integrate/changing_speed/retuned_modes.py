@@ -13,7 +13,8 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
 from rubhpc.integrate.changing_speed.followed_modes import Tabulated, followed, matched, taken
-from rubhpc.integrate.changing_speed.mode_parts import Linear, held_mode, output_operators, speeds_of
+from rubhpc.integrate.changing_speed.mode_parts import held_mode, output_operators, speeds_of
+from rubhpc.integrate.changing_speed.near_modes import Linear, near_mode
 from rubhpc.integrate.reduced_model.contact_mode import confine
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
 from rubhpc.integrate.reduced_model.reduction import directions
@@ -69,11 +70,13 @@ class RetunedLibrary(ModeLibrary):
     desks : dict
         Of the libraries that take turns, by what they have in common.
     beside : sequence of ReducedModel
-        The same at two other speeds of the range (`followed_modes.NODE`), through which modes follow the
-        speed; none where they stay what they are.
+        The same at other speeds of the range (`followed_modes.FEW` or `NODES`), through which modes follow
+        the speed; none where they stay what they are.
     at_place : callable, optional
-        The same at a place in the range, from -1 to 1: for modes that cannot be followed, which are solved at
-        each piece.
+        The same at a place in the range, from -1 to 1, and of the acceleration: for modes that cannot be
+        followed, which are solved at each piece.
+    risen : ReducedModel, optional
+        The same in the middle of the range at another acceleration, with which modes go evenly.
     is_balanced : bool
         Whether energies are asked for, which stand in no table of modes that follow the speed.
     """
@@ -94,7 +97,8 @@ class RetunedLibrary(ModeLibrary):
         n_level: int,
         desks: dict[tuple[object, ...], Desk] | None = None,
         beside: Sequence[ReducedModel] = (),
-        at_place: Callable[[float], ReducedModel] | None = None,
+        at_place: Callable[[float, float], ReducedModel] | None = None,
+        risen: ReducedModel | None = None,
         is_balanced: bool = True,
     ) -> None:
         """Start with every pair open."""
@@ -109,6 +113,7 @@ class RetunedLibrary(ModeLibrary):
         self.first_masks = [0]
         self.width = self._width_of(model, friction)
         self._beside = [self._with(other) for other in beside]
+        self._risen = [self._with(risen)] if risen is not None else []
         q = len(self.gap_jacobian)
         kind: tuple[object, ...] = type(self), self.width, n_level, is_balanced
         desk = Desk(TableStack(1 + q, self._most_modes))
@@ -197,15 +202,15 @@ class RetunedLibrary(ModeLibrary):
         if self._tuned.get(mask, 0) <= at:
             end = min(speeds.spin.size, self.n_room) if self.n_room > 1 else at + 1
             if mask in self._strange:
-                self._solve_at(mask, place, float(speeds.within[at]))
+                self._solve_at(mask, place, float(speeds.within[at]), float(speeds.rise[at]))
                 end = at + 1
             retune(self.tables(), place - at, self._held[mask][1], speeds, at, end)
             self._tuned[mask] = end
         self.masks[place] = self.tables().mask[place] = mask
         return True
 
-    def eigenmodes(self, mask: int, within: float) -> Eigenmodes | None:
-        """Those of a set of closed pairs at a place in the range, from -1 to 1.
+    def eigenmodes(self, mask: int, within: float, rise: float) -> Eigenmodes | None:
+        """Those of a set of closed pairs at a place in the range, from -1 to 1, and of the acceleration.
 
         None where a speed changes what enters them otherwise, or it has no room.
         """
@@ -218,10 +223,10 @@ class RetunedLibrary(ModeLibrary):
             return None
         varying = held.varying
         for course in (varying.kept_shape, varying.kept_entry):
-            take_course(course, within, varying.kept)
-        constant = taken(varying.enter_constant, row.enter_constant[0], within)[:, :, :m]
-        enter_re = taken(varying.enter_re, row.enter_re[0], within)[:, :m]
-        enter_im = taken(varying.enter_im, row.enter_im[0], within)[:, :m]
+            take_course(course, within, rise, varying.kept)
+        constant = taken(varying.enter_constant, row.enter_constant[0], within, rise)[:, :, :m]
+        enter_re = taken(varying.enter_re, row.enter_re[0], within, rise)[:, :m]
+        enter_im = taken(varying.enter_im, row.enter_im[0], within, rise)[:, :m]
         return Eigenmodes(
             exponent=held.exponent[:m].copy(),
             is_pair=held.is_pair,
@@ -261,13 +266,22 @@ class RetunedLibrary(ModeLibrary):
     def _tabulate(self, mode: ContactMode, row: ModeTables | None = None) -> None:
         self._note_exponents(mode)
         _, row, held = middle = self._tabulated(mode, row)
-        others = [(library, matched(mode, library._solved(mode.mask))) for library in self._beside]
-        nodes = [library._tabulated(other) for library, other in others if other is not None]
-        if self._beside and len(nodes) < len(others):
-            self._strange.add(mode.mask)
-        elif nodes:
-            held = followed((middle, nodes[0], nodes[1]), self._linear(mode).seen)
+        if self._beside:
+            own = self._linear(mode)
+            found = [self._node(mode, own, library) for library in (*self._beside, *self._risen)]
+            nodes = [node for node in found if node is not None]
+            if len(nodes) == len(found):
+                n = len(self._beside)
+                held = followed([middle, *nodes[:n]], nodes[n] if self._risen else None, own.seen)
+            else:
+                self._strange.add(mode.mask)
         self._held[mode.mask] = row, held
+
+    def _node(self, mode: ContactMode, own: Linear, library: RetunedLibrary) -> Tabulated | None:
+        """The same mode in another library; None where that has another motion."""
+        near = near_mode(mode, (own, library._linear(mode)), self.reduced, library.reduced)
+        found = near or matched(mode, library._solved(mode.mask))
+        return library._tabulated(found) if found else None
 
     def _tabulated(self, mode: ContactMode, row: ModeTables | None = None) -> Tabulated:
         """A mode of these matrices with what is renewed of its tables left out."""
@@ -298,10 +312,10 @@ class RetunedLibrary(ModeLibrary):
         other._among = self._among.at(reduced, other._opened) if self._among else None
         return other
 
-    def _solve_at(self, mask: int, place: int, within: float) -> None:
+    def _solve_at(self, mask: int, place: int, within: float, rise: float) -> None:
         """Solve a mode that cannot be followed at a place in the range, and put it on the desk."""
         assert self._at_place is not None
-        library = self._with(self._at_place(within))
+        library = self._with(self._at_place(within, rise))
         mode = library._solved(mask)
         _, row, held = library._tabulated(mode)
         self._held[mask] = row, held
@@ -352,7 +366,8 @@ class RetunedLibrary(ModeLibrary):
             reaction[closed] = solved @ self._phasor
         across = np.zeros((n, q))
         across[:, closed] = (self.force_direction - self.gap_jacobian)[closed].T
-        return Linear(tangent @ (project @ self._phasor), switch, reaction, across, reduced.damping)
+        passed = tangent @ project
+        return Linear(passed @ self._phasor, switch, reaction, across, reduced.damping, passed)
 
     def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
         """What the spin speed leaves alone of a mode and its tables, (1, ...) each."""

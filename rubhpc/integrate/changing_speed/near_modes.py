@@ -1,0 +1,134 @@
+"""A contact mode of matrices near those of one that is known, in its order, lengths and phases.
+
+In the coordinates of the known modes, matrices that differ read `L + D`, with a diagonal L. A mode of them is
+`x`, `x_j = 1`, with the exponent `l = L_j + (D x)_j`; what it has of the others follows from `x_k = (D x)_k /
+(l - L_k)`, taken again and again (perturbation theory after Brillouin and Wigner). Each step has one more
+order of what D mixes, and costs a product where a solution costs dozens.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.integrate.reduced_model.products import real_times
+
+if TYPE_CHECKING:
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Complexes = NDArray[np.complex128]
+
+STEPS, SETTLED = 24, 1e-8  # at most, and change of a share by the last of them
+MOST = 0.5  # share of a known mode in another one, from which it may be that mode
+
+
+class Linear(NamedTuple):
+    """What a set of states makes of the motion: n reduced degrees, r switch functions."""
+
+    seen: Complexes  # (n,), what the constraints leave of the unbalance at unit speed
+    switch: Floats  # (r, 2 n), switch functions of the motion
+    reaction: Complexes  # (r,), what they lose by the unbalance at unit speed
+    across: Floats  # (n, r), friction forces by switch functions
+    damping: Floats  # (n, n)
+    passed: Floats  # (n, n), what the constraints leave of a force
+
+
+def near_mode(
+    mode: ContactMode, linear: tuple[Linear, Linear], reduced: ReducedModel, other: ReducedModel
+) -> ContactMode | None:
+    """The contact mode of other matrices; None where it has to be solved.
+
+    Its response to unbalance, and what constants take off it, are left as they are in `mode`.
+
+    Parameters
+    ----------
+    mode : ContactMode
+        That of `reduced`.
+    linear : two of Linear
+        What its set of states makes of the motion with either matrices.
+    """
+    if mode.drift.any():
+        return None  # what grows with time has a velocity
+    m, n, weight = mode.n_eigenmode, reduced.stiffness.shape[0], weights(mode)
+    own, next_ = linear
+    change = own.passed @ np.hstack([other.stiffness - reduced.stiffness, other.damping - reduced.damping])
+    enter, shape, exponent = mode.enter[:m], mode.motion[:, :m] / weight, mode.exponent[:m]
+    paired = np.flatnonzero(weight > 1.5)
+    # Conjugates come behind the modes that stand for a pair.
+    swap = np.arange(m + paired.size)
+    swap[paired], swap[m:] = m + np.arange(paired.size), paired
+    every_enter = np.vstack([enter, enter[paired].conj()])
+    pushed = -every_enter[:, n:] @ real_times(change, shape)
+    whole = np.hstack([pushed, pushed[swap][:, paired].conj()])
+    moved = np.flatnonzero((whole != 0.0).any(axis=0) | (whole != 0.0).any(axis=1))
+    columns = moved[moved < m]
+    every_exponent = np.append(exponent, exponent[paired].conj())
+    found = _settled(whole[np.ix_(moved, moved)], every_exponent[moved], columns.size)
+    if found is None:
+        return None
+    share, exponents = found
+    motion, entered, switch = mode.motion.copy(), mode.enter.copy(), mode.switch.copy()
+    every_shape = np.hstack([shape, shape[:, paired].conj()])[:, moved]
+    motion[:, columns] = every_shape @ share * weight[columns]
+    new_exponent = mode.exponent.copy()
+    new_exponent[columns] = exponents
+    entered_by(entered, motion, columns, weight)
+    still = mode.motion[:, m + 1 :].real
+    if (load := change @ still).any():
+        motion[:, m + 1 :] += (motion[:, :m] @ (entered[:m, n:] @ load / new_exponent[:m, np.newaxis])).real
+    moved_switch = real_times(next_.switch, motion)
+    switch[:, :m] = moved_switch[:, :m]
+    switch[:, m + 1 :] += moved_switch[:, m + 1 :] - next_.switch @ still
+    switch[:, m + 1 :] += (next_.switch - own.switch) @ still
+    return replace(mode, exponent=new_exponent, motion=motion, enter=entered, switch=switch)
+
+
+def entered_by(enter: Complexes, motion: Complexes, columns: Ints, weight: Floats) -> None:
+    """Make what enters some modes, a closed part of all, that which enters shapes by which they have changed.
+
+    Modes that stand for a pair have their conjugates behind them; others are complex too where two real
+    exponents come as a pair.
+    """
+    both = columns[weight[columns] > 1.5]
+    shape = motion[:, columns] / weight[columns]
+    against = np.vstack([enter[columns], enter[both].conj()])
+    turned = against @ np.hstack([shape, shape[:, weight[columns] > 1.5].conj()])
+    enter[columns] = np.linalg.solve(turned, against)[: columns.size]
+
+
+def weights(mode: ContactMode) -> Floats:
+    """2 for modes that stand for a conjugate pair, 1 for others."""
+    m = mode.n_eigenmode
+    own = np.einsum("ka,ak->k", mode.enter[:m], mode.motion[:, :m]).real
+    return np.where(own > 1.5, 2.0, 1.0)
+
+
+def _settled(whole: Complexes, exponent: Complexes, own: int) -> tuple[Complexes, Complexes] | None:
+    """The first modes (p, own), exponents (own,), of `diag(exponent) + whole`; None if they do not settle."""
+    every, itself = np.arange(exponent.size), np.arange(own)
+    exponent = exponent + whole[every, every]  # so that only what mixes modes is left to be followed
+    whole[every, every] = 0.0
+    share = np.eye(exponent.size, own, dtype=np.complex128)
+    for _ in range(STEPS):
+        given = whole @ share
+        now = exponent[:own] + given[itself, itself]
+        apart = now - exponent[:, np.newaxis]
+        is_given = given != 0.0
+        is_given[itself, itself] = False
+        if np.any(is_given & (apart == 0.0)):
+            return None
+        found = np.divide(given, apart, out=np.zeros_like(given), where=is_given)
+        most = float(np.abs(found).max(initial=0.0))
+        found[itself, itself] = 1.0
+        last, share = float(np.abs(found - share).max(initial=0.0)), found
+        if not most < MOST:
+            return None
+        if last < SETTLED:
+            return share, now
+    return None
