@@ -78,7 +78,7 @@ def pass_directly(
         if reason is not None or walk.n_left <= 0:
             return walk.ended(reason)
         wanted = int(LONGER * walk.n_revolution)
-        states = march.states
+        states = march.mask
         walk.stand()
         piecewise = piecewise or _piecewise(walk, solve_from)
         if piecewise is None:

@@ -45,7 +45,7 @@ def test_sections_are_those_of_single_revolutions(contact):
     assert reason is None
     scale = np.abs(expected).max(axis=0)
     assert (np.abs(sections - expected) / scale).max() < 1e-9
-    assert together.states == singly.states
+    assert together.mask == singly.mask
     assert together.n_step == singly.n_step
     assert (np.abs(together.motion() - sections[-1]) / scale).max() < 1e-14
 

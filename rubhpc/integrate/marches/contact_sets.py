@@ -1,0 +1,125 @@
+"""Sets of closed contacts of a case, and what an event makes of one: what periodic motions ask of a march."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from rubhpc.integrate.marches.modal import ModalMarch
+from rubhpc.integrate.measuring.samples import new_accumulator
+from rubhpc.kernels.contact_modes import FORCED_LEVEL
+from rubhpc.kernels.mode_change import change_contacts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.marches.met_modes import MetModes
+    from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
+    from rubhpc.kernels.accumulators import Accumulator
+
+    Floats = NDArray[np.float64]
+
+
+class ContactSets(ModalMarch):
+    """A case that stands in one set of closed contacts, or of states of its pairs, after another."""
+
+    take_change: ClassVar[Callable[..., int]] = staticmethod(change_contacts)  # kernel that takes an event
+
+    _modes: MetModes
+
+    @property
+    def library(self) -> ModeLibrary:
+        """Contact modes of the case."""
+        return self._modes.library
+
+    @property
+    def mask(self) -> int:
+        """Set of closed pairs in which the case stands, or of the states of all under set-valued friction."""
+        return int(self.tables.mask[self._bare_progress["mode"]])
+
+    def moved_by(self, mask: int) -> int:
+        """What of a set of contacts decides how the bodies move: all of it, but whether pairs are lifted."""
+        return mask
+
+    def touching(self) -> NDArray[np.bool_]:
+        """Which pairs are closed, (q,)."""
+        return self.closed(self.mask)
+
+    def closed(self, mask: int) -> NDArray[np.bool_]:
+        """Which pairs are closed in a contact mode, (q,)."""
+        return np.array([bool(mask >> i & 1) for i in range(self._clearance.size)])
+
+    def opened(self, mask: int) -> NDArray[np.bool_]:
+        """Which pairs are open in a contact mode, and watched for their gap, (q,)."""
+        return ~self.closed(mask)
+
+    def gaps_watched(self, mask: int) -> int:
+        """Bits of the switch functions that are gaps in a contact mode."""
+        stride = self.tables.switch_re.shape[1] // self._clearance.size
+        return sum(1 << stride * int(i) for i in np.flatnonzero(self.opened(mask)))
+
+    @cached_property
+    def impulse_of_change(self) -> Floats:
+        """Impulses of the pairs (q, n) behind a change of the velocities, the shortest where several are."""
+        bodies = self.bodies
+        if len(bodies.gap_jacobian) == 1:
+            return np.asarray(bodies.gap_jacobian / bodies.delassus)
+        return np.asarray(np.linalg.pinv(bodies.delassus, rcond=1e-12) @ bodies.gap_jacobian)
+
+    def forces(self, mode: int, z: Floats) -> Floats:
+        """Forces (q,), N, at coordinates (2, m) of a contact mode, given by its index in the tables."""
+        force = self.tables.switch_re[mode] @ z[0] - self.tables.switch_im[mode] @ z[1]
+        return np.where(self.closed(int(self.tables.mask[mode])), force, 0.0)
+
+    def exponents(self, mask: int) -> tuple[Floats, Floats]:
+        """Exponents of the coordinates of a contact mode and their drift (`ModeLibrary.exponents`)."""
+        return self.library.exponents(mask)
+
+    @property
+    def derived(self) -> dict[int, Any]:
+        """What is kept of the contact modes as long as their tables are (`ModeLibrary.derived`)."""
+        return self.library.derived
+
+    @property
+    def moment(self) -> float:
+        """Time, s: a pair that would part for less than that at an event stays closed."""
+        return float(self.clock.tick * 2**FORCED_LEVEL)
+
+    def change(
+        self, mask: int, crossing: int, angle: float, motion: Floats, moment: float | None = None
+    ) -> int:
+        """Take an event: `motion` (2 n,) after it, in place, and the contact mode that goes on, or -1.
+
+        `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft; `moment` (s) is
+        `self.moment` where it is not given.
+        """
+        return int(
+            self.take_change(
+                self.bodies,
+                mask,
+                crossing,
+                self.clock.spin,
+                self.moment if moment is None else moment,
+                np.cos(angle),
+                np.sin(angle),
+                motion,
+                False,
+                *self._change_work,
+                self._unrecorded,
+            )
+        )
+
+    @cached_property
+    def _change_work(self) -> tuple[Floats, Floats, NDArray[np.bool_], Floats]:
+        """Room for an event that is taken by itself."""
+        q = self._clearance.size
+        return np.zeros(q), np.zeros(q), np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
+
+    @cached_property
+    def _unrecorded(self) -> Accumulator:
+        """What is asked for where nothing is recorded."""
+        return new_accumulator(self._clearance.size)
