@@ -1,5 +1,6 @@
 """Studies with [branch]: what is stored and opened, resumption, refusals and the diagram."""
 
+import re
 import shutil
 
 import numpy as np
@@ -16,7 +17,9 @@ from postproc.store.live import open_live
 from postproc.store.open import open_store
 from rubhpc.errors import InputError
 from rubhpc.integrate.branches import case
+from rubhpc.running.plan import make_plan
 from rubhpc.running.progress import Progress
+from rubhpc.running.stopwatch import Enough, Stopwatch
 from rubhpc.study.study import read_study
 
 STUDY = """
@@ -210,3 +213,29 @@ def test_case_without_a_motion_is_done_with_a_remark(tmp_path, monkeypatch):
     assert np.isnan(stored.point_multiplier_real).all()
     assert np.isnan(stored.point_section_vertical).all()
     assert rubhpc.open(tmp_path / "none.zarr").sizes["point"] == 0
+
+
+def test_plan_foresees_branches_from_how_far_the_first_has_come(tmp_path, monkeypatch):
+    """Cut off where a motion is sought for the n-th time; later it has come by more of the range."""
+    foreseen = []
+    for most in (8, 12):
+        began: list[int] = []
+
+        def cut(self, run, limit, began=began, most=most):
+            def check():
+                began.append(1)
+                if len(began) == most:
+                    raise Enough
+
+            with pytest.raises(Enough):
+                run(check)
+            return 1.0, None
+
+        monkeypatch.setattr(Stopwatch, "timed", cut)
+        (tmp_path / "study.toml").write_text(STUDY)
+        plan = make_plan(read_study(tmp_path / "study.toml", tmp_path / f"{most}.zarr"))
+        assert len(began) == most  # the other case would take as long
+        assert "at least" not in plan.text()
+        assert re.search(r"\(\d.* to \d.* on one core\)", plan.text())
+        foreseen.append(3600.0 * plan.core_hours)
+    assert 2.0 < foreseen[1] < foreseen[0] < 60.0  # two cases, each 1 s for a share of its range
