@@ -71,8 +71,8 @@ class Pilots:
         Those of them that went on to their ends.
     arrays : dict
         Signals and the like of the latest case that was run, by name.
-    modes : list of int
-        Bytes of contact modes that cases of one set-up and friction held in a ring, for each that was timed.
+    modes : dict
+        Bytes of contact modes that cases of one set-up and friction held in a ring, by the index of the last.
     memory : float
         Bytes that this process held at most before the first case, its kernels loaded.
     """
@@ -97,7 +97,7 @@ class Pilots:
         self.irregular: set[tuple[int, ...]] = set()
         self.ended: set[tuple[int, ...]] = set()
         self.arrays: dict[str, NDArray[Any]] = {}
-        self.modes: list[int] = []
+        self.modes: dict[tuple[int, ...], int] = {}
         self.memory = 0.0
 
     @property
@@ -136,10 +136,13 @@ class Pilots:
             self.arrays = arrays_of(record)
             return Pace(seconds / steps, rig, speed, 0.0)
         modes, rest = self._taken.get(index) or self._modes_and_rest(case, setup, steps, limit)
-        if is_ring(setup) and isinstance(setup, ModalSetup) and setup.n_byte:
-            self.modes.append(max(setup.n_byte.values()) + setup.n_byte_of_parts)
+        self._note_modes(index, setup)
         self._paces.append(rest / steps)
         return Pace(step=rest / steps, rig=rig, speed=speed, friction=modes)
+
+    def _note_modes(self, index: tuple[int, ...], setup: Setup) -> None:
+        if is_ring(setup) and isinstance(setup, ModalSetup) and setup.n_byte:
+            self.modes[index] = max(setup.n_byte.values()) + setup.n_byte_of_parts
 
     def _modes_and_rest(self, case: Case, setup: Setup, steps: float, limit: float) -> tuple[float, float]:
         """Times of contact modes that are shared with other cases, and of a case that finds them solved."""
@@ -259,6 +262,7 @@ class Pilots:
         """Run the next part of a shortened case; whether that came to its end within `limit` s."""
         followed = self._kept[index]
         is_done = followed.go_on(limit)
+        self._note_modes(index, followed.setup)
         if followed.is_whole:
             self._take_in(followed)
             self.ended.add(index)

@@ -167,7 +167,7 @@ def time_pilots(
         known=sample.known,
         is_bound=is_bound,
         seconds=seconds,
-        modes=tuple(pilots.modes),
+        modes=tuple(pilots.modes.values()),
         memory=pilots.memory,
         has_compiled=pilots.compiling > 0.0,
         failures=tuple(failures),

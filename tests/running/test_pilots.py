@@ -35,7 +35,7 @@ def test_more_cases_are_timed_where_they_differ(costs, n_pilot, monkeypatch):
     class Pilots:
         loading = compiling = 0.0
         was_cut, arrays, alike, shortened = False, {}, {}, {}
-        irregular, modes, memory = frozenset(), [], 0.0
+        irregular, modes, memory = frozenset(), {}, 0.0
 
         def __init__(self, grid):
             pass
@@ -77,7 +77,7 @@ class Shortened:
 
     loading = compiling = 0.0
     was_cut, arrays, alike = False, {}, {}
-    irregular, modes, memory = frozenset(), [], 0.0
+    irregular, modes, memory = frozenset(), {}, 0.0
 
     def __init__(self, parts, forecasts, now):
         self.parts, self.forecasts, self.now = parts, forecasts, now
@@ -151,7 +151,7 @@ def test_all_cases_of_a_small_study_are_begun(monkeypatch):
     class Pilots:
         loading = compiling = 0.0
         was_cut, arrays, alike, shortened = False, {}, {}, {}
-        irregular, modes, memory = frozenset(), [], 0.0
+        irregular, modes, memory = frozenset(), {}, 0.0
 
         def __init__(self, grid):
             pass
@@ -178,7 +178,7 @@ def test_cases_of_a_ring_are_timed_in_pairs(monkeypatch):
     class Pilots:
         loading = compiling = 0.0
         was_cut, arrays, shortened = False, {}, {}
-        irregular, modes, memory = frozenset(), [], 0.0
+        irregular, modes, memory = frozenset(), {}, 0.0
 
         def __init__(self, grid):
             self.alike = {(0,): (1,), (2,): (3,)}
