@@ -1,10 +1,10 @@
-"""Contact modes that follow the speed: polynomials through those of three or five speeds in a range.
+"""Contact modes that follow the speed: polynomials through those of three speeds in a range.
 
 Eigenvectors of the speeds at either side are brought to the length and phase that those in the middle see as
 theirs (`near_modes`), so that exponents, shapes, their inverse and what is made of them go smoothly:
-parabolas follow them, with errors of the third order in the range, or polynomials of the fourth order, with
-errors of the fifth. The inverse has to be their inverse, or each event would lose or gain motion: it is exact
-at five places, and goes through these by polynomials of the fourth order. With the
+parabolas follow them, with errors of the third order in the range. The inverse has to be their inverse, or
+each event would lose or gain motion: it is exact at five places, and goes through these by polynomials of the
+fourth order. With the
 acceleration, which changes the matrices little, all of it goes evenly: from that in the middle to that of
 another acceleration there.
 """
@@ -32,9 +32,11 @@ Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 A = TypeVar("A", Floats, Complexes)
 
-# Places of three and of five speeds in the range, the middle first, about as Chebyshev's.
-FEW, NODES = (0.0, -0.87, 0.87), (0.0, -0.59, 0.59, -0.95, 0.95)
-POWERS = {len(places): np.linalg.inv(np.vander(places, increasing=True)) for places in (FEW, NODES)}
+# Places of the three speeds in the range, and of those where the inverse is exact, the middle first.
+NODES, EXACT = (0.0, -0.8, 0.8), (0.0, -0.5, 0.5, -1.0, 1.0)
+POWERS = {len(places): np.linalg.inv(np.vander(places, increasing=True)) for places in (NODES, EXACT)}
+JUDGED = -0.8, -0.3, 0.3, 0.8  # places at which modes are judged
+MOST_LOST = 1e-4  # share of a mode in another; sets that are followed well have a tenth of it
 FAR = 0.5  # share of a mode in another of a speed beside it, over its own, from which it is not the same
 EQUAL = 1e-9  # relative difference of two exponents that repeat
 STILL, LEAST = 1e-13, 1e-16  # change of an entry over it, and over the greatest, below which it stays
@@ -55,7 +57,7 @@ class Tabulated(NamedTuple):
 
 
 def between(values: Sequence[A], place: float) -> A:
-    """What goes through values at `FEW` or `NODES`, the middle first, at a place in the range."""
+    """What goes through values at `NODES` or `EXACT`, the middle first, at a place in the range."""
     middle, *others = values
     weight = place ** np.arange(len(values)) @ POWERS[len(values)]
     found: A = middle + sum(share * (other - middle) for share, other in zip(weight[1:], others, strict=True))
@@ -121,10 +123,25 @@ def aligned(seen: Complexes, exponent: Complexes) -> tuple[NDArray[np.int64], Co
     return place, turn
 
 
+def lost(nodes: Sequence[Tabulated]) -> float:
+    """Share of a mode in another, at most, by which what enters modes that follow the speed is no inverse.
+
+    Beyond `MOST_LOST` the modes of these contacts go with the speed too fast, as where two of them meet.
+    """
+    modes = [node.mode for node in nodes]
+    m, worst = modes[0].n_eigenmode, 0.0
+    enters, _ = _entries(nodes, None)
+    for place in JUDGED:
+        shape = between([mode.motion[:, :m] for mode in modes], place) / weights(modes[0])
+        off = between(list(enters), place) @ shape - np.eye(m)
+        worst = max(worst, float(np.abs(off).max(initial=0.0)))
+    return worst
+
+
 def followed(nodes: Sequence[Tabulated], risen: Tabulated | None, seen: Complexes) -> HeldMode:
     """What is held of the mode in the middle, with what of it goes with the speed and its acceleration.
 
-    `nodes` are those at `FEW` or `NODES`, the middle first; `risen` is that in the middle at another
+    `nodes` are those at `NODES`, the middle first; `risen` is that in the middle at another
     acceleration, if any; `seen` (n,) is what constraints leave of the unbalance.
     """
     middle, mode = nodes[0], nodes[0].mode
@@ -137,7 +154,7 @@ def followed(nodes: Sequence[Tabulated], risen: Tabulated | None, seen: Complexe
     constant = np.zeros((len(enter), *middle.row.enter_constant.shape[1:]))
     constant[..., 0, :m], constant[..., 1, :m] = take_off.real, take_off.imag
     for name, values in (("enter_re", padded.real), ("enter_im", padded.imag), ("enter_constant", constant)):
-        courses[name] = _through(values, m, len(NODES), skips_response=False)
+        courses[name] = _through(values, m, len(EXACT), skips_response=False)
     shape: dict[str, Any] = {name: [getattr(node.held, name) for node in of_all] for name in _HELD}
     entry: dict[str, Any] = {
         "drive": enter[:, :, n:] @ seen,
@@ -155,7 +172,7 @@ def followed(nodes: Sequence[Tabulated], risen: Tabulated | None, seen: Complexe
             found.append(course._replace(at=course.at + places[name]))
         return _joined(found)
 
-    shapes, entries = moved(shape, n_node), moved(entry, len(NODES))
+    shapes, entries = moved(shape, n_node), moved(entry, len(EXACT))
     varying = Varying(kept=kept, kept_shape=shapes, kept_entry=entries, **courses)
     rim = {name.removeprefix(_RIM): view for name, view in views.items() if name.startswith(_RIM)}
     own = {name: view for name, view in views.items() if not name.startswith(_RIM)}
@@ -178,18 +195,15 @@ def _groups(exponent: Complexes) -> list[NDArray[np.int64]]:
 
 
 def _entries(nodes: Sequence[Tabulated], risen: Tabulated | None) -> tuple[Complexes, Complexes]:
-    """What enters a mode (5, m, 2 n), and what constants take off it (5, c, m), at `NODES`.
+    """What enters a mode (5, m, 2 n), and what constants take off it (5, c, m), at `EXACT`.
 
     With that at another acceleration as a sixth.
     """
     modes = [node.mode for node in nodes]
     mode, m = modes[0], modes[0].n_eigenmode
     constants = slice(m + 1, m + 1 + len(mode.take_off) - 2)
-    if len(nodes) < len(NODES):
-        motions = [between([other.motion for other in modes], place) for place in NODES]
-        enters = _inverses(mode, motions)
-    else:
-        motions, enters = [other.motion for other in modes], [other.enter[:m] for other in modes]
+    motions = [between([other.motion for other in modes], place) for place in EXACT]
+    enters = _inverses(mode, motions)
     if risen:
         motions, enters = [*motions, risen.mode.motion], [*enters, risen.mode.enter[:m]]
     found = zip(enters, motions, strict=True)

@@ -1,8 +1,8 @@
-"""Ranges of speed over which contact modes may follow those of a few speeds (`followed_modes`).
+"""Ranges of speed over which contact modes may follow those of three speeds (`followed_modes`).
 
 At both ends of a range, within it and where it meets a resonance the modes followed are held against the
 matrices themselves: by what unbalance and forces on the rotor at its contacts make of every signal. Held
-matrices err by the first order of a range, the modes followed by the third or by the fifth.
+matrices err by the first order of a range, the modes followed by the third.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.followed_modes import EQUAL, FEW, NODES, aligned, between
+from rubhpc.integrate.changing_speed.followed_modes import EQUAL, EXACT, NODES, aligned, between
 from rubhpc.integrate.changing_speed.held_matrices import NARROWEST
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.integrate.reduced_model.standstill import cutoff_frequency
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 PASSING = 0.01  # growth over the speed, 1/rad, at which a passage meets a resonance
 STRUCK = 0.1  # the same of motions that contacts excite, which they strike again and again
 ORDERS, HIGHEST = 0.5, 16.0  # of the speed: between frequencies at which these are judged, and at most
-AT_ENDS = 0.5  # error at the ends of a range over the accuracy, of which the fifth order leaves little inside
+AT_ENDS = 0.5  # error at the ends of a range over the accuracy, of which the third order leaves little inside
 BY_ACCELERATION = 1.0  # the same by the acceleration, at the ends of its range
-PLACES = -1.0, -0.8, -0.3, 0.3, 0.8, 1.0  # between those of the modes, where a range is judged
+PLACES = -1.0, -0.8, -0.4, 0.4, 0.8, 1.0  # between those of the modes, where a range is judged
 LEAK = 1.0  # of it by which an event may change a motion, over the accuracy
 SAFE = 0.9  # share of the range that would just do
 LEAST, MOST = 0.2, 0.85  # factors by which a range shrinks
@@ -55,7 +55,6 @@ class Reach(NamedTuple):
 
     half: float  # rad/s
     swing: float  # rad/s^2, by which the acceleration may change where nothing goes with it
-    places: tuple[float, ...] = FEW  # of the speeds through whose modes they follow
     judge: Judge | None = None  # where modes go with the acceleration too
 
 
@@ -65,7 +64,7 @@ class Judge:
     Parameters
     ----------
     nodes : list of (exponents, shapes)
-        Modes at `FEW` or `NODES`, the middle first, and last those in the middle at the other acceleration.
+        Modes at `NODES`, the middle first, and last those in the middle at the other acceleration.
     momentum : (n, n)
         Change of the stiffness with the acceleration, per rad/s^2.
     at : (float, float, float)
@@ -161,26 +160,23 @@ def followed_reach(
     half, allowed = widest, AT_ENDS * accuracy
     while True:
         middle = speed + sense * half
-        for places in (FEW, NODES):
-            nodes = _nodes(of_part, middle, half, places)
-            error = _error(of_part, nodes, middle, half, abs(acceleration), allowed) if nodes else np.inf
-            if error <= allowed:
-                break
+        nodes = _nodes(of_part, middle, half)
+        error = _error(of_part, nodes, middle, half, abs(acceleration), allowed) if nodes else np.inf
         if error <= allowed or half <= NARROWEST * speed:
             break
-        half *= float(np.clip(SAFE * (allowed / error) ** 0.2, LEAST, MOST))
+        half *= float(np.clip(SAFE * (allowed / error) ** (1.0 / 3.0), LEAST, MOST))
     turning = momentum[np.ix_(part, part)]
     swing = _swing(of_part, middle, turning, accuracy)
     rise = max((other - acceleration for other in others), key=abs)
     if nodes is None or abs(rise) <= swing:
-        return Reach(half, swing, places)
+        return Reach(half, swing)
     stiffness, damping = of_part.matrices(middle)
     risen = _in_order(nodes[0], _modes(stiffness + rise * turning, damping))
     if risen is None:
-        return Reach(half, swing, places)
+        return Reach(half, swing)
     at = middle, half, acceleration
     judge = Judge(of_part, [*nodes, risen], turning, at, rise=rise, accuracy=accuracy)
-    return Reach(half, swing, places, judge)
+    return Reach(half, swing, judge)
 
 
 def _part(rotor: Rotor, speed: float, other: float) -> Ints:
@@ -208,11 +204,9 @@ def _of_part(rotor: Rotor, part: Ints) -> Rotor:
     )
 
 
-def _nodes(
-    rotor: Rotor, middle: float, half: float, places: tuple[float, ...]
-) -> list[tuple[Complexes, Complexes]] | None:
-    """Modes at places, the middle first; None where they cannot be followed."""
-    first, *others = (_modes(*rotor.matrices(middle + place * half)) for place in places)
+def _nodes(rotor: Rotor, middle: float, half: float) -> list[tuple[Complexes, Complexes]] | None:
+    """Modes at `NODES`, the middle first; None where they cannot be followed."""
+    first, *others = (_modes(*rotor.matrices(middle + place * half)) for place in NODES)
     nodes = [first]
     for other in others:
         if (found := _in_order(first, other)) is None:
@@ -265,9 +259,8 @@ def _leak(shapes: list[Complexes], speed: float) -> float:
 
 
 def _inverses(shapes: list[Complexes]) -> list[Complexes]:
-    """Inverses at `NODES` of what goes through shapes."""
-    few = len(shapes) < len(NODES)
-    return [_inverse(shape) for shape in ([between(shapes, place) for place in NODES] if few else shapes)]
+    """Inverses at `EXACT` of what goes through shapes."""
+    return [_inverse(between(shapes, place)) for place in EXACT]
 
 
 def _inverse(shape: Complexes) -> Complexes:

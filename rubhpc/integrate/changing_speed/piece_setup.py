@@ -44,7 +44,7 @@ class HeldMatrices:
     """Matrices at a speed, rad/s, and an acceleration, rad/s^2, and what has been solved of them.
 
     `momentum` (n, n) is the change of the stiffness with the acceleration, per rad/s^2. `beside` are the
-    model and its matrices at other speeds of the range (`followed_modes.FEW` or `NODES`), through which they
+    model and its matrices at other speeds of the range (`followed_modes.NODES`), through which they
     follow the speed; none where they stay what they are. `judge` says which accelerations they follow.
     """
 

@@ -13,6 +13,7 @@ from rubhpc.fem.assemble import model_at
 from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.probes import probes_at
 from rubhpc.fem.statics import sag_under
+from rubhpc.integrate.changing_speed.followed_modes import NODES
 from rubhpc.integrate.changing_speed.followed_range import followed_reach, rotor_of
 from rubhpc.integrate.changing_speed.held_matrices import (
     NARROWEST,
@@ -222,15 +223,17 @@ class Pieces:
         fastest, free = self._fastest, self._fastest.free_spin
         is_followed = free is None and not fastest.is_updated
         judge: Judge | None = None
-        places: tuple[float, ...] = ()
         if is_followed:
-            reach, swing, places, judge = self._followed_reach(speed, acceleration)
+            reach, swing, judge = self._followed_reach(speed, acceleration)
         else:
             reach, swing = self._held_reach(speed, acceleration, slope)
         if free is None:
             speed += np.sign(acceleration) * reach
         model, reduced = self._reduced(speed, acceleration, slope, speed)
-        beside = [self._reduced(speed + place * reach, acceleration, slope, speed) for place in places[1:]]
+        beside = [
+            self._reduced(speed + place * reach, acceleration, slope, speed)
+            for place in (NODES[1:] if is_followed else ())
+        ]
         if all(np.array_equal(other.stiffness, reduced.stiffness) for _, other in beside) and all(
             np.array_equal(other.damping, reduced.damping) for _, other in beside
         ):

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
-from rubhpc.integrate.changing_speed.followed_modes import Tabulated, followed, matched, taken
+from rubhpc.integrate.changing_speed.followed_modes import (
+    MOST_LOST,
+    Tabulated,
+    followed,
+    lost,
+    matched,
+    taken,
+)
 from rubhpc.integrate.changing_speed.mode_parts import held_mode, output_operators, speeds_of
 from rubhpc.integrate.changing_speed.near_modes import Linear, near_mode
 from rubhpc.integrate.reduced_model.contact_mode import confine
@@ -70,7 +77,7 @@ class RetunedLibrary(ModeLibrary):
     desks : dict
         Of the libraries that take turns, by what they have in common.
     beside : sequence of ReducedModel
-        The same at other speeds of the range (`followed_modes.FEW` or `NODES`), through which modes follow
+        The same at other speeds of the range (`followed_modes.NODES`), through which modes follow
         the speed; none where they stay what they are.
     at_place : callable, optional
         The same at a place in the range, from -1 to 1, and of the acceleration: for modes that cannot be
@@ -270,8 +277,8 @@ class RetunedLibrary(ModeLibrary):
             own = self._linear(mode)
             found = [self._node(mode, own, library) for library in (*self._beside, *self._risen)]
             nodes = [node for node in found if node is not None]
-            if len(nodes) == len(found):
-                n = len(self._beside)
+            n = len(self._beside)
+            if len(nodes) == len(found) and lost([middle, *nodes[:n]]) <= MOST_LOST:
                 held = followed([middle, *nodes[:n]], nodes[n] if self._risen else None, own.seen)
             else:
                 self._strange.add(mode.mask)

