@@ -12,7 +12,7 @@ from trial_rig import trial_rig
 
 from rubhpc import LumpedStator, Rig, Unbalance, run_up, simulate
 from rubhpc.errors import InputError
-from rubhpc.integrate.changing_speed import retuned_modes, stretch
+from rubhpc.integrate.changing_speed import stretch
 from rubhpc.integrate.changing_speed.run_up import integrate_run_up
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.pieces import Pieces
@@ -266,7 +266,6 @@ def test_pieces_together_are_pieces_one_by_one(monkeypatch, contact, pieces):
     """From before the contact on, with pieces of a part of a revolution, of one and of several."""
     case = {"clearance": "60 um", "friction": 0.2, "samples_per_revolution": 64, **contact}
     law = {"speed_law": [(0.0, 200.0), (0.6, 240.0), (3.0, 250.0)], "pieces_per_revolution": pieces}
-    monkeypatch.setattr(retuned_modes, "MOST_BYTES", 2**24)  # large tables too are tuned to several pieces
     together = run_up(trial_rig(2), **law, **case)
     taken = []
 
