@@ -16,6 +16,11 @@ FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
 NEXT_ROOM = 16  # for a case that goes on rubbing; then for all, since what is there has to be copied
 MOST_BYTES = 2**30  # of their tables
 _PAGES = 2**16  # bytes from which an array has pages of its own
+_KEPT = 2**24  # bytes of an array up to which the C library keeps what is freed
+
+# It takes arrays smaller than the largest that was ever freed from its heap, which keeps twice as much
+# (mallopt(3)). Tables were such; without them those of spectra are given back and taken anew in every case.
+np.empty(_KEPT, dtype=np.uint8)
 
 
 class TableStack:
