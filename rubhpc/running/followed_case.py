@@ -11,7 +11,7 @@ from rubhpc.integrate.following import n_followed
 from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN
 from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS, N_ALL, N_FIRST, N_MOST
 from rubhpc.integrate.modal_setup import ModalSetup
-from rubhpc.running.met_modes import USUAL, MetModes, sum_of_powers
+from rubhpc.running.modes_to_come import USUAL, ModesToCome, sum_of_powers
 
 if TYPE_CHECKING:
     from rubhpc.integrate.record import Record, State
@@ -64,7 +64,7 @@ class Forecast(NamedTuple):
         """Time of the case, s, if so many revolutions are followed behind its record.
 
         Where it still meets contact modes, each doubling of its revolutions is taken to meet a share of those
-        of the last (`MetModes`).
+        of the last (`ModesToCome`).
         """
         n = self._behind(n_behind)
         left = max(self.n_left + n, 0.0)
@@ -111,7 +111,7 @@ class FollowedCase:
         self._n_motion = n_motion(setup)
         self._n_passed = 0  # revolutions of the transient
         self._pace = 0.0  # s a revolution of the latest part, without its contact modes
-        self._met = MetModes()
+        self._met = ModesToCome()
         self._part = 1  # revolutions of the first part
         self._cut = 0.0  # s, after which the next part was cut off, without its contact modes
         self._cut_behind = 0  # revolutions behind the record by then

@@ -9,7 +9,7 @@ import pytest
 from rubhpc.integrate.following import count_followed, n_followed
 from rubhpc.running import followed_case, pilot_cases
 from rubhpc.running.followed_case import FollowedCase, Forecast
-from rubhpc.running.met_modes import MetModes
+from rubhpc.running.modes_to_come import ModesToCome
 from rubhpc.study.study import Recording
 
 RECORDING = Recording(transient=60, revolutions=32, samples_per_revolution=16)
@@ -131,7 +131,7 @@ def test_each_doubling_of_an_irregular_motion_meets_a_share_of_the_last():
     ],
 )
 def test_modes_to_come_are_those_of_the_last_doublings(new, n_new, fading, to_come):
-    met = MetModes()
+    met = ModesToCome()
     for k, n in enumerate(new):
         met.enter(2 ** (k + 1), n)
     assert met.n_new == pytest.approx(n_new)
@@ -142,7 +142,7 @@ def test_modes_to_come_are_those_of_the_last_doublings(new, n_new, fading, to_co
 
 def test_a_part_that_is_run_again_is_no_doubling():
     """A look ahead met its modes before; the last part of a transient may be shorter than all before."""
-    met, looked = MetModes(), MetModes()
+    met, looked = ModesToCome(), ModesToCome()
     for revolutions, n in ((2, 200), (4, 100), (8, 100)):
         met.enter(revolutions, n)
     for revolutions, n in ((2, 200), (4, 90), (4, 10), (8, 100), (8, 0)):

@@ -20,6 +20,17 @@ from rubhpc.study.study import read_study
 from tests.support.running import write_study
 
 
+class NothingYet:
+    """Pilots before any case was timed."""
+
+    loading = compiling = 0.0
+    was_cut, arrays, alike, shortened = False, {}, {}, {}
+    irregular, modes, memory = frozenset(), {}, 0.0
+
+    def __init__(self, grid):
+        pass
+
+
 @pytest.mark.parametrize(
     ("costs", "n_pilot"),
     [
@@ -32,14 +43,7 @@ from tests.support.running import write_study
 def test_more_cases_are_timed_where_they_differ(costs, n_pilot, monkeypatch):
     now = [0.0]
 
-    class Pilots:
-        loading = compiling = 0.0
-        was_cut, arrays, alike, shortened = False, {}, {}, {}
-        irregular, modes, memory = frozenset(), {}, 0.0
-
-        def __init__(self, grid):
-            pass
-
+    class Pilots(NothingYet):
         def pace(self, index, steps, limit):
             now[0] += costs[index[0]]
             return pilots.Pace(costs[index[0]] / steps, 0.0, 0.0, 0.0)
@@ -148,14 +152,7 @@ def test_all_cases_of_a_small_study_are_begun(monkeypatch):
     """A whip among ten cases takes half of the time of a study, and nobody knows which it is."""
     asked = []
 
-    class Pilots:
-        loading = compiling = 0.0
-        was_cut, arrays, alike, shortened = False, {}, {}, {}
-        irregular, modes, memory = frozenset(), {}, 0.0
-
-        def __init__(self, grid):
-            pass
-
+    class Pilots(NothingYet):
         def pace(self, index, steps, limit):
             asked.append(limit)
             return pilots.Pace(0.6 / steps, 0.0, 0.0, 0.0)

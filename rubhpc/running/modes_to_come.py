@@ -12,7 +12,7 @@ _BURST = 0.5  # the same after a doubling that met more than all before: a whip 
 _GROWING = 0.01  # new contact modes over those of all revolutions before: beyond, a motion is irregular
 
 
-class MetModes:
+class ModesToCome:
     """Contact modes that were solved as a case went on.
 
     An irregular motion of a ring of 32 met 116, 150, 103, 102 and 115 in five doublings of its revolutions,
