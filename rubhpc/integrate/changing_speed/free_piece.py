@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rubhpc.integrate.changing_speed.carried_modes import Change
+from rubhpc.integrate.changing_speed.last_turn import LastTurn
 from rubhpc.integrate.changing_speed.passing import Passed, Passing, energy_of, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp
@@ -78,7 +79,7 @@ class Spin:
         self._gyroscopic = model.rotor.gyroscopic
         self._phasor = model.unbalance_cosine - 1j * model.unbalance_sine
         self.speed, self.time = drive.start, 0.0
-        self._brake = 0.0  # N m, mean of the last piece
+        self._last_turn = LastTurn(fastest.samples_per_revolution)
         # N m, by which the drive twists the shaft: at the speed that was guessed, so that it does not jump.
         self._twisting = drive.at(drive.start)
         self._begun: State | Place | None = None
@@ -104,15 +105,21 @@ class Spin:
         drive, inertia = self._drive, self._free.inertia
         turned = 2.0 * math.pi * length / per_revolution
         first, last = (2.0 * math.pi * i / per_revolution for i in (at, at + length))
-        acceleration = (drive.at(self.speed) - self._brake) / inertia
-        acceleration = (drive.at(self._after(acceleration, 0.5 * turned)) - self._brake) / inertia
+        last_turn, may_be_halved = self._last_turn, not is_fixed and length % 2 == 0
+        brake = last_turn.torque(at, length)
+        acceleration = (drive.at(self.speed) - brake) / inertia
+        acceleration = (drive.at(self._after(acceleration, 0.5 * turned)) - brake) / inertia
+        if may_be_halved:
+            foreseen = UNEVEN * last_turn.rubbed(at, length) / (turned * inertia)
+            if _is_uneven(foreseen, turned / self.speed, length, per_revolution):
+                return None
         for tried in range(MOST_TRIES):
             end_speed = self._after(acceleration, turned)
             if not end_speed > 0.0:
                 return None
             mean = 0.5 * (self.speed + end_speed)
             duration = turned / mean
-            if not is_fixed and abs(acceleration) * duration**2 > 12.0 * DRIVEN_LAG and length % 2 == 0:
+            if may_be_halved and abs(acceleration) * duration**2 > 12.0 * DRIVEN_LAG:
                 return None
             torque = self._mean_torque(end_speed)
             low, high = self._twisting, drive.at(end_speed)
@@ -145,8 +152,8 @@ class Spin:
                 )
             flows = np.sum([accumulator.energy for accumulator in passed.accumulators], axis=0)
             rubbed = UNEVEN * abs(flows[FRICTION_LOSS]) / (turned * inertia)  # rad/s^2
-            is_long = rubbed * duration**2 > 12.0 * DRIVEN_LAG and SHORTEST * length > per_revolution
-            if not is_fixed and is_long and length % 2 == 0:
+            last_turn.note_rub(at, length, abs(flows[FRICTION_LOSS]))
+            if may_be_halved and _is_uneven(rubbed, duration, length, per_revolution):
                 return None
             before = self._momentum(state_at(reached, setup), first)
             after = self._momentum(state_at(passed.end, setup), last)
@@ -184,7 +191,7 @@ class Spin:
             self._held_from = self.time
         self._standing = self._passing.standing(setup, passed.end, length)
         self.time += duration
-        self._brake = torque - inertia * change / duration
+        last_turn.note_torque(at, length, torque - inertia * change / duration)
         self._twisting = high
         self._begun = ramp.after(passed.end, setup)
         self._earlier = passed.accumulators[-1], duration
@@ -247,3 +254,8 @@ class Spin:
         turning = (1j * self._phasor * complex(np.exp(1j * angle))).real
         tilted = state.rotor_displacement @ (self._gyroscopic @ state.rotor_velocity)
         return float(turning @ state.rotor_velocity), -0.5 * float(tilted)
+
+
+def _is_uneven(rubbed: float, duration: float, length: int, per_revolution: int) -> bool:
+    """Whether a piece is too long for what its touches take from the speed, `UNEVEN` times, rad/s^2."""
+    return rubbed * duration**2 > 12.0 * DRIVEN_LAG and SHORTEST * length > per_revolution
