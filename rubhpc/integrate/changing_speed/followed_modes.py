@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.changing_speed.near_modes import entered_by, weights
+from rubhpc.integrate.changing_speed.near_modes import most_of, weights
 from rubhpc.kernels.varying import Course, Varying
 
 if TYPE_CHECKING:
@@ -123,32 +123,35 @@ def aligned(seen: Complexes, exponent: Complexes) -> tuple[NDArray[np.int64], Co
     return place, turn
 
 
-def lost(nodes: Sequence[Tabulated]) -> float:
+def lost(nodes: Sequence[Tabulated], enters: Complexes) -> float:
     """Share of a mode in another, at most, by which what enters modes that follow the speed is no inverse.
 
-    Beyond `MOST_LOST` the modes of these contacts go with the speed too fast, as where two of them meet.
+    `enters` (5, m, 2 n) is that at `EXACT`. Beyond `MOST_LOST` the modes of these contacts go with the speed
+    too fast, as where two of them meet.
     """
     modes = [node.mode for node in nodes]
     m, worst = modes[0].n_eigenmode, 0.0
-    enters, _ = _entries(nodes, None)
     for place in JUDGED:
         shape = between([mode.motion[:, :m] for mode in modes], place) / weights(modes[0])
         off = between(list(enters), place) @ shape - np.eye(m)
-        worst = max(worst, float(np.abs(off).max(initial=0.0)))
+        worst = max(worst, most_of(off))
     return worst
 
 
-def followed(nodes: Sequence[Tabulated], risen: Tabulated | None, seen: Complexes) -> HeldMode:
+def followed(
+    nodes: Sequence[Tabulated], risen: Tabulated | None, entered: tuple[Complexes, Complexes], seen: Complexes
+) -> HeldMode:
     """What is held of the mode in the middle, with what of it goes with the speed and its acceleration.
 
     `nodes` are those at `NODES`, the middle first; `risen` is that in the middle at another
-    acceleration, if any; `seen` (n,) is what constraints leave of the unbalance.
+    acceleration, if any; `entered` is what enters them (`entries`), `seen` (n,) what constraints leave of
+    the unbalance.
     """
     middle, mode = nodes[0], nodes[0].mode
     held, m, n = middle.held, mode.n_eigenmode, seen.size
     of_all, n_node = [*nodes, *([risen] if risen else [])], len(nodes)
     courses = {name: _through([getattr(node.row, name)[0] for node in of_all], m, n_node) for name in _TABLES}
-    enter, take_off = _entries(nodes, risen)
+    enter, take_off = entered
     padded = np.zeros((len(enter), *middle.row.enter_re.shape[1:]), dtype=np.complex128)
     padded[:, :, :m] = enter.transpose(0, 2, 1)
     constant = np.zeros((len(enter), *middle.row.enter_constant.shape[1:]))
@@ -194,7 +197,7 @@ def _groups(exponent: Complexes) -> list[NDArray[np.int64]]:
     return [np.array(group) for group in sorted({tuple(np.flatnonzero(row)) for row in near})]
 
 
-def _entries(nodes: Sequence[Tabulated], risen: Tabulated | None) -> tuple[Complexes, Complexes]:
+def entries(nodes: Sequence[Tabulated], risen: Tabulated | None) -> tuple[Complexes, Complexes]:
     """What enters a mode (5, m, 2 n), and what constants take off it (5, c, m), at `EXACT`.
 
     With that at another acceleration as a sixth.
@@ -203,34 +206,44 @@ def _entries(nodes: Sequence[Tabulated], risen: Tabulated | None) -> tuple[Compl
     mode, m = modes[0], modes[0].n_eigenmode
     constants = slice(m + 1, m + 1 + len(mode.take_off) - 2)
     motions = [between([other.motion for other in modes], place) for place in EXACT]
-    enters = _inverses(mode, motions)
     if risen:
-        motions, enters = [*motions, risen.mode.motion], [*enters, risen.mode.enter[:m]]
-    found = zip(enters, motions, strict=True)
-    return np.array(enters), np.array([(enter @ motion[:, constants]).T for enter, motion in found])
+        motions.append(risen.mode.motion)
+    enters = _inverses(mode, np.array(motions))
+    return enters, np.array(
+        [(enter @ motion[:, constants]).T for enter, motion in zip(enters, motions, strict=True)]
+    )
 
 
-def _inverses(mode: ContactMode, motions: Sequence[Complexes]) -> list[Complexes]:
-    """What enters each of these motions, of which the first is that of a mode."""
-    m = mode.n_eigenmode
-    gripped = range(len(mode.enter) - m)  # coordinates beside the eigenmodes that motion enters
-    grips = [m + k for k in gripped if mode.enter[m + k].any()]
-    inverse, weight = mode.enter[:m], weights(mode)
-    pushed = np.zeros((m, m), dtype=bool)
-    moved = np.any([motion[:, :m] != mode.motion[:, :m] for motion in motions], axis=(0, 1))
-    columns = np.flatnonzero(moved)
-    for motion in motions[1:]:
-        change = motion[:, columns] - mode.motion[:, columns]
-        seen = np.abs(inverse @ change) + np.abs(inverse @ change.conj())
-        pushed[:, columns] |= seen > LEAST
-    rows = np.flatnonzero(pushed.any(axis=1) | moved)
-    found = [inverse]
-    for motion in motions[1:]:
-        enter = inverse.copy()
-        entered_by(enter, motion, rows, weight)
-        for row in grips:
-            enter -= np.outer(enter @ motion[:, row], mode.enter[row])
-        found.append(enter)
+def _inverses(mode: ContactMode, motions: Complexes) -> Complexes:
+    """What enters each of some motions (k, 2 n, coordinates), of which the first is that of a mode.
+
+    Modes that stand for a pair have their conjugates behind them; others are complex too where two real
+    exponents come as a pair.
+    """
+    m, weight = mode.n_eigenmode, weights(mode)
+    change = motions[1:, :, :m] - motions[0, :, :m]
+    columns = np.flatnonzero(change.any(axis=(0, 1)))
+    change = change[..., columns] / weight[columns]
+    is_paired, paired = weight[columns] > 1.5, np.flatnonzero(weight > 1.5)
+    every = np.vstack([mode.enter[:m], mode.enter[paired].conj()])
+    seen = every @ np.concatenate([change, change[..., is_paired].conj()], axis=2)
+    # Modes that change, or that others change into, and behind them the conjugates of those that are pairs.
+    pushed = np.abs(seen.view(np.float64)).max(axis=(0, 2), initial=0.0) > LEAST
+    pushed[columns] = True
+    pushed[paired] |= pushed[m:]
+    rows = np.flatnonzero(pushed[:m])
+    pushed[m:] = pushed[paired]
+    both = np.flatnonzero(pushed)
+    behind = m + np.searchsorted(paired, columns[is_paired])
+    turned = np.tile(np.eye(both.size, dtype=np.complex128), (len(change), 1, 1))
+    turned[..., np.searchsorted(both, np.concatenate([columns, behind]))] += seen[:, both]
+    unit = np.eye(both.size, rows.size)
+    back = np.linalg.solve(turned.transpose(0, 2, 1), unit).transpose(0, 2, 1)
+    found = np.tile(mode.enter[:m], (len(motions), 1, 1))
+    found[1:, rows] = back @ every[both]
+    for k in range(m, len(mode.enter)):  # coordinates beside the eigenmodes that motion enters
+        if mode.enter[k].any():
+            found[1:] -= (found[1:] @ motions[1:, :, k, np.newaxis]) * mode.enter[k]
     return found
 
 

@@ -89,8 +89,10 @@ def held_mode(
         Whether energies are asked for; without, nothing resists.
     """
     m, n = mode.n_eigenmode, slip.shape[1]
-    motion = np.pad(mode.motion, ((0, 0), (0, width - mode.exponent.size)))
-    exponent = np.pad(mode.exponent, (0, width - mode.exponent.size))
+    end = mode.exponent.size
+    motion: Complexes = np.zeros((2 * n, width), dtype=np.complex128)
+    exponent = np.zeros(width, dtype=np.complex128)
+    motion[:, :end], exponent[:end] = mode.motion, mode.exponent
     position, velocity, acceleration = np.hsplit(output, 3)
     seen = position @ motion[:n] + velocity @ motion[n:]
     seen += (acceleration @ motion[n:]) * exponent
@@ -102,9 +104,9 @@ def held_mode(
         skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
         against = np.hstack([skew, linear.damping])
         resistance, resisting = against - linear.across @ linear.switch, against @ motion
-        resisting[:, : mode.exponent.size] -= linear.across @ mode.switch
+        resisting[:, :end] -= linear.across @ mode.switch
     return HeldMode(
-        n_coordinate=mode.exponent.size,
+        n_coordinate=end,
         exponent=exponent,
         is_pair=doubled > 1.5,
         motion=np.ascontiguousarray(mode.motion[:, :m].T),

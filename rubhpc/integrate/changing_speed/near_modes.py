@@ -44,7 +44,7 @@ def near_mode(
 ) -> ContactMode | None:
     """The contact mode of other matrices; None where it has to be solved.
 
-    Its response to unbalance, and what constants take off it, are left as they are in `mode`.
+    What enters it, its response to unbalance, and what constants take off it, are left as in `mode`.
 
     Parameters
     ----------
@@ -73,33 +73,22 @@ def near_mode(
     if found is None:
         return None
     share, exponents = found
-    motion, entered, switch = mode.motion.copy(), mode.enter.copy(), mode.switch.copy()
+    motion, switch = mode.motion.copy(), mode.switch.copy()
     every_shape = np.hstack([shape, shape[:, paired].conj()])[:, moved]
     motion[:, columns] = every_shape @ share * weight[columns]
     new_exponent = mode.exponent.copy()
     new_exponent[columns] = exponents
-    entered_by(entered, motion, columns, weight)
     still = mode.motion[:, m + 1 :].real
     if (load := change @ still).any():
-        motion[:, m + 1 :] += (motion[:, :m] @ (entered[:m, n:] @ load / new_exponent[:m, np.newaxis])).real
+        mirrored = share[np.searchsorted(moved, swap[moved])][:, weight[columns] > 1.5].conj()
+        driven = every_enter[moved, n:] @ load
+        given = np.linalg.solve(np.hstack([share, mirrored]), driven)[: columns.size]
+        motion[:, m + 1 :] += (motion[:, columns] @ (given / exponents[:, np.newaxis])).real
     moved_switch = real_times(next_.switch, motion)
     switch[:, :m] = moved_switch[:, :m]
     switch[:, m + 1 :] += moved_switch[:, m + 1 :] - next_.switch @ still
     switch[:, m + 1 :] += (next_.switch - own.switch) @ still
-    return replace(mode, exponent=new_exponent, motion=motion, enter=entered, switch=switch)
-
-
-def entered_by(enter: Complexes, motion: Complexes, columns: Ints, weight: Floats) -> None:
-    """Make what enters some modes, a closed part of all, that which enters shapes by which they have changed.
-
-    Modes that stand for a pair have their conjugates behind them; others are complex too where two real
-    exponents come as a pair.
-    """
-    both = columns[weight[columns] > 1.5]
-    shape = motion[:, columns] / weight[columns]
-    against = np.vstack([enter[columns], enter[both].conj()])
-    turned = against @ np.hstack([shape, shape[:, weight[columns] > 1.5].conj()])
-    enter[columns] = np.linalg.solve(turned, against)[: columns.size]
+    return replace(mode, exponent=new_exponent, motion=motion, switch=switch)
 
 
 def weights(mode: ContactMode) -> Floats:
@@ -118,17 +107,22 @@ def _settled(whole: Complexes, exponent: Complexes, own: int) -> tuple[Complexes
     for _ in range(STEPS):
         given = whole @ share
         now = exponent[:own] + given[itself, itself]
+        given[itself, itself] = 0.0
         apart = now - exponent[:, np.newaxis]
-        is_given = given != 0.0
-        is_given[itself, itself] = False
-        if np.any(is_given & (apart == 0.0)):
+        if np.any((apart == 0.0) & (given != 0.0)):
             return None
-        found = np.divide(given, apart, out=np.zeros_like(given), where=is_given)
-        most = float(np.abs(found).max(initial=0.0))
+        apart[apart == 0.0] = 1.0
+        found = given / apart
+        if not most_of(found) < MOST:
+            return None
         found[itself, itself] = 1.0
-        last, share = float(np.abs(found - share).max(initial=0.0)), found
-        if not most < MOST:
-            return None
+        last, share = most_of(found - share), found
         if last < SETTLED:
             return share, now
     return None
+
+
+def most_of(values: Complexes) -> float:
+    """The largest real or imaginary part, without a root for each value."""
+    parts = values.view(np.float64)
+    return float(max(parts.max(initial=0.0), -parts.min(initial=0.0)))

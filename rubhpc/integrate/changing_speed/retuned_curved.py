@@ -63,10 +63,10 @@ class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
         self._still.clear()
         super().forget()
 
-    def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
+    def _hold(self, mode: ContactMode, row: ModeTables, linear: Linear) -> HeldMode:
         directions = self.gap_jacobian, self.force_direction
         self._still[mode.mask] = still_parts(mode, self.reduced, self._row, directions, self.width)
-        return super()._hold(mode, row)
+        return super()._hold(mode, row, linear)
 
     def _linear(self, mode: ContactMode) -> Linear:
         linear = super()._linear(mode)  # friction follows the momentary normal, and is not counted

@@ -8,7 +8,7 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.near_modes import Linear
 from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
-from rubhpc.integrate.reduced_model.contact_mode import confine
+from rubhpc.integrate.reduced_model.contact_mode import left_free
 from rubhpc.integrate.reduced_model.friction_library import MOST_FRICTION_MODES
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, states_of
 from rubhpc.integrate.reduced_model.mode_library import SPARE
@@ -114,7 +114,7 @@ class RetunedFrictionLibrary(RetunedLibrary):
         if pairs.stiffness:
             along = pressed.T @ pairs.gap_jacobian[closed]
             stiffness, damping = stiffness + pairs.stiffness * along, damping + pairs.damping * along
-        tangent, project, _ = confine(reduced, rows, force)
+        tangent, project = left_free(rows, force)
         switch, reaction, across = (
             np.zeros((2 * q, 2 * n)),
             np.zeros(2 * q, dtype=complex),
@@ -149,9 +149,9 @@ class RetunedFrictionLibrary(RetunedLibrary):
         passed = tangent @ project
         return Linear(passed @ self._phasor, switch, reaction, across, damping, passed)
 
-    def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
+    def _hold(self, mode: ContactMode, row: ModeTables, linear: Linear) -> HeldMode:
         assert isinstance(mode, FrictionMode)
-        held = super()._hold(mode, row)
+        held = super()._hold(mode, row, linear)
         q = len(self.slip)
         one = mode.n_eigenmode + 1 + q
         switch = mode.switch[:, one].copy()

@@ -13,8 +13,10 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
 from rubhpc.integrate.changing_speed.followed_modes import (
+    EXACT,
     MOST_LOST,
     Tabulated,
+    entries,
     followed,
     lost,
     matched,
@@ -22,7 +24,7 @@ from rubhpc.integrate.changing_speed.followed_modes import (
 )
 from rubhpc.integrate.changing_speed.mode_parts import held_mode, output_operators, speeds_of
 from rubhpc.integrate.changing_speed.near_modes import Linear, near_mode
-from rubhpc.integrate.reduced_model.contact_mode import confine
+from rubhpc.integrate.reduced_model.contact_mode import left_free
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.table_stack import TableStack
@@ -272,25 +274,28 @@ class RetunedLibrary(ModeLibrary):
 
     def _tabulate(self, mode: ContactMode, row: ModeTables | None = None) -> None:
         self._note_exponents(mode)
-        _, row, held = middle = self._tabulated(mode, row)
+        own = self._linear(mode)
+        _, row, held = middle = self._tabulated(mode, own, row)
         if self._beside:
-            own = self._linear(mode)
             found = [self._node(mode, own, library) for library in (*self._beside, *self._risen)]
-            nodes = [node for node in found if node is not None]
-            n = len(self._beside)
-            if len(nodes) == len(found) and lost([middle, *nodes[:n]]) <= MOST_LOST:
-                held = followed([middle, *nodes[:n]], nodes[n] if self._risen else None, own.seen)
-            else:
+            nodes, n = [middle, *(node for node in found if node is not None)], 1 + len(self._beside)
+            if len(nodes) > len(found):
+                risen = nodes[n] if self._risen else None
+                entered = entries(nodes[:n], risen)
+                if lost(nodes[:n], entered[0][: len(EXACT)]) <= MOST_LOST:
+                    held = followed(nodes[:n], risen, entered, own.seen)
+            if held is middle.held:
                 self._strange.add(mode.mask)
         self._held[mode.mask] = row, held
 
     def _node(self, mode: ContactMode, own: Linear, library: RetunedLibrary) -> Tabulated | None:
         """The same mode in another library; None where that has another motion."""
-        near = near_mode(mode, (own, library._linear(mode)), self.reduced, library.reduced)
+        linear = library._linear(mode)
+        near = near_mode(mode, (own, linear), self.reduced, library.reduced)
         found = near or matched(mode, library._solved(mode.mask))
-        return library._tabulated(found) if found else None
+        return library._tabulated(found, linear) if found else None
 
-    def _tabulated(self, mode: ContactMode, row: ModeTables | None = None) -> Tabulated:
+    def _tabulated(self, mode: ContactMode, linear: Linear, row: ModeTables | None = None) -> Tabulated:
         """A mode of these matrices with what is renewed of its tables left out."""
         row = row or self._tables_of(mode, self.reduced)
         if not self._is_measured:
@@ -309,7 +314,7 @@ class RetunedLibrary(ModeLibrary):
             name: getattr(row, name).shape for name in ("power_re", "power_im", "bound")
         }
         row = row._replace(**{name: np.broadcast_to(0.0, shape) for name, shape in shapes.items()})
-        return Tabulated(mode, row, self._hold(mode, row))
+        return Tabulated(mode, row, self._hold(mode, row, linear))
 
     def _with(self, reduced: ReducedModel) -> RetunedLibrary:
         """A library with other matrices that solves and tabulates as this one does, and holds nothing."""
@@ -324,7 +329,7 @@ class RetunedLibrary(ModeLibrary):
         assert self._at_place is not None
         library = self._with(self._at_place(within, rise))
         mode = library._solved(mask)
-        _, row, held = library._tabulated(mode)
+        _, row, held = library._tabulated(mode, library._linear(mode))
         self._held[mask] = row, held
         for field, new in zip(self.tables(), row, strict=True):
             field[place] = new[0]
@@ -365,7 +370,7 @@ class RetunedLibrary(ModeLibrary):
         reduced, q, n = self.reduced, *self.slip.shape
         closed = np.array([i for i in range(q) if mode.mask >> i & 1], dtype=int)
         rate, force = self.gap_jacobian[closed], self.force_direction[closed].T
-        tangent, project, _ = confine(reduced, rate, force)
+        tangent, project = left_free(rate, force)
         switch, reaction = np.hstack([self.gap_jacobian, np.zeros((q, n))]), np.zeros(q, dtype=complex)
         if closed.size:
             solved = np.linalg.solve(rate @ force, rate)
@@ -376,12 +381,12 @@ class RetunedLibrary(ModeLibrary):
         passed = tangent @ project
         return Linear(passed @ self._phasor, switch, reaction, across, reduced.damping, passed)
 
-    def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
+    def _hold(self, mode: ContactMode, row: ModeTables, linear: Linear) -> HeldMode:
         """What the spin speed leaves alone of a mode and its tables, (1, ...) each."""
         return held_mode(
             mode,
             self.reduced,
-            self._linear(mode),
+            linear,
             slip=self._slip_rows(),
             phasor=self._phasor,
             output=self._output,

@@ -11,6 +11,7 @@ from rubhpc.integrate.reduced_model.penalty_mode import overlap_rows
 from rubhpc.kernels.retuning_laws import NO_RIM, Springs
 
 if TYPE_CHECKING:
+    from rubhpc.integrate.changing_speed.near_modes import Linear
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.kernels.contact_modes import ModeTables
@@ -30,8 +31,8 @@ class RetunedSoftFrictionLibrary(RetunedFrictionLibrary):
         rows = overlap_rows(self.gap_jacobian, closed, mode, self.width)
         return Springs(0.5 * self._pairs.stiffness, np.ascontiguousarray(self.gap_jacobian[closed]), rows)
 
-    def _hold(self, mode: ContactMode, row: ModeTables) -> HeldMode:
-        held = super()._hold(mode, row)
+    def _hold(self, mode: ContactMode, row: ModeTables, linear: Linear) -> HeldMode:
+        held = super()._hold(mode, row, linear)
         if not self._is_measured:
             return held
         m, one = held.is_pair.size, held.rim.one

@@ -202,7 +202,7 @@ def confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats,
         whole, system = np.eye(n), np.zeros((2 * n, 2 * n))
         system[:n, n:], system[n:, :n], system[n:, n:] = whole, -reduced.stiffness, -reduced.damping
         return whole, whole, system
-    tangent, project = _left_free(rate.tobytes(), np.ascontiguousarray(force).tobytes(), n)
+    tangent, project = left_free(rate, force)
     m = tangent.shape[1]
     system = np.zeros((2 * m, 2 * m))
     system[:m, m:] = np.eye(m)
@@ -211,9 +211,16 @@ def confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats,
     return tangent, project, system
 
 
+def left_free(rate: Floats, force: Floats) -> tuple[Floats, Floats]:
+    """Motions and projection of `confine`, which no speed changes."""
+    if not len(rate):
+        return np.eye(len(force)), np.eye(len(force))
+    return _left_free(rate.tobytes(), np.ascontiguousarray(force).tobytes(), len(force))
+
+
 @lru_cache(maxsize=32)
 def _left_free(rate: bytes, force: bytes, n: int) -> tuple[Floats, Floats]:
-    """Motions and projection of `confine` from `rate` (r, n) and `force` (n, r), which no speed changes."""
+    """The same from `rate` (r, n) and `force` (n, r) as bytes."""
     rows, directions = np.frombuffer(rate).reshape(-1, n), np.frombuffer(force).reshape(n, -1)
     tangent, left = _null_space(rows), _null_space(directions.T)
     project = np.asarray(np.linalg.solve(left.T @ tangent, left.T), dtype=np.float64)

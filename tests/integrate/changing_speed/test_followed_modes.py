@@ -136,5 +136,4 @@ def test_modes_near_a_known_one_are_those_solved(q, law):
         for name in ("exponent", "motion", "switch"):
             own, expected = getattr(near, name)[..., ~response], getattr(true, name)[..., ~response]
             assert np.abs(own - expected).max() <= 1e-8 * np.abs(expected).max(), (mask, name)
-        np.testing.assert_allclose(near.enter, true.enter, atol=1e-8 * np.abs(true.enter).max())
     assert n_near > 0
