@@ -13,11 +13,13 @@ from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - likewise
 from rubhpc.kernels.coulomb_friction import ROUNDING
 from rubhpc.kernels.friction_events import (
     FrictionWork,
+    add_kick,
     bring_to_rest,
     collide,
     observe_event,
     part_pairs,
     rate_without_forces,
+    see_pairs,
     solve_event,
 )
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
@@ -50,19 +52,47 @@ def change_states(
     nothing impacts, a normal force follows from its own gap alone, and `work.solver` is that of a march's
     `_soften`.
     """
-    q, n = reduced.gap_jacobian.shape
-    velocity, solver = motion[n:], work.solver
+    see_pairs(reduced, bodies, states, crossing, motion, work)
+    found = change_seen(
+        reduced, bodies, states, crossing, moment, cosine, sine, motion, is_recorded, work, accumulator
+    )
+    add_kick(work, motion)
+    return found
+
+
+@jit_lean_sum
+def change_seen(
+    reduced: Reduced,
+    bodies: FrictionBodies,
+    states: int,
+    crossing: int,
+    moment: float,
+    cosine: float,
+    sine: float,
+    motion: Floats,
+    is_recorded: bool,
+    work: FrictionWork,
+    accumulator: Accumulator,
+) -> int:
+    """States that go on after an event, or -1, by what `work` sees of the pairs; fills its impulses.
+
+    As in `change_states`, but the motion is left as it is; it is read under a penalty alone.
+    """
+    q, solver = work.rate.size, work.solver
     is_soft = reduced.spring > 0.0
     remaining = int(np.int64(0))
+    work.given[:] = 0.0
+    work.kick[:] = 0.0
     if is_soft:
-        remaining = press_pairs(reduced, bodies, states, crossing, motion, work)
-    elif not collide(reduced, bodies, states, crossing, velocity, is_recorded, work, accumulator):
-        return -1
-    if is_soft:
+        remaining = press_pairs(reduced, states, crossing, motion, work)
         for i in range(q):
-            solver.slip[i] = work.slip[i] / moment + rate_without_forces(bodies, q + i, cosine, sine, motion)
+            if solver.gap[i] < np.inf:
+                along = rate_without_forces(bodies, q + i, cosine, sine, work)
+                solver.slip[i] = work.slip[i] / moment + along
     else:
-        part_pairs(reduced, bodies, moment, cosine, sine, motion, work)
+        if not collide(reduced, bodies, states, crossing, is_recorded, work, accumulator):
+            return -1
+        part_pairs(bodies, moment, cosine, sine, work)
     pivots = solve_event(bodies, work, False)
     if pivots == UNSOLVED:
         return -1
@@ -75,7 +105,7 @@ def change_states(
         elif is_recorded and reduced.restitution > 0.0:
             has_bounced = state_of(states, i) == OPEN and (crossing >> (2 * i)) & 1 == 1
             accumulator.n_contact[i] += 1 if has_bounced else 0
-    bring_to_rest(reduced, bodies, remaining, velocity, is_recorded, work, accumulator)
+    bring_to_rest(reduced, bodies, remaining, is_recorded, work, accumulator)
     return remaining
 
 

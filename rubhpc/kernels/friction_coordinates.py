@@ -14,6 +14,7 @@ from rubhpc.kernels.accumulators import DAMPING_LOSS, UNBALANCE_WORK, Accumulato
 from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import ModeTables, add_rows, dot, find_mode
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.transitions import Transitions, loss_gained
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ def enter_states(
     if mode < 0:
         return False
     cosine, sine = shaft_turn(clock, progress.tick)
-    first, used = tables.n_eigenmode[mode], used_width(tables, mode)
+    used = used_width(tables, mode)
     for part in range(2):
         rows = tables.enter_re[mode] if part == 0 else tables.enter_im[mode]
         target = z[part, :used]
@@ -58,12 +59,27 @@ def enter_states(
                 target[k] -= source[k] * constant
         add_rows(rows, motion, target)
         z[part, used:] = 0.0
+    begin_states(tables, mode, clearance, cosine, sine, progress, z)
+    return True
+
+
+@jit_inline_sum
+def begin_states(
+    tables: ModeTables,
+    mode: int,
+    clearance: Floats,
+    cosine: float,
+    sine: float,
+    progress: Progress,
+    z: Floats,
+) -> None:
+    """Begin in a contact mode: fill in the coordinates (2, m) that do not move."""
+    first = tables.n_eigenmode[mode]
     z[0, first], z[1, first] = cosine, sine
     for i in range(clearance.size):
         z[0, first + 1 + i], z[1, first + 1 + i] = clearance[i], 0.0
     progress.mode, progress.wanted, progress.entered = mode, NONE, progress.tick
     progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
-    return True
 
 
 @jit_inline_sum
@@ -88,7 +104,9 @@ def leave_states(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> No
 
 
 @jit_lean_sum
-def energies_gained(tables: ModeTables, mode: int, begun: Floats, z: Floats, gained: Floats) -> None:
+def energies_gained(
+    tables: ModeTables, mode: int, begun: Floats, z: Floats, gained: Floats, transitions: Transitions
+) -> None:
     """Fill `gained` (2,), J, with damping loss and unbalance work between coordinates (2, m) of a mode.
 
     The form of the loss is read once for both, and what is beside its diagonal, which is symmetric, once.
@@ -98,6 +116,10 @@ def energies_gained(tables: ModeTables, mode: int, begun: Floats, z: Floats, gai
     y_re, y_im = begun[0, :used], begun[1, :used]
     if form.shape[0] == 0:  # tables without energies
         gained[0], gained[1] = 0.0, 0.0
+        return
+    gained[1] = work_form(tables, mode, z_re, z_im) - work_form(tables, mode, y_re, y_im)
+    if transitions.mode.size > 0 and transitions.energy[mode] >= 0:
+        gained[0] = loss_gained(transitions, mode, m, begun, z)
         return
     loss = 0.0
     for k in range(0, used, 4):  # four rows at a time: one would wait for its sum
@@ -126,7 +148,7 @@ def energies_gained(tables: ModeTables, mode: int, begun: Floats, z: Floats, gai
                 within += (a * one[m + j] + b * two[m + j] + c * three[m + j] + d * four[m + j]) * z_im[j]
                 within -= (e * one[m + j] + f * two[m + j] + g * three[m + j] + h * four[m + j]) * y_im[j]
         loss += 2.0 * aside + within
-    gained[0], gained[1] = loss, work_form(tables, mode, z_re, z_im) - work_form(tables, mode, y_re, y_im)
+    gained[0] = loss
 
 
 @jit_inline_sum
@@ -161,11 +183,12 @@ def end_energies(
     progress: Progress,
     recorder: Recorder,
     accumulator: Accumulator,
+    transitions: Transitions,
 ) -> None:
     """Add what damping took and the unbalance gave since they began, in one contact mode all along."""
     mode = progress.mode
     time = (progress.tick - progress.energy_from) * clock.tick
-    energies_gained(tables, mode, recorder.begun, z, recorder.entry)
+    energies_gained(tables, mode, recorder.begun, z, recorder.entry, transitions)
     accumulator.energy[DAMPING_LOSS] += recorder.entry[0] + tables.steady_power[mode, 0] * time
     accumulator.energy[UNBALANCE_WORK] += recorder.entry[1] + tables.steady_power[mode, 1] * time
     progress.energy_from = NONE

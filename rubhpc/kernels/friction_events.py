@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean
+from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean, jit_lean_sum
 from rubhpc.kernels.accumulators import (
     DRIVE_WORK,
     FRICTION_LOSS,
@@ -34,6 +34,9 @@ class FrictionWork(NamedTuple):
     solver: Workspace  # compliances are those of velocities, 1/kg
     rate: Floats  # (q,), of gaps, m/s
     slip: Floats  # (q,), m/s
+    drawn: Floats  # (2 q,), how rates of gaps, then of slips change with the motion, `pull` times it, m/s2
+    given: Floats  # (2, q), normal impulses of the event and tractions, N s
+    kick: Floats  # (n,), what they add to the velocity, m/s
     free_until: NDArray[
         np.int64
     ]  # (2, 2 q), what is known of the switch functions: `event_bounds.free_until`
@@ -46,12 +49,15 @@ class FrictionWork(NamedTuple):
     trail: Trail  # of the motion
 
 
-def friction_work(solver: Workspace, q: int) -> FrictionWork:
-    """Work space of the events of q pairs, with that of their laws, without a trail."""
+def friction_work(solver: Workspace, q: int, n: int) -> FrictionWork:
+    """Work space of the events of q pairs and n coordinates, with that of their laws, without a trail."""
     return FrictionWork(
         solver=solver,
         rate=np.zeros(q),
         slip=np.zeros(q),
+        drawn=np.zeros(2 * q),
+        given=np.zeros((2, q)),
+        kick=np.zeros(n),
         free_until=np.zeros((2, 2 * q), dtype=np.int64),
         impulse=np.zeros(q),
         rest=np.zeros((2 * q, 2 * q)),
@@ -132,29 +138,83 @@ def observe_event(problem: int, pivots: int, solver: Workspace, accumulator: Acc
 
 
 @jit_inline_sum
+def takes_part(states: int, crossing: int, i: int) -> bool:
+    """Whether an event with the switch functions `crossing` concerns pair i: it is closed, or closes."""
+    return state_of(states, i) != OPEN or (crossing >> (2 * i)) & 1 == 1
+
+
+@jit_inline_sum
+def touches(states: int, crossing: int, q: int) -> bool:
+    """Whether the gap of an open pair closes."""
+    found = False
+    for i in range(q):
+        found = found or (state_of(states, i) == OPEN and (crossing >> (2 * i)) & 1 == 1)
+    return found
+
+
+@jit_lean_sum
+def see_pairs(
+    reduced: Reduced, bodies: FrictionBodies, states: int, crossing: int, motion: Floats, work: FrictionWork
+) -> None:
+    """Read from a motion (2 n,) what its event asks of the pairs that it concerns."""
+    q, velocity = work.rate.size, motion[motion.size // 2 :]
+    for i in range(q):
+        if takes_part(states, crossing, i):
+            work.rate[i] = product(reduced.gap_jacobian[i], velocity)
+            work.slip[i] = bodies.rim_speed[i] + product(reduced.slip[i], velocity)
+            work.drawn[i] = product(bodies.pull[i], motion)
+            work.drawn[q + i] = product(bodies.pull[q + i], motion)
+
+
+@jit_lean_sum
+def give_impulses(
+    reduced: Reduced, bodies: FrictionBodies, states: int, crossing: int, work: FrictionWork
+) -> None:
+    """Add the impulses that `work.solver` holds, and what they change of what is seen of the pairs."""
+    solver, q, n = work.solver, work.rate.size, work.kick.size
+    for i in range(q):
+        force, traction = solver.force[i], solver.traction[i]
+        work.given[0, i] += force
+        work.given[1, i] += traction
+        if force != 0.0 or traction != 0.0:
+            for k in range(n):
+                work.kick[k] += force * reduced.gap_jacobian[i, k] - traction * reduced.slip[i, k]
+    for i in range(q):
+        if takes_part(states, crossing, i):
+            work.rate[i] += gap_change(solver, i)
+            work.slip[i] += slip_change(solver, i)
+            work.drawn[i] += product(bodies.pull[i, n:], work.kick)
+            work.drawn[q + i] += product(bodies.pull[q + i, n:], work.kick)
+
+
+@jit_inline_sum
+def add_kick(work: FrictionWork, motion: Floats) -> None:
+    """Add to a motion (2 n,) what the impulses of an event do to its velocity."""
+    n = work.kick.size
+    for k in range(n):
+        motion[n + k] += work.kick[k]
+
+
+@jit_inline_sum
 def collide(
     reduced: Reduced,
     bodies: FrictionBodies,
     states: int,
     crossing: int,
-    velocity: Floats,
     is_recorded: bool,
     work: FrictionWork,
     accumulator: Accumulator,
 ) -> bool:
-    """Take the impacts of rigid pairs whose gaps close, in a velocity (n,); False where none obey the laws.
+    """Take the impacts of rigid pairs whose gaps close; False where none obey the laws.
 
     Fills which pairs take part in what goes on: the gap in `work.solver` of any other is infinite. A pair
     that stuck has not slid by an impact elsewhere: whether it is held is seen by the forces that go on.
     """
-    q, n = reduced.gap_jacobian.shape
     solver = work.solver
     is_impact = False
-    for i in range(q):
+    for i in range(work.rate.size):
         state = state_of(states, i)
         first, second = (crossing >> (2 * i)) & 1, (crossing >> (2 * i + 1)) & 1
-        work.rate[i] = product(reduced.gap_jacobian[i], velocity)
-        work.slip[i] = bodies.rim_speed[i] + product(reduced.slip[i], velocity)
         solver.slip[i] = work.slip[i]
         solver.is_sticking[i] = state == STUCK and first == 0 and second == 0
         solver.gap[i], solver.target[i] = np.inf, 0.0
@@ -170,52 +230,44 @@ def collide(
     pivots = solve_event(bodies, work, True)
     if pivots == UNSOLVED:
         return False
+    for i in range(work.rate.size):
+        if not solver.force[i] > 0.0:
+            solver.force[i], solver.traction[i] = 0.0, 0.0
     if is_recorded:
         observe_event(IMPACT, pivots, solver, accumulator)
         observe_impacts(bodies, work, accumulator)
-    for i in range(q):
+    give_impulses(reduced, bodies, states, crossing, work)
+    for i in range(work.rate.size):
         if solver.force[i] > 0.0:
-            force, traction = solver.force[i], solver.traction[i]
-            for k in range(n):
-                velocity[k] += force * reduced.gap_jacobian[i, k] - traction * reduced.slip[i, k]
-            bound = solver.cone[i] * force * (1.0 - ROUNDING)
-            solver.is_sticking[i] = solver.is_sticking[i] or abs(traction) < bound
+            bound = solver.cone[i] * solver.force[i] * (1.0 - ROUNDING)
+            solver.is_sticking[i] = solver.is_sticking[i] or abs(solver.traction[i]) < bound
     return True
 
 
 @jit_inline_sum
 def rate_without_forces(
-    bodies: FrictionBodies, row: int, cosine: float, sine: float, motion: Floats
+    bodies: FrictionBodies, row: int, cosine: float, sine: float, work: FrictionWork
 ) -> float:
-    """What changes a gap's or a slip's rate, by its row of `bodies.pull`, without contact forces, m/s2."""
+    """What changes a gap's or a slip's rate, by its row of `work.drawn`, without contact forces, m/s2."""
     turned = bodies.turned[row]
-    return float(turned[0] * cosine + turned[1] * sine - product(bodies.pull[row], motion))
+    return float(turned[0] * cosine + turned[1] * sine - work.drawn[row])
 
 
 @jit_inline_sum
-def part_pairs(
-    reduced: Reduced,
-    bodies: FrictionBodies,
-    moment: float,
-    cosine: float,
-    sine: float,
-    motion: Floats,
-    work: FrictionWork,
-) -> None:
+def part_pairs(bodies: FrictionBodies, moment: float, cosine: float, sine: float, work: FrictionWork) -> None:
     """Fill what the gaps and slips of rigid pairs do over a `moment` (s) without forces, m/s2.
 
     Those that part take no part in what goes on.
     """
-    solver, q, velocity = work.solver, work.rate.size, motion[motion.size // 2 :]
+    solver, q = work.solver, work.rate.size
     for i in range(q):
         if solver.gap[i] < np.inf:
-            opening = rate_without_forces(bodies, i, cosine, sine, motion)
-            rate = product(reduced.gap_jacobian[i], velocity)
+            opening, rate = rate_without_forces(bodies, i, cosine, sine, work), work.rate[i]
             # A pair that parts so slowly that it is pressed together again at once has not parted.
             if rate <= OPENING + max(-opening, 0.0) * moment:
                 solver.gap[i] = opening + (rate / moment if abs(rate) > OPENING else 0.0)
-                slip = bodies.rim_speed[i] + product(reduced.slip[i], velocity)
-                solver.slip[i] = slip / moment + rate_without_forces(bodies, q + i, cosine, sine, motion)
+                along = rate_without_forces(bodies, q + i, cosine, sine, work)
+                solver.slip[i] = work.slip[i] / moment + along
             else:
                 solver.gap[i] = np.inf
         solver.target[i] = 0.0
@@ -226,22 +278,19 @@ def bring_to_rest(
     reduced: Reduced,
     bodies: FrictionBodies,
     states: int,
-    velocity: Floats,
     is_recorded: bool,
     work: FrictionWork,
     accumulator: Accumulator,
 ) -> None:
-    """Stop what the states that go on hold still, gaps and slips, in a velocity (n,).
+    """Stop what the states that go on hold still, gaps and slips.
 
     A pair that parts for a moment lacks as much of its impulse as presses it together again. One that sticks
     has been slipping at the tick before its slip vanishes.
     """
-    q, n = reduced.gap_jacobian.shape
+    q = work.rate.size
     solver, moves = work.solver, False
     for i in range(q):
         state = state_of(states, i)
-        work.rate[i] = product(reduced.gap_jacobian[i], velocity)
-        work.slip[i] = bodies.rim_speed[i] + product(reduced.slip[i], velocity)
         work.rest_speed[i], work.rest_speed[q + i] = work.rate[i], work.slip[i]
         is_held = state != OPEN and reduced.spring == 0.0
         work.is_at_rest[i], work.is_at_rest[q + i] = is_held, state == STUCK
@@ -266,11 +315,9 @@ def bring_to_rest(
         if state in (FORWARD, BACKWARD):
             sense = 1.0 if state == FORWARD else -1.0
             solver.traction[i] = sense * bodies.sliding[i] * solver.force[i]
-        for k in range(n):
-            velocity[k] += solver.force[i] * reduced.gap_jacobian[i, k]
-            velocity[k] -= solver.traction[i] * reduced.slip[i, k]
     if is_recorded:
         observe_impacts(bodies, work, accumulator)
+    give_impulses(reduced, bodies, states, 0, work)
 
 
 @jit_lean

@@ -31,6 +31,7 @@ from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
     ModeTables,
     Reduced,
+    find_mode,
     is_beyond,
 )
 from rubhpc.kernels.event_bounds import free_until
@@ -46,19 +47,36 @@ from rubhpc.kernels.event_steps import (
     record_touch,
     sample_step,
 )
-from rubhpc.kernels.friction_change import change_states
+from rubhpc.kernels.friction_change import change_seen
 from rubhpc.kernels.friction_coordinates import (
     begin_energies,
+    begin_states,
     end_energies,
     enter_states,
     leave_states,
     used_width,
 )
-from rubhpc.kernels.friction_events import FrictionWork, observe_states
+from rubhpc.kernels.friction_events import (
+    FrictionWork,
+    add_kick,
+    observe_states,
+    see_pairs,
+    takes_part,
+    touches,
+)
 from rubhpc.kernels.friction_measuring import begin_friction, observe_friction, resolved_friction
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import note_after, note_before, note_piece
+from rubhpc.kernels.transitions import (
+    UNKNOWN,
+    WORTH_A_TABLE,
+    Transitions,
+    add_impulses,
+    is_far,
+    pass_over,
+    see,
+)
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -87,6 +105,7 @@ def advance_with_friction(
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
+    transitions: Transitions,
 ) -> int:
     """Advance a case from the tick reached to `last_tick`, as `event_loop.advance` does.
 
@@ -95,8 +114,9 @@ def advance_with_friction(
     Returns
     -------
     int
-        FINISHED, DIVERGED (at an event), MODE_WANTED, PAUSED, or CONTACT_UNSOLVED with the motion in
-        `motion`: no forces obey the laws, or events follow one another without end.
+        FINISHED, DIVERGED (at an event), MODE_WANTED (a transition may be wanted from the mode where it
+        stands), PAUSED, or CONTACT_UNSOLVED with the motion in `motion`: no forces obey the laws, or events
+        follow one another without end.
     """
     # Tuples are opened here: a field read inside the loop would count a reference at every step.
     mask, switch_re, switch_im = tables.mask, tables.switch_re, tables.switch_im
@@ -134,7 +154,7 @@ def advance_with_friction(
             if is_recorded and end_samples(
                 tables, clock, is_sample, z, progress, recorder, samples, accumulator
             ):
-                end_energies(tables, clock, z, progress, recorder, accumulator)
+                end_energies(tables, clock, z, progress, recorder, accumulator, transitions)
             return FINISHED
         is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
         if progress.n_step > last_step and not is_at_event:
@@ -241,14 +261,19 @@ def advance_with_friction(
                 is_recorded,
                 progress,
                 z,
+                z_next,
                 motion,
                 work,
                 recorder,
                 samples,
                 accumulator,
+                transitions,
             )
             if outcome != UNDER_WAY:
                 return outcome
+            if progress.wanted < 0:
+                note_piece(work.trail, mask[progress.mode], z)
+                is_new = True
 
 
 @jit_inline_sum
@@ -279,31 +304,49 @@ def take_change(
     is_recorded: bool,
     progress: Progress,
     z: Floats,
+    z_next: Floats,
     motion: Floats,
     work: FrictionWork,
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
+    transitions: Transitions,
 ) -> int:
-    """Take the event of the switch functions `crossing`: what it makes of `motion`, and the states wanted.
+    """Take the event of the switch functions `crossing`.
+
+    Where its transition is tabulated, the coordinates in the contact mode that goes on are left in `z`.
+    Otherwise that mode is wanted, with the motion in `motion`.
 
     Returns
     -------
     int
-        UNDER_WAY, DIVERGED or CONTACT_UNSOLVED.
+        UNDER_WAY, DIVERGED, CONTACT_UNSOLVED, or MODE_WANTED where a transition is to be tabulated.
     """
-    states = tables.mask[progress.mode]
-    leave_states(tables, progress.mode, z, motion)
+    mode, q = progress.mode, work.rate.size
+    states, m, used = tables.mask[mode], z.shape[1], used_width(tables, mode)
+    is_known = transitions.mode.size > 0 and transitions.mode[mode] >= 0
     count_event(clock, progress)
-    if is_beyond(reduced, motion):
-        return DIVERGED
-    if is_recorded:
-        end_energies(tables, clock, z, progress, recorder, accumulator)
-        for i in range(work.impulse.size):
-            work.impulse[i] = accumulator.impulse[i]
-    note_before(work.trail, progress.tick, crossing, motion)
     (cosine, sine), moment = shaft_turn(clock, progress.tick), (1 << FORCED_LEVEL) * clock.tick
-    wanted = change_states(
+    if is_known:
+        first = tables.n_eigenmode[mode]
+        z[0, first], z[1, first] = cosine, sine
+        for i in range(q):
+            if takes_part(states, crossing, i):
+                rate, slip, along_gap, along_slip = see(transitions, mode, m, i, used, z)
+                work.rate[i], work.slip[i] = rate, bodies.rim_speed[i] + slip
+                work.drawn[i], work.drawn[q + i] = along_gap, along_slip
+    is_left = not is_known or is_far(transitions, mode, q, m, reduced.displacement_limit, z)
+    if is_left:
+        leave_states(tables, mode, z, motion)
+        if is_beyond(reduced, motion):
+            return DIVERGED
+        if not is_known:
+            see_pairs(reduced, bodies, states, crossing, motion, work)
+    if is_recorded:
+        end_energies(tables, clock, z, progress, recorder, accumulator, transitions)
+        for i in range(q):
+            work.impulse[i] = accumulator.impulse[i]
+    wanted = change_seen(
         reduced,
         bodies,
         states,
@@ -317,12 +360,34 @@ def take_change(
         accumulator,
     )
     if is_recorded:
-        for i in range(work.impulse.size):
+        for i in range(q):
             record_event(clock, progress, work.impulse, i, samples, accumulator)
             if wanted >= 0:
                 record_touch(i, state_of(wanted, i) != OPEN, accumulator)
-    if wanted < 0 or progress.n_event > MOST_EVENTS:
+    following, passed = NONE, UNKNOWN
+    if wanted >= 0 and transitions.mode.size > 0:
+        following = find_mode(tables.mask, wanted)
+        if following >= 0:
+            passed = transitions.entry[mode, following]
+            if passed < 0:
+                passed -= 1
+                transitions.entry[mode, following] = passed
+    is_unsolved = wanted < 0 or progress.n_event > MOST_EVENTS
+    # The tangent reads the velocities of a trail where a gap closes.
+    is_read = passed < 0 or is_unsolved or (work.trail.tick.size > 0 and touches(states, crossing, q))
+    if is_read and not is_left:
+        leave_states(tables, mode, z, motion)
+    note_before(work.trail, progress.tick, crossing, motion)
+    add_kick(work, motion)
+    if is_unsolved:
         return CONTACT_UNSOLVED
     note_after(work.trail, motion)
-    progress.wanted = wanted
+    if passed < 0:
+        progress.wanted = wanted
+        return MODE_WANTED if passed == UNKNOWN - WORTH_A_TABLE else UNDER_WAY
+    pass_over(transitions, passed, m, z, z_next)
+    add_impulses(transitions, following, q, m, work.given, z_next)
+    for k in range(m):
+        z[0, k], z[1, k] = z_next[0, k], z_next[1, k]
+    begin_states(tables, following, reduced.clearance, cosine, sine, progress, z)
     return UNDER_WAY

@@ -53,6 +53,7 @@ from rubhpc.kernels.pieces import (
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.sampling import Recorder
+    from rubhpc.kernels.transitions import Transitions
 
 Floats = NDArray[np.float64]
 
@@ -76,10 +77,12 @@ def advance_friction_pieces(
     recorder: Recorder,
     samples: Samples,
     sums: Accumulator,
+    transitions: Transitions,
 ) -> int:
     """Advance a case through pieces, as `piece_loop.advance_pieces` does.
 
-    `bodies.rim_speed` is that of `reduced`; `bodies.turned` is set.
+    `bodies.rim_speed` is that of `reduced`; `bodies.turned` is set. There are no `transitions`: modes change
+    from piece to piece.
 
     Returns
     -------
@@ -131,6 +134,7 @@ def advance_friction_pieces(
                 recorder,
                 samples,
                 part,
+                transitions,
             )
             if outcome != FINISHED:
                 return outcome

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rubhpc.kernels.friction_events import FrictionWork
     from rubhpc.kernels.friction_states import FrictionBodies
     from rubhpc.kernels.sampling import Recorder
+    from rubhpc.kernels.transitions import Transitions
 
 Floats = NDArray[np.float64]
 
@@ -40,6 +41,7 @@ def advance_friction_sections(
     samples: Samples,
     accumulator: Accumulator,
     sections: Floats,
+    transitions: Transitions,
 ) -> int:
     """Advance from the tick reached to tick 0 as `sections_loop.advance_sections` does.
 
@@ -69,6 +71,7 @@ def advance_friction_sections(
             recorder,
             samples,
             accumulator,
+            transitions,
         )
         if outcome != FINISHED:
             return outcome

@@ -18,11 +18,9 @@ from rubhpc.kernels.friction_states import (
     FORWARD,
     OPEN,
     STUCK,
-    FrictionBodies,
     lifted_place,
     state_of,
 )
-from rubhpc.kernels.mode_change import product
 from rubhpc.kernels.penalty_events import force_of, gap_of
 
 Floats = NDArray[np.float64]
@@ -31,7 +29,6 @@ Floats = NDArray[np.float64]
 @jit_lean_sum
 def press_pairs(
     reduced: Reduced,
-    bodies: FrictionBodies,
     states: int,
     crossing: int,
     motion: Floats,
@@ -41,8 +38,7 @@ def press_pairs(
 
     The gap of any other is infinite.
     """
-    q, n = reduced.gap_jacobian.shape
-    velocity, solver = motion[n:], work.solver
+    q, solver = work.rate.size, work.solver
     lifted = int(np.int64(0))
     for i in range(q):
         state = state_of(states, i)
@@ -58,7 +54,6 @@ def press_pairs(
             is_lifted = gap_of(reduced, i, motion) < 0.0
         if is_lifted:
             lifted |= 1 << lifted_place(q, i)
-        work.slip[i] = bodies.rim_speed[i] + product(reduced.slip[i], velocity)
         solver.is_sticking[i] = state == STUCK and first == 0 and second == 0
         solver.gap[i], solver.target[i] = np.inf, 0.0
         if is_closed:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.marches.workspace import empty_workspace
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, states_of
+from rubhpc.integrate.reduced_model.transitions import MetTransitions
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     FINISHED,
@@ -22,6 +23,7 @@ from rubhpc.kernels.case_progress import (
     follow,
     shaft_angle,
 )
+from rubhpc.kernels.contact_modes import ModeTables
 from rubhpc.kernels.friction_change import change_states
 from rubhpc.kernels.friction_events import friction_work
 from rubhpc.kernels.friction_loop import advance_with_friction
@@ -29,6 +31,7 @@ from rubhpc.kernels.friction_pieces import AT_REST, LEAST_FORCE, advance_frictio
 from rubhpc.kernels.friction_sections import advance_friction_sections
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, MOST_PAIRS, OPEN, STUCK, FrictionBodies
 from rubhpc.kernels.trail import BROKEN
+from rubhpc.kernels.transitions import NO_TRANSITIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,11 +42,11 @@ if TYPE_CHECKING:
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.contact_pairs import Workspace
     from rubhpc.kernels.friction_events import FrictionWork
     from rubhpc.kernels.pieces import Pieces
     from rubhpc.kernels.trail import Trail
+    from rubhpc.kernels.transitions import Transitions
 
     Floats = NDArray[np.float64]
 
@@ -71,6 +74,7 @@ class FrictionMarch(EventDrivenMarch):
             self._setup, clearance, friction, State.at_rest(self._setup.model), check
         )
         self._steps: ContactSteppingMarch | None = None
+        self._transitions: Transitions | None = None
         self._n_short = 0  # ticks to be taken in short steps
         self._pulled: tuple[Floats, Floats, Floats] | None = None  # stiffness, and what follows from it
         super().__init__(setup, clearance, friction, initial, check)
@@ -110,7 +114,10 @@ class FrictionMarch(EventDrivenMarch):
         self._entered_with[:q] = self._clearance
         self.bodies = self.bodies._replace(clearance=self._entered_with)
         self._friction = self._friction_bodies()
-        return setup.friction_library(friction)
+        library = setup.friction_library(friction)
+        shared = library.transitions
+        self._met, self._transitions = None if shared is None else MetTransitions(shared), None
+        return library
 
     @cached_property
     def _coefficients(self) -> tuple[Floats, Floats]:
@@ -127,7 +134,7 @@ class FrictionMarch(EventDrivenMarch):
         solver.matrix[:], solver.coupling[:] = gap_jacobian @ gap_jacobian.T, gap_jacobian @ along.T
         solver.tangential[:] = -along @ gap_jacobian.T, -along @ along.T
         self._soften(solver)
-        return friction_work(solver, q)
+        return friction_work(solver, q, gap_jacobian.shape[1])
 
     def _friction_bodies(self) -> FrictionBodies:
         """What friction asks of the bodies at the speed that they turn at."""
@@ -141,8 +148,36 @@ class FrictionMarch(EventDrivenMarch):
         turned[:, 0], turned[:, 1] = rows @ bodies.force_cosine, rows @ bodies.force_sine
         return FrictionBodies(*self._coefficients, rim_speed=bodies.rim_speed, pull=pull, turned=turned)
 
+    def find_wanted(self) -> None:
+        """See that the tables hold the set of states, or the transition to it, that the kernel asks for."""
+        before, wanted = self.mask, int(self._bare_progress["wanted"])
+        is_known = wanted in self.tables.mask
+        if self._met is None or not self._met.is_due(before, wanted, is_counted=is_known):
+            super().find_wanted()
+            return
+        left = self._tables_of(before, is_copied=not is_known)  # the other may take its place
+        super().find_wanted()
+        self._met.tabulate(left, self._tables_of(wanted), self.bodies, self._friction)
+
+    def _tables_of(self, mask: int, *, is_copied: bool = False) -> ModeTables:
+        """The tables (1, ...) of a set of states that they hold."""
+        place = self.tables.mask.tolist().index(mask)
+        fields: list[Any] = [field[place : place + 1] for field in self.tables]
+        fields = [field.copy() for field in fields] if is_copied else fields
+        return ModeTables(*fields)
+
+    @property
+    def transitions(self) -> Transitions:
+        """Transitions between the contact modes of the tables that this case takes often."""
+        if self._met is None:
+            return NO_TRANSITIONS
+        if self._transitions is None:
+            self._transitions = self._met.among(self.tables)
+        return self._transitions
+
     def _use(self, tables: ModeTables) -> None:
         super()._use(tables)
+        self._transitions = None
         self._z_kept = np.zeros_like(self._z)
         if self._recorder.begun.shape != self._z.shape:
             self._recorder = self._recorder._replace(begun=np.zeros_like(self._z))
@@ -224,6 +259,7 @@ class FrictionMarch(EventDrivenMarch):
             samples,
             accumulator,
             sections,
+            self.transitions,
         )
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
@@ -254,6 +290,7 @@ class FrictionMarch(EventDrivenMarch):
             self._recorder,
             samples,
             accumulator,
+            self.transitions,
         )
 
     def _advance_pieces(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
@@ -272,6 +309,7 @@ class FrictionMarch(EventDrivenMarch):
             self._recorder,
             samples,
             sums,
+            NO_TRANSITIONS,
         )
 
     def _hand_over(self) -> None:

@@ -43,6 +43,8 @@ class FrictionLibrary(ModeLibrary):
     ) -> None:
         """Start as `ModeLibrary` does, with one pair sliding forward."""
         self._pairs = pairs
+        # Overlaps ask for the motion at each event; the few modes of one pair stay in the processor's cache.
+        self.transitions = None if pairs.stiffness or len(pairs.gap_jacobian) == 1 else {}
         super().__init__(reduced, model, pairs.friction, **shared)
 
     _closed = FORWARD

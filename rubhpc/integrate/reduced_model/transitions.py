@@ -1,0 +1,222 @@
+"""Tables of transitions between contact modes under set-valued friction, of those that a case takes often."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rubhpc.integrate.reduced_model.coupling import coupled_rows
+from rubhpc.kernels.transitions import LANES, UNKNOWN, WORTH_A_TABLE, Transitions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.kernels.contact_modes import ModeTables, Reduced
+    from rubhpc.kernels.friction_states import FrictionBodies
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
+
+MOST_BYTES = 2**26  # of the transitions of a case
+MOST_SHARED = 2**27  # of those that the cases of a library share
+UNMOVED = 1e-9  # of unit coordinates: what a transition moves less stays where it is
+
+
+class Part(NamedTuple):
+    """Numbers of a contact mode or of a transition, as `kernels.transitions` reads them."""
+
+    number: Ints
+    value: Floats
+    shifted: Ints  # where in `number` places in `value` are
+
+
+class MetTransitions:
+    """Transitions that one case takes, tabulated where it takes them often.
+
+    What the kernel does must not depend on what other cases have left: a case begins with no table, and takes
+    one out of `shared` where another has made it.
+    """
+
+    def __init__(self, shared: dict[tuple[int, int, str], Part]) -> None:
+        """Begin with none."""
+        self._shared = shared
+        self._entry: dict[tuple[int, int], int] = {}  # by sets of states
+        self._modes: dict[int, int] = {}
+        self._energies: dict[int, int] = {}
+        self._number, self._value = np.zeros(0, dtype=np.int64), np.zeros(0)
+        self._n_number = self._n_value = 0
+        self._masks: list[int] = []
+        self._placed: Transitions | None = None
+
+    def among(self, tables: ModeTables) -> Transitions:
+        """Return them as a kernel takes them, for the modes of these tables."""
+        self._note_passages()
+        self._masks = tables.mask.tolist()
+        place = {mask: k for k, mask in enumerate(self._masks) if mask >= 0}
+        p, m = len(self._masks), tables.pace.shape[1]
+        entry, mode, energy = np.full((p, p), UNKNOWN), np.full(p, UNKNOWN), np.full(p, UNKNOWN)
+        for (before, after), passed in self._entry.items():
+            if before in place and after in place:
+                entry[place[before], place[after]] = passed
+        for known, at in ((self._modes, mode), (self._energies, energy)):
+            for mask in known.keys() & place.keys():
+                at[place[mask]] = known[mask]
+        self._placed = Transitions(
+            entry, mode, energy, self._number, self._value, np.zeros(4 * m), np.zeros(4 * m)
+        )
+        return self._placed
+
+    def is_due(self, before: int, after: int, *, is_counted: bool) -> bool:
+        """Whether the transition between two sets of states has just been passed often enough for a table.
+
+        `is_counted` says whether the kernel has counted this passage, as it does where its tables hold both.
+        """
+        self._note_passages()
+        passed = self._entry.get((before, after), UNKNOWN)
+        if not is_counted and passed < 0:
+            self._entry[before, after] = passed = passed - 1
+        return passed == UNKNOWN - WORTH_A_TABLE and self._n_value * self._value.itemsize <= MOST_BYTES
+
+    def tabulate(
+        self, before: ModeTables, after: ModeTables, reduced: Reduced, bodies: FrictionBodies
+    ) -> None:
+        """Tabulate the transition between two contact modes, by the tables (1, ...) of each."""
+        masks = int(before.mask[0]), int(after.mask[0])
+        for mask, tables in zip(masks, (before, after), strict=True):
+            if mask not in self._modes:
+                _, self._modes[mask] = self._take(
+                    (mask, mask, "mode"), partial(seen_in, tables, reduced, bodies)
+                )
+            if mask not in self._energies and tables.loss.shape[1]:
+                key = mask, mask, "energies"
+                self._energies[mask], _ = self._take(key, partial(loss_blocks, tables.loss[0]))
+        self._entry[masks], _ = self._take((*masks, "transition"), partial(transition, before, after))
+
+    def _note_passages(self) -> None:
+        """Take over how often the kernel has passed; it has to be given them anew then."""
+        if self._placed is not None:
+            entry, self._placed = self._placed.entry, None
+            for before, after in np.argwhere(entry != UNKNOWN).tolist():
+                self._entry[self._masks[before], self._masks[after]] = int(entry[before, after])
+
+    def _take(self, key: tuple[int, int, str], make: Callable[[], Part]) -> tuple[int, int]:
+        """Take in what belongs to a key; returns its places in `number` and `value`."""
+        part = self._shared.get(key)
+        if part is None:
+            part = make()
+            if sum(known.value.nbytes for known in self._shared.values()) > MOST_SHARED:
+                self._shared.clear()
+            self._shared[key] = part
+        at = self._n_number, self._n_value
+        self._number = _with_room(self._number, at[0], part.number.size)
+        self._value = _with_room(self._value, at[1], part.value.size)
+        self._n_number, self._n_value = at[0] + part.number.size, at[1] + part.value.size
+        self._number[at[0] : self._n_number], self._value[at[1] : self._n_value] = part.number, part.value
+        self._number[at[0] + part.shifted] += at[1]
+        return at
+
+
+def _with_room(array: NDArray[Any], n_filled: int, n_more: int) -> NDArray[Any]:
+    """The array, or a longer one that begins with what it is filled with."""
+    if n_filled + n_more <= array.size:
+        return array
+    longer = np.empty(2 * (n_filled + n_more), array.dtype)
+    longer[:n_filled] = array[:n_filled]
+    return longer
+
+
+def seen_in(tables: ModeTables, reduced: Reduced, bodies: FrictionBodies) -> Part:
+    """What an event sees of the q pairs in a mode, what impulses give to its coordinates, and its reach.
+
+    They are (4 q, 2, m), (2 q, 2, m) and (m,), one after the other; the reach is the largest motion along
+    `reduced.translations` with each coordinate.
+    """
+    q, n = reduced.gap_jacobian.shape
+    rows = np.zeros((q, 4, 2 * n))
+    rows[:, 0, n:], rows[:, 1, n:] = reduced.gap_jacobian, reduced.slip
+    rows[:, 2], rows[:, 3] = bodies.pull[:q], bodies.pull[q:]
+    motion_re, motion_im = tables.motion_re[0], tables.motion_im[0]
+    rows = rows.reshape(4 * q, 2 * n)
+    seen = np.stack([rows @ motion_re, rows @ motion_im], axis=1)
+    struck = np.stack([reduced.gap_jacobian, -reduced.slip], axis=1).reshape(2 * q, n)
+    given = np.stack([struck @ tables.enter_re[0, n:], struck @ tables.enter_im[0, n:]], axis=1)
+    moved = reduced.translations @ (motion_re[:n] + 1j * motion_im[:n])
+    value = np.concatenate([seen.ravel(), given.ravel(), np.abs(moved).max(axis=0)])
+    return Part(np.zeros(0, dtype=np.int64), value, np.zeros(0, dtype=np.int64))
+
+
+def transition(before: ModeTables, after: ModeTables) -> Part:
+    """What becomes of the coordinates of a mode in another one: `x = Re(motion @ z)`, and entered again."""
+    m, first, q = before.pace.shape[1], int(before.n_eigenmode[0]), before.enter_constant.shape[1]
+    both = before, after
+    enter = [np.hstack([tables.enter_re[0], tables.enter_im[0]]) for tables in both]
+    moves, moved = (np.hstack([tables.motion_re[0], -tables.motion_im[0]]) for tables in both)
+    is_source = np.asarray(enter[0].any(axis=0) & moves.any(axis=0))  # imaginary parts of decays move nothing
+    is_source[first : first + 1 + q], is_source[m + first] = True, True
+    of_source, of_target = np.flatnonzero(is_source), np.flatnonzero(enter[1].any(axis=0) & moved.any(axis=0))
+    matrix = enter[1][:, of_target].T @ moves[:, of_source]
+    place = np.searchsorted(of_source, [first, m + first, *range(first + 1, first + 1 + q)])
+    taken_off = [after.enter_cosine[0], after.enter_sine[0], *after.enter_constant[0]]
+    matrix[:, place] -= np.reshape(taken_off, (2 + q, 2 * m))[:, of_target].T
+    kept_to: list[int] = []
+    kept_from: list[int] = []
+    index: list[int] = []
+    value: list[Floats] = []
+    shifted: list[int] = []
+    n_block = n_value = 0
+    for rows, columns in _blocks(matrix):
+        targets, sources, block = of_target[rows], of_source[columns], matrix[rows[:, None], columns]
+        place = np.abs(block).argmax(axis=1)
+        is_kept = len(targets) == len(sources) and len(set(place.tolist())) == len(targets)
+        if is_kept and np.abs(block - np.eye(len(sources))[place]).max() < UNMOVED:
+            kept_to += targets.tolist()
+            kept_from += sources[place].tolist()
+            continue
+        filled = np.zeros((len(sources), _whole(len(targets))))
+        filled[:, : len(targets)] = block.T
+        shifted.append(len(index) + 2)
+        index += [len(sources), len(targets), n_value, *sources.tolist(), *targets.tolist()]
+        value.append(filled.ravel())
+        n_value += filled.size
+        n_block += 1
+    head = [len(kept_to), n_block, *kept_to, *kept_from]
+    return Part(
+        np.array(head + index),
+        np.concatenate([*value, np.zeros(0)]),
+        np.array(shifted, dtype=np.int64) + len(head),
+    )
+
+
+def _blocks(matrix: Floats) -> list[tuple[Ints, Ints]]:
+    """Rows and columns of each block of a matrix that has only zeros beside them."""
+    n_row, n_column = matrix.shape
+    linked = np.zeros((n_row + n_column, n_row + n_column), dtype=np.bool_)
+    linked[:n_row, n_row:] = matrix != 0.0
+    parts = ((both[both < n_row], both[both >= n_row] - n_row) for both in coupled_rows(linked))
+    return [(rows, columns) for rows, columns in parts if rows.size and columns.size]
+
+
+def loss_blocks(form: Floats) -> Part:
+    """The form (2 m, 2 m) of the coordinates whose growth is the loss of damping, by its blocks."""
+    live = np.flatnonzero(form.any(axis=1))
+    blocks = [live[rows] for rows in coupled_rows(form[live[:, None], live] != 0.0)]
+    index, shifted, n_value = [len(blocks)], list[int](), 0
+    value: list[Floats] = []
+    for rows in blocks:
+        size = _whole(len(rows))
+        block = np.zeros((size, size))
+        block[: len(rows), : len(rows)] = form[rows[:, None], rows]
+        shifted.append(len(index) + 1)
+        index += [size, n_value, *rows.tolist(), *[0] * (size - len(rows))]
+        value.append(block.ravel())
+        n_value += block.size
+    return Part(np.array(index), np.concatenate([*value, np.zeros(0)]), np.array(shifted, dtype=np.int64))
+
+
+def _whole(count: int) -> int:
+    """The least number of whole vectors that hold a count."""
+    return -(-count // LANES) * LANES

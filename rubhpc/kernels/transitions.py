@@ -1,0 +1,178 @@
+"""From contact mode to contact mode without the motion between: what an event sees, gives and leaves.
+
+Leaving a mode and entering the next is one linear map of modal coordinates, and most of it is known: bodies
+that take part in neither keep their coordinates. `integrate.reduced_model.transitions` tabulates what is left
+of it, what an event asks of the pairs, and what their impulses do in the coordinates of the next mode. A case
+has tables of those transitions that it takes often, and goes by the motion (2 n,) otherwise.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean, jit_lean_sum
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+UNKNOWN = -1  # place of what is not tabulated
+WORTH_A_TABLE = 64  # passages after which a transition is tabulated
+LANES = 8  # columns of a block are filled up to whole vectors
+SEEN = 4  # rows of a pair: rate of the gap, slip, and what changes them (`FrictionWork.drawn`)
+GIVEN = 2  # rows of a pair: coordinates after a unit impulse, then a unit traction
+
+
+class Transitions(NamedTuple):
+    """Transitions between p contact modes of m coordinates; p is 0 where none are wanted.
+
+    Coordinates count from 0 to 2 m, real parts first. A transition is in `number`: how many coordinates stay
+    what they are, how many blocks there are, where those coordinates are, and were; then for each block the
+    number of its sources, that of its targets, its place in `value`, its sources and its targets. The loss
+    in a mode is the number of its blocks, then for each its size, its place in `value` and its coordinates.
+    """
+
+    entry: Ints  # (p, p), place in `number` of that from one mode to another; else UNKNOWN less passages
+    mode: Ints  # (p,), place in `value` of what is seen and given in a mode, and its reach; or UNKNOWN
+    energy: Ints  # (p,), place in `number` of the energies of a mode
+    number: Ints  # as above
+    value: Floats
+    source: Floats  # (4 m,), work space
+    target: Floats  # (4 m,), likewise
+
+
+_EMPTY, _ROOM = np.zeros(0, dtype=np.int64), np.zeros(0)
+NO_TRANSITIONS = Transitions(np.zeros((0, 0), dtype=np.int64), _EMPTY, _EMPTY, _EMPTY, _ROOM, _ROOM, _ROOM)
+
+
+@jit_inline_sum
+def is_far(transitions: Transitions, mode: int, q: int, m: int, limit: float, z: Floats) -> bool:
+    """Whether coordinates (2, m) of a mode may take the rotor beyond the limit, m: by the sizes of all."""
+    reach = transitions.value[transitions.mode[mode] + 2 * (SEEN + GIVEN) * q * m :]
+    most = 0.0
+    for k in range(z.shape[1]):
+        most += reach[k] * (abs(z[0, k]) + abs(z[1, k]))
+    return not most <= limit
+
+
+@jit_inline_sum
+def see(
+    transitions: Transitions, mode: int, m: int, i: int, used: int, z: Floats
+) -> tuple[float, float, float, float]:
+    """What an event sees of pair i at coordinates (2, m) of a mode, of which the first ones are used."""
+    rows = transitions.value[transitions.mode[mode] + 2 * SEEN * i * m :]
+    z_re, z_im = z[0, :used], z[1, :used]
+    a_re, a_im, b_re, b_im = rows[:used], rows[m : m + used], rows[2 * m : 2 * m + used], rows[3 * m :]
+    c_re, c_im, d_re, d_im = rows[4 * m :], rows[5 * m :], rows[6 * m :], rows[7 * m :]
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for k in range(used):
+        x, y = z_re[k], z_im[k]
+        a += a_re[k] * x - a_im[k] * y
+        b += b_re[k] * x - b_im[k] * y
+        c += c_re[k] * x - c_im[k] * y
+        d += d_re[k] * x - d_im[k] * y
+    return a, b, c, d
+
+
+@jit_lean
+def add_impulses(transitions: Transitions, mode: int, q: int, m: int, given: Floats, z: Floats) -> None:
+    """Add impulses and tractions (2, q), N s, to the coordinates (2, m) of the mode that goes on."""
+    place = transitions.mode[mode] + 2 * SEEN * q * m
+    for i in range(q):
+        for kind in range(GIVEN):
+            share = given[kind, i]
+            if share != 0.0:
+                for part in range(2):
+                    row = transitions.value[place + (2 * (GIVEN * i + kind) + part) * m :]
+                    for k in range(m):
+                        z[part, k] += share * row[k]
+
+
+@jit_lean
+def pass_over(transitions: Transitions, place: int, m: int, z: Floats, after: Floats) -> None:
+    """Fill the coordinates `after` (2, m) in the next mode, but for those that do not move, from `z`."""
+    number, value, source, target = (
+        transitions.number,
+        transitions.value,
+        transitions.source,
+        transitions.target,
+    )
+    n_kept, n_block = number[place], number[place + 1]
+    place += 2
+    for k in range(m):
+        after[0, k], after[1, k] = 0.0, 0.0
+    for k in range(n_kept):
+        here, there = number[place + k], number[place + n_kept + k]
+        part, other = (1 if here >= m else 0), (1 if there >= m else 0)
+        after[part, here - part * m] = z[other, there - other * m]
+    place += 2 * n_kept
+    for _ in range(n_block):
+        n_source, n_target, at = number[place], number[place + 1], number[place + 2]
+        place += 3
+        width = (n_target + LANES - 1) // LANES * LANES
+        for k in range(n_source):
+            there = number[place + k]
+            part = 1 if there >= m else 0
+            source[k] = z[part, there - part * m]
+        place += n_source
+        times_rows(value[at:], n_source, width, source, target)
+        for k in range(n_target):
+            here = number[place + k]
+            part = 1 if here >= m else 0
+            after[part, here - part * m] = target[k]
+        place += n_target
+
+
+@jit_lean
+def times_rows(rows: Floats, n_row: int, width: int, value: Floats, total: Floats) -> None:
+    """Fill `total` (width,) with rows (n_row width,) times values (n_row,): four rows at a time."""
+    whole, last = n_row - n_row % 4, total[:width]
+    for k in range(width):
+        last[k] = 0.0
+    for row in range(0, whole, 4):
+        at = row * width
+        first, second = rows[at : at + width], rows[at + width : at + 2 * width]
+        third, fourth = rows[at + 2 * width : at + 3 * width], rows[at + 3 * width : at + 4 * width]
+        a, b, c, d = value[row], value[row + 1], value[row + 2], value[row + 3]
+        for k in range(width):
+            last[k] += first[k] * a + second[k] * b + third[k] * c + fourth[k] * d
+    for row in range(whole, n_row):
+        first, a = rows[row * width : (row + 1) * width], value[row]
+        for k in range(width):
+            last[k] += first[k] * a
+
+
+@jit_lean_sum
+def loss_gained(transitions: Transitions, mode: int, m: int, begun: Floats, z: Floats) -> float:
+    """Loss of damping, J, between coordinates (2, m) of a mode, by the blocks of its form.
+
+    With the difference d and the sum s of both it is `d' P s`.
+    """
+    number, change, total = transitions.number, transitions.source, transitions.target
+    place = transitions.energy[mode]
+    n_block, loss = number[place], 0.0
+    place += 1
+    for _ in range(n_block):
+        size, at = number[place], number[place + 1]
+        place += 2
+        rows = transitions.value[at : at + size * size]
+        for k in range(size):
+            here = number[place + k]
+            part = 1 if here >= m else 0
+            new, old = z[part, here - part * m], begun[part, here - part * m]
+            change[k], total[k] = new - old, new + old
+        place += size
+        for k in range(0, size, 4):  # four rows at a time: one would wait for its sum
+            block = k - k % LANES  # where the block on the diagonal begins
+            one, two = rows[k * size : (k + 1) * size], rows[(k + 1) * size : (k + 2) * size]
+            three, four = rows[(k + 2) * size : (k + 3) * size], rows[(k + 3) * size : (k + 4) * size]
+            a, b, c, d = change[k], change[k + 1], change[k + 2], change[k + 3]
+            e, f, g, h = total[k], total[k + 1], total[k + 2], total[k + 3]
+            for j in range(block):  # symmetric: what is beside the diagonal is read once
+                loss += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * total[j]
+                loss += (e * one[j] + f * two[j] + g * three[j] + h * four[j]) * change[j]
+            for j in range(block, block + LANES):
+                loss += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * total[j]
+    return loss

@@ -1,0 +1,169 @@
+"""Transitions from contact mode to contact mode, against leaving the one and entering the other."""
+
+import numpy as np
+import pytest
+from trial_rig import trial_rig
+
+from rubhpc import State
+from rubhpc.integrate.marches.friction import FrictionMarch
+from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
+from rubhpc.integrate.reduced_model.transitions import MetTransitions
+from rubhpc.integrate.setup import prepare
+from rubhpc.kernels.friction_coordinates import energies_gained, used_width
+from rubhpc.kernels.transitions import NO_TRANSITIONS, UNKNOWN, WORTH_A_TABLE, add_impulses, pass_over, see
+from rubhpc.study.study import Contact, Integrator
+
+PER_REVOLUTION = 64
+
+
+def whip(setup=None, n_stator=3):
+    setup = setup or prepare(
+        trial_rig(n_stator),
+        120.0,
+        contact=Contact(friction_law="coulomb"),
+        integrator=Integrator(),
+        samples_per_revolution=PER_REVOLUTION,
+    )
+    return FrictionMarch(setup, 20e-6, 0.6, State.at_rest(setup.model), None)
+
+
+def advance(march, n_revolution):
+    nothing = empty_samples(march.n_place, 0), new_accumulator(march.touching().size)
+    first = -n_revolution * PER_REVOLUTION
+    assert march.advance(first, 0, *nothing, is_recorded=False) is None
+    return march.motion()
+
+
+@pytest.fixture(scope="module")
+def settled():
+    march = whip()
+    advance(march, 60)
+    return march
+
+
+def tables_of(march, before, after):
+    """All of a transition, whatever a case has passed."""
+    met = MetTransitions({})
+    met._entry[before, after] = UNKNOWN - WORTH_A_TABLE
+    assert met.is_due(before, after, is_counted=True)
+    met.tabulate(march._tables_of(before), march._tables_of(after), march.bodies, march._friction)
+    return met.among(march.tables)
+
+
+def pairs_of_modes(march):
+    masks = [mask for mask in march.tables.mask.tolist() if mask >= 0]
+    return [(a, b) for a in masks for b in masks if a != b]
+
+
+def entered(march, mode, motion, angle):
+    stands = march._z.copy()
+    march._enter_at(mode, march._entered_with, np.cos(angle), np.sin(angle), motion)
+    found = march._z.copy()
+    march._z[:] = stands
+    return found
+
+
+def test_a_transition_is_leaving_and_entering(settled):
+    rng, march = np.random.default_rng(1), settled
+    masks = march.tables.mask.tolist()
+    for before, after in pairs_of_modes(march):
+        transitions = tables_of(march, before, after)
+        here, there = masks.index(before), masks.index(after)
+        z = entered(march, here, rng.standard_normal(march._motion.size), 0.3)
+        first, m = march.tables.n_eigenmode[there], z.shape[1]
+        wanted = entered(march, there, march._motion_in(here, z), 0.3)
+        found = np.zeros_like(z)
+        pass_over(transitions, transitions.entry[here, there], m, z, found)
+        found[:, first : first + 2 + march.bodies.radius.size] = wanted[
+            :, first : first + 2 + march.bodies.radius.size
+        ]
+        for seen in (march._motion_in(there, found), march.forces(there, found)):
+            expected = march._motion_in(there, wanted), march.forces(there, wanted)
+            known = expected[0] if seen.size == expected[0].size else expected[1]
+            np.testing.assert_allclose(seen, known, rtol=1e-9, atol=1e-9 * np.abs(known).max())
+
+
+def test_what_an_event_sees_and_gives(settled):
+    rng, march = np.random.default_rng(2), settled
+    bodies, n = march.bodies, march.bodies.stiffness.shape[0]
+    q = bodies.radius.size
+    before, after = next(pair for pair in pairs_of_modes(march) if pair[0] == 0)
+    transitions = tables_of(march, before, after)
+    mode = march.tables.mask.tolist().index(before)
+    z = entered(march, mode, rng.standard_normal(2 * n), 0.0)
+    motion, m = march._motion_in(mode, z), z.shape[1]
+    for i in range(q):
+        rows = np.stack(
+            [
+                np.concatenate([np.zeros(n), bodies.gap_jacobian[i]]),
+                np.concatenate([np.zeros(n), bodies.slip[i]]),
+                *march._friction.pull[[i, q + i]],
+            ]
+        )
+        known = rows @ motion
+        size = np.abs(rows) @ np.abs(motion)
+        assert np.all(
+            np.abs(see.py_func(transitions, mode, m, i, m, z) - known) < 1e-9 * size
+        )  # closed gaps cancel
+    given = rng.standard_normal((2, q))
+    struck = z.copy()
+    add_impulses(transitions, mode, q, m, given, struck)
+    change = march._motion_in(mode, struck) - motion
+    kicked = motion.copy()
+    kicked[n:] += given[0] @ bodies.gap_jacobian - given[1] @ bodies.slip
+    wanted = march._motion_in(mode, entered(march, mode, kicked, 0.0))
+    wanted -= march._motion_in(mode, entered(march, mode, motion, 0.0))
+    np.testing.assert_allclose(change, wanted, rtol=0.0, atol=1e-9 * np.abs(wanted).max())
+
+
+def test_losses_by_blocks_are_those_of_the_whole_form(settled):
+    rng, march = np.random.default_rng(3), settled
+    for before, after in pairs_of_modes(march)[:6]:
+        transitions = tables_of(march, before, after)
+        for mask in (before, after):
+            mode = march.tables.mask.tolist().index(mask)
+            used = used_width.py_func(march.tables, mode)
+            first, second = np.zeros((2, 2, march._z.shape[1]))
+            first[:, :used], second[:, :used] = rng.standard_normal((2, 2, used))
+            gained = np.zeros((2, 2))
+            for given, found in zip((NO_TRANSITIONS, transitions), gained, strict=True):
+                energies_gained(march.tables, mode, first, second, found, given)
+            form = march.tables.loss[mode]
+            size = np.abs(second.ravel()) @ np.abs(form) @ np.abs(second.ravel())
+            assert abs(gained[0, 0] - gained[1, 0]) < 1e-12 * size
+            assert gained[0, 1] == gained[1, 1]
+
+
+def test_a_case_goes_on_alike_with_tables_and_without(settled):
+    assert (settled.transitions.entry >= 0).sum() > 5
+    plain, other = whip(), whip(settled.setup)
+    other._met = settled._met
+    state, motions = settled.final(), []
+    for march in (plain, other):
+        march.start_again(state)
+        motions.append(advance(march, 1))
+    assert (plain.transitions.entry < 0).all()
+    np.testing.assert_allclose(*motions, rtol=0.0, atol=1e-9 * np.abs(motions[0]).max())
+
+
+def test_a_case_does_not_depend_on_tables_that_others_have_made(settled):
+    alone, after_another = whip(), whip(settled.setup)
+    assert not alone.library.transitions
+    assert after_another.library.transitions
+    assert advance(alone, 10).tobytes() == advance(after_another, 10).tobytes()
+
+
+def test_passages_count_alike_where_the_library_lacks_a_mode(settled):
+    """Large tables are of two kinds, and a mode may be given up: what others have left decides nothing."""
+    counts = []
+    for forgets in (False, True):
+        march = whip()
+        advance(march, 3)
+        state = march.final()
+        if forgets:
+            march.library.forget()
+        march.start_again(state)
+        advance(march, 3)
+        march._met._note_passages()
+        counts.append(march._met._entry)
+    assert counts[0] == counts[1]
