@@ -99,11 +99,11 @@ def carried(
     )
     has_touched = any(march.met)
     size, spin = np.abs(now.exponent.imag), abs(setup.spin)
-    goes_on = before.setup.held.is_followed and setup.held.is_followed and not change.jump
+    is_followed = before.setup.held.is_followed and setup.held.is_followed
     fast = size > LOWEST * spin
-    if goes_on:  # as from piece to piece
-        fast = np.abs(now.exponent) > max(FAST * spin, QUICK / change.ahead)
-    elif not has_touched:
+    if is_followed and not change.jump:  # as from piece to piece
+        fast = np.abs(now.exponent) > max(FAST * spin, QUICK / max(before.time, change.ahead))
+    elif not is_followed and not has_touched:
         fast |= (size > LOWEST_RINGING * spin) & (np.abs(now.exponent.real) < RINGING * size)
     exponent, enter = now.exponent[fast], now.enter[fast]
     left = 0.5 * np.stack([enter @ parts.shape, enter @ parts.shape.conj()])  # (2, modes, parts)
@@ -113,8 +113,9 @@ def carried(
     left[0, :, -2] -= (march.constants @ now.constant)[fast]
     real = np.zeros_like(left)  # what is sudden indeed
     if change.jump:
-        steady = Parts(parts.exponent[-2:], parts.shape[:, -2:])
-        real[..., -2:] = _pushed(steady, exponent, enter, change.jump * setup.held.momentum)
+        slow = np.append(np.abs(was.exponent) <= LOWEST * spin, [True, True])
+        pushing = Parts(parts.exponent[slow], parts.shape[:, slow])
+        real[..., slow] = _pushed(pushing, exponent, enter, change.jump * setup.held.momentum)
     longest = TOUCH * 2.0 * np.pi / spin if mask else np.inf
     spans = np.minimum(_spans(before, setup, change), longest)
     taken = 1.0 - left_over(_apart(parts, exponent), *spans, has_touched=has_touched)

@@ -49,6 +49,7 @@ class Passing:
         self._check = check
         self._march: EventDrivenMarch | None = None
         self._left: tuple[int, Floats] | None = None  # where the last piece has ended, in modes
+        self._lasted = 0.0  # s, that piece
         self._room: dict[int, Samples] = {}  # by how many samples a piece has
         self._at: PieceSetup | None = None  # the piece at whose beginning the march stands
 
@@ -65,7 +66,7 @@ class Passing:
         """Take one piece; `earlier` holds the contact forces before it, and how long ago they began, s.
 
         `is_balanced`: its energies are asked for. `goes_on`: the piece before was taken too, with the same
-        acceleration, and matrices of the same range.
+        acceleration, and matrices of the same range; or it is the first one, and no fast mode rings.
         """
         if self._check is not None:
             self._check()
@@ -81,12 +82,13 @@ class Passing:
     def continued(
         self, setup: PieceSetup, begun: State | Place, before: Standing | None, change: Change
     ) -> State | Place:
-        """Where a piece begins after another in other matrices.
+        """Where a piece begins after another in other matrices, or at another acceleration that these follow.
 
         What a curved gap adds follows the motion, which may not change while that is closed.
         """
-        is_other = before is not None and before.setup.held is not setup.held
-        if self._march is None or before is None or not is_other or not isinstance(begun, Place):
+        if self._march is None or before is None or not isinstance(begun, Place):
+            return begun
+        if before.setup.held is setup.held and not setup.held.is_followed:
             return begun
         if not self._march.has_closed_form and (begun.contact_force > 0.0).any():
             return begun
@@ -117,7 +119,7 @@ class Passing:
         left = self._left if goes_on else None
         march, setup = self._march, setups[first]
         try:
-            library = begin_stretch(march, setup, n_sample, begun, left)
+            library = begin_stretch(march, setup, begun, self._longer(setup, n_sample), left)
         except NoClosedForm:
             return None
         if library is None:
@@ -125,8 +127,12 @@ class Passing:
             return None
         found = take_stretch(march, library, setups, first, room, begun, earlier, self._check)
         if found is not None:
-            self._left = found.left
+            self._left, self._lasted = found.left, setups[first + found.n_piece - 1].interval * n_sample
         return found
+
+    def _longer(self, setup: PieceSetup, n_sample: int) -> float:
+        """Duration, s, of the last piece or of the next one, whichever is longer."""
+        return max(self._lasted, setup.interval * n_sample)
 
     def _begin(self, setup: PieceSetup, n_sample: int, begun: State | Place, *, goes_on: bool) -> ModalMarch:
         """The march that stands where a piece begins."""
@@ -135,10 +141,8 @@ class Passing:
             if at is setup:
                 return march
             march.begin(setup, begun)
-            library = march.library
-            is_followed = isinstance(library, RetunedLibrary) and library.follows(march.mask)
-            if self._left is not None and goes_on and is_followed:
-                march.keep_fast(self._left, setup.spin, setup.interval * n_sample)
+            if goes_on:
+                self._keep_fast(march, setup, n_sample)
             return march
         kind = march_of(setup.scheme, setup)
         is_stepped = kind is ContactSteppingMarch
@@ -147,7 +151,17 @@ class Passing:
         assert isinstance(made, ModalMarch)
         if isinstance(made, EventDrivenMarch):
             self._march = made
+            if goes_on:
+                mask, z = made.reached_in()
+                self._left = mask, np.zeros_like(z)
+                self._keep_fast(made, setup, n_sample)
         return made
+
+    def _keep_fast(self, march: EventDrivenMarch, setup: PieceSetup, n_sample: int) -> None:
+        """Let fast modes that follow the speed go on as they were."""
+        library = march.library
+        if self._left is not None and isinstance(library, RetunedLibrary) and library.follows(march.mask):
+            march.keep_fast(self._left, setup.spin, self._longer(setup, n_sample))
 
     def _pass(
         self,
@@ -173,6 +187,7 @@ class Passing:
                 break
         gained = march.energy() - before if is_balanced else math.nan
         self._left = march.reached_in() if isinstance(march, EventDrivenMarch) else None
+        self._lasted = setup.interval * n_sample
         return Passed(samples.whole, accumulators, march.n_step, march.reached(), gained, reason or "")
 
     def _room_for(self, model: Model, n_sample: int) -> Samples:

@@ -25,7 +25,7 @@ from rubhpc.integrate.changing_speed.twist_ramp import moved
 from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_accumulator
 from rubhpc.integrate.record import State
 from rubhpc.integrate.start import start_of
-from rubhpc.study.initial import Initial
+from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import cut
 
 if TYPE_CHECKING:
@@ -135,7 +135,12 @@ def integrate_run_up(
         goes_on = last is not None and last[0].goes_on_in(
             setup, float(accelerations[piece - 1]), float(accelerations[piece])
         )
-        if last is not None and reached is not None and last[0].held is not setup.held:
+        if (
+            last is not None
+            and reached is not None
+            and not goes_on
+            and (last[0].held is not setup.held or setup.held.is_followed)
+        ):
             ended = passing.standing(last[0], reached, last[1])
             # What an acceleration that jumps leaves to ring is no work of the matrices.
             jump = float(accelerations[piece] - accelerations[piece - 1])
@@ -144,12 +149,14 @@ def integrate_run_up(
             reached = moved(reached, setup, leant, none)
             reached = passing.continued(setup, reached, ended, change)
             reached = moved(reached, setup, -leant, none)
-            held_from = times[piece]
+            if last[0].held is not setup.held:
+                held_from = times[piece]
         while not reason and (place := piece - block) < len(setups):
             first = int(cuts[piece])
             if reached is None:
                 assert isinstance(initial, Initial)
                 reached = start_of(initial, setup, clearance, law.speed[0])
+                goes_on = initial.from_ == CONTACT_FREE
             stretch, before_it, follows = None, (earlier, before[piece]), goes_on or place > 0
             if not late[piece]:
                 stretch = passing.take_several(

@@ -38,20 +38,21 @@ class Stretch(NamedTuple):
 def begin_stretch(
     march: EventDrivenMarch,
     setup: PieceSetup,
-    n_sample: int,
     begun: Place,
+    since: float,
     left: tuple[int, Floats] | None = None,
 ) -> RetunedLibrary | None:
     """Begin a piece, with others to follow in the same kernel call; None where it is to be taken by itself.
 
     It has begun either way, but where the march is none that takes several (`has_piece_loop`). `left` is
-    where the piece before has ended (`EventDrivenMarch.reached_in`), of modes that follow the speed.
+    where the piece before has ended (`EventDrivenMarch.reached_in`), of modes that follow the speed, `since`
+    the time from its middle to that of this one, s.
     """
     library = march.begin_tuned(setup, begun)
     if not isinstance(library, RetunedLibrary):
         return None
     if left is not None and library.follows(march.mask):
-        march.keep_fast(left, setup.spin, setup.interval * n_sample)
+        march.keep_fast(left, setup.spin, since)
     return None if library.n_room == 1 or library.has_strange() else library
 
 

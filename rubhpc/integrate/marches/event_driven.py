@@ -72,10 +72,10 @@ class EventDrivenMarch(ContactSets):
         """Set of contacts in which the case stands, and a copy of its modal coordinates (2, m)."""
         return self.moved_by(self.mask), self._z.copy()
 
-    def keep_fast(self, before: tuple[int, Floats], spin: float, lasts: float) -> None:
+    def keep_fast(self, before: tuple[int, Floats], spin: float, since: float) -> None:
         """Let fast modes go on as they were before a piece began at another speed, in the same contacts.
 
-        `spin` (rad/s) is that of the piece, which `lasts` so long, s.
+        `spin` (rad/s) is that of the piece, `since` the time from the middle of the one before to its own, s.
 
         Modes follow the speed, which changes evenly, and do not ring for it (`kernels.pieces.begin_piece`).
         """
@@ -84,7 +84,7 @@ class EventDrivenMarch(ContactSets):
             return
         mode = int(self._bare_progress["mode"])
         pace = self.tables.pace[mode]
-        fast = (pace > max(FAST * abs(spin), QUICK / lasts)) | (pace == DYING)
+        fast = (pace > max(FAST * abs(spin), QUICK / since)) | (pace == DYING)
         fast[int(self.tables.n_eigenmode[mode]) :] = False
         self._z[:, fast] = z[:, fast]
 

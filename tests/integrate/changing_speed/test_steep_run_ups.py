@@ -140,6 +140,23 @@ def test_accelerations_of_a_steep_passage(speeds):
     assert max(off.values()) < 5e-3, off
 
 
+def test_bends_and_the_start_leave_no_spikes():
+    """Fast modes of a bearing that hardly moves do not ring where the speed goes on evenly."""
+    rig, law = machine(), SpeedLaw(time=(0.0, 0.05, 0.09, 0.16), speed=(300.0, 301.0, 319.0, 321.1))
+    expected = stepped(rig, law)
+    found = run_up(
+        rig,
+        speed_law=list(zip(law.time, law.speed, strict=True)),
+        clearance=1.0,
+        friction=0.0,
+        probes=PROBES,
+        samples_per_revolution=PER_REVOLUTION,
+    )
+    for probe, signal in zip(PROBES, expected, strict=True):
+        off = np.abs(found[f"probe_{probe.name}"].values - signal).max()
+        assert off < 0.05 * np.abs(signal).max(), (probe.name, off / np.abs(signal).max())
+
+
 RUB = {"clearance": 1.6e-4, "friction": 0.1}
 EVEN_STEP = 2e-6  # s
 
