@@ -103,7 +103,8 @@ def run_up(
         (m/s), below 0 where steady sliding does not hold; and over `revolution` and `order` the
         amplitude (zero to peak) and phase of the displacements of the disc, its torsion and the probes, over
         six revolutions: `amplitude_vertical`, `phase_vertical` (rad, by which the signal leads the order of
-        the shaft's angle), and so on. A case that ends early says why in the attribute `reason`.
+        the shaft's angle), and so on. A case that ends early says why in the attribute `reason`;
+        what is wrong with its result stands in `note`.
 
     Raises
     ------
@@ -166,7 +167,7 @@ def run_up(
         variables[short] = own[name].dims, values, _about(own[name].unit, own[name].long_name)
     attributes: dict[str, Any] = {
         "reason": found.reason,
-        "note": one.note,
+        "note": "; ".join(text for text in (one.note, found.advice) if text),
         "rig": one.rig.as_dict(),
         "study": {"record": {"probe": [plain(probe) for probe in measured]}},
     }

@@ -48,7 +48,7 @@ class RunUpRecord:
     measures : dict
         Of the whole run-up.
     remark : str
-        Why it ended early; "" where it did not.
+        Why it ended early, or what is wrong with its result; "" where nothing is.
     """
 
     arrays: dict[str, Floats]
@@ -113,7 +113,7 @@ def record_run_up(
     return RunUpRecord(
         arrays=known | (signals if turns else {}),
         measures=measures,
-        remark=found.reason,
+        remark=found.reason or found.advice,
         status=DIVERGED if found.reason else DONE,
     )
 

@@ -17,7 +17,7 @@ import numpy as np
 from rubhpc.study.speed_law import LAG
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -30,6 +30,7 @@ NEXT_SPEED = 0.02  # of a speed, to the next one for which pieces are judged
 STILL = 1e-12  # of the largest degree, below which one is not moved
 PASSING = 0.01  # growth over the speed, 1/rad, at which a passage meets a resonance
 LEAST = LAG / 64.0  # rad, for signals of nodes that do not move with the shaft
+PROMISED = 5e-3  # error of a signal without contact, relative, beyond which a case says so
 
 
 class Linear(NamedTuple):
@@ -75,19 +76,37 @@ class Ripples:
     def __init__(self, linear: Callable[[float], Linear], accuracy: float) -> None:
         self._linear, self._accuracy = linear, accuracy
         self._known: dict[int, Linear] = {}
-        self._allowed: dict[tuple[int, float], float] = {}
+        self._errors: dict[tuple[int, float], Floats] = {}
 
     def allowed(self, speed: float, turns: float) -> float:
         """Lag (rad) of a piece at a speed, rad/s, that takes so many revolutions."""
-        place = round(math.log(speed) / NEXT_SPEED)
-        asked = place, turns
-        if asked not in self._allowed:
-            error = self._per_lag(place, turns) / (SHARE * self._accuracy)
-            self._allowed[asked] = LAG / max(LAG * error, 1.0)
-        return max(self._allowed[asked], LEAST)
+        error = self._per_lag(speed, turns).max(initial=0.0) / (SHARE * self._accuracy)
+        return max(LAG / max(LAG * float(error), 1.0), LEAST)
 
-    def _per_lag(self, place: int, turns: float) -> float:
-        """Relative error of the worst signal over the lag, 1/rad."""
+    def advice(self, speed: Floats, turns: Floats, lag: Floats, names: Sequence[str]) -> str:
+        """What to do where pieces, (n,) each, are too long for a signal; "" where they are not.
+
+        `names` are those of the signals, `lag` (rad) that of the pieces.
+        """
+        worst = np.zeros(len(names))
+        for at, lasts, late in zip(speed.tolist(), turns.tolist(), np.abs(lag).tolist(), strict=True):
+            worst = np.maximum(worst, late * self._per_lag(at, lasts))
+        error = worst.max()
+        if error <= max(PROMISED, self._accuracy):
+            return ""
+        return (
+            f"its pieces are too long for the change of speed: {names[int(worst.argmax())]} may err by "
+            f"{100 * error:.2g} %; take more samples_per_revolution (a power of 2), no pieces_per_revolution"
+        )
+
+    def _per_lag(self, speed: float, turns: float) -> Floats:
+        """Relative error of each signal over the lag, 1/rad; 0 for those that the unbalance leaves alone."""
+        place = round(math.log(speed) / NEXT_SPEED)
+        if (place, turns) not in self._errors:
+            self._errors[place, turns] = self._error(place, turns)
+        return self._errors[place, turns]
+
+    def _error(self, place: int, turns: float) -> Floats:
         speed = math.exp(place * NEXT_SPEED)
         if place not in self._known:
             self._known[place] = self._linear(speed)
@@ -96,5 +115,6 @@ class Ripples:
         at = np.concatenate([[1.0], 1.0 + count / turns])
         signals = np.abs(self._known[place].signals((1j * at + PASSING) * speed))
         own, sides = signals[0], signals[1:] * (3.0 / (np.pi * count[:, np.newaxis]) ** 2)
-        is_heard = own > 0.0
-        return float((np.linalg.norm(sides, axis=0)[is_heard] / own[is_heard]).max(initial=0.0))
+        error: Floats = np.zeros_like(own)
+        np.divide(np.linalg.norm(sides, axis=0), own, out=error, where=own > 0.0)
+        return error

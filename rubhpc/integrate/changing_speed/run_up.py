@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.fem.model import Model
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
     from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
@@ -50,6 +51,8 @@ class RunUp:
     ----------
     reason : str
         Why it ended early; "" where it did not.
+    advice : str
+        What to do where its pieces are too long for a signal; "" where they are not.
     whole : (n_row, n_sample)
         Samples as `Samples.whole`, locked to the shaft.
     speed : (n_revolution,), rad/s
@@ -74,6 +77,7 @@ class RunUp:
     together: Accumulator
     n_step: int
     final: State
+    advice: str = ""
 
 
 def integrate_run_up(
@@ -124,6 +128,9 @@ def integrate_run_up(
     late, sudden = np.zeros((2, speeds.size))
     sudden[bent] = accelerations[bent] - law.at_angle(angles[bent])[2]  # past its first sample
     late[bent] = ((speeds - 0.5 * (at_cuts[1:] + at_cuts[:-1])) * durations)[bent]
+    is_even = sizes > 1  # those of a sample are around a bend
+    lag = (accelerations * durations**2 / 12.0)[is_even]
+    advice = pieces.ripples.advice(speeds[is_even], sizes[is_even] / per_revolution, lag, signal_names(model))
     unit, none = unit_rotation(model.rotor), np.zeros(model.rotor.n_dof)
     piece, held_from = 0, times[0]  # since when the matrices are held
     last: tuple[PieceSetup, int] | None = None  # piece of the matrices before, and its samples
@@ -208,4 +215,11 @@ def integrate_run_up(
         together=gathered.together,
         n_step=n_step,
         final=state_at(reached, setup),
+        advice=advice,
     )
+
+
+def signal_names(model: Model) -> list[str]:
+    """Names of what `Pieces.ripples` judge: the disc's displacements and the probes."""
+    probes = () if model.probe is None else model.probe.probes
+    return ["vertical", "horizontal", *(f"probe {probe.name}" for probe in probes)]

@@ -1,13 +1,21 @@
 """What pieces of constant speed leave of the unbalance force, and what is left of changes that are spread."""
 
 import math
+import re
 
 import numpy as np
 import pytest
+from test_steep_run_ups import PROBES, machine
 
+from rubhpc import run_up
+from rubhpc.integrate.changing_speed import ripples
 from rubhpc.integrate.changing_speed.carried_modes import left_over
+from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.changing_speed.ripples import Linear, Ripples
+from rubhpc.integrate.setup import prepare
+from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import LAG, SpeedLaw, cut
+from rubhpc.study.study import Contact, Integrator, Recording
 
 NATURAL, DAMPING = 200.0, 0.02  # rad/s, of critical
 
@@ -51,6 +59,38 @@ def test_pieces_go_with_the_accuracy():
     coarse, fine = (Ripples(one_mass, accuracy).allowed(120.0, 0.125) for accuracy in (1e-3, 2e-4))
     assert fine == pytest.approx(0.2 * coarse)
     assert Ripples(one_mass, 1e-9).allowed(120.0, 0.125) == pytest.approx(LAG / 64.0)
+
+
+def test_pieces_that_are_too_long_are_named():
+    """The error of the worst signal, where it is more than 0.5 %; what is allowed errs by 0.075 %."""
+    judged, one, speed = Ripples(one_mass, 1e-3), np.ones(1), 120.0
+    most = judged.allowed(speed, 0.125)
+    assert judged.advice(speed * one, 0.125 * one, 6.0 * most * one, ["left"]) == ""
+    lags = -most * np.array([1.0, 8.0])
+    assert "left may err by 0.6 %" in judged.advice(np.full(2, speed), np.full(2, 0.125), lags, ["left"])
+
+
+def test_a_run_up_in_too_few_pieces_says_so():
+    """The bearing that errs most, and by how much, but for a factor of two: it is an estimate."""
+    case = {"start": 300.0, "stop": 318.0, "time": 0.2, "clearance": 1.0, "friction": 0.0}
+    case |= {"probes": PROBES, "samples_per_revolution": 64}
+    coarse, fine = run_up(machine(), **case, pieces_per_revolution=1), run_up(machine(), **case)
+    assert fine.note == ""
+    found = re.search(r"probe at_1 may err by ([0-9.]+) %", coarse.note)
+    off = np.linalg.norm(coarse.probe_at_1 - fine.probe_at_1) / np.linalg.norm(fine.probe_at_1)
+    assert 0.5 < 0.01 * float(found[1]) / off < 2.0
+
+
+def test_a_case_of_a_study_says_so(monkeypatch):
+    """36 samples a revolution can be cut into four pieces at most."""
+    law = SpeedLaw(time=(0.0, 0.1), speed=(300.0, 345.0))
+    setup = prepare(
+        machine(), 345.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=36, probes=PROBES
+    )
+    recording = Recording(transient=0, revolutions=law.n_revolution, samples_per_revolution=36)
+    case = {"clearance": 1.0, "friction": 0.0, "initial": Initial(from_=CONTACT_FREE)}
+    monkeypatch.setattr(ripples, "PROMISED", 1e-3)
+    assert "take more samples_per_revolution" in record_run_up(setup, law, recording=recording, **case).remark
 
 
 def test_a_change_that_is_spread():
