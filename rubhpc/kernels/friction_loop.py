@@ -32,6 +32,7 @@ from rubhpc.kernels.contact_modes import (
     ModeTables,
     Reduced,
     find_mode,
+    floor_log2,
     is_beyond,
 )
 from rubhpc.kernels.event_bounds import free_until
@@ -42,7 +43,6 @@ from rubhpc.kernels.event_steps import (
     count_event,
     end_samples,
     longest_step,
-    note_resolved,
     record_event,
     record_touch,
     sample_step,
@@ -163,15 +163,16 @@ def advance_with_friction(
         states = mask[mode]
         is_ahead = is_sample and states == 0
         longest = longest_step(clock, last_tick, highest_level, is_recorded, is_ahead, progress.tick)
-        is_measured, finest = is_recorded and states != 0, clock.contact_level
+        is_measured, finest = is_recorded and states != 0, 1 << clock.sample_level
         if is_measured and progress.tick > progress.entered:
             age = contact_age(progress)
             if age != progress.contact_age:
                 since = (progress.tick - progress.entered) * clock.tick
                 resolved = resolved_friction(tables, mode, since, z_re, z_im)
-                note_resolved(resolved, clock, highest_level, age, progress)
-            finest = min(clock.contact_level, progress.resolved_level)
-            longest = min(longest, finest)
+                progress.contact_age = age
+                progress.resolved = int(max(1.0, min(resolved / clock.tick, 1.0 * finest)))
+            finest = min(finest, progress.resolved)
+            longest = min(longest, floor_log2(finest))
         if not is_at_event and progress.tick >= renewed_at and progress.tick + (1 << longest) > sure_to:
             free_to, sure_to = free_until(
                 states,
@@ -280,16 +281,16 @@ def advance_with_friction(
 def measured_step(clock: Clock, last_tick: int, finest: int, sure_to: int, progress: Progress) -> int:
     """Ticks of the next step of a closed pair that is recorded: on to the next sample in equal steps.
 
-    None is longer than 2^finest ticks, nor, but for a search for events, ends after the tick `sure_to`. They
+    None is longer than `finest` ticks, nor, but for a search for events, ends after the tick `sure_to`. They
     are taken by powers of two of ticks, and so counts of few digits are chosen.
     """
     now = progress.tick
     next_sample = ((now >> clock.sample_level) + 1) << clock.sample_level
     ahead = min(last_tick, next_sample) - now
-    most = min(1 << finest, max(sure_to - now, 1 << clock.search_level))
+    most = min(finest, max(sure_to - now, 1 << clock.search_level))
     n_step = (ahead + most - 1) // most
     count = (ahead + n_step - 1) // n_step
-    unit = max(1, (1 << finest) >> FEW_BITS)
+    unit = max(1, (1 << floor_log2(finest)) >> FEW_BITS)
     whole = (count + unit - 1) // unit * unit
     return min(ahead, whole if whole <= most else max(most // unit * unit, count % unit))
 
