@@ -44,7 +44,7 @@ class Accumulator(NamedTuple):
     friction_work: Floats  # (q,), J
     least_slip: Floats  # (q,), m/s
     peak_force: Floats  # (q,), N, largest mean over the averaging time: see `force_average`
-    force_piece: Floats  # (q, 6, n), pieces of the force within that time
+    force_piece: Floats  # (q, 7, n), pieces of the force within that time
     force_held: Ints  # (q, 2), which of them
     origin: Floats  # (1,), s, by which their clock is ahead of the march's
     peak_lateral: Floats  # (q,), m

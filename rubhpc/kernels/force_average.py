@@ -22,6 +22,7 @@ SHORTEST = AVERAGING_TIME / 64  # s, of two pieces that follow one another; shor
 MOST_PIECES = 160  # of a force within the averaging time; what does not fit is added to the last one
 
 BEGIN, END, BEFORE, IMPULSE, FIRST, LAST = range(6)  # rows of `piece`: s, s, N s, N s, N, N
+LOUD = 6  # row whose first number is the end of the last piece whose force may have passed the peak, s
 OLDEST, COUNT = range(2)  # columns of `held`
 
 
@@ -38,6 +39,14 @@ def part_of(piece: Floats, k: int, time: float) -> tuple[float, float]:
     quadratic, cubic = 3.0 * impulse - 2.0 * a - b, a + b - 2.0 * impulse
     s = (time - piece[BEGIN, k]) / length
     return s * (a + s * (quadratic + s * cubic)), (a + s * (2.0 * quadratic + 3.0 * s * cubic)) / length
+
+
+@jit_inline
+def greatest_force(step: float, impulse: float, first: float, last: float, merged: float) -> float:
+    """Bound on the force (N) of a piece, and of those that it is one with: Bernstein's of its parabola."""
+    if not step > 0.0:
+        return np.inf
+    return max(first, last, 3.0 * impulse / step - first - last, merged)
 
 
 @jit_lean
@@ -64,7 +73,7 @@ def add_force(
         When the piece begins, counted from `origin` (1,), and how long it lasts; 0 for an impact.
     impulse, first, last : float, N s, N, N
         Its impulse, and the force at its ends.
-    pieces : (q, 6, MOST_PIECES)
+    pieces : (q, 7, MOST_PIECES)
         The pieces within the averaging time, in a ring.
     held : (q, 2)
         Which is the oldest of them, and how many there are.
@@ -91,6 +100,11 @@ def add_force(
         now, count = (k + count) % most, count + 1
         piece[BEGIN, now], piece[END, now], piece[BEFORE, now] = begin, end, before
         piece[IMPULSE, now], piece[FIRST, now], piece[LAST, now] = impulse, first, last
+    if greatest_force(step, impulse, first, last, piece[FIRST, now]) > peak[i]:
+        piece[LOUD, 0] = end
+    elif begin - AVERAGING_TIME >= piece[LOUD, 0]:  # no mean of less than the peak is above it
+        held[i, OLDEST], held[i, COUNT] = k, count
+        return
     before = piece[BEFORE, now]
     time, start = begin, begin - AVERAGING_TIME  # the ends of the window
     is_inside = piece[BEGIN, k] <= start  # whether it begins in piece k, or in a flight before that

@@ -11,6 +11,7 @@ from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import Accumulator
 from rubhpc.kernels.case_progress import LONG_AGO, NONE, Clock, Progress
 from rubhpc.kernels.contact_modes import DYING, ModeTables, Reduced, dot, enter, find_mode
+from rubhpc.kernels.force_average import LOUD
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Samples
@@ -152,6 +153,7 @@ def begin_part(part: Accumulator, before: Accumulator, since: float, closed: int
                 part.force_piece[i, row, k] = before.force_piece[i, row, k]
         for k in range(2):
             part.force_held[i, k] = before.force_held[i, k]
+        part.force_piece[i, LOUD, 0] = np.inf  # to a peak that begins anew
     part.origin[0] = before.origin[0] + since
     for i in range(part.is_touching.size):
         part.is_touching[i] = (closed >> i) & 1 == 1

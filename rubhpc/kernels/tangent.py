@@ -20,6 +20,7 @@ from rubhpc.kernels.complementarity import solve_active
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot, floor_log2
 from rubhpc.kernels.mode_change import AT_REST, product
 from rubhpc.kernels.trail import Trail  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.transitions import UNKNOWN, Transitions, add_impulses, pass_over, see
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -57,6 +58,8 @@ class Tangent(NamedTuple):
     compliance: Floats  # (2 q, 2 q)
     speed: Floats  # (2 q,)
     found: Floats  # (2 q,)
+    rate: Floats  # (2, q), of gaps, then slips, with the displacement
+    given: Floats  # (2, q), impulses, then tractions, that its derivative has
     active: NDArray[np.bool_]  # (2 q,)
     elimination: Floats  # (2 q, 2 q + 1)
 
@@ -76,6 +79,8 @@ def new_tangent(m: int, q: int, impulse_of_change: Floats, generic: Floats, n_re
         compliance=np.zeros((2 * q, 2 * q)),
         speed=np.zeros(2 * q),
         found=np.zeros(2 * q),
+        rate=np.zeros((2, q)),
+        given=np.zeros((2, q)),
         active=np.zeros(2 * q, dtype=np.bool_),
         elimination=np.zeros((2 * q, 2 * q + 1)),
     )
@@ -91,6 +96,7 @@ def carry_along(
     per_revolution: int,
     trail: Trail,
     modes: TrailModes,
+    transitions: Transitions,
     tangent: Tangent,
 ) -> int:
     """Carry a displacement along a trail: `tangent.grown.size` revolutions of `per_revolution` ticks.
@@ -158,10 +164,25 @@ def carry_along(
             add_rate(shift, exponent, drift, z, d)
             forced = tables.n_eigenmode[place]
             cosine_rate, sine_rate = d[0, forced], d[1, forced]
-        read_displacement(tables, place, tangent)
-        if is_touching and reduced.spring == 0.0:
-            strike(reduced, modes.has_states, trail.velocity[k], tangent)
-        enter_displacement(tables, next_place, cosine_rate, sine_rate, tangent)
+        strikes, passed = is_touching and reduced.spring == 0.0, UNKNOWN
+        if transitions.mode.size > 0:
+            passed = transitions.entry[place, next_place]
+        if passed >= 0:
+            q, m = reduced.radius.size, d.shape[1]
+            if strikes:
+                for i in range(q):
+                    tangent.rate[0, i], tangent.rate[1, i], _, _ = see(transitions, place, m, i, m, d)
+                strike(reduced, True, trail.velocity[k], tangent)
+            pass_over(transitions, passed, m, d, z)
+            if strikes:
+                add_impulses(transitions, next_place, q, m, tangent.given, z)
+            for i in range(m):
+                d[0, i], d[1, i] = z[0, i], z[1, i]
+        else:
+            read_displacement(tables, place, tangent)
+            if strikes:
+                strike_motion(reduced, modes.has_states, trail.velocity[k], tangent)
+            enter_displacement(tables, next_place, cosine_rate, sine_rate, tangent)
         if shift != 0.0:
             read_begun(trail, k + 1, z)
             add_rate(-shift, modes.exponent[following], modes.drift[following], z, d)
@@ -235,16 +256,35 @@ def size_of(motion: Floats, spin: float) -> float:
 
 
 @jit_lean_sum
+def strike_motion(reduced: Reduced, has_states: bool, velocity: Floats, tangent: Tangent) -> None:
+    """Apply the derivative of an impact to `tangent.motion`, as `strike` finds it."""
+    q, n = reduced.gap_jacobian.shape
+    moved = tangent.motion[n:]
+    for i in range(q):
+        tangent.rate[0, i] = product(reduced.gap_jacobian[i], moved)
+        tangent.rate[1, i] = product(reduced.slip[i], moved)
+    strike(reduced, has_states, velocity, tangent)
+    for i in range(q):
+        given, along_slip = tangent.given[0, i], tangent.given[1, i]
+        for k in range(n):
+            if has_states:
+                moved[k] += given * reduced.gap_jacobian[i, k] - along_slip * reduced.slip[i, k]
+            else:
+                moved[k] += given * reduced.force_direction[i, k]
+
+
+@jit_lean_sum
 def strike(reduced: Reduced, has_states: bool, velocity: Floats, tangent: Tangent) -> None:
-    """Apply the derivative of an impact to `tangent.motion`: `dv+ = dv- - F (R F)^-1 R dv-`.
+    """Fill `tangent.given` with the impulses of the derivative of an impact: `dv+ = dv- - F (R F)^-1 R dv-`.
 
     The rows R are those of the gap velocities that impulses change, each times 1 + restitution where the pair
     parts, and of the slips that they stop; F are the directions of these impulses, friction in proportion
-    included. `velocity` (2, n) are those before and after it.
+    included. `velocity` (2, n) are those before and after it, `tangent.rate` what the displacement does to
+    the rates of gaps and to slips.
     """
     q, n = reduced.gap_jacobian.shape
     impulse, active, share = tangent.impulse, tangent.active, tangent.share
-    moved = tangent.motion[n:]
+    tangent.given[:] = 0.0
     largest = 0.0
     for i in range(tangent.impulse_of_change.shape[0]):
         total = 0.0
@@ -262,12 +302,12 @@ def strike(reduced: Reduced, has_states: bool, velocity: Floats, tangent: Tangen
         if active[i]:
             parts = abs(product(reduced.gap_jacobian[i], velocity[1])) > AT_REST
             scale = 1.0 + reduced.restitution if parts else 1.0
-            tangent.speed[i] = scale * product(reduced.gap_jacobian[i], moved)
+            tangent.speed[i] = scale * tangent.rate[0, i]
             if has_states:
                 slip = reduced.rim_speed[i] + product(reduced.slip[i], velocity[1])
                 if abs(slip) <= STOPPED * reduced.rim_speed[i]:
                     active[q + i] = True
-                    tangent.speed[q + i] = product(reduced.slip[i], moved)
+                    tangent.speed[q + i] = tangent.rate[1, i]
                 else:
                     share[i] = impulse[q + i] / impulse[i]
     for j in range(q):
@@ -289,16 +329,10 @@ def strike(reduced: Reduced, has_states: bool, velocity: Floats, tangent: Tangen
         return
     for i in range(q):
         if active[i]:
-            for k in range(n):
-                if has_states:
-                    moved[k] += tangent.found[i] * (
-                        reduced.gap_jacobian[i, k] - share[i] * reduced.slip[i, k]
-                    )
-                else:
-                    moved[k] += tangent.found[i] * reduced.force_direction[i, k]
+            tangent.given[0, i] = tangent.found[i]
+            tangent.given[1, i] = share[i] * tangent.found[i]
         if active[q + i]:
-            for k in range(n):
-                moved[k] += tangent.found[q + i] * reduced.slip[i, k]
+            tangent.given[1, i] -= tangent.found[q + i]
 
 
 @jit_inline_sum

@@ -8,7 +8,7 @@ import pytest
 
 from rubhpc.integrate.measuring.samples import following_accumulator, new_accumulator
 from rubhpc.kernels.accumulators import Accumulator
-from rubhpc.kernels.force_average import AVERAGING_TIME, MOST_PIECES, add_force
+from rubhpc.kernels.force_average import AVERAGING_TIME, LOUD, MOST_PIECES, add_force
 
 
 def add(pieces, accumulator: Accumulator | None = None, i=0):
@@ -47,6 +47,23 @@ def on_a_grid(pieces, n=400_000):
         return np.where(k < 0, 0.0, total[np.maximum(k, 0)] + within)
 
     return (passed(times) - passed(times - AVERAGING_TIME)).max() / AVERAGING_TIME
+
+
+@pytest.mark.parametrize("longest", [1e-6, 8e-6, 60e-6])
+def test_pieces_that_cannot_pass_the_peak_are_left_out_bit_for_bit(longest):
+    rng = np.random.default_rng(7)
+    quick, whole, n_quiet, time = new_accumulator(1), new_accumulator(1), 0, 0.0
+    for n in range(3000):
+        step = 0.0 if rng.random() < 0.02 else longest * rng.random()
+        first, last = rng.random(2) * (0.2 + math.sin(0.01 * n) ** 2)
+        share = step * (0.5 * (first + last) + 0.1 * rng.random()) if step > 0.0 else 1e-6 * rng.random()
+        for seen in (quick, whole):
+            add([(time, step, share, first, last)], seen)
+        n_quiet += time - AVERAGING_TIME >= quick.force_piece[0, LOUD, 0]
+        whole.force_piece[0, LOUD, 0] = np.inf
+        assert quick.peak_force.tobytes() == whole.peak_force.tobytes()
+        time += step + (0.0 if rng.random() < 0.9 else longest * rng.random())
+    assert n_quiet > 300
 
 
 @pytest.mark.parametrize("step", [0.7e-6, 7e-6, 35e-6])

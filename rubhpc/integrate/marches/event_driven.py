@@ -21,6 +21,7 @@ from rubhpc.kernels.piece_loop import advance_pieces
 from rubhpc.kernels.pieces import FAST, QUICK
 from rubhpc.kernels.sections_loop import advance_sections
 from rubhpc.kernels.trail import Trail, begin_trail, new_trail, no_trail
+from rubhpc.kernels.transitions import NO_TRANSITIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Progress
     from rubhpc.kernels.pieces import Pieces
+    from rubhpc.kernels.transitions import Transitions
 
     Floats = NDArray[np.float64]
 
@@ -67,6 +69,11 @@ class EventDrivenMarch(ContactSets):
             n = self.bodies.stiffness.shape[0]
             self._motion[:n] += setup.reduced.project[:, : moved.size] @ moved
         self._enter_first(place.contact_force)
+
+    @property
+    def transitions(self) -> Transitions:
+        """Transitions between the contact modes of the tables that are tabulated: none."""
+        return NO_TRANSITIONS
 
     def reached_in(self) -> tuple[int, Floats]:
         """Set of contacts in which the case stands, and a copy of its modal coordinates (2, m)."""

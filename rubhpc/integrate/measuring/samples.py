@@ -14,7 +14,7 @@ from rubhpc.kernels.accumulators import (
     Accumulator,
     Samples,
 )
-from rubhpc.kernels.force_average import LAST, MOST_PIECES
+from rubhpc.kernels.force_average import LOUD, MOST_PIECES
 from rubhpc.schema import PROBE
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
     return _accumulator(
         n_stator,
         n_stator if n_place is None else n_place,
-        force_piece=np.zeros((n_stator, LAST + 1, MOST_PIECES)),
+        force_piece=np.zeros((n_stator, LOUD + 1, MOST_PIECES)),
         force_held=np.zeros((n_stator, 2), dtype=np.int64),
         origin=np.zeros(1),
     )
@@ -62,10 +62,12 @@ def following_accumulator(before: Accumulator, passed: float) -> Accumulator:
 
     Means of the contact force reach back beyond it.
     """
+    pieces = before.force_piece.copy()
+    pieces[:, LOUD, 0] = np.inf  # to a peak that begins anew
     return _accumulator(
         before.impulse.size,
         before.peak_lateral.size,
-        force_piece=before.force_piece.copy(),
+        force_piece=pieces,
         force_held=before.force_held.copy(),
         origin=before.origin + passed,
     )

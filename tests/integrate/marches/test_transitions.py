@@ -9,9 +9,10 @@ from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.integrate.reduced_model.transitions import MetTransitions
 from rubhpc.integrate.setup import prepare
+from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.kernels.friction_coordinates import energies_gained, used_width
 from rubhpc.kernels.transitions import NO_TRANSITIONS, UNKNOWN, WORTH_A_TABLE, add_impulses, pass_over, see
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.study import Contact, Integrator, Recording
 
 PER_REVOLUTION = 64
 
@@ -144,6 +145,17 @@ def test_a_case_goes_on_alike_with_tables_and_without(settled):
         motions.append(advance(march, 1))
     assert (plain.transitions.entry < 0).all()
     np.testing.assert_allclose(*motions, rtol=0.0, atol=1e-9 * np.abs(motions[0]).max())
+
+
+def test_the_tangent_goes_alike_with_tables_and_without(settled):
+    state, grown = settled.final(), []
+    recording = Recording(transient=0, revolutions=1, samples_per_revolution=PER_REVOLUTION, keep=())
+    for met in (settled._met, None):
+        march = whip(settled.setup)
+        march._met = met
+        tangent = TangentMotion(lambda state: whip(), state, settled.setup, recording, march=march)
+        grown.append([tangent.part(1) for _ in range(2)])
+    assert grown[0] == pytest.approx(grown[1], abs=1e-8)
 
 
 def test_a_case_does_not_depend_on_tables_that_others_have_made(settled):
