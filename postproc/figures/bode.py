@@ -14,6 +14,7 @@ from postproc.signals.orders import order_over_speed, written_lag
 from postproc.store.run_ups import is_run_up
 from postproc.store.units import short_name
 from postproc.store.variables import require_results
+from rubhpc.fem.separation_margin import response_peaks
 from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
@@ -21,8 +22,15 @@ if TYPE_CHECKING:
 
     import xarray as xr
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
     from postproc.figures.options import Axis, Positive
+    from rubhpc.fem.separation_margin import ResponsePeak
+
+    Floats = NDArray[np.float64]
+
+LEAST_LAG = 45.0  # degrees by which the lag grows between the half-power points of a resonance, half of 90
+ROOM = 0.2  # of the width of a plot, between two peaks that are named
 
 
 def bode(
@@ -31,7 +39,7 @@ def bode(
     """Bode plot: amplitude and phase lag of an order over the speed.
 
     Of a run-up by revolution, or of the cases of a study along its speeds, whose waveforms it needs. Critical
-    speeds are marked.
+    speeds are marked; of peaks of 1X, the speed and the amplification factor (API 684).
 
     Parameters
     ----------
@@ -77,7 +85,7 @@ def draw_bode(
     is_sparse = data.sizes[along] < 40
     over = next((dim for dim in data[f"amplitude_{signals[0]}"].dims if dim != along), None)
     style: dict[str, Any] = {"marker": "." if is_sparse else "", "markersize": 4, "linewidth": 0.8}
-    n_curve = 0
+    n_curve, peaks = 0, []
     for name in signals:
         amplitude, phase = data[f"amplitude_{name}"], data[f"phase_{name}"]
         curves = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
@@ -89,12 +97,15 @@ def draw_bode(
             label = ", ".join(text for text in (own, case) if text) or None
             top.plot(rpm, height.values * scale.factor, label=label, **style)
             lag = written_lag(lead.values, lag)
+            if order == 1.0:
+                peaks += peaks_of(own_speeds.values, height.values * scale.factor, lag)
             bottom.plot(rpm, lag, **style)
             n_curve += 1
     shown = [signal_name(data[f"amplitude_{signals[0]}"])] if len(signals) == 1 else []
     top.set_title(", ".join([*shown, written_order(order)]), fontsize=8)
-    top.set(ylabel=scale.label("Amplitude"), xlim=ends)
+    top.set(ylabel=scale.label("Amplitude, 0\N{EN DASH}peak"), xlim=ends)
     top.set_ylim(bottom=0.0)
+    _name_peaks(top, peaks)
     for i, speed in enumerate(critical):
         line: dict[str, Any] = {"color": "0.6", "linewidth": 0.6, "linestyle": (0, (4, 3)), "zorder": 0.5}
         top.axvline(speed * RPM, label=None if i else written_speeds(critical), **line)
@@ -107,6 +118,41 @@ def draw_bode(
     bottom.yaxis.set_major_locator(degree_steps(bottom))
     bottom.ticklabel_format(axis="x", style="plain", useOffset=False)
     top.figure.align_ylabels(axes)
+
+
+def peaks_of(speed: Floats, height: Floats, lag: Floats) -> list[ResponsePeak]:
+    """Resonances of an amplitude (n,) with a lag (n,), degrees, over rising or falling speeds (n,), rad/s.
+
+    The amplitude falls to 0.707 of a peak on both sides, and the lag grows by `LEAST_LAG` between these.
+    """
+    known = np.isfinite(speed) & np.isfinite(height)
+    speed, height, lag = speed[known], height[known], lag[known]
+    steps = np.diff(speed)
+    if speed.size < 3 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+        return []
+    rising = np.argsort(speed)
+    speed, height, lag = speed[rising], height[rising], lag[rising]
+    found = []
+    for peak in response_peaks(lambda at: float(np.interp(at, speed, height)), speed):
+        below, above = np.interp(peak.half_power_speeds, speed, lag)
+        if above - below >= LEAST_LAG:  # not so where one of them is unknown
+            found.append(peak)
+    return found
+
+
+def _name_peaks(ax: Axes, peaks: Sequence[ResponsePeak]) -> None:
+    """Write speed (rpm) and amplification factor at peaks, from the highest, where there is room."""
+    taken: list[float] = []
+    for peak in sorted(peaks, key=lambda peak: -peak.amplitude):
+        rpm = RPM * peak.speed
+        if any(abs(rpm - other) < ROOM * np.ptp(ax.get_xlim()) for other in taken):
+            continue
+        taken.append(rpm)
+        words = f"{rpm:.0f} rpm, AF {peak.amplification_factor:.3g}"
+        place: dict[str, Any] = {"xytext": (0, 2), "textcoords": "offset points", "ha": "center"}
+        ax.annotate(words, (rpm, peak.amplitude), va="bottom", fontsize=6, **place)
+    if peaks:
+        ax.set_ylim(top=max(ax.get_ylim()[1], 1.2 * max(peak.amplitude for peak in peaks)))
 
 
 def signal_name(amplitude: xr.DataArray) -> str:

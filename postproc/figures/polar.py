@@ -99,7 +99,9 @@ def draw_polar(
     if len(curves) > 1 or passed:
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.01), ncols=2, frameon=False, fontsize=6)
     draw_rotation(ax)
-    ax.set_title(scale.label(f"{signal_name(amplitude)}, {written_order(order)}"), fontsize=8)
+    ax.set_title(
+        scale.label(f"{signal_name(amplitude)}, {written_order(order)}, 0\N{EN DASH}peak"), fontsize=8
+    )
     return ax
 
 

@@ -14,7 +14,7 @@ from postproc.store.rig_of_case import rig_axes, rig_of
 from rubhpc.rig.reading import rig_from_dict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     import xarray as xr
     from matplotlib.axes import Axes
@@ -63,7 +63,7 @@ def written_speeds(speeds: Iterable[float]) -> str:
 
 
 def name_speeds(ax: Axes, curves: Sequence[tuple[Floats, Floats]], speed: Floats) -> None:
-    """Mark speeds (rad/s) along the first curve, with the rpm, where they are far enough apart to be read.
+    """Mark round speeds (of rad/s) along the first curve, with the rpm, where they are far enough apart.
 
     Each is written where it covers least of curves and of other labels, those of the grid included, with a
     leader where that is far.
@@ -72,22 +72,17 @@ def name_speeds(ax: Axes, curves: Sequence[tuple[Floats, Floats]], speed: Floats
     size = math.hypot(np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()))
     taken: list[tuple[float, float]] = []
     middle = 0.5 * sum(ax.get_xlim()), 0.5 * sum(ax.get_ylim())
-    finite = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
-    if not finite.size:
-        return
     written = _Written(ax, curves)
-    inner = finite[np.linspace(0, finite.size - 1, 41).round().astype(int)]
-    for i in (finite[0], finite[-1], *inner):
-        if any(math.hypot(x[i] - a, y[i] - b) < 0.085 * size for a, b in taken):
+    for text, px, py in _round_speeds(x, y, RPM * speed):
+        if any(math.hypot(px - a, py - b) < 0.085 * size for a, b in taken):
             continue
-        taken.append((float(x[i]), float(y[i])))
-        ax.plot(x[i], y[i], ".", color="k", markersize=3, zorder=4)
-        text = f"{RPM * speed[i]:.0f}"
-        away = np.array([x[i] - middle[0], y[i] - middle[1]])
-        offset, is_far = written.place(text, np.array([x[i], y[i]]), away / (np.hypot(*away) or 1.0))
+        taken.append((px, py))
+        ax.plot(px, py, ".", color="k", markersize=3, zorder=4)
+        away = np.array([px - middle[0], py - middle[1]])
+        offset, is_far = written.place(text, np.array([px, py]), away / (np.hypot(*away) or 1.0))
         ax.annotate(
             text,
-            (x[i], y[i]),
+            (px, py),
             xytext=tuple(offset),
             textcoords="offset points",
             ha="center",
@@ -97,8 +92,26 @@ def name_speeds(ax: Axes, curves: Sequence[tuple[Floats, Floats]], speed: Floats
         )
 
 
+def _round_speeds(x: Floats, y: Floats, rpm: Floats) -> Iterator[tuple[str, float, float]]:
+    """Speeds and where a curve has them first: its ends, and round numbers between, the roundest first."""
+    finite = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    for i in finite[[0, -1]] if finite.size else ():
+        yield f"{rpm[i]:.0f}", float(x[i]), float(y[i])
+    low, high = np.nanmin(rpm), np.nanmax(rpm)
+    finest = 10.0 ** math.floor(math.log10(max(high - low, 1e-9)) - 1.0)
+    for step in finest * np.array([10.0, 5.0, 2.0, 1.0]):
+        for value in step * np.arange(math.ceil(low / step), math.floor(high / step) + 1):
+            passed = np.flatnonzero((rpm[:-1] - value) * (rpm[1:] - value) <= 0.0)
+            for i in passed[:1]:
+                share = (value - rpm[i]) / ((rpm[i + 1] - rpm[i]) or 1.0)
+                at = (1.0 - share) * x[i] + share * x[i + 1], (1.0 - share) * y[i] + share * y[i + 1]
+                if np.isfinite(at).all():
+                    yield f"{value:.10g}", float(at[0]), float(at[1])
+
+
 _GAP = 2.5  # points, of a label from its mark in each direction
 _LETTER, _HEIGHT = 3.9, 6.0  # points, of a letter and its margin at the size of labels
+_MARK = 3.0  # points, half the size of a mark
 _FARTHER = (0.0, 10.0, 22.0)  # points
 _LEADER = {"arrowstyle": "-", "linewidth": 0.4, "color": "0.4", "shrinkA": 1.0, "shrinkB": 1.5}
 _AROUND = [(across, up) for across in (-1, 0, 1) for up in (-1, 0, 1) if across or up]
@@ -118,6 +131,9 @@ class _Written:
         for text in ax.texts:
             if text.get_transform() == ax.transData:
                 self._boxes.append((self._at(np.array(text.get_position())), _half(text.get_text())))
+        for points in (np.asarray(line.get_xydata()) for line in ax.lines):
+            if len(points) == 1:  # a mark
+                self._boxes.append((self._at(points[0]), np.full(2, _MARK)))
 
     def place(self, text: str, at: Floats, away: Floats) -> tuple[Floats, bool]:
         """Where the middle of a label goes from its point, points, if possible the way `away`.

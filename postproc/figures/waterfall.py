@@ -82,7 +82,7 @@ def draw_waterfall(
     scale = scale_of(data["amplitude"])
     _bar(ax, _HEIGHT * span, scale.label(f"{top * scale.factor:.3g}").replace("(", "").replace(")", ""))
     ax.set(xlabel=_abscissa(orders), ylabel="Spin speed (rpm)")
-    ax.set_title(short_name(data["amplitude"].rename(signal)), fontsize=8, pad=12)
+    ax.set_title(f"{short_name(data['amplitude'].rename(signal))}, 0\N{EN DASH}peak", fontsize=8, pad=12)
     return ax
 
 
@@ -125,7 +125,7 @@ def draw_spectrogram(
             if ends[-1] < end:
                 style: dict[str, Any] = {"xytext": (2, 0), "ha": "left", "va": "center", "fontsize": 6}
                 ax.annotate(_named(line), (rpm[-1], ends[-1]), textcoords="offset points", **style)
-    name = short_name(data["amplitude"].rename(signal))
+    name = f"{short_name(data['amplitude'].rename(signal))}, 0\N{EN DASH}peak"
     ax.figure.colorbar(mesh, ax=ax, label=scale.label(name), pad=0.06)
     ax.set(xlabel="Spin speed (rpm)", ylabel=_abscissa(orders))
     return ax

@@ -7,7 +7,7 @@ import pytest
 import synthetic_store
 import xarray as xr
 
-from postproc.figures.bode import bode
+from postproc.figures.bode import bode, peaks_of
 from postproc.signals.orders import order_over_speed
 from rubhpc.errors import InputError
 
@@ -52,7 +52,7 @@ def test_cases_lie_over_one_another():
     axes = bode(study(), over="friction").show()
     assert [len(ax.lines) for ax in axes] == [2, 2]
     assert axes[0].get_title(loc="left") == "Vertical displacement, 1X"
-    assert axes[0].get_ylabel() == "Amplitude (µm)"
+    assert axes[0].get_ylabel() == "Amplitude, 0\N{EN DASH}peak (µm)"
     assert axes[1].get_xlabel() == "Spin speed (rpm)"
 
 
@@ -95,3 +95,30 @@ def test_what_has_no_bode_plot_is_refused():
         bode(study())
     with pytest.raises(InputError, match="torsoin: no such signal"):
         bode(synthetic_store.make(), "torsoin")
+
+
+def test_a_resonance_has_the_amplification_factor_of_its_damping():
+    """1 / (2 D) for little damping; a force of constant size, up and down."""
+    speed, damping = np.linspace(50.0, 150.0, 401), 0.05
+    response = 1.0 / (1.0 - (speed / 100.0) ** 2 + 2j * damping * speed / 100.0)
+    lag = -np.degrees(np.unwrap(np.angle(response)))
+    for way in (1, -1):
+        (peak,) = peaks_of(speed[::way], np.abs(response)[::way], lag[::way])
+        assert peak.speed == pytest.approx(100.0, rel=5e-3)
+        assert peak.amplification_factor == pytest.approx(1.0 / (2.0 * damping), rel=0.02)
+        assert not peaks_of(speed[::way], np.abs(response)[::way], 0.3 * lag[::way])  # no resonance
+    assert not peaks_of(speed[speed < 104.0], np.abs(response)[speed < 104.0], lag[speed < 104.0])
+    assert not peaks_of(np.r_[speed, speed[::-1]], np.r_[response, response].real, np.r_[lag, lag])
+
+
+def test_a_bode_plot_names_the_peaks_of_1x():
+    speed = np.linspace(50.0, 150.0, 101)
+    response = 1e-5 / (1.0 - (speed / 100.0) ** 2 + 0.1j * speed / 100.0)
+    angle = 2 * math.pi * np.arange(6 * N) / N
+    signal = (response[:, None] * np.exp(1j * angle)).real
+    data = study().isel(friction=0, speed=[0] * 101, drop=True).assign(vertical=(("speed", "sample"), signal))
+    data = data.assign(vertical=data["vertical"].assign_attrs(units="m"))
+    data["spin_speed"] = "speed", speed, {"units": "rad s-1"}
+    axes = bode(data.assign_coords(speed=speed)).show()
+    assert [text.get_text() for text in axes[0].texts] == ["955 rpm, AF 9.93"]
+    assert not bode(data.assign_coords(speed=speed), order=2.0).show()[0].texts
