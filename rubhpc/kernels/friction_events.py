@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean
 from rubhpc.kernels.accumulators import (
     DRIVE_WORK,
     FRICTION_LOSS,
@@ -152,7 +152,7 @@ def touches(states: int, crossing: int, q: int) -> bool:
     return found
 
 
-@jit_lean_sum
+@jit_inline_sum
 def see_pairs(
     reduced: Reduced, bodies: FrictionBodies, states: int, crossing: int, motion: Floats, work: FrictionWork
 ) -> None:
@@ -166,19 +166,23 @@ def see_pairs(
             work.drawn[q + i] = product(bodies.pull[q + i], motion)
 
 
-@jit_lean_sum
-def give_impulses(
-    reduced: Reduced, bodies: FrictionBodies, states: int, crossing: int, work: FrictionWork
-) -> None:
-    """Add the impulses that `work.solver` holds, and what they change of what is seen of the pairs."""
-    solver, q, n = work.solver, work.rate.size, work.kick.size
-    for i in range(q):
+@jit_inline_sum
+def give_impulses(reduced: Reduced, work: FrictionWork) -> None:
+    """Add the impulses that `work.solver` holds to those of the event."""
+    solver = work.solver
+    for i in range(work.rate.size):
         force, traction = solver.force[i], solver.traction[i]
-        work.given[0, i] += force
-        work.given[1, i] += traction
         if force != 0.0 or traction != 0.0:
-            for k in range(n):
+            work.given[0, i] += force
+            work.given[1, i] += traction
+            for k in range(work.kick.size):
                 work.kick[k] += force * reduced.gap_jacobian[i, k] - traction * reduced.slip[i, k]
+
+
+@jit_inline_sum
+def see_impulses(bodies: FrictionBodies, states: int, crossing: int, work: FrictionWork) -> None:
+    """Bring what is seen of the pairs up to the first impulses of an event."""
+    solver, q, n = work.solver, work.rate.size, work.kick.size
     for i in range(q):
         if takes_part(states, crossing, i):
             work.rate[i] += gap_change(solver, i)
@@ -236,7 +240,8 @@ def collide(
     if is_recorded:
         observe_event(IMPACT, pivots, solver, accumulator)
         observe_impacts(bodies, work, accumulator)
-    give_impulses(reduced, bodies, states, crossing, work)
+    give_impulses(reduced, work)
+    see_impulses(bodies, states, crossing, work)
     for i in range(work.rate.size):
         if solver.force[i] > 0.0:
             bound = solver.cone[i] * solver.force[i] * (1.0 - ROUNDING)
@@ -317,7 +322,7 @@ def bring_to_rest(
             solver.traction[i] = sense * bodies.sliding[i] * solver.force[i]
     if is_recorded:
         observe_impacts(bodies, work, accumulator)
-    give_impulses(reduced, bodies, states, 0, work)
+    give_impulses(reduced, work)
 
 
 @jit_lean
