@@ -43,9 +43,12 @@ class FrictionLibrary(ModeLibrary):
     ) -> None:
         """Start as `ModeLibrary` does, with one pair sliding forward."""
         self._pairs = pairs
-        # Overlaps ask for the motion at each event; the few modes of one pair stay in the processor's cache.
-        self.transitions = None if pairs.stiffness or len(pairs.gap_jacobian) == 1 else {}
         super().__init__(reduced, model, pairs.friction, **shared)
+        # Overlaps ask for the motion at each event; the few modes of one pair stay in the processor's cache.
+        # Where a mode may be given up, or is held in two tables, what is there depends on other cases.
+        q = len(pairs.gap_jacobian)
+        keeps_all = not self._is_large and 4**q <= self.n_most
+        self.transitions = {} if keeps_all and q > 1 and not pairs.stiffness else None
 
     _closed = FORWARD
 

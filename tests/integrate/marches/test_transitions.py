@@ -1,5 +1,7 @@
 """Transitions from contact mode to contact mode, against leaving the one and entering the other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from trial_rig import trial_rig
@@ -15,16 +17,15 @@ from rubhpc.kernels.transitions import NO_TRANSITIONS, UNKNOWN, WORTH_A_TABLE, a
 from rubhpc.study.study import Contact, Integrator, Recording
 
 PER_REVOLUTION = 64
+LAW = {
+    "contact": Contact(friction_law="coulomb"),
+    "integrator": Integrator(),
+    "samples_per_revolution": PER_REVOLUTION,
+}
 
 
 def whip(setup=None, n_stator=3):
-    setup = setup or prepare(
-        trial_rig(n_stator),
-        120.0,
-        contact=Contact(friction_law="coulomb"),
-        integrator=Integrator(),
-        samples_per_revolution=PER_REVOLUTION,
-    )
+    setup = setup or prepare(trial_rig(n_stator), 120.0, **LAW)
     return FrictionMarch(setup, 20e-6, 0.6, State.at_rest(setup.model), None)
 
 
@@ -163,6 +164,14 @@ def test_a_case_does_not_depend_on_tables_that_others_have_made(settled):
     assert not alone.library.transitions
     assert after_another.library.transitions
     assert advance(alone, 10).tobytes() == advance(after_another, 10).tobytes()
+
+
+def test_rings_whose_modes_may_be_given_up_have_no_tables():
+    assert whip(n_stator=2).library.transitions is not None
+    assert whip(n_stator=1).library.transitions is None
+    rig = trial_rig(3)
+    ring = replace(rig, stator=rig.stator + tuple(replace(one, angle=one.angle + 3.0) for one in rig.stator))
+    assert whip(prepare(ring, 120.0, **LAW)).library.transitions is None
 
 
 def test_passages_count_alike_where_the_library_lacks_a_mode(settled):
