@@ -84,6 +84,7 @@ class Reduced(NamedTuple):
     clearance: Floats  # (q,), m
     translations: Floats  # (r, n), displacements that none may pass the limit with
     displacement_limit: float  # m
+    overlap: float  # m, of an open pair that parts, up to which it goes on without an event
 
 
 @jit_lean_sum

@@ -90,6 +90,7 @@ def change_curved(
         clearance=reduced.clearance,
         translations=reduced.translations,
         displacement_limit=reduced.displacement_limit,
+        overlap=reduced.overlap,
     )
     for i in range(q):
         speed[i] = product(rate_row[i], velocity) if is_closed(candidates, i) else np.inf

@@ -113,7 +113,7 @@ def advance(
     mask, switch_re, switch_im = tables.mask, tables.switch_re, tables.switch_im
     rate_re, rate_im, bound = tables.rate_re, tables.rate_im, tables.bound
     power_re, power_im = tables.power_re, tables.power_im
-    interval = clock.tick * (1 << clock.sample_level)
+    interval, overlap = clock.tick * (1 << clock.sample_level), reduced.overlap
     highest_level = power_re.shape[1] - 1
     every_pair = (1 << reduced.radius.size) - 1
     last_step = progress.n_step + MOST_STEPS
@@ -161,7 +161,9 @@ def advance(
         progress.n_step += 1
         crossing = int(np.int64(0))  # no literal: the event would be compiled for it once more
         if not is_event_free:
-            crossing = find_crossing(mask[mode], mode, switch_re, switch_im, next_re, next_im)
+            crossing = find_crossing(
+                mask[mode], mode, switch_re, switch_im, rate_re, rate_im, next_re, next_im, overlap
+            )
         if crossing != 0 and level > 0:
             progress.halving_level = level - 1
             continue
@@ -269,13 +271,28 @@ def note_resolution(
 
 @jit_inline_sum
 def find_crossing(
-    closed: int, mode: int, switch_re: Floats, switch_im: Floats, z_re: Floats, z_im: Floats
+    closed: int,
+    mode: int,
+    switch_re: Floats,
+    switch_im: Floats,
+    rate_re: Floats,
+    rate_im: Floats,
+    z_re: Floats,
+    z_im: Floats,
+    overlap: float,
 ) -> int:
-    """Set of the pairs whose switch function is negative, of which those of `closed` are closed."""
+    """Set of the pairs whose switch function is negative, of which those of `closed` are closed.
+
+    An open pair that parts is none of them up to an `overlap` (m): modes that follow the speed leave one as
+    they are entered.
+    """
     crossing = int(np.int64(0))
     for i in range(switch_re.shape[1]):
-        tolerance = 0.0 if (closed >> i) & 1 else GAP_TOLERANCE
-        if dot(switch_re[mode, i], switch_im[mode, i], z_re, z_im) < -tolerance:
+        is_closed = (closed >> i) & 1 == 1
+        value = dot(switch_re[mode, i], switch_im[mode, i], z_re, z_im)
+        if value < (0.0 if is_closed else -GAP_TOLERANCE) and (
+            is_closed or value < -overlap or dot(rate_re[mode, i], rate_im[mode, i], z_re, z_im) < 0.0
+        ):
             crossing |= 1 << i
     return crossing
 

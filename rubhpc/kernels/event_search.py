@@ -36,30 +36,50 @@ def find_change(
     switch_im: Floats,
     z_re: Floats,
     z_im: Floats,
+    rate_re: Floats,
+    rate_im: Floats,
+    overlap: float,
     tick: int,
     known: Ints,
 ) -> int:
     """Bits of the switch functions (2 q, m) of a set of states that are negative at a tick.
 
-    Those that are known to be positive until then (`event_bounds.free_until`) are not looked at.
+    Those that are known to be positive until then (`event_bounds.free_until`) are not looked at. The gap of a
+    pair that parts is none of them up to an `overlap` (m): modes that follow the speed leave one as they are
+    entered.
     """
     crossing = int(np.int64(0))
     for j in range(switch_re.shape[1]):
         is_open = state_of(states, j // 2) == OPEN
         if (is_open and j % 2 == 1) or known[FREE, j] >= tick:
             continue
-        if dot(switch_re[mode, j], switch_im[mode, j], z_re, z_im) < (-GAP_TOLERANCE if is_open else 0.0):
+        value = dot(switch_re[mode, j], switch_im[mode, j], z_re, z_im)
+        if value < (-GAP_TOLERANCE if is_open else 0.0) and (
+            not is_open or value < -overlap or dot(rate_re[mode, j], rate_im[mode, j], z_re, z_im) < 0.0
+        ):
             crossing |= 1 << j
     return crossing
 
 
 @jit_inline_sum
-def changes_at(tables: ModeTables, mode: int, z: Floats, tick: int, known: Ints) -> int:
+def changes_at(tables: ModeTables, mode: int, z: Floats, overlap: float, tick: int, known: Ints) -> int:
     """Bits of the switch functions that are negative at coordinates (2, m)."""
     used = used_width(tables, mode)
     z_re, z_im = z[0, :used], z[1, :used]
     return int(
-        find_change(tables.mask[mode], mode, tables.switch_re, tables.switch_im, z_re, z_im, tick, known)
+        find_change(
+            tables.mask[mode],
+            mode,
+            tables.switch_re,
+            tables.switch_im,
+            z_re,
+            z_im,
+            tables.rate_re,
+            tables.rate_im,
+            overlap,
+            tick,
+            known,
+        )
     )
 
 
@@ -173,6 +193,7 @@ def approach_change(
     clock: Clock,
     mode: int,
     crossing: int,
+    overlap: float,
     count: int,
     z: Floats,
     work: Floats,
@@ -186,6 +207,8 @@ def approach_change(
     ----------
     crossing : int
         Bits of the switch functions that are negative at its end.
+    overlap : float, m
+        As in `find_change`.
     z : (2, m)
         Coordinates at its beginning; in place, those at that tick.
     work : (2, m)
@@ -214,7 +237,7 @@ def approach_change(
         if tried <= NEWTON_TRIES and 0.0 <= root < 1.0 * after:
             place = min(max(int(root), before + 1), after - 1)
         move_ticks(tables, bodies, mode, place, clock.tick, z, work)
-        found = changes_at(tables, mode, work, now + place, known)
+        found = changes_at(tables, mode, work, overlap, now + place, known)
         if found != 0:
             after, crossing = place, found
         else:

@@ -125,7 +125,7 @@ def advance_with_friction(
     power_re, power_im, n_eigenmode = tables.power_re, tables.power_im, tables.n_eigenmode
     rim_speed = bodies.rim_speed
     q = rim_speed.size
-    interval = clock.tick * (1 << clock.sample_level)
+    interval, overlap = clock.tick * (1 << clock.sample_level), reduced.overlap
     highest_level = power_re.shape[1] - 1
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
@@ -210,7 +210,17 @@ def advance_with_friction(
         ends = progress.tick + count
         if not is_forced and ends > free_to:
             crossing = find_change(
-                states, mode, switch_re, switch_im, next_re, next_im, ends, work.free_until
+                states,
+                mode,
+                switch_re,
+                switch_im,
+                next_re,
+                next_im,
+                rate_re,
+                rate_im,
+                overlap,
+                ends,
+                work.free_until,
             )
         if crossing != 0 and level > clock.sample_level:
             progress.halving_level = level - 1
@@ -225,6 +235,7 @@ def advance_with_friction(
                 clock,
                 mode,
                 crossing,
+                overlap,
                 count,
                 z,
                 z_next,

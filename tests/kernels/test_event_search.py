@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rubhpc.kernels import event_search
+from rubhpc.kernels import event_loop, event_search
 from rubhpc.kernels._jit import plain
+from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.friction_states import FORWARD, OPEN, FrictionBodies
 
 LEVEL, TICK = 10, 1e-6  # 1024 ticks
@@ -63,11 +64,11 @@ def search(exponents, rows, state=FORWARD):
     end, kept = np.empty((2, 2, exponents.size))
     plain(event_search.move_ticks)(tables, BODIES, 0, N_TICK, TICK, z, end)
     known = np.zeros((2, 2), dtype=np.int64)
-    crossing = plain(event_search.changes_at)(tables, 0, end, N_TICK, known)
+    crossing = plain(event_search.changes_at)(tables, 0, end, GAP_TOLERANCE, N_TICK, known)
     assert crossing != 0
     clock = SimpleNamespace(tick=TICK)
     passed, crossing = plain(event_search.approach_change)(
-        tables, BODIES, clock, 0, crossing, N_TICK, z, end, kept, 0, known
+        tables, BODIES, clock, 0, crossing, GAP_TOLERANCE, N_TICK, z, end, kept, 0, known
     )
     assert z[0] + 1j * z[1] == pytest.approx(np.exp(exponents * TICK * passed), rel=1e-12)
     return passed, crossing
@@ -149,3 +150,18 @@ def test_a_step_of_any_ticks_is_made_up_of_powers_of_two(monkeypatch):
             count, 0, tables.power_re, tables.power_im, np.ones(2), np.zeros(2), re, im
         )
         assert re + 1j * im == pytest.approx(np.exp(exponents * TICK * count), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("exponent", "overlap", "is_seen"),
+    [(-1.0, 1e-5, False), (-1.0, 1e-7, True), (-1.0, GAP_TOLERANCE, True), (1.0, 1e-5, True)],
+)
+def test_overlap_of_an_open_pair(exponent, overlap, is_seen, monkeypatch):
+    """It is no event while the pair parts, up to a bound; an overlap that grows is one."""
+    tables = tables_of(np.array([exponent]), np.array([[-1e-6], [1.0]]), OPEN)
+    z = np.array([[1.0], [0.0]])
+    known = np.zeros((2, 2), dtype=np.int64)
+    assert plain(event_search.changes_at)(tables, 0, z, overlap, N_TICK, known) == is_seen
+    monkeypatch.setattr(event_loop, "dot", plain(event_loop.dot))
+    rows = [part[:, :1] for part in (tables.switch_re, tables.switch_im, tables.rate_re, tables.rate_im)]
+    assert plain(event_loop.find_crossing)(0, 0, *rows, z[0], z[1], overlap) == is_seen

@@ -37,6 +37,7 @@ def bodies(rng, q, friction=0.0, restitution=0.0):
         damper=0.0,
         translations=np.eye(N),
         displacement_limit=np.inf,
+        overlap=0.0,
     )
 
 

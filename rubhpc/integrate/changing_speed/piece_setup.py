@@ -241,12 +241,19 @@ class PieceSetup(ModalSetup):
                 force_sine=made.force_sine.copy(),
                 stiffness=made.stiffness.copy(),
                 damping=made.damping.copy(),
+                overlap=self._overlap(clearance)
+                if self.held.is_followed and not made.spring
+                else made.overlap,
             )
         of_pieces = known[friction]
         of_pieces.stiffness[:], of_pieces.damping[:] = self.reduced.stiffness, self.reduced.damping
         of_pieces.force_cosine[:], of_pieces.force_sine[:] = self.reduced.force
         np.multiply(of_pieces.radius, abs(self.spin), out=of_pieces.rim_speed)
         return of_pieces
+
+    def _overlap(self, clearance: Floats) -> float:
+        """Overlap, m, that modes which follow the speed may leave as a pair opens, and that is no event."""
+        return float(self.accuracy * clearance[: len(self.model.stators)].min())
 
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, which serve until another piece asks for them."""

@@ -163,7 +163,7 @@ def integrate_run_up(
             if reached is None:
                 assert isinstance(initial, Initial)
                 reached = start_of(initial, setup, clearance, law.speed[0])
-                goes_on = initial.from_ == CONTACT_FREE
+                goes_on = is_contact_free(initial, reached)
             stretch, before_it, follows = None, (earlier, before[piece]), goes_on or place > 0
             if not late[piece]:
                 stretch = passing.take_several(
@@ -217,6 +217,12 @@ def integrate_run_up(
         final=state_at(reached, setup),
         advice=advice,
     )
+
+
+def is_contact_free(initial: Initial, begun: State) -> bool:
+    """Whether a case begins in the contact-free motion itself, with no disturbance or stator pushed aside."""
+    moved = (*begun.stator_displacement, begun.contact_force)
+    return initial.from_ == CONTACT_FREE and not initial.is_disturbed and not any(m.any() for m in moved)
 
 
 def signal_names(model: Model) -> list[str]:

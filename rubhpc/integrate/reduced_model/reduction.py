@@ -15,6 +15,7 @@ from rubhpc.integrate.reduced_model.truncation import SMOOTH, kept_modes
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.contact_pairs import LATERAL, N_DEGREE, TORSION, V, W, rim_sense
+from rubhpc.kernels.event_steps import GAP_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -284,6 +285,7 @@ def kernel_bodies(
         clearance=clearance,
         translations=reduced.translations,
         displacement_limit=displacement_limit,
+        overlap=GAP_TOLERANCE,
     )
 
 
