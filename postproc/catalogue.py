@@ -55,7 +55,7 @@ class Option:
     def check(self, value: Any) -> None:
         """Raise InputError where the value is none of the choices or out of bounds."""
         if self.choices and value is not None and value not in self.choices:
-            raise InputError(f'{self.name}: "{value}" is none of {", ".join(self.choices)}')
+            raise InputError(f'{self.name}: "{value}" is not one of {", ".join(self.choices)}')
         if self.bounds is not None and isinstance(value, int | float) and value not in self.bounds:
             raise InputError(f"{self.name}: {value:g} is out of range; it must be {self.bounds}")
 

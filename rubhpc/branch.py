@@ -76,7 +76,7 @@ def branch(
     period : int
         Revolutions of the first motion, up to 64.
     initial : State or dict, optional
-        A motion at `start`, where the search begins; or where the simulation starts that leads to one.
+        A motion at `start`, where the search begins; or the start of the simulation that leads to one.
     sweeps : int
         Values of the parameter, spread over the range, at which motions of other branches are sought: by a
         simulation with rising, one with falling parameter, and one from a random disturbance at each.
@@ -85,18 +85,18 @@ def branch(
     transient : int
         Revolutions of each simulation.
     most_points : int
-        Of a branch.
+        Largest number of points of a branch.
     samples_per_revolution : int
-        Of the records of points, an even number.
+        Samples in each revolution of the records of points, an even number.
     keep : tuple of {"waveform", "spectrum", "section"}
-        What these hold besides measures.
+        What these records contain in addition to measures.
     **case
-        Speed, clearance, friction, laws and accuracy as of `simulate`, but for what is varied.
+        Speed, clearance, friction, laws and accuracy as of `simulate`, except the parameter that varies.
 
     Returns
     -------
     tuple of Branch
-        That of the first motion, then those that were found from it, then others.
+        The branch of the first motion, then those found from it, then others.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def _range(rig: Rig, along: str, start: float | str, stop: float | str) -> tuple
     """The range in SI units, in the order given."""
     first, last = _one(rig, along, start, "start"), _one(rig, along, stop, "stop")
     if first == last:
-        raise InputError(f"branch: stop: {stop} is the start too; give a range")
+        raise InputError(f"branch: stop: {stop} equals start; give a range")
     if along in SPEEDS and first * last <= 0.0:
         raise InputError("branch: start: the range contains 0, which is not a valid speed; use one sign only")
     return first, last
@@ -189,7 +189,7 @@ def _one(rig: Rig, along: str, value: float | str, name: str) -> float:
         raise InputError(f"branch: along: {error}") from None
     found = parse_quantity(value, unit, f"branch: {name}")
     if not math.isfinite(found):
-        raise InputError(f"branch: {name}: {value} is no number")
+        raise InputError(f"branch: {name}: {value} is not a number")
     return found
 
 
@@ -199,7 +199,7 @@ def _operation(
     """What is held along the branch, checked at its start, and where the search begins."""
     given: dict[str, Any] = dict(case)
     if along in given:
-        raise InputError(f"branch: {along}: is what varies; leave it out")
+        raise InputError(f"branch: {along}: varies along the branch; remove it")
     there: dict[str, Any] = {along: value}
     if along not in (*SPEEDS, *CLEARANCES, "friction"):
         there = {"overrides": {**(given.get("overrides") or {}), along: value}}

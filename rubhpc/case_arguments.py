@@ -125,9 +125,9 @@ def _assembled(
     speed, speed_ratio = given.get("speed"), given.get("speed_ratio")
     clearance, clearance_ratio = given.get("clearance"), given.get("clearance_ratio")
     if (speed is None) == (speed_ratio is None):
-        raise InputError(f"{caller}: give speed or speed_ratio, one of the two")
+        raise InputError(f"{caller}: give either speed or speed_ratio")
     if (clearance is None) == (clearance_ratio is None):
-        raise InputError(f"{caller}: give clearance or clearance_ratio, one of the two")
+        raise InputError(f"{caller}: give either clearance or clearance_ratio")
     model = recent(lambda: assemble(rig), "model", rig)
     if speed_ratio is not None:
         ratio = parse_quantity(speed_ratio, "", f"{caller}: speed_ratio")
@@ -146,7 +146,7 @@ def _assembled(
         if gap + stator.clearance_offset <= 0:
             offset = stator.clearance_offset
             problem = f"{gap:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
-            raise InputError(f"{caller}: clearance: {problem}; take a larger one")
+            raise InputError(f"{caller}: clearance: {problem}; use a larger one")
     mu = parse_quantity(given.get("friction", FRICTION), "", f"{caller}: friction")
     if mu < 0:
         raise InputError(f"{caller}: friction: {mu:g} is out of range; it must be at least 0")

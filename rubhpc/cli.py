@@ -22,9 +22,9 @@ from rubhpc.threads import VARIABLES
 _STOPPED = 75
 # name -> (where it is, what it does). The figure commands come from `postproc.catalogue`.
 COMMANDS = {
-    "run": ("rubhpc.commands.run:run", "Run a study, or what is left of it (run may be left out)."),
-    "plan": ("rubhpc.commands.run:plan", "Cases, bytes, files, core-hours; what is done, failed, missing."),
-    "status": ("rubhpc.commands.run:status", "Progress and failures; works while a run is on."),
+    "run": ("rubhpc.commands.run:run", "Run or resume a study; the word run may be omitted."),
+    "plan": ("rubhpc.commands.run:plan", "Cases, bytes, files, core-hours; done, failed and missing cases."),
+    "status": ("rubhpc.commands.run:status", "Progress and failures, also during a run."),
     "verify": ("rubhpc.commands.run:verify", "Check every stored case against its checksum."),
     "modes": (
         "rubhpc.commands.modes:modes",
@@ -32,11 +32,11 @@ COMMANDS = {
     ),
     "knock": (
         "rubhpc.commands.knock:knock",
-        "The least knock that leads to a rub that stays, over the speed.",
+        "The least knock that leads to sustained rub, over the speed.",
     ),
     "reduce": ("rubhpc.commands.reduce:reduce", "Mean, envelope, quantiles or histogram over many cases."),
     "report": ("rubhpc.commands.report:report", "One HTML page: maps, and every case behind them."),
-    "view": ("rubhpc.commands.report:view", "The same over a big store, served to this machine alone."),
+    "view": ("rubhpc.commands.report:view", "The same for a large store, served to this machine only."),
     "export": ("rubhpc.commands.export:export", "Cases as one file: HDF5, CSV or Parquet."),
     "claims": ("rubhpc.commands.claims:claims", "The paper's claims against the stores of jobs/paper."),
 }

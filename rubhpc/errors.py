@@ -11,7 +11,7 @@ def printable(text: str) -> str:
 
 
 class RubError(Exception):
-    """Anything the user can fix; its text is one line, without control characters."""
+    """An error that the user can fix; its text is one line, without control characters."""
 
     exit_code = 1
 

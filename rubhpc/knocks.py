@@ -1,4 +1,4 @@
-"""The least knock that takes a machine from its contact-free motion to a rub that stays."""
+"""The least knock that takes a machine from its contact-free motion to sustained rub."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def least_knock(
     Parameters
     ----------
     study : Study
-        Its own starts are left out; it may have no axes of starts.
+        Its own `[initial]` is ignored; it may have no axes of starts.
     angles : int
         Directions tried, evenly spread.
     nodes : sequence of int
@@ -51,9 +51,9 @@ def least_knock(
     workers : int
         Processes that share the cases; the result is the same for any number.
     progress : Path, optional
-        A file that keeps the results of cases that are done; with it an interrupted search goes on.
+        A file for the results of finished cases; with it an interrupted search is resumed.
     report : callable
-        Called with the number of cases that are done, and of all.
+        Called with the number of finished cases and the number of all cases.
 
     Returns
     -------

@@ -51,7 +51,7 @@ def periodic(
         divisor of them is returned with that period.
     initial : State or dict, optional
         A state near the solution, where the search begins, such as the `state` of one at a neighbouring speed
-        or a record's `final`; or where a simulation starts that leads there, by keys of [initial], by default
+        or a record's `final`; or the start of a simulation that leads there, by keys of [initial], by default
         at rest.
     transient : int
         Revolutions of that simulation.
@@ -60,10 +60,10 @@ def periodic(
     samples_per_revolution : int
         Samples in each revolution of the record, an even number.
     keep : tuple of {"waveform", "spectrum", "section"}
-        What the record holds besides its measures.
+        What the record contains in addition to its measures.
     probes : sequence of Probe or dict
-        What is measured besides, by the keys of [[record.probe]], such as `{"name": "left", "node": 1,
-        "angle": "-45 deg"}`: the record holds `probe_left` and `spectrum_probe_left`.
+        Additional sensors, by the keys of [[record.probe]], such as `{"name": "left", "node": 1, "angle":
+        "-45 deg"}`: the record holds `probe_left` and `spectrum_probe_left`.
     **case
         Speed, clearance, friction, laws and accuracy as of `simulate`: one of `speed` and `speed_ratio` and
         one of `clearance` and `clearance_ratio` are needed.

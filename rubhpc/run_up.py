@@ -91,7 +91,7 @@ def run_up(
     samples_per_revolution : int
         Samples in each, locked to the shaft.
     probes : sequence of Probe or dict
-        What is measured besides, as in `simulate`.
+        Additional sensors, as in `simulate`.
     **case
         Clearance, friction, laws and accuracy as of `simulate`; `clearance` is needed.
 
@@ -100,11 +100,11 @@ def run_up(
     xarray.Dataset
         Signals as of `simulate` over `sample`; over `revolution` `speed` (rad/s), `time` (s),
         `contact_fraction`, `peak_contact_force` and `friction_work`; over `stator` the `minimum_slip_speed`
-        (m/s), below 0 where steady sliding does not hold; and over `revolution` and `order` the
-        amplitude (zero to peak) and phase of the displacements of the disc, its torsion and the probes, over
-        six revolutions: `amplitude_vertical`, `phase_vertical` (rad, by which the signal leads the order of
-        the shaft's angle), and so on. A case that ends early says why in the attribute `reason`;
-        what is wrong with its result stands in `note`.
+        (m/s), below 0 where steady sliding does not hold; and over `revolution` and `order` the amplitude
+        (zero to peak) and phase of the displacements of the disc, its torsion and the probes, over six
+        revolutions: `amplitude_vertical`, `phase_vertical` (rad, by which the signal leads the order of the
+        shaft's angle), and so on. A case that ends early says why in the attribute `reason`; what is wrong
+        with its result is in `note`.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def run_up(
         drive=law if isinstance(law, DriveLaw) else None,
     )
     if not isinstance(one.setup, ModalSetup):
-        raise InputError(f'run_up: method: {case["method"]} holds the speed; take method = "modal"')
+        raise InputError(f'run_up: method: {case["method"]} keeps the speed constant; set method = "modal"')
     given_case: dict[str, Any] = {
         "clearance": one.clearance,
         "friction": one.friction,
@@ -205,7 +205,7 @@ def _read_law(
 ) -> SpeedLaw:
     """The speed over the time, from either way to state it."""
     if (law is None) == (start is None and stop is None and time is None):
-        raise InputError("run_up: give start, stop and time, or a speed_law, one of the two")
+        raise InputError("run_up: give either start, stop and time, or a speed_law")
     if law is None:
         for name, value in (("start", start), ("stop", stop), ("time", time)):
             if value is None:
@@ -216,7 +216,7 @@ def _read_law(
         speeds = tuple(parse_quantity(speed, "rad/s", "speed") for _, speed in law)
         return SpeedLaw(time=times, speed=speeds)
     except (TypeError, ValueError):
-        raise InputError("run_up: speed_law: is no list of pairs; write [(0, 30), (10, 300)]") from None
+        raise InputError("run_up: speed_law: is not a list of pairs; write [(0, 30), (10, 300)]") from None
     except InputError as error:
         raise InputError(f"run_up: {error}") from None
 

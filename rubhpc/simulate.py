@@ -73,9 +73,9 @@ def simulate(
     law : {"lagrange", "penalty"}
         Gaps closed exactly, or by a spring and a damper.
     stiffness : float (N/m) or str with a unit, optional
-        Of the penalty's spring, which needs one.
+        Stiffness of the penalty's spring; required with `law="penalty"`.
     damping : float (N s/m) or str with a unit, optional
-        Of the penalty's damper; default none.
+        Damping of the penalty; none by default.
     restitution : float, optional
         Normal velocity after an impact over that before it, 0 to 1; default none.
     friction_law : {"sliding", "coulomb", "stribeck", "table"}
@@ -85,7 +85,7 @@ def simulate(
     stribeck_speed : float (m/s) or str with a unit, optional
         Slip speed at which the excess of friction at rest has decayed to 1/e, of Stribeck's law.
     slip_speed : sequence of float (m/s) or str with a unit, optional
-        Of a friction table, rising from 0.
+        Slip speeds of a friction table, rising from 0.
     friction_ratio : sequence of float, optional
         Coefficient at these slip speeds over `friction`; linear between them, constant beyond.
     normal : {"fixed", "updated"}
@@ -106,19 +106,20 @@ def simulate(
     transient_limit : int, optional
         Most revolutions discarded with `transient="auto"`, `"direct"` or `"shared"`; default 240.
     transient_tolerance : float, optional
-        Share of their largest value by which they may differ with `transient="auto"`; default 1e-4.
+        Largest difference of displacements that count as settled with `transient="auto"`, relative to their
+        largest value; default 1e-4.
     revolutions : int
         Revolutions recorded.
     samples_per_revolution : int
         Samples in each, an even number.
     keep : tuple of {"waveform", "spectrum", "section"}
-        What the record holds besides its measures and its final state.
+        What the record contains in addition to its measures and its final state.
     lyapunov : int
         Lyapunov exponents measured by the exact tangent map over 256 revolutions after the record:
         `lyapunov_1` and on, and `kaplan_yorke_dimension`; NaN where the laws have no closed form.
     probes : sequence of Probe or dict
-        What is measured besides, by the keys of [[record.probe]], such as `{"name": "left", "node": 1,
-        "angle": "-45 deg"}`: the record holds `probe_left` and `spectrum_probe_left`.
+        Additional sensors, by the keys of [[record.probe]], such as `{"name": "left", "node": 1, "angle":
+        "-45 deg"}`: the record holds `probe_left` and `spectrum_probe_left`.
     initial : State or dict, optional
         Where to start, by default at rest: a record's `final`, or keys of [initial] such as
         `{"from": "contact_free", "impulse": "0.1 N*s"}` or `{"from": "sweep.zarr", "select": {"speed_ratio":

@@ -116,8 +116,8 @@ def attractors(store: xr.Dataset, tolerance: float = TOLERANCE) -> xr.DataArray:
     `SPREAD_TOLERANCE`, whatever their regime. A torus may pass for a long period, where it repeats to within
     the tolerance of regimes: cases with a period from `LONG_PERIOD` on, of no solution and with a record that
     closes no better than `CLOSED`, are compared with those. Two tori of about one place and size count as one
-    motion. Cases are joined by single linkage. The torsion of motions without contact, which dies out,
-    distinguishes none.
+    motion. Cases are joined by single linkage. The torsion of motions without contact decays and is not
+    compared.
     """
     require_variables(store, ["regime", "period", *_SECTIONS])
     starts = start_axes(store)

@@ -118,7 +118,7 @@ def _halves(
         which = "smaller clearances" if n_rub < n_free else "clearances above the contact-free amplitude"
         raise InputError(
             f"{source(data)}: {n_free} selected cases without contact and {n_rub} with it are too few to "
-            f"learn from; take some {4 * _LEAST} of each, the others by {which} in the study"
+            f"learn from; use some {4 * _LEAST} of each, the others by {which} in the study"
         )
     return halves
 

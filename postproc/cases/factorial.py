@@ -58,7 +58,7 @@ def _mean_over(values: Floats, weights: list[Floats], axes: Any) -> Floats:
 def filled_in(values: Floats, usable: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """Return values with the best sum of main effects where none is usable, and its residuals elsewhere.
 
-    Filling, taking the effects of the whole grid and filling anew converges to least squares over the usable
+    Filling, taking the effects of the whole grid and filling again converges to least squares over the usable
     cases (F. Yates, Emp. J. Exp. Agric. 1, 1933).
     """
     filled = np.where(usable, values, values[usable].mean())

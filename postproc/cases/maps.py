@@ -89,7 +89,7 @@ def facet_axes(store: xr.Dataset, names: Sequence[str], taken: Sequence[str]) ->
     """
     facets = [find_axis(store, name) for name in names]
     if len(facets) > MOST_FACETS or len({*facets, *taken}) < len(facets) + len(taken):
-        raise InputError(f"{source(store)}: --facet: take one or two axes, and not {' or '.join(taken)}")
+        raise InputError(f"{source(store)}: --facet: give one or two axes other than {' or '.join(taken)}")
     for axis in facets:
         if store.sizes[axis] > MOST_PANELS:
             raise InputError(
@@ -121,7 +121,7 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
     """
     if not is_mappable(value):
         require_variables(store, [value])
-        raise InputError(f"{source(store)}: {value}: no measure of a case; choose {', '.join(MAPPABLE)}")
+        raise InputError(f"{source(store)}: {value}: not a measure of a case; choose {', '.join(MAPPABLE)}")
     store = store.assign(validity=validity(store))
     marks = ["status", "validity", *(n for n in ("settled",) if n in store)]  # older stores lack the last
     data = narrow(store, dict.fromkeys([value, *marks]), spread=[*spread, *facets])

@@ -124,8 +124,8 @@ def mean_spectrum(store: xr.Dataset, signal: str, over: Iterable[str] = ()) -> x
 def envelope(store: xr.Dataset, signal: str, over: Iterable[str] = ()) -> xr.Dataset:
     """Return the largest amplitude of a signal's spectrum over cases, order by order; lazy.
 
-    To learn where the worst lies along an axis, keep that axis and take `idxmax` of what comes back.
-    Arguments and result as of `mean_spectrum`.
+    To find where the worst value lies along an axis, keep that axis and use `idxmax` of the result. Arguments
+    and result as of `mean_spectrum`.
     """
     return _spectrum(store, signal, over, _largest, "largest over cases of the ")
 

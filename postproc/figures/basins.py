@@ -54,7 +54,7 @@ def basins(
 
     The starts are axes of the study such as initial.vertical, or drawn from ranges of them. Cases are sorted
     by the periodic solution that they reach, or by period and Poincaré section; the share of the starts that
-    reach each motion has a 95 % interval. The orbits of the motions are drawn beside it. Along an axis, the
+    reach each motion has a 95 % interval. The orbits of the motions are drawn next to it. Along an axis, the
     shares are stacked above the section points of each motion.
 
     Parameters
@@ -68,7 +68,7 @@ def basins(
     along
         Draw the share of each motion along AXIS, over all starts, instead.
     tolerance
-        Share of the section's size within which periodic motions are one.
+        Periodic motions whose sections differ by less, relative to their size, count as one.
     """
     starts = start_axes(cases)
     if along is not None:

@@ -51,7 +51,7 @@ def bifurcation(
 ) -> Drawing:
     """Bifurcation diagram: section points of a signal along an axis.
 
-    There is a point a revolution, coloured by regime, period or direction of the sweep. Cases without a
+    There is one point per revolution, coloured by regime, period or direction of the sweep. Cases without a
     result are hatched by their status. Of a branch study the branches are drawn: stable parts full, unstable
     ones dashed, with their events.
 
@@ -152,12 +152,12 @@ def default_axis(store: xr.Dataset, along: str | None = None) -> str:
 
 
 def default_coloring(store: xr.Dataset, color: str | None = None) -> str:
-    """Return the colouring named, or else the way of the sweep where there are two of them, or the regime.
+    """Return the colouring named, or else the direction of the sweep where there are two, or the regime.
 
     Raises
     ------
     InputError
-        By the way of the sweep in a store that holds but one.
+        By the direction of the sweep in a store with a single one.
     """
     ways = store.sizes.get(DIRECTION, 1)
     if color == DIRECTION and ways < 2:

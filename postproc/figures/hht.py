@@ -49,8 +49,8 @@ def hht(
 ) -> Drawing:
     """Hilbert-Huang analysis of a signal.
 
-    Its energy over time and frequency is drawn, with contact shaded. Prints the amplitude-weighted median
-    frequency between contacts, of all spans and of each.
+    Its energy over time and frequency is drawn, with contact shaded. The amplitude-weighted median frequency
+    between contacts is printed, of all spans and of each.
 
     Parameters
     ----------
@@ -59,7 +59,8 @@ def hht(
     signal
         Which recorded signal.
     contact
-        Leave spans in contact out, under windows, or keep them [default: kept for a stator's signals].
+        Leave out spans in contact, with windows over the others, or keep them [default: kept for a stator's
+        signals].
     revolutions
         The last ones.
     mode
@@ -105,7 +106,7 @@ def energy_time_frequency(
     natural : mapping of name to Hz, optional
         Natural frequencies to be marked.
     colorbar : bool
-        Beside `ax`.
+        Whether a colour bar is drawn next to `ax`.
     """
     mesh = _draw_energy(hht, ax, limit, natural or {}, mode)
     if colorbar:
@@ -209,7 +210,7 @@ def _refusal(hht: xr.Dataset, mode: int) -> str:
         )
     where = "between contacts" if hht.attrs["contact"] == "masked" else "between contacts, nor in them"
     return (
-        f"has no mode {mode} in these spans: it does not oscillate {where}; take more samples a revolution, "
+        f"has no mode {mode} in these spans: it does not oscillate {where}; use more samples a revolution, "
         "or another signal"
     )
 

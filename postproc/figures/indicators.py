@@ -50,11 +50,11 @@ def indicators(
     noise
         Level of noise; may be repeated.
     draws
-        Of noise, a case.
+        Draws of the noise for each case.
     false_alarms
-        Share that sets the thresholds.
+        Share of false alarms that sets the thresholds.
     seed
-        Of noise and halves.
+        Seed of the noise and of the random halves.
     scores
         Write every case's scores and verdict: .zarr or .nc.
     """

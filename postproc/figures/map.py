@@ -55,8 +55,8 @@ def map(  # noqa: A001 - the name of the command
 ) -> Drawing:
     """Map of a measure, the regime or the status over two axes.
 
-    What is missing, not settled or out of the model's range is hatched. A sampled study is drawn as a point a
-    case over two of the quantities that were drawn at random.
+    What is missing, not settled or out of the model's range is hatched. A sampled study is drawn as one point
+    per case over two of its random quantities.
 
     Parameters
     ----------
@@ -69,13 +69,13 @@ def map(  # noqa: A001 - the name of the command
     y
         Axis up [default: the next longest].
     facet
-        A map for each value; twice: a grid.
+        Axis with a map for each value; given twice: a grid of maps.
     contours
         Lines at N levels.
     log
         Colours on a logarithmic scale.
     computed
-        Dots on the cases of a refined map that were computed; the others are inferred from them.
+        Mark the computed cases of a refined map by dots; the others are inferred.
     events
         A store of branches: where motions meet, double their period or graze, over the map.
     """

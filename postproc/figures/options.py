@@ -73,7 +73,7 @@ def hertz(value: float | str, option: str) -> float:
     Raises
     ------
     InputError
-        The text is no frequency, or it is not above 0; `option` names it.
+        The text is not a frequency, or not above 0; `option` names it.
     """
     from rubhpc.input.quantity import parse_quantity
 

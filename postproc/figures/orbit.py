@@ -34,8 +34,8 @@ def orbit(
 ) -> Drawing:
     """Orbit of the disc, or of the place that two probes look at.
 
-    The clearance, the stators and a point a revolution are drawn with that of the disc, the directions of
-    the probes with the other.
+    With the orbit of the disc, the clearance, the stators and one point per revolution are drawn; with
+    probes, their directions.
 
     Parameters
     ----------

@@ -26,8 +26,8 @@ def section(
 ) -> Drawing:
     """Poincaré section of two signals.
 
-    It has a point a revolution, in the plane of both signals or of one signal along an axis. Where waveforms
-    are stored, vertical_velocity, horizontal_velocity and torsion_velocity count as signals.
+    It has one point per revolution, in the plane of both signals or of one signal along an axis. Where
+    waveforms are stored, vertical_velocity, horizontal_velocity and torsion_velocity count as signals.
 
     Parameters
     ----------

@@ -32,9 +32,9 @@ def sensitivity(
 ) -> Drawing:
     """Sobol indices of a measure over the axes of the study.
 
-    First-order and total indices are drawn with intervals. They are exact on the levels of a grid, each of
-    which weighs the same; an interval says what as many other levels of the same range could have given.
-    Those of a sampled study are estimates, with SALib. Cases without a value are counted, and reported.
+    First-order and total indices are drawn with intervals. They are exact on the levels of a grid, with equal
+    weights; an interval shows what the same number of other levels in the range could have given. Those of a
+    sampled study are estimates, with SALib. Cases without a value are counted, and reported.
 
     Parameters
     ----------
@@ -43,11 +43,11 @@ def sensitivity(
     measure
         A measure or setting of a case; of several stators, the worst.
     confidence
-        Of the intervals.
+        Confidence of the intervals.
     draws
-        Of levels, or points.
+        Draws of levels or points for the intervals.
     seed
-        Of the draws.
+        Seed of the draws.
     """
     found = sobol_indices(cases, measure, n_draw=draws, confidence=confidence, seed=seed)
     return Drawing(

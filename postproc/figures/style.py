@@ -74,7 +74,7 @@ def check_figure_path(path: str | Path) -> Path:
 
 
 def save(figure: Figure, path: str | Path) -> Path:
-    """Write the figure as png, pdf or svg, by its extension, and return where it lies."""
+    """Write the figure as png, pdf or svg, by its extension, and return its path."""
     path = check_figure_path(path)
     try:
         figure.savefig(path)

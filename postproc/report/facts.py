@@ -27,7 +27,7 @@ _MOST_FAILURES = 200  # listed, of each kind
 _LIMITS = {
     "minimum_slip_speed": "below 0: the rim slips backwards, which contradicts steady sliding",
     "force_over_euler_load": "above 1: the stator would buckle",
-    "foreshortening_ratio": "above 0.1: forces are too large by a tenth and more; count how the stator bends",
+    "foreshortening_ratio": 'above 0.1: forces are too large by 10 % or more; use geometry = "second_order"',
     "tip_deflection_ratio": "above 0.1: the stator is no longer a linear beam",
 }
 
@@ -69,7 +69,7 @@ def failures(store: xr.Dataset, axes: list[dict[str, Any]]) -> list[dict[str, An
         (FAILED, "failed: no result"),
         (
             DIVERGED,
-            "diverged: the motion grew without bound, or its contact has no solution, which is a result",
+            "diverged: the motion grew without bound, or its contact has no solution; this is a result",
         ),
     ):
         flats = np.flatnonzero(status == code)

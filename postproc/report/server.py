@@ -117,7 +117,7 @@ class Server(ThreadingHTTPServer):
         try:
             super().__init__((HOST, port), _Handler)
         except OSError as error:
-            problem = f"{port} cannot be had: {error.strerror or error}"
+            problem = f"{port} is not available: {error.strerror or error}"
             raise InputError(f"--port: {problem}; give another, or leave it out") from error
         self.library = library
 

@@ -1,4 +1,4 @@
-"""Rub indicators: what a case's measured vibration says of contact, under noise.
+"""Rub indicators: how measured vibration shows contact, under noise.
 
 The paper proposes to detect rub from rotor and stator vibration together. Each indicator is a level in dB
 that rises with rub and uses only what a test rig measures: both lateral motions of the disc, its torsion, the
@@ -115,7 +115,7 @@ def indicator_scores(
         least = math.ceil(2 * float(highest.max())) + 1
         raise InputError(
             f"{source(store)}: {n} samples a revolution do not resolve the stator's vibration at the lowest "
-            f"speed; take at least {least}, or select faster cases"
+            f"speed; use at least {least}, or select faster cases"
         )
     reference = [float(_rms(data[name]).where(rub).median()) for name in CHANNELS]
     waves = [data[name] for name in CHANNELS]

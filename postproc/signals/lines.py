@@ -62,7 +62,7 @@ def parse_orders(text: str, where: str) -> list[Fraction]:
     try:
         return [Fraction(part.strip().upper().removesuffix("X")) for part in text.split(",") if part.strip()]
     except (ValueError, ZeroDivisionError):
-        raise InputError(f'{where}: "{text}" is no list of orders; write 1/2,1,2') from None
+        raise InputError(f'{where}: "{text}" is not a list of orders; write 1/2,1,2') from None
 
 
 def spikes(

@@ -76,8 +76,8 @@ def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> x
 def mean_positions(store: xr.Dataset, signals: Sequence[str]) -> xr.Dataset:
     """Return the mean position during a run-up, with its `speed` (rad/s), loaded.
 
-    It is the mean over six revolutions of means over six, one for each revolution: parts of 1/2X and 1/3X
-    leave nothing of themselves in it, and those of a whirl at any other order little.
+    It is the mean over six revolutions of means over six, one for each revolution: components at 1/2X and
+    1/3X cancel, and whirl at any other order contributes little.
     """
     data, per_revolution, n = _case(store, signals)
     half = max(min(MEANS, n // 2), 1)

@@ -165,7 +165,7 @@ def signal_or_whirl(signal: str, full: bool) -> str:
 
 
 def check_signal(signal: str) -> None:
-    """Refuse a name that is no recorded signal."""
+    """Refuse a name that is not a recorded signal."""
     if not is_signal(signal):
         velocity = " (a velocity has a section alone)" if signal.endswith("_velocity") else ""
         raise InputError(

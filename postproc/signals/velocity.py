@@ -22,9 +22,9 @@ def section_velocity(waveform: xr.DataArray, spin_speed: xr.DataArray) -> xr.Dat
     """Return the time derivative of a signal at every whole revolution, in its unit per second; lazy.
 
     It is that of the polynomial of degree 8 through the sample and four on either side; NaN at the first
-    sample, before which there is none. Unlike the derivative of a Fourier series, it asks for no whole
-    periods. The relative error at order `k` is about `(2 pi k / n)^8 / 630` of `n` samples a revolution: 2e-9
-    at 4X of 256.
+    sample, before which there is none. Unlike the derivative of a Fourier series, it needs no whole periods.
+    The relative error at order `k` is about `(2 pi k / n)^8 / 630` of `n` samples a revolution: 2e-9 at 4X of
+    256.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ def other_axes(points: xr.Dataset) -> list[str]:
 def check_points(store: xr.Dataset) -> None:
     """Refuse a store of branches without a point."""
     if store.sizes.get("point") == 0:
-        problem = "holds no point of a branch"
+        problem = "contains no point of a branch"
         raise InputError(f"{source(store)}: {problem}; rubhpc status says whether any was found or computed")
 
 

@@ -1,4 +1,4 @@
-"""A store of cases that run up, as its figures read it: the highest speed is no axis of it."""
+"""A store of run-ups as its figures read it: the highest speed is not an axis."""
 
 from __future__ import annotations
 

@@ -25,9 +25,10 @@ FOLDER = "paper"  # where the studies of jobs/paper put their stores
 @click.option("--document", metavar="FILE", help="Write the table as a document, such as docs/claims.md.")
 @click.option("--draw", metavar="FOLDER", help="Draw the figures of the paper into a folder, as PNG.")
 def claims(number: int | None, stores: str, is_json: bool, document: str | None, draw: str | None) -> int:
-    """Check every claim of the paper against the stores of its studies; exit 1 when one fails.
+    """Check every claim of the paper against the stores of its studies; the exit code is 1 if one fails.
 
-    `make paper` runs the studies. What the paper leaves open or contradicts itself on is reported only.
+    `make paper` runs the studies. Where the paper leaves a value open or contradicts itself, the result is
+    only reported.
     """
     from postproc.mokhtar2017.claims.index import CLAIMS, FAILS, evaluate, on_figure, open_studies
     from postproc.mokhtar2017.claims.table import as_json, document_of, text

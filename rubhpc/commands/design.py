@@ -125,8 +125,8 @@ def _print_peaks(design: xr.Dataset) -> None:
         click.echo(line)
     if any(math.isnan(factor) for factor in design["amplification_factor"].values):
         click.echo(
-            "AF nan: beside that peak the amplitude does not fall to 0.707 of it within the range, "
-            "or rises above it before"
+            "AF nan: within the range the amplitude does not fall to 0.707 of that peak on both sides, "
+            "or exceeds the peak before it does"
         )
 
 

@@ -51,11 +51,11 @@ def knock(
     data: str | None,
     trust_rig: bool,
 ) -> int:
-    """Find the least knock that takes a machine from its contact-free motion to a rub that stays.
+    """Find the least knock that takes a machine from its contact-free motion to sustained rub.
 
     For every case of STUDY.toml: the smallest impulse over all directions and nodes tried. A figure shows it
     over the speed, the resilience curve of the machine. No store is made; cases that are done are kept in
-    files beside the figure until it is drawn, so that the same command resumes an interrupted search. With
+    files next to the figure until it is drawn, so that the same command resumes an interrupted search. With
     --workers, or under mpirun, several processes share the cases.
     """
     from postproc.figures.resilience_curve import resilience
@@ -75,9 +75,7 @@ def knock(
     search |= {"progress": progress, "report": _report()}
     if launch().size > 1:
         if workers > 1:
-            raise InputError(
-                "--workers: mpirun has started several processes already; leave one of the two out"
-            )
+            raise InputError("--workers: mpirun has started several processes already; use one of the two")
         found = least_knock_on(connect(), lambda: read_study(study, trust_rig=trust_rig), **search)
     else:
         found = least_knock(read_study(study, trust_rig=trust_rig), workers=workers, **search)

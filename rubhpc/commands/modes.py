@@ -91,7 +91,7 @@ def modes(
         raise InputError("--shapes: conflicts with --response; give one of them")
     if data and not (nodes or shapes) and check_data_path(data).suffix == ".csv":
         raise InputError(
-            f"--data {data}: a whole design is no table; add --response or --shapes, or name it .nc"
+            f"--data {data}: a whole design is not a table; add --response or --shapes, or name it .nc"
         )
     spins = [quantity(speed, "rad/s", "--speed") for speed in speeds] or [0.0]
     path = check_figure_path(figure) if figure else None
@@ -179,7 +179,7 @@ def _print_tables(
         alike.setdefault((on.get(number), *values), []).append(number)
     for (carrier_name, *_), among in alike.items():
         title = stator_names(among).capitalize() + (", each" if len(among) > 1 else "")
-        held = f", while carrier {carrier_name} is held" if carrier_name else ""
+        held = f", carrier {carrier_name} fixed" if carrier_name else ""
         tables.append((title + held, stators[among[0] - 1]))
     click.echo("Natural and damped frequency in Hz, damping as a fraction of critical.")
     for title, listed in tables:

@@ -20,18 +20,22 @@ from rubhpc.errors import InputError
     show_default=True,
     help="Mean or envelope of spectra; quantiles or histogram of a measure.",
 )
-@click.option("--signal", help="Whose spectra are reduced [default: torsion].")
-@click.option("--measure", help="For quantiles and histogram [default: peak_contact_force].")
-@click.option("--over", multiple=True, metavar="AXIS", help="May be repeated [default: all axes].")
+@click.option("--signal", help="Signal whose spectra are reduced [default: torsion].")
+@click.option("--measure", help="Measure of quantiles and histogram [default: peak_contact_force].")
+@click.option(
+    "--over", multiple=True, metavar="AXIS", help="Axis to reduce; may be repeated [default: all axes]."
+)
 @SELECT
 @click.option(
     "--level", "levels", multiple=True, type=click.FloatRange(0, 1), default=(0.05, 0.5, 0.95),
-    show_default=True, help="Of a quantile; may be repeated.",
+    show_default=True, help="Level of a quantile; may be repeated.",
 )  # fmt: skip
-@click.option("--bins", type=click.IntRange(min=1), default=50, show_default=True, help="Of a histogram.")
+@click.option(
+    "--bins", type=click.IntRange(min=1), default=50, show_default=True, help="Bins of a histogram."
+)
 @click.option("--data", metavar="FILE", help=".csv, .json, .zarr or .nc [default: STORE_WHAT.nc here].")
 @click.option(
-    "--figure", metavar="FILE", help="Drawn if one spectrum is left [default: STORE_WHAT.png here]."
+    "--figure", metavar="FILE", help="Figure, if one spectrum is left [default: STORE_WHAT.png here]."
 )
 @click.option(
     "--on",
@@ -45,11 +49,11 @@ from rubhpc.errors import InputError
 )
 @click.option(
     "--cores", type=click.IntRange(min=1), default=1, show_default=True,
-    help="Of a Slurm job, with one worker each.",
+    help="Cores of a Slurm job, one worker each.",
 )  # fmt: skip
-@click.option("--memory", default="4 GB", show_default=True, help="Of a Slurm job.")
-@click.option("--queue", help="Slurm's partition.")
-@click.option("--walltime", default="01:00:00", show_default=True, help="Of a Slurm job.")
+@click.option("--memory", default="4 GB", show_default=True, help="Memory of a Slurm job.")
+@click.option("--queue", help="Slurm partition.")
+@click.option("--walltime", default="01:00:00", show_default=True, help="Time limit of a Slurm job.")
 def reduce(
     store: str,
     what: str,

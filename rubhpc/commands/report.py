@@ -16,12 +16,12 @@ _STORE = click.argument("store", type=click.Path(path_type=Path))
 @click.option(
     "--output", type=click.Path(path_type=Path), metavar="FILE", help="The page [default: STORE.html here]."
 )
-@click.option("--limit", default="10 MB", show_default=True, metavar="SIZE", help="The page's size, at most.")
+@click.option("--limit", default="10 MB", show_default=True, metavar="SIZE", help="Largest size of the page.")
 def report(store: Path, output: Path | None, limit: str) -> None:
-    """Write one self-contained HTML page on STORE: it needs no network, server or store.
+    """Write one self-contained HTML page on STORE, which needs no network, server or store.
 
     It shows the study, the rig, the runs, failures, and where the model leaves its range; from its maps each
-    case opens with its orbit, spectrum, waveform and Poincaré section. Works while a run is on.
+    case opens with its orbit, spectrum, waveform and Poincaré section. It also works during a run.
     """
     from postproc.report.budget import write_report
     from postproc.store.live import open_live
@@ -42,7 +42,7 @@ def report(store: Path, output: Path | None, limit: str) -> None:
 @click.command()
 @_STORE
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, show_default="any that is free", help="To listen on."
+    "--port", type=click.IntRange(0, 65535), default=0, show_default="a free port", help="Port of the server."
 )
 def view(store: Path, port: int) -> None:
     """Serve the page of `rubhpc report` over STORE, of any size, to this machine only; Ctrl-C ends it.

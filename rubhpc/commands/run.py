@@ -13,7 +13,10 @@ from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.running.launch import end_with_launcher, launch
 
 _OUTPUT = click.option(
-    "--output", type=click.Path(path_type=Path), metavar="STORE", help="The store, instead of the study's."
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="STORE",
+    help="The store, in place of that of the study.",
 )
 _WHOLE_START = 1.5  # the store made and ended
 _TRUST = click.option(
@@ -65,11 +68,11 @@ def run(
     only: str | None,
     quiet: bool,
 ) -> int:
-    """Run STUDY.toml, or what is left of it; with --workers, or under mpirun, on several processes.
+    """Run or resume STUDY.toml; with --workers, or under mpirun, on several processes.
 
-    With --part 3/64, as of an array of jobs, only a share of it; the last part to end completes the store.
-    It stops cleanly, with code 75, on SIGTERM, SIGINT or SIGUSR1, at its time limit, or when a file STOP is
-    created in the store; the same command resumes it.
+    With --part 3/64, as in an array of jobs, only that part is computed; the last part to end completes the
+    store. The run stops cleanly, with code 75, on SIGTERM, SIGINT or SIGUSR1, at its time limit, or when a
+    file STOP is created in the store; the same command resumes it.
     """
     if only is not None:
         if part is not None:
@@ -116,7 +119,7 @@ def _reproduce(study: Path, output: Path | None, name: str, *, trust_rig: bool) 
 @click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
 @_OUTPUT
 @_TRUST
-@click.option("--part", metavar="K/N", help="Of what part K of N computes.")
+@click.option("--part", metavar="K/N", help="Estimate only part K of N.")
 def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) -> int:
     """Estimate the cost of STUDY.toml and show what is done; writes nothing.
 

@@ -33,5 +33,5 @@ def pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, str]]:
     """Return the NAME=VALUE texts of an option as pairs."""
     for text in texts:
         if not all(part.strip() for part in text.partition("=")):
-            raise InputError(f'{option}: "{text}" is no pair; write NAME=VALUE')
+            raise InputError(f'{option}: "{text}" is not a pair; write NAME=VALUE')
     return [(name.strip(), value.strip()) for name, _, value in (text.partition("=") for text in texts)]

@@ -64,7 +64,7 @@ def release(model: Model, drive_inertia: float | None) -> tuple[Model, FreeSpin]
         drive_inertia = LEAST_DRIVE * own
     inertia = own + drive_inertia
     if not inertia > 0.0:
-        problem = "missing; this rotor has no degree thx, so that the drive's inertia is all that turns"
+        problem = "missing; this rotor has no degree thx, so that only the drive's inertia turns"
         raise InputError(f'[drive] inertia: {problem}; give one, such as "0.01 kg m^2"')
     mass = rotor.mass - np.outer(moment, moment) / inertia
     return replace(model, rotor=replace(rotor, mass=mass)), FreeSpin(inertia=inertia, share=moment / inertia)

@@ -51,8 +51,8 @@ def undamped_message(model: Model, spin: float) -> str:
     if not named:
         return ""
     return (
-        f"nothing damps {', and '.join(named)}: once excited it does not die out, and a motion that has "
-        "settled otherwise looks quasi-periodic; give it damping"
+        f"no damping acts on {', and '.join(named)}: once excited, it does not decay, and a motion that is "
+        "otherwise settled looks quasi-periodic; add damping"
     )
 
 

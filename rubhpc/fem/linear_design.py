@@ -53,7 +53,7 @@ def linear_design(
     operating : tuple of (least, greatest), optional
         Operating speeds, rad/s, from which the separation margins of API 617 count.
     nodes : sequence of int, optional
-        At which peaks of the response are looked for; by default the recorded one.
+        Nodes at which peaks of the response are sought; by default the recorded one.
     probes : sequence of float
         Angles of displacement probes, rad, from straight up with the spin.
     n_speed : int

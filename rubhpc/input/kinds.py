@@ -174,7 +174,9 @@ def _parse_criteria(value: object, limits: Limits, where: str) -> tuple[tuple[st
         elif isinstance(entry, dict):
             pairs += [(name, parse_quantity(share, "", f"{where}: {name}")) for name, share in entry.items()]
         else:
-            raise InputError(f"{where}: {brief(entry)} is no flag and no measure; write {limits['example']}")
+            raise InputError(
+                f"{where}: {brief(entry)} is neither a flag nor a measure; write {limits['example']}"
+            )
     return tuple(pairs)
 
 
@@ -191,7 +193,7 @@ def _check_criteria(value: Any, limits: Limits) -> str:
         if name in flags and share:
             return f'{name} is a flag, which has no difference; write "{name}"'
         if name not in flags and name not in measures:
-            return f"{brief(name)} is no flag or measure; {nearest(name, [*flags, *measures])}"
+            return f"{brief(name)} is neither a flag nor a measure; {nearest(name, [*flags, *measures])}"
     return ""
 
 
@@ -203,7 +205,7 @@ def _parse_selection(value: object, limits: Limits, where: str) -> tuple[tuple[s
         if isinstance(one, dict):  # `stator.angle = 0` without quotes
             found += [(f"{name}.{rest}", entry) for rest, entry in _parse_selection(one, limits, where)]
         elif isinstance(one, bool) or not isinstance(one, str | int | float):
-            raise InputError(f"{where}.{name}: {brief(one)} is no value; write {limits['example']}")
+            raise InputError(f"{where}.{name}: {brief(one)} is not a value; write {limits['example']}")
         else:
             found.append((name, one if isinstance(one, str) else float(one)))
     return tuple(found)
@@ -215,7 +217,7 @@ def _parse_pairs(value: object, limits: Limits, where: str) -> tuple[tuple[float
     if isinstance(value, list) and all(isinstance(pair, list) and len(pair) == 2 for pair in value):
         return tuple((parse_quantity(a, key_unit, where), parse_quantity(b, unit, where)) for a, b in value)
     if not isinstance(value, dict):
-        raise InputError(f"{where}: {brief(value)} holds no pairs; write {limits['example']}")
+        raise InputError(f"{where}: {brief(value)} contains no pairs; write {limits['example']}")
     flat: dict[str, object] = {}
     for key, entry in value.items():
         inner = entry.items() if isinstance(entry, dict) else [(None, entry)]

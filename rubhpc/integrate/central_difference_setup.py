@@ -62,7 +62,7 @@ def prepare_steps(
     if integrator.step is not None and integrator.step >= limit:
         raise InputError(
             f"[integrator] step: {integrator.step:.4g} s is above the stability limit of rig {rig.name}; "
-            f"take less than {limit:.4g} s"
+            f"use less than {limit:.4g} s"
         )
     interval = 2.0 * math.pi / (abs(speed) * samples_per_revolution)
     steps_per_sample = math.ceil(interval / integrator.step_within(limit) * (1.0 - 1e-12))

@@ -52,7 +52,7 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
     if state.packed().size != state_size(setup.model):
         raise InputError(
             f"initial: a state of {state.packed().size} numbers for a rig of {state_size(setup.model)}; "
-            "carry it between cases with the same degrees of freedom"
+            "use it only for cases with the same degrees of freedom"
         )
     allowed = np.zeros_like(state.contact_force) if state.overlap is None else state.overlap
     displacement = _as_seen(state.displacement, setup)

@@ -103,8 +103,8 @@ class ModalSetup:
             return ""
         fix = sufficient_accuracy(self.model, self.spin)
         return (
-            f"it needs more than {MOST_MODES} modes: those left out may change it by "
-            f"{100 * self.modal_error:.2g} %, motions that part by more; accuracy = {fix:.0e} keeps all"
+            f"it needs more than {MOST_MODES} modes: those left out may change signals by "
+            f"{100 * self.modal_error:.2g} %, chaotic motions by more; accuracy = {fix:.0e} keeps all"
         )
 
     def bodies(self, friction: float, clearance: Floats) -> Reduced:

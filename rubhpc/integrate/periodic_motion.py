@@ -70,7 +70,7 @@ class PeriodicMotion:
     record : Record
         As of a simulation that starts there: signals, spectra, sections and measures.
     multipliers : (n_state,)
-        Floquet multipliers over a period, complex, largest first: by these numbers small disturbances grow.
+        Floquet multipliers, complex, largest first: factors by which small disturbances grow in a period.
         n_state is twice the number of reduced degrees of freedom.
     is_stable : bool
         Whether all multipliers lie within the unit circle.
@@ -79,7 +79,7 @@ class PeriodicMotion:
     residual : float
         Distance of the motion after a period from that before it, over its size.
     iterations : int
-        Of Newton's method.
+        Iterations of Newton's method.
     least_gap : (n_stator,), m
         Least gap of each stator where it turns between contacts: how far it is from touching once more; inf
         where none turns.
@@ -143,14 +143,14 @@ def find_periodic_motion(
     """
     if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
         raise InputError(
-            "periodic: it needs motion in closed form between events; take method modal, normal fixed, "
+            "periodic: it needs motion in closed form between events; use method modal, normal fixed, "
             "stators of linear geometry, and friction_law sliding or coulomb"
         )
     try:
         piecewise, orbit = _search(setup, clearance, friction, period, recording, initial)
     except NoClosedForm:
         problem = "contacts open and close without end, or in too many combinations"
-        raise NoPeriodicMotion(f"periodic: {problem}; take another case") from None
+        raise NoPeriodicMotion(f"periodic: {problem}; use another case") from None
     multipliers = orbit.multipliers
     state = piecewise.march.state_of(orbit.motion, piecewise.contact_force(orbit.states, orbit.motion))
     return PeriodicMotion(

@@ -30,10 +30,9 @@ class State:
     stator_displacement, stator_velocity : tuple of (n_stator_dof,)
         m or rad, m/s or rad/s.
     contact_force : (n_stator,), N
-        Normal force at that instant; it fixes the acceleration from which a run goes on.
+        Normal force at that instant; it determines the acceleration with which a run continues.
     overlap : (n_stator,), m
-        How far disc and tip have entered one another at that instant, as a penalty lets them; default not at
-        all.
+        How far disc and tip overlap at that instant, under a penalty; zero by default.
     """
 
     rotor_displacement: Floats
@@ -87,7 +86,7 @@ class State:
 
     @classmethod
     def at_rest(cls, model: Model) -> State:
-        """Nothing moves but the steady spin; constant loads bend the shaft, and no stator touches."""
+        """Return the state of rest: only the steady spin, the shaft bent by constant loads, no contact."""
         n_dof = model.body_start[-1]
         displacement = np.zeros(n_dof)
         displacement[: model.rotor.n_dof] = model.sag
@@ -102,7 +101,8 @@ MOST_LEFT_RESIDUAL = 1e-4  # the same of a case in closed form that was left to 
 class Record(RecordVariables):
     """One simulated case; every stored variable is an attribute (`record.vertical`, `record.period`).
 
-    Type checkers do not know the names of probes and Lyapunov spectra: take `signals` and `measures` there.
+    Type checkers do not know the names of probes and Lyapunov spectra: use `signals` and `measures` for
+    these.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class Record(RecordVariables):
     settings : dict of float
         `spin_speed` (rad/s) and `clearance` (m).
     final : State
-        Where the case ended: `initial=` of a run that goes on.
+        Final state; as `initial=` of another run it continues the motion.
     probed : tuple of (name, quantity)
         Its probes.
     n_exponent : int
@@ -168,7 +168,7 @@ class Record(RecordVariables):
                 for group in self._groups():
                     if name in group:
                         return group[name]
-            raise AttributeError(f"this record holds no {name}")
+            raise AttributeError(f"this record contains no {name}")
 
     @property
     def remark(self) -> str:
@@ -177,8 +177,8 @@ class Record(RecordVariables):
         texts = [text for text in (self.reason, self.note) if text]
         has_left = self.measures.get("left_closed_form", 0) > 0
         if not self.reason and residual > (MOST_LEFT_RESIDUAL if has_left else MOST_RESIDUAL):
-            left = "in the short steps to which it was left, " if has_left else ""
-            texts.append(f"{left}its energy balance is off by {100 * residual:.2g} %; take a shorter step")
+            left = "with its short steps " if has_left else ""
+            texts.append(f"{left}its energy balance is off by {100 * residual:.2g} %; use a shorter step")
         if not self.reason and self.advice:
             texts.append(self.advice)
         return "; ".join(texts)

@@ -82,7 +82,7 @@ def _contact_free(setup: Setup, spin: float) -> State:
     known, model = _shared(setup).contact_free, setup.model
     if spin not in known:
         if problem := instability_message(model, spin):
-            raise InputError(f'[initial] from: {problem}; take from = "rest"')
+            raise InputError(f'[initial] from: {problem}; set from = "rest"')
         response = steady_response(model, spin)
         known[spin] = replace(
             State.at_rest(model),
@@ -120,7 +120,9 @@ def _shapes_of_output(setup: Setup, wanted: tuple[int, ...]) -> Floats:
     for i in wanted:
         if rows[i] < 0:
             key = ("vertical", "horizontal")[i]
-            raise InputError(f"[initial] {key}: the output node is held there; leave it out")
+            raise InputError(
+                f"[initial] {key}: the output node is constrained in this direction; leave it out"
+            )
     free = [i for i in (0, 1) if rows[i] >= 0]
     seen = [rows[i] for i in free]
     force = np.zeros((model.body_start[-1], len(free)))

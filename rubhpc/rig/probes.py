@@ -56,11 +56,11 @@ class Probe:
         if not re.fullmatch(rf"[A-Za-z]\w{{,{LONGEST_NAME - 1}}}", self.name, re.ASCII):
             fix = f"write up to {LONGEST_NAME} letters, digits and _, beginning with a letter"
             shown = self.name if len(self.name) <= LONGEST_NAME else f"{self.name[:LONGEST_NAME]}..."
-            raise FieldError("name", f'"{shown}" makes no name of a variable; {fix}')
+            raise FieldError("name", f'"{shown}" is not a valid name of a variable; {fix}')
         if (self.node is None) == (self.stator is None):
-            raise FieldError("node", "give either node = 1 or stator = 1, one of the two")
+            raise FieldError("node", "give either node = 1 or stator = 1")
         if self.stator is not None and self.quantity not in (*MOTIONS, "foundation_force"):
-            fix = f"take one of {', '.join(MOTIONS)}, foundation_force, or give a node"
+            fix = f"choose one of {', '.join(MOTIONS)}, foundation_force, or give a node"
             raise FieldError("quantity", f"{self.quantity} is not measured at a stator; {fix}")
         if self.node is not None and self.quantity == "foundation_force":
             fix = "give a stator, or take bearing_force: bearings stand on the ground"

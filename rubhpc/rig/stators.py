@@ -65,7 +65,7 @@ class Seat:
     @property
     def carrier_problem(self) -> str:
         """Why the stator cannot stand on a carrier, and what to do; "" where it can."""
-        return "a stator of this kind stands on the ground; remove carrier, or take a cantilever or springs"
+        return "a stator of this kind stands on the ground; remove carrier, or use a cantilever or springs"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,11 +107,11 @@ class Stator(Seat):
             raise FieldError("geometry", f'{problem}; set lateral = true, or geometry = "linear"')
         if self.geometry == SECOND_ORDER and self.carrier is not None:
             problem = "second_order needs a stator on the ground, and this one stands on a carrier"
-            raise FieldError("geometry", f'{problem}; take geometry = "linear", or remove carrier')
+            raise FieldError("geometry", f'{problem}; set geometry = "linear", or remove carrier')
 
     @property
     def carrier_problem(self) -> str:
-        """A tip without lateral motion cannot follow."""
+        """Why the stator cannot stand on a carrier: without lateral motion its tip cannot follow."""
         return "" if self.lateral else "lateral = false, so its tip would not follow; set lateral = true"
 
     @property
@@ -171,10 +171,12 @@ class LumpedStator(Seat):
 
     @property
     def carrier_problem(self) -> str:
-        """Neither a wall nor a mass without lateral motion can follow."""
+        """Why the stator cannot stand on a carrier: a wall or a laterally fixed mass cannot follow."""
         if not self.rigid and self.lateral_stiffness is not None:
             return ""
-        return "it is held laterally and would not follow; give it mass, stiffness and lateral_stiffness"
+        return (
+            "it is constrained laterally and would not follow; give it mass, stiffness and lateral_stiffness"
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -210,7 +212,7 @@ class MatrixStator(Seat):
 
     @property
     def carrier_problem(self) -> str:
-        """Matrices do not say which springs go to the ground."""
+        """Why the stator cannot stand on a carrier: matrices do not show which springs go to the ground."""
         return "matrices hold it to the ground; put it and the carrier into one model, or give it springs"
 
 

@@ -90,8 +90,8 @@ def begin_part(
             store.reopen()
             if must_be_grown(store, grid, accept_version=request.accept_version):
                 raise StoreError(
-                    f"{store.path}: cannot take up the study as it now is while {others[0]} computes it "
-                    "as it was; wait for all parts, or stop them"
+                    f"{store.path}: the study has changed since {others[0]} began it; wait for all "
+                    "parts, or stop them"
                 )
         run = free_number(store.path)
         if request.lock is None:

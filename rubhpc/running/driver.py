@@ -51,14 +51,14 @@ def run(
     quiet: bool = False,
     stopping: Stopping | None = None,
 ) -> Summary:
-    """Run a study, or what is left of it, on this process, on `workers`, or on all MPI ranks it is called on.
+    """Run or resume a study in this process, on `workers`, or on all MPI ranks that call it.
 
     Parameters
     ----------
     study : Study or path
         What to run; a path is read on the first rank.
     output : path, optional
-        The store, instead of the study's.
+        The store, in place of that of the study.
     retry_failed : bool
         Compute failed cases again.
     max_failures : int, optional
@@ -86,7 +86,7 @@ def run(
     Raises
     ------
     InputError
-        The study cannot be run as it stands.
+        The study cannot be run.
     StoreError
         The store belongs to another study, is in use, or cannot be written.
     StoppedEarly

@@ -151,7 +151,7 @@ def time_pilots(
             is_bound = pilots.covered == 0.0
             break
     if pilots.shortened:
-        say(f"timing cases: {len(paces)} so far, the dearest of them to their end")
+        say(f"timing cases: {len(paces)} so far, now the longest to their end")
     # The beginnings alone may have taken all that is allowed.
     _finish(pilots, picked, sample, max(allowed(), min(_LEAST, _HALF * foreseen())))
     block = time_block(manifest, pilots.arrays) if pilots.arrays else 0.0

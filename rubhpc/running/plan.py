@@ -118,11 +118,11 @@ class Plan:
             return []
         note = ""
         if timing.n_pilot == self.counts[MISSING]:
-            note = ", all that are missing"
+            note = ", all missing ones"
         elif self._range:
             few = "are few and differ" if timing.n_pilot <= _FEW else "differ"
             share = "two plans in three" if timing.n_pilot <= _FEW else "eight to nine plans in ten"
-            note = f"; they {few}: such a range holds the time of {share}"
+            note = f"; they {few}: such a range contains the time in {share}"
         return [f"timed       {timing.n_pilot} case{'s' * (timing.n_pilot > 1)}{note}"]
 
     @property
@@ -142,9 +142,9 @@ class Plan:
     @property
     def _idle(self) -> str:
         if self.n_sequence == self.n_block:
-            return "more ranks would idle"
+            return "more ranks would be idle"
         sweeps = f"{self.n_sequence} sequential sweep{'s' * (self.n_sequence > 1)}"
-        return f"in {sweeps}: more ranks than that would idle"
+        return f"in {sweeps}: more ranks than that would be idle"
 
     def text(self) -> str:
         """The plan for people, a few lines."""
@@ -157,8 +157,8 @@ class Plan:
             else "core-hours unknown: the pilot cases failed"
         )
         if self.start_up > 0.0 and self.counts[MISSING]:
-            cost += f", with the {self.start_up:.1f} s that a process takes to start"
-        compiled = "; kernels were compiled, less from now on" if self.timing.has_compiled else ""
+            cost += f", including {self.start_up:.1f} s to start a process"
+        compiled = "; includes compilation, less from now on" if self.timing.has_compiled else ""
         return "\n".join(
             [
                 f"{self.title} -> {self.store}",

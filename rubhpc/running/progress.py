@@ -97,7 +97,7 @@ class Progress:
         n_ended = self._n_done + sums.n_case
         if self._bar is None:
             among = (
-                f"/{self._n_case} cases" if n_ended <= self._n_case else f" cases, {self._n_case} foreseen"
+                f"/{self._n_case} cases" if n_ended <= self._n_case else f" cases, {self._n_case} expected"
             )
             print(f"{n_ended}{among}; {self._rest(sums)}", flush=True)
             self._gap = min(max(self._gap, 0.1 * (now - seconds_compiling() - self._began)), _LONGEST_GAP)

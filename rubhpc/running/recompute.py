@@ -151,12 +151,16 @@ def _locate(store: Store, study: Study, case: Case) -> int | None:
 def _find(grid: CaseGrid, name: str) -> int:
     """Flat index of the one case whose id begins so."""
     if len(name) < SHORTEST:
-        raise InputError(f"--only {name}: too short; give {SHORTEST} characters of an id at least")
+        raise InputError(f"--only {name}: too short; give at least {SHORTEST} characters of an id")
     manifest = manifest_of(grid)
     found = [flat for flat in range(grid.n_case) if manifest.case_id(flat).startswith(name)]
     if len(found) != 1:
-        what = f"{len(found)} cases have such an id; give more of it" if found else "no case has such an id"
-        raise InputError(f"--only {name}: {what}; rubhpc status names those that failed")
+        what = (
+            f"{len(found)} cases have such an id; give more characters of it"
+            if found
+            else "no case has such an id"
+        )
+        raise InputError(f"--only {name}: {what}; rubhpc status lists those that failed")
     return found[0]
 
 
@@ -165,13 +169,13 @@ def _compare(
 ) -> str:
     """How a case compares with the store, where there is one; raises where it differs."""
     if not is_store(study.output):
-        return f"{study.output} is not there yet"
+        return f"{study.output} does not exist yet"
     store = Store(study.output)
     flat = _locate(store, study, case)
     ledger = store.replay()
     assert ledger.measures is not None
     if flat is None or ledger.status[flat] == MISSING:
-        return f"{study.output} does not hold it yet"
+        return f"{study.output} does not contain it yet"
     if ledger.status[flat] != status:
         raise StoreError(
             f"{study.output}: case {case.id} is {STATUS[status]} now, but stored as "

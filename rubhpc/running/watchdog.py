@@ -59,7 +59,7 @@ class Watchdog:
         self._record.note_overrun(limit)
         print(
             f"rubhpc: rank {launch().rank}: a case is over its time limit of {limit:g} s and cannot be "
-            "interrupted; run the same command again, it leaves this case out",
+            "interrupted; run the same command again, which skips this case",
             file=sys.stderr,
             flush=True,
         )

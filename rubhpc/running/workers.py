@@ -232,7 +232,7 @@ def start_workers(count: int) -> Iterator[Parent]:
     if count < 1:
         raise InputError(f"workers: {count} is out of range; it must be at least 1")
     if launch().size > 1:
-        raise InputError("workers: mpirun has started several processes already; leave one of the two out")
+        raise InputError("workers: mpirun has started several processes already; use one of the two")
     with Parent(count) as parent:
         yield parent
 

@@ -114,9 +114,9 @@ def read_deaths(
             causes[flat] = evidence
     for flat, n in deaths.items():
         if crashes[flat] >= _CRASHES:
-            failed.setdefault(flat, f"its rank died in it {crashes[flat]} times: {causes[flat]}")
+            failed.setdefault(flat, f"its rank died {crashes[flat]} times while computing it: {causes[flat]}")
         elif n >= _DEATHS:
-            failed.setdefault(flat, f"its rank died in it {n} times, of unknown cause")
+            failed.setdefault(flat, f"its rank died {n} times while computing it, of unknown cause")
     suspect = {flat: n for flat, n in deaths.items() if flat not in failed and (n > 1 or crashes[flat])}
     return RankDeaths(failed, suspect)
 
@@ -163,7 +163,7 @@ def _cause(evidence: str) -> str:
 def _out_of_memory(where: str) -> str:
     host, _, n_kill = where.partition(" ")
     is_here = host == socket.gethostname() and n_kill.isdigit()
-    return "killed, as the machine had no memory left" if is_here and _oom_kills() > int(n_kill) else ""
+    return "killed, because the machine ran out of memory" if is_here and _oom_kills() > int(n_kill) else ""
 
 
 def _oom_kills() -> int:

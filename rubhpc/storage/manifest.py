@@ -268,8 +268,8 @@ def no_store(path: Path, advice: str) -> str:
     """
     if (path / "zarr.json").is_file() and not (path / PRIVATE).is_dir():
         return (
-            f"{path}: its directory {PRIVATE} is missing, which holds what is done and all checksums; "
-            "copy it too (cp -r STORE, not STORE/*), or move this store away and run the study anew"
+            f"{path}: its directory {PRIVATE} is missing, which holds the journals and all checksums; "
+            "copy it too (cp -r STORE, not STORE/*), or move this store away and run the study again"
         )
     if (path / PRIVATE / "journal").is_dir():
         return f"{path}: both copies of its manifest are missing; put one back from a backup, or {advice}"

@@ -27,7 +27,7 @@ class Summary:
     computed : int
         Cases this run computed.
     seconds : float
-        What the run took.
+        Duration of the run, s.
     reasons : tuple of (str, str)
         Coordinates and reason of each failed case, the first hundred.
     flawed : int
@@ -35,7 +35,7 @@ class Summary:
     lost : int
         Ranks that died during the run; the others did their work.
     part : str
-        What was run of the study, as "3/64"; "" where it was all of it.
+        Part of the study that was run, as "3/64"; "" for the whole study.
     n_elsewhere : int
         Cases of other parts that are missing.
     """
@@ -64,7 +64,7 @@ class Summary:
         """The summary in a line."""
         states = [i for i in (DONE, FAILED, DIVERGED, INFERRED, MISSING) if self.counts[i]]
         counts = ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in states)
-        flaw = f"; {self.flawed} done with a remark, rubhpc status names them" if self.flawed else ""
+        flaw = f"; {self.flawed} done with a remark, rubhpc status lists them" if self.flawed else ""
         rest = ""
         if self.part:
             missing = f"{self.n_elsewhere} cases of other parts are missing"
@@ -77,7 +77,7 @@ class Summary:
         if not self.counts[FAILED]:
             lost = "a rank was lost" if self.lost == 1 else f"{self.lost} ranks were lost"
             return (
-                f"{self.name}: {lost} on the way, the others finished the study; nothing is left to be done"
+                f"{self.name}: {lost} during the run; the others finished the study, and no case is missing"
             )
         case, reason = self.reasons[0]
         rest = (

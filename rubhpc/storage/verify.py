@@ -89,7 +89,8 @@ def verify(path: Path) -> Damage:
     lost = _lost_lines(store, ledger)
     packed = _damaged_packed(store, ledger)
     oversized = dict.fromkeys(
-        f"{file.parent.name} (a shard with bytes of no case)" for file in store.block_files.oversized()
+        f"{file.parent.name} (a shard with bytes that belong to no case)"
+        for file in store.block_files.oversized()
     )
     files = dict.fromkeys(_named(name) for name in store.damaged_files())
     n_checked = int(np.isin(ledger.status, (DONE, DIVERGED)).sum())
@@ -148,10 +149,10 @@ def _damaged_cases(store: Store, ledger: Ledger) -> dict[int, str]:
 def _trouble(store: Store, start: tuple[int, ...]) -> str:
     """Why a block cannot be read."""
     if store.has_files(start):
-        return "a chunk is garbled"
+        return "a chunk cannot be decoded"
     absent = [path for path in store.chunk_files(start) if not is_filled(path)]
     is_gone = not any(os.path.lexists(path) for path in absent)
-    return "a file is gone" if is_gone else "a chunk is empty, or is not a regular file"
+    return "a file is missing" if is_gone else "a chunk is empty, or is not a regular file"
 
 
 def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:
@@ -161,7 +162,7 @@ def _lost_lines(store: Store, ledger: Ledger) -> dict[int, str]:
     lost = set(ledger.damaged_cases)
     if packed is not None:
         lost |= set(np.flatnonzero(~np.isin(packed.ravel(), (MISSING, INFERRED)) & never).tolist())
-    return {flat: "its line in the journal is damaged or gone" for flat in lost if never[flat]}
+    return {flat: "its line in the journal is damaged or missing" for flat in lost if never[flat]}
 
 
 def _misplaced(store: Store) -> list[str]:

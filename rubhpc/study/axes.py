@@ -203,7 +203,7 @@ def problem_of(name: str, values: tuple[float, ...], *, is_drawn: bool = False) 
             if problem := check_value(declared, value):
                 return problem
     if name in SPEED_AXES and 0.0 in values:
-        return "0 is no speed; leave it out, the rotor has to spin"
+        return "0 is not a valid speed; remove it, the rotor has to spin"
     if not is_drawn and len(set(values)) < len(values):
         ordered = sorted(values)
         twice = next(v for v, following in itertools.pairwise(ordered) if v == following)

@@ -83,7 +83,7 @@ def unit_of(name: str, rig: Rig) -> str:
     """
     declared = _declared(name, rig, name)
     if declared.metadata["kind"] != "quantity":
-        raise InputError(f"{name}: is no quantity; take one, such as friction")
+        raise InputError(f"{name}: is not a quantity; give one, such as friction")
     return str(declared.metadata["unit"])
 
 
@@ -164,7 +164,9 @@ def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
             ) from None
         raise InputError(f"{where}: {str(error).replace('unknown key', 'unknown axis')}") from None
     if declared.metadata["kind"] == "choice":
-        raise InputError(f"{where}: a word of the rig is no axis; set it in [override], one study for each")
+        raise InputError(
+            f"{where}: a key with text values cannot be an axis; set it in [override], one study per value"
+        )
     return declared
 
 
@@ -183,7 +185,7 @@ def _read_table(table: Mapping[str, object], where: str) -> tuple[object, str]:
         other = next(key for key in rest if key != "values")
         raise InputError(f"{where}: {other} conflicts with values; give either a range or values")
     if isinstance(rest["values"], dict):
-        raise InputError(f"{where}: values: {brief(rest['values'])} is no list; write values = [...]")
+        raise InputError(f"{where}: values: {brief(rest['values'])} is not a list; write values = [...]")
     return rest["values"], str(sweep)
 
 

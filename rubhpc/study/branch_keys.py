@@ -66,7 +66,7 @@ class BranchKeys:
             raise FieldError("periods", "empty; give at least one, such as [1, 2]")
         for period in self.periods:
             if period != int(period) or period > LONGEST_PERIOD:
-                problem = f"{period:g} is no number of revolutions from 1 to {LONGEST_PERIOD}"
+                problem = f"{period:g} is not a number of revolutions from 1 to {LONGEST_PERIOD}"
                 raise FieldError("periods", f"{problem}; write whole numbers")
 
     @property
@@ -103,7 +103,9 @@ def check_branch(
 ) -> None:
     """Refuse what cannot be followed; `is_bent` where a stator is of the second order."""
     if all(axis.name != keys.along for axis in axes):
-        raise InputError(f"[branch] along: {keys.along} is no axis of the grid; add it as {{ start, stop }}")
+        raise InputError(
+            f"[branch] along: {keys.along} is not an axis of the grid; add it as {{ start, stop }}"
+        )
     if is_sampled:
         raise InputError("[branch] along: a sample has no axis to follow; remove [sample] or [branch]")
     if any(axis.sweep != FROM_REST for axis in axes):
@@ -112,7 +114,7 @@ def check_branch(
     is_closed = integrator.method == "modal" and contact.closed_form != "never" and not is_bent
     if not is_closed or "contact.law" in varied:
         raise InputError(
-            "[branch] along: branches need motion in closed form between events; take method modal, normal "
+            "[branch] along: branches need motion in closed form between events; use method modal, normal "
             "fixed, stators of linear geometry, and friction_law sliding or coulomb"
         )
     if recording.probe:

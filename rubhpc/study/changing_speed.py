@@ -39,8 +39,8 @@ def check_changing(
     if others:
         raise InputError(f"[{table}]: run-ups are not combined with [{others}]; remove one of them")
     if integrator.method != "modal":
-        problem = f"{integrator.method} holds the speed"
-        raise InputError(f'[integrator] method: {problem}; take method = "modal", or remove [{table}]')
+        problem = f"{integrator.method} keeps the speed constant"
+        raise InputError(f'[integrator] method: {problem}; set method = "modal", or remove [{table}]')
     for axis in axes:
         if axis.sweep != FROM_REST:
             raise InputError(f"[grid] {axis.name}: sweep: a run-up begins at its first speed; remove sweep")

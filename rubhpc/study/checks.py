@@ -41,7 +41,7 @@ def check_axes(axes: tuple[Axis, ...]) -> None:
             raise InputError(f"[grid] {given[1]}: conflicts with {given[0]}; give only one of them")
     swept = [axis.name for axis in axes if axis.sweep != FROM_REST]
     if len(swept) > 1:
-        raise InputError(f"[grid] {swept[1]}: sweep: {swept[0]} is swept already; leave one of the two out")
+        raise InputError(f"[grid] {swept[1]}: sweep: {swept[0]} is swept already; remove one sweep")
     if swept and any(axis.dimension != axis.coordinate for axis in axes):
         raise InputError(f"[grid] {swept[0]}: sweep: {NO_NEIGHBOURS}")
     taken: dict[str, str] = {}
@@ -51,13 +51,13 @@ def check_axes(axes: tuple[Axis, ...]) -> None:
             raise InputError(f"[grid] {axis.name}: {axis.coordinate} is another variable of a store; {fix}")
         if axis.coordinate in taken:
             raise InputError(
-                f"[grid] {axis.name}: is the same dimension as {taken[axis.coordinate]}; leave one out"
+                f"[grid] {axis.name}: is the same dimension as {taken[axis.coordinate]}; remove one"
             )
         taken[axis.coordinate] = axis.name
         for other in axes:
             without_numbers = ".".join(part for part in axis.name.split(".") if not part.isdigit())
             if other.name == without_numbers != axis.name:
-                raise InputError(f"[grid] {axis.name}: is set by the axis {other.name} too; leave one out")
+                raise InputError(f"[grid] {axis.name}: is also set by the axis {other.name}; remove one")
 
 
 def check_rigs(rig: Rig, axes: tuple[Axis, ...], probes: tuple[Probe, ...] = ()) -> None:

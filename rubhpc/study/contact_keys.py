@@ -139,7 +139,7 @@ class Contact(ContactKeys):
         super().__post_init__()
         for key, (kind, laws, reason) in NEEDS_LAW.items():
             if getattr(self, key) is not None and getattr(self, kind) not in laws:
-                raise FieldError(key, f'{reason}; take {kind} = "{laws[0]}", or leave it out')
+                raise FieldError(key, f'{reason}; set {kind} = "{laws[0]}", or leave it out')
         for (kind, law), needed in _EXAMPLES.items():
             for key, example in needed.items():
                 if getattr(self, kind) == law and getattr(self, key) is None:

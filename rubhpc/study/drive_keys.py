@@ -111,10 +111,10 @@ class DriveKeys:
         rpm = 30.0 / math.pi
         if self.lowest is not None and self.lowest >= start:
             problem = f"{self.lowest * rpm:.6g} rpm is not below the start at {start * rpm:.6g} rpm"
-            raise FieldError("lowest", f"{problem}; the record would end at once; lower it")
+            raise FieldError("lowest", f"{problem}; the record would end immediately; lower it")
         if self.highest is not None and self.highest <= start:
             problem = f"{self.highest * rpm:.6g} rpm is not above the start at {start * rpm:.6g} rpm"
-            raise FieldError("highest", f"{problem}; the record would end at once; raise it")
+            raise FieldError("highest", f"{problem}; the record would end immediately; raise it")
 
 
 def first_speed(keys: DriveKeys, axes: Sequence[Axis]) -> float:
@@ -144,7 +144,7 @@ def check_drive(
     for name, axis in varied.items():
         key = name.removeprefix(DRIVE_PREFIX)
         if getattr(keys, key) is not None:
-            raise InputError(f"[drive] {key}: is an axis of the grid too; leave one out")
+            raise InputError(f"[drive] {key}: is also an axis of the grid; remove one")
         if key == "torque" and keys.speed is not None:
             raise InputError("[drive] speed: goes with a table of torques, not with an axis; leave it out")
         if key == "start":

@@ -33,7 +33,7 @@ class Initial:
 
     from_: str = text(
         doc='Motion that the case starts from: "rest", "contact_free" (the steady unbalance response), or '
-        "where a case of a store has ended: its path.",
+        "the final state of a stored case: the path of its store.",
         example='"sweep.zarr"',
         default=REST,
     )

@@ -285,7 +285,7 @@ class OperatingPoints:
             if self.is_clearance_ratio:
                 raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead")
             if self.study.initial.from_ == CONTACT_FREE:
-                raise InputError(f'[initial] from: {problem}; take from = "rest"')
+                raise InputError(f'[initial] from: {problem}; set from = "rest"')
             amplitude = math.nan
         if self.is_clearance_ratio and not amplitude > 0:
             problem = f"no contact-free amplitude at {speed:.6g} rad/s to take it of"

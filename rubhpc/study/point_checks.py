@@ -42,7 +42,7 @@ def check_gap(points: OperatingPoints, least: float) -> None:
         gap, shift = typed_quantity(least, "m"), typed_quantity(offset, "m")
         problem = f"{gap} and a stator's clearance_offset of {shift} leave no gap"
         name = "clearance_ratio" if points.is_clearance_ratio else "clearance"
-        raise InputError(f"[grid] {name}: {problem}; take a larger one")
+        raise InputError(f"[grid] {name}: {problem}; use a larger one")
 
 
 def _check_step(points: OperatingPoints, step: float) -> None:
@@ -51,7 +51,7 @@ def _check_step(points: OperatingPoints, step: float) -> None:
         if step >= limit:
             where = points.named(points.rig_axes, index)
             problem = f"{step:g} s is above the stability limit{f' at {where}' if where else ''}"
-            raise InputError(f"[integrator] step: {problem}; take less than {limit:.3g} s")
+            raise InputError(f"[integrator] step: {problem}; use less than {limit:.3g} s")
 
 
 def _check_held(points: OperatingPoints) -> None:
@@ -59,10 +59,10 @@ def _check_held(points: OperatingPoints) -> None:
     for index in points.along(points.response_axes) if points.has_few_rigs else ():
         if free := find_rigid_body_mode(points.model(index)):
             where = points.named(points.response_axes, index)
-            problem = f"modal needs bodies that are held, and {free}{f' at {where}' if where else ''}"
+            problem = f"modal needs constrained bodies, and {free}{f' at {where}' if where else ''}"
             # Friction turns a free rotor back for ever: it has no steady twist.
             hold = "give it a stiffness, however soft" if "torsion" in free else "hold it"
-            raise InputError(f'[integrator] method: {problem}; {hold}, or take method = "central-difference"')
+            raise InputError(f'[integrator] method: {problem}; {hold}, or set method = "central-difference"')
 
 
 def _check_knocks(points: OperatingPoints) -> None:

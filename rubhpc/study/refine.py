@@ -59,7 +59,7 @@ class Refine:
         check_fields(self)
         if self.coarse & (self.coarse - 1):
             near = 2 ** self.coarse.bit_length()
-            problem = f"{self.coarse} is no power of two; write {near // 2} or {near}"
+            problem = f"{self.coarse} is not a power of two; write {near // 2} or {near}"
             raise FieldError("coarse", problem)
 
     def refined(self, axes: Sequence[Axis]) -> list[str]:
@@ -84,7 +84,7 @@ class Refine:
             raise InputError(f"[refine]: {problem}; write one as {{ start, stop, num }}, or remove [refine]")
         for name in self.axes:
             if name not in {axis.name for axis in axes}:
-                raise InputError(f"[refine] axes: {name} is no axis of [grid]; {nearest(name, ranges)}")
+                raise InputError(f"[refine] axes: {name} is not an axis of [grid]; {nearest(name, ranges)}")
             if name not in ranges:
                 problem = f"{name} is a list, whose values have no even steps"
                 raise InputError(

@@ -105,7 +105,7 @@ def check_run_up(
         return
     if keys.law or keys.time is not None:
         key = "law" if keys.law else "time"
-        raise InputError(f"[run_up] {key}: {RUN_UP_TIME} is an axis of the grid too; leave one out")
+        raise InputError(f"[run_up] {key}: {RUN_UP_TIME} is also an axis of the grid; remove one")
     for time in next(axis for axis in axes if axis.name == RUN_UP_TIME).tried:
         try:
             keys.law_at(time)

@@ -48,7 +48,7 @@ def draw(axes: Sequence[Axis], sample: Sample) -> tuple[Axis, ...]:
     ranges = [axis for axis in axes if axis.drawn_from is not None]
     if not ranges or (sample.is_saltelli and len(ranges) < 2):
         what = f"{ranges[0].name} is the only range" if ranges else "no axis of [grid] is a range"
-        fix = "two { start, stop } at least" if sample.is_saltelli else "a { start, stop }"
+        fix = "at least two { start, stop }" if sample.is_saltelli else "a { start, stop }"
         raise InputError(f"[sample]: {what}; write {fix}, or leave [sample] out")
     n_case = sample.n * (cases_per_point(len(ranges)) if sample.is_saltelli else 1)
     if n_case > MOST_DRAWN:

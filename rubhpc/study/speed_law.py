@@ -109,11 +109,11 @@ def piece_length(per_revolution: int, pieces_per_revolution: int) -> int:
     Raises
     ------
     InputError
-        It is no divisor of the samples in a revolution.
+        It is not a divisor of the samples in a revolution.
     """
     is_count = isinstance(pieces_per_revolution, int) and pieces_per_revolution >= 1
     if not is_count or per_revolution % pieces_per_revolution:
-        problem = f"{pieces_per_revolution} is no divisor of the {per_revolution} samples in a revolution"
+        problem = f"{pieces_per_revolution} is not a divisor of the {per_revolution} samples in a revolution"
         raise InputError(f"pieces_per_revolution: {problem}; choose another number")
     return per_revolution // pieces_per_revolution
 
@@ -147,7 +147,7 @@ def cut(
     Raises
     ------
     InputError
-        `pieces_per_revolution` is no divisor of the samples in a revolution.
+        `pieces_per_revolution` is not a divisor of the samples in a revolution.
     """
     n = law.n_revolution
     if pieces_per_revolution is not None:

@@ -69,7 +69,7 @@ def read_state(path: str, select: Selection) -> StoredState:
         group = zarr.open_group(path, mode="r")
         rig: Any = group.attrs["rig"]
     except (OSError, KeyError, ValueError, TypeError):
-        raise InputError(f"{where}: is no store of a study; give the path of one") from None
+        raise InputError(f"{where}: is not a store of a study; give the path of one") from None
     if FINAL_STATE not in group:
         fix = 'run its study with [record] keep = ["state", ...]'
         raise InputError(f"{where}: keeps no final states; {fix}")
@@ -123,7 +123,7 @@ def _nearest(axis: zarr.Array[Any], values: NDArray[np.float64], dim: str, wante
         near = values[np.sort(np.argsort(np.abs(values - number), kind="stable")[:_MOST_WRITTEN])]
         listed = ", ".join(_written(axis, value) for value in near)
         problem = f"{brief(wanted)} is not on the grid of the store"
-        raise InputError(f"[initial] select.{dim}: {problem}; take one of {listed}")
+        raise InputError(f"[initial] select.{dim}: {problem}; choose one of {listed}")
     return place
 
 

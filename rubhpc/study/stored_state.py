@@ -65,7 +65,7 @@ class StoredState:
             mine, its = _in_words(self.bodies, self.n_stator), _in_words(bodies, n_stator)
             problem = f"a state of {mine} does not fit this rig, {its}"
             raise InputError(
-                f"[initial] from: {problem}; take a store of a rig with these elements and stators"
+                f"[initial] from: {problem}; use a store of a rig with these elements and stators"
             )
 
 

@@ -88,9 +88,9 @@ class Study:
     drive : DriveKeys or None
         What turns the rotor where its speed is free; the axis of speeds then holds the first one alone.
     contact : ContactKeys
-        A `Contact`; of a grid with contact axes what they leave open, as far as it applies to a case's law.
+        A `Contact`; with contact axes, the keys that no axis sets, as far as they apply to the law of a case.
     initial : Initial
-        Where cases start, but for what initial axes say; a state of a store is read here.
+        Where cases start, apart from initial axes; a state of a store is read here.
     output : Path
         The store.
     source : Path or None
@@ -99,7 +99,7 @@ class Study:
     Raises
     ------
     InputError
-        When the grid lacks an axis, has two for one thing, or holds values with which the rig cannot be.
+        When the grid lacks an axis, has two for one quantity, or has values that make the rig invalid.
     """
 
     title: str
@@ -248,11 +248,11 @@ def read_study(
     except InputError as error:
         raise InputError(f"{place(file)}: {error}") from None
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
-        raise InputError(f"{place(file, 'override', name)}: is an axis of the grid too; leave one out")
+        raise InputError(f"{place(file, 'override', name)}: is also an axis of the grid; remove one")
     for name in ("contact", "initial"):
         for key in table_of(table, name, file):
             if f"{name}.{key}" in {axis.name for axis in axes}:
-                raise InputError(f"{place(file, name, key)}: is an axis of the grid too; leave one out")
+                raise InputError(f"{place(file, name, key)}: is also an axis of the grid; remove one")
     is_varied = any(axis.is_contact_key for axis in axes)
     contact = build(ContactKeys if is_varied else Contact, table.get("contact", {}), file, "contact")
     starts = {"from": CONTACT_FREE} if run_up is not None or drive is not None else {}

@@ -33,7 +33,9 @@ def table_of(table: dict[str, Any], key: str, file: str) -> dict[str, Any]:
     """A table by its name; empty where it is left out."""
     value = table.get(key, {})
     if not isinstance(value, dict):
-        raise InputError(f"{place(file, key)}: {brief(value)} is no table; write [{key}] and its keys below")
+        raise InputError(
+            f"{place(file, key)}: {brief(value)} is not a table; write [{key}] and its keys below"
+        )
     return value
 
 
@@ -57,7 +59,7 @@ def read_branch(
     """Return the table [branch], its step in the unit of its axis."""
     along, step = table.get("along"), table.get("step")
     if isinstance(along, str) and along not in dict(flatten(grid)):
-        fix = f"{along} is no axis of the grid; add it as {{ start, stop }}"
+        fix = f"{along} is not an axis of the grid; add it as {{ start, stop }}"
         raise InputError(f"{place(file, 'branch', 'along')}: {fix}")
     if sample is not None:
         fix = "a sample has no axis to follow; remove [sample] or [branch]"

@@ -133,7 +133,7 @@ class Recording:
         at_least=0,
         at_most=64,
     )
-    probe: tuple[Probe, ...] = table(doc="What is measured besides, and where.", default=(), added=True)
+    probe: tuple[Probe, ...] = table(doc="Sensors: what else is measured, and where.", default=(), added=True)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -206,7 +206,7 @@ class Sample:
         at_most=2**20,
     )
     seed: int = count(
-        doc="Seed; a larger n with the same seed continues the sample, but for a Latin hypercube.",
+        doc="Seed; a larger n with the same seed continues the sample, except with a Latin hypercube.",
         example="1",
         default=1,
         at_least=0,
@@ -216,11 +216,11 @@ class Sample:
         check_fields(self)
         if self.is_saltelli and self.n < FEWEST_POINTS:
             problem = f"{self.n} is out of range; it must be at least {FEWEST_POINTS}"
-            raise FieldError("n", f'{problem}, or take method = "sobol-sequence"')
+            raise FieldError("n", f'{problem}, or set method = "sobol-sequence"')
         if self.is_saltelli and self.n & (self.n - 1):
             near = 2 ** self.n.bit_length()
-            problem = f"{self.n} is no power of two, without which Sobol' points lose their balance"
-            fix = f'write {near // 2} or {near}, or take method = "sobol-sequence"'
+            problem = f"{self.n} is not a power of two, without which Sobol' points lose their balance"
+            fix = f'write {near // 2} or {near}, or set method = "sobol-sequence"'
             raise FieldError("n", f"{problem}; {fix}")
 
     @property

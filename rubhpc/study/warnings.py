@@ -71,7 +71,7 @@ def _sag(points: OperatingPoints) -> str:
     share = f"{n_bad} of {len(spread)}"
     return (
         f"[grid] clearance_ratio: the sag of the shaft exceeds {share} clearances, {text}: it rests on a "
-        "stator, and the ratio says little; give clearance instead"
+        "stator, and the ratio has little meaning; give clearance instead"
     )
 
 

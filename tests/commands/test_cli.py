@@ -235,9 +235,7 @@ def test_plan_extrapolates_cases_that_take_long_from_where_they_rub(tmp_path, mo
 def test_plan_names_the_start_of_a_process(tmp_path, capsys):
     code, out, _ = call(capsys, "plan", write_study(tmp_path))
     assert code == 0
-    found = re.search(
-        r"core-hours \(.* on one core\), with the (\d+\.\d) s that a process takes to start", out
-    )
+    found = re.search(r"core-hours \(.* on one core\), including (\d+\.\d) s to start a process", out)
     assert found is not None
     assert float(found[1]) > 0.0
 

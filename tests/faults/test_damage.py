@@ -158,8 +158,8 @@ def test_the_command_names_the_damage_though_the_store_is_in_use(store):
         done = run("verify", store)
     assert done.returncode == 3
     assert done.stdout.splitlines() == [
-        "damaged: case (1, 0, 0) speed_ratio=2, clearance_ratio=0.7, friction=0.1: a file is gone",
-        "damaged: case (1, 0, 1) speed_ratio=2, clearance_ratio=0.7, friction=0.3: a file is gone",
+        "damaged: case (1, 0, 0) speed_ratio=2, clearance_ratio=0.7, friction=0.1: a file is missing",
+        "damaged: case (1, 0, 1) speed_ratio=2, clearance_ratio=0.7, friction=0.3: a file is missing",
     ]
     (line,) = done.stderr.splitlines()
     assert line.startswith(f"rubhpc: {store}: damage in 2 cases and 0 arrays; not marked for the next run: ")

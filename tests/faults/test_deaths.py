@@ -51,7 +51,7 @@ def check_outcome(store: Path, reason: str, guilty: int = 1) -> None:
 def test_a_case_with_a_segmentation_fault_fails_after_two_of_them(tmp_path, launcher, ranks, guilty):
     study, store = write_poisoned(tmp_path, guilty=guilty), tmp_path / "tiny.zarr"
     n_death = runs_until_the_end("segfault", study, store, 2 * guilty, ranks=ranks, launcher=launcher)
-    check_outcome(store, "its rank died in it 2 times: segmentation fault", guilty)
+    check_outcome(store, "its rank died 2 times while computing it: segmentation fault", guilty)
     where = f"{launcher.name}, {ranks} ranks"
     print(f"\n{where}: {guilty} cases with a segmentation fault failed after {n_death} deaths")
     healthy = run(study, "--retry-failed")
@@ -68,7 +68,7 @@ def test_a_case_whose_rank_is_killed_fails_after_five_times(tmp_path, launcher):
     """SIGKILL does not show its cause: neither the memory nor the user is blamed."""
     study, store = write_poisoned(tmp_path, guilty=2), tmp_path / "tiny.zarr"
     n_death = runs_until_the_end("killed", study, store, 10, ranks=2, launcher=launcher)
-    check_outcome(store, "its rank died in it 5 times, of unknown cause", guilty=2)
+    check_outcome(store, "its rank died 5 times while computing it, of unknown cause", guilty=2)
     print(f"\n{launcher.name}: 2 cases that are killed failed after {n_death} deaths")
 
 
@@ -142,5 +142,7 @@ def test_want_of_memory_is_distinguished_from_other_kills(store, monkeypatch):
     die(store, 5)
     monkeypatch.setattr(in_progress, "_oom_kills", lambda: 8)
     suspects = read_deaths(store.in_progress_directory, store.manifest, is_missing)
-    assert suspects.failed == {3: "its rank died in it 2 times: killed, as the machine had no memory left"}
+    assert suspects.failed == {
+        3: "its rank died 2 times while computing it: killed, because the machine ran out of memory"
+    }
     assert suspects.suspect == {5: 1}

@@ -29,7 +29,7 @@ def test_masses_without_lateral_damping_are_named_once(tmp_path):
     frequency = math.sqrt(1e6 / 0.06) / (2.0 * math.pi)
     text = undamped_message(assemble(rig_of(tmp_path, MASS + SOFT)), 200.0)
     assert text.startswith(
-        f"nothing damps the lateral mode of {frequency:.4g} Hz of stators 1 to 4: once excited"
+        f"no damping acts on the lateral mode of {frequency:.4g} Hz of stators 1 to 4: once excited"
     )
     assert "\n" not in text
     damped = rig_of(tmp_path, MASS + SOFT + 'lateral_damping = "1 N s/m"\n')

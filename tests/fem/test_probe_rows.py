@@ -136,7 +136,7 @@ def test_a_tip_that_moves_along_its_axis_alone_is_not_seen_across_it():
 @pytest.mark.parametrize(
     ("keys", "says"),
     [
-        ({"name": "1st"}, 'name: "1st" makes no name of a variable'),
+        ({"name": "1st"}, 'name: "1st" is not a valid name of a variable'),
         ({"name": "x" * 65}, "up to 64 letters"),
         ({"name": "a b", "node": 1}, "letters, digits and _"),
         ({"name": "a", "node": 1, "stator": 1}, "node: give either node = 1 or stator = 1"),

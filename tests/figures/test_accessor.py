@@ -110,9 +110,9 @@ def test_as_many_axes_are_asked_for_as_a_figure_has(store: xr.Dataset) -> None:
 @pytest.mark.parametrize(
     ("name", "args", "message"),
     [
-        ("cascade", {"form": "water"}, 'form: "water" is none of waterfall, intensity'),
+        ("cascade", {"form": "water"}, 'form: "water" is not one of waterfall, intensity'),
         ("cascade", {"max_frequency": -5.0, **REST}, "out of range"),
-        ("bifurcation", {"color": "red"}, 'color: "red" is none of regime, period'),
+        ("bifurcation", {"color": "red"}, 'color: "red" is not one of regime, period'),
         ("hht", {"contact": "none", **ONE}, "contact: "),
         ("orbit", {"revolutions": 0, **ONE}, "revolutions: 0 is out of range; it must be at least 1"),
     ],

@@ -116,14 +116,14 @@ def test_data_come_as_arrays(run, synthetic_path, name):
     ("name", "args", "said"),
     [
         ("orbit", ["--select", "speed_ratio=1.5"], "select one value of clearance"),
-        ("orbit", ["--select", "speed_ratio"], "is no pair; write NAME=VALUE"),
+        ("orbit", ["--select", "speed_ratio"], "is not a pair; write NAME=VALUE"),
         ("orbit", [*ONE, "--figure", "orbit.bmp"], "a figure is one of"),
         ("orbit", [*ONE, "--data", "orbit.xls"], "unknown format; choose one of"),
         ("waveform", [*ONE, "--signal", "twist"], "twist: no such signal"),
-        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--order-lines", "1/0"], "no list of orders"),
+        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--order-lines", "1/0"], "not a list of orders"),
         ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--max-frequency", "1 kg"], "--max-frequency"),
         ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--max-frequency", "-5"], "out of range"),
-        ("map", ["--value", "vertical"], "no measure of a case"),
+        ("map", ["--value", "vertical"], "not a measure of a case"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(run, synthetic_path, name, args, said):

@@ -88,7 +88,7 @@ def test_one_bad_stator_spoils_the_case():
 
 
 def test_no_map_of_what_is_no_scalar(plain_map):
-    with pytest.raises(InputError, match="vertical: no measure of a case"):
+    with pytest.raises(InputError, match="vertical: not a measure of a case"):
         plain_map("vertical")
     with pytest.raises(InputError, match="did you mean peak_torsion"):
         plain_map("peak_torsio")

@@ -90,7 +90,7 @@ def test_regimes_have_no_contours(synthetic_path, axes):
 def test_facets_are_other_axes_of_few_values(synthetic_path):
     store = open_store(synthetic_path)
     assert facet_axes(store, ["friction", "stator.youngs_modulus"], ["speed_ratio", "clearance"]) == FACETS
-    with pytest.raises(InputError, match="not speed_ratio or clearance"):
+    with pytest.raises(InputError, match="other than speed_ratio or clearance"):
         facet_axes(store, ["clearance"], ["speed_ratio", "clearance"])
     with pytest.raises(InputError, match="one or two axes"):
         facet_axes(store, ["friction", "friction"], ["speed_ratio", "clearance"])

@@ -129,7 +129,7 @@ def test_what_a_penalty_overlaps_stays_and_what_a_wall_adds_goes():
 def test_a_rig_of_other_degrees_is_refused_in_a_line():
     record = simulate("mokhtar2017", speed_ratio=0.75, clearance="100 um", transient=0, revolutions=1)
     with pytest.raises(
-        InputError, match=r"initial: a state of \d+ numbers for a rig of \d+; carry it between"
+        InputError, match=r"initial: a state of \d+ numbers for a rig of \d+; use it only for"
     ):
         simulate(
             "mokhtar2017",

@@ -48,7 +48,7 @@ def test_variables_are_attributes(record):
     assert record.vertical[5] == 5.0
     assert record.section_vertical.size == 3
     assert not hasattr(record, "horizontal")
-    with pytest.raises(AttributeError, match="holds no torsion"):
+    with pytest.raises(AttributeError, match="contains no torsion"):
         _ = record.torsion
 
 
@@ -79,13 +79,12 @@ def test_one_line_says_what_it_holds(record):
     ("left", "residual", "remark"),
     [
         (0, 9e-3, ""),
-        (0, 0.25, "its energy balance is off by 25 %; take a shorter step"),
+        (0, 0.25, "its energy balance is off by 25 %; use a shorter step"),
         (1, 9e-5, ""),
         (
             1,
             1.1e-3,
-            "in the short steps to which it was left, its energy balance is off by 0.11 %; "
-            "take a shorter step",
+            "with its short steps its energy balance is off by 0.11 %; use a shorter step",
         ),
     ],
 )

@@ -105,7 +105,7 @@ def test_rig_without_stator_is_refused():
 def test_step_above_the_limit_is_refused_with_the_limit(modulus):
     overrides = {"stator.youngs_modulus": modulus}
     limit = step_limit(assemble(with_keys(RIG, overrides)))
-    with pytest.raises(InputError, match=f"take less than {limit:.4g} s"):
+    with pytest.raises(InputError, match=f"use less than {limit:.4g} s"):
         simulate(RIG, **(RUB | {"step": limit * 1.001}), overrides=overrides)
     # as long as it may be; the samples' interval then shortens it by 0.3 % at most
     record = simulate(

@@ -46,7 +46,7 @@ def test_the_survivors_of_lost_ranks_finish_the_study(tmp_path, launcher, victim
     print(f"\nranks {victims} of 3 killed, the others finished {time.monotonic() - began:.1f} s later")
     lost = "a rank was lost" if len(victims) == 1 else "2 ranks were lost"
     assert complaint(err) == (
-        f"rubhpc: {store}: {lost} on the way, the others finished the study; nothing is left to be done"
+        f"rubhpc: {store}: {lost} during the run; the others finished the study, and no case is missing"
     )
     assert "12 done" in out
     assert (Store(store).replay().status == DONE).all()

@@ -95,7 +95,7 @@ def test_nothing_can_be_sent_to_it(server: Server) -> None:
 
 
 def test_a_port_in_use_is_said(server: Server, synthetic_path: Path) -> None:
-    with pytest.raises(InputError, match=f"--port: {server.port} cannot be had"):
+    with pytest.raises(InputError, match=f"--port: {server.port} is not available"):
         Server(Library(lambda: open_store(synthetic_path)), server.port)
 
 

@@ -155,8 +155,8 @@ def test_multipliers_are_drawn(store):
     ("old", "new", "text"),
     [
         ('{ start = "112 um", stop = "124 um" }', '"112 um"', "clearance: .* follows it; write it as"),
-        ('along = "clearance"', 'along = "speed"', "along: speed is no axis of the grid"),
-        ("periods = [1, 2]", "periods = [1.5]", "periods: 1.5 is no number of revolutions"),
+        ('along = "clearance"', 'along = "speed"', "along: speed is not an axis of the grid"),
+        ("periods = [1, 2]", "periods = [1.5]", "periods: 1.5 is not a number of revolutions"),
         ("periods = [1, 2]", "periods = []", "periods: "),
         ('step = "4 um"', 'step = "4 kg"', "step: "),
         ('step = "4 um"', "step = 0", "step: 0 is out of range"),
@@ -200,7 +200,7 @@ def test_multipliers_beyond_the_plane_are_at_its_edge_in_their_direction():
 def test_store_without_points_is_refused(store):
     empty = rubhpc.open(store / "branches.zarr").isel(point=slice(0))
     for figure in (bifurcation, multipliers, Page):
-        with pytest.raises(InputError, match="holds no point of a branch"):
+        with pytest.raises(InputError, match="contains no point of a branch"):
             figure(empty)
 
 

@@ -235,7 +235,7 @@ def test_a_case_that_fails_breaks_its_chain_and_a_retry_completes_it(
     summary = run(study, quiet=True)
     undo()
     assert summary.counts == (0, 16, 4, 0, 0)
-    assert "4 done with a remark, rubhpc status names them" in summary.text()
+    assert "4 done with a remark, rubhpc status lists them" in summary.text()
     ledger = Store(study.output).replay()
     reported = sorted({text for i, text in ledger.reasons.items() if ledger.status[i] == DONE})
     assert reported == ["it starts at rest, as speed_ratio=1.5 before it has failed"]
@@ -296,7 +296,9 @@ def test_a_sweep_is_part_of_what_a_study_is(finished, tmp_path):
 
 def test_the_plan_shows_how_many_ranks_have_work(finished):
     plan = make_plan(finished)
-    assert "12, at most 2 cases each; in 4 sequential sweeps: more ranks than that would idle" in plan.text()
+    assert (
+        "12, at most 2 cases each; in 4 sequential sweeps: more ranks than that would be idle" in plan.text()
+    )
     assert plan.counts[DONE] == 20
 
 

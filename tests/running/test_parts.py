@@ -169,7 +169,7 @@ def test_what_cannot_go_on_beside_a_part_is_refused(physics, tmp_path):
         with pytest.raises(StoreError, match=r"in other parts, by part 2/3"):
             compute(study, "2/4")
         grown = make_study(tmp_path, friction=[*FRICTIONS, 0.5])
-        with pytest.raises(StoreError, match=r"as it now is while part 2/3 .* computes it"):
+        with pytest.raises(StoreError, match=r"the study has changed since part 2/3 .* began it"):
             compute(grown, "3/3")
         (study.output / ".rubhpc" / "parts" / "shares.json").write_text("damaged")
         with pytest.raises(StoreError, match="shares of its parts are damaged"):

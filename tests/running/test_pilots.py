@@ -213,7 +213,7 @@ def test_plan_of_few_cases_claims_less(n_pilot, share):
         timing=timing,
     )
     they = "are few and differ" if n_pilot == 3 else "differ"
-    assert f"cases; they {they}: such a range holds the time of {share}" in found.text()
+    assert f"cases; they {they}: such a range contains the time in {share}" in found.text()
 
 
 def test_a_block_is_timed_with_its_folders(tmp_path, monkeypatch):

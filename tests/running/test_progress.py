@@ -70,7 +70,7 @@ def test_a_refined_map_of_more_cases_than_foreseen_does_not_say_that_it_ends(clo
             shown.update(Totals(done=done, cost=5 * done))
     assert capsys.readouterr().out.splitlines()[1:] == [
         "9/10 cases; 0.9 a second, 1 s left",
-        "12 cases, 10 foreseen; 0.6 a second",
+        "12 cases, 10 expected; 0.6 a second",
     ]
 
 

@@ -61,9 +61,9 @@ def test_a_case_that_is_not_stored_is_computed_all_the_same(finished, tmp_path):
         finished, axes=(*finished.axes[:2], replace(finished.axes[2], values=(0.1, 0.2, 0.3, 0.5)))
     )
     name = CaseGrid(grown).case((0, 0, 1)).id
-    assert "does not hold it yet" in reproduce(grown, name).verdict
+    assert "does not contain it yet" in reproduce(grown, name).verdict
     elsewhere = replace(finished, output=tmp_path / "none.zarr")
-    assert "is not there yet" in reproduce(elsewhere, CaseGrid(finished).case((0, 0, 0)).id).verdict
+    assert "does not exist yet" in reproduce(elsewhere, CaseGrid(finished).case((0, 0, 0)).id).verdict
     assert list(tmp_path.iterdir()) == []
     assert "bit for bit" in reproduce(grown, CaseGrid(finished).case((1, 1, 2)).id).verdict  # it has moved
 

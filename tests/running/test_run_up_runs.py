@@ -169,11 +169,11 @@ def test_a_report_shows_measures_and_pictures(folder, monkeypatch, tmp_path):
     [
         ('start = "1800 rpm"', "", "[run_up] start: missing; give start, stop and time, or law"),
         ('"run_up.time" = ["0.3 s", "0.5 s"]', "", "[run_up] time: missing; give one, or the axis"),
-        ('stop = "1500 rpm"', 'stop = "1500 rpm"\ntime = "1 s"', "[run_up] time: run_up.time is an axis"),
+        ('stop = "1500 rpm"', 'stop = "1500 rpm"\ntime = "1 s"', "[run_up] time: run_up.time is also an axis"),
         ('stop = "1500 rpm"', 'stop = "1500 rpm"\nlaw = [[0, 9], [1, 9]]', "start: conflicts with law"),
         ('["0.3 s", "0.5 s"]', '"1 ms"', "run_up.time: 0.001 s: the shaft turns by 0.0275"),
         ('["0.3 s", "0.5 s"]', '"1e9 s"', "1e+09 s: the shaft turns by 2.75e+10 revolutions, above 100000"),
-        ('start = "1800 rpm"\nstop = "1500 rpm"', "law = 3", "[run_up.law]: 3 holds no pairs; write [["),
+        ('start = "1800 rpm"\nstop = "1500 rpm"', "law = 3", "[run_up.law]: 3 contains no pairs; write [["),
         (
             'start = "1800 rpm"\nstop = "1500 rpm"',
             "law = [[1, 100], [0, 90]]",
@@ -181,7 +181,7 @@ def test_a_report_shows_measures_and_pictures(folder, monkeypatch, tmp_path):
         ),
         ("friction = 0.2", "friction = 0.2\nspeed = 100.0", "[grid] speed: conflicts with [run_up]"),
         ('clearance = ["100 um", "5 mm"]', "clearance_ratio = 0.7", "clearance_ratio: the speed changes"),
-        ("[record]", '[integrator]\nmethod = "central-difference"\n[record]', "holds the speed"),
+        ("[record]", '[integrator]\nmethod = "central-difference"\n[record]', "keeps the speed constant"),
         ("[record]", "[refine]\n[record]", "not combined with [refine]"),
         ("friction = 0.2", 'friction = { values = [0.1, 0.2], sweep = "up" }', "remove sweep"),
         ('[run_up]\nstart = "1800 rpm"\nstop = "1500 rpm"', "", "add the table [run_up]"),

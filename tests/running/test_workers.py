@@ -73,7 +73,7 @@ def test_the_loss_of_a_worker_does_not_end_the_run(tmp_path, whole):
     workers_of(job)[0].kill()
     out, err = job.communicate(timeout=120)
     assert job.returncode == 71, err
-    assert "a rank was lost on the way, the others finished the study" in complaint(err)
+    assert "a rank was lost during the run; the others finished the study" in complaint(err)
     assert "12 done" in out
     assert (Store(store).replay().status == DONE).all()
     assert stored_bytes(store) == whole

@@ -217,7 +217,7 @@ def test_bad_input_is_refused(rub, arguments, said):
 
 def test_sampling_too_coarse_for_the_stator_is_refused():
     slow = store({}, np.array([True, False])).assign(spin_speed=2 * math.pi * 12.0)
-    with pytest.raises(InputError, match="take at least 176"):
+    with pytest.raises(InputError, match="use at least 176"):
         indicator_scores(slow)
 
 

@@ -189,7 +189,7 @@ def test_a_shard_that_was_written_twice_is_named_and_written_anew(store, packed)
     shard = next((store / "vertical").glob("c.*"))
     shard.write_bytes(2 * shard.read_bytes())
     damage = verify(store)
-    assert damage.arrays == ("vertical (a shard with bytes of no case)",)
+    assert damage.arrays == ("vertical (a shard with bytes that belong to no case)",)
     assert not damage.cases
     assert rerun(store, packed) == 0
 

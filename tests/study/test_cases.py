@@ -230,7 +230,7 @@ def test_a_block_shares_its_speed_and_rig():
 def test_a_step_beyond_stability_is_refused_before_the_run():
     grid = SMALL | {"stator.youngs_modulus": [3e9, 3e10]}
     with pytest.raises(
-        InputError, match=r"\[integrator\] step: 1e-06 s .* stator\.youngs_modulus = 3e\+10; take less"
+        InputError, match=r"\[integrator\] step: 1e-06 s .* stator\.youngs_modulus = 3e\+10; use less"
     ):
         CaseGrid(study(grid, integrator=Integrator(method="central-difference", step=1e-6)))
     CaseGrid(study(SMALL, integrator=Integrator(method="central-difference", step=1e-6)))

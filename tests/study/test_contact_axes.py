@@ -152,7 +152,7 @@ def test_quantities_are_axes_in_si_units(tmp_path):
             "stiffness = 1e7",
             r'stiffness: no case has law = "penalty"',
         ),
-        ('contact.law = ["lagrange"]', 'law = "lagrange"', "law: is an axis of the grid too"),
+        ('contact.law = ["lagrange"]', 'law = "lagrange"', "law: is also an axis of the grid"),
         ('contact.normal = { values = ["fixed", "updated"], sweep = "up" }', "", "words have no order"),
     ],
 )

@@ -64,7 +64,7 @@ def test_a_study_without_starts_keeps_its_identity(tmp_path):
         ('initial.from = ["rest"]', "", "initial.from: unknown axis"),
         ("initial.vertical = [0.0, 0.0]", "", "initial.vertical: 0 is duplicated"),
         ('initial.vertical = ["3 kg"]', "", "is not in m"),
-        ("initial.vertical = [0.0]", "vertical = 1e-5", "vertical: is an axis of the grid too"),
+        ("initial.vertical = [0.0]", "vertical = 1e-5", "vertical: is also an axis of the grid"),
         ('initial.vertical = { values = [0, 1e-5], sweep = "up" }', "", "sweep another axis"),
         ("initial.impulse_angle = [0.0, 1.0]", "", "impulse_angle: there is no impulse"),
         ("initial.impulse_node = [0]", "impulse = 1.0", "initial.impulse_node = 0: .* at least 1"),

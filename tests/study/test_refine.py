@@ -232,13 +232,13 @@ def test_the_estimate_is_that_of_edges_and_ends_at_the_truth():
 @pytest.mark.parametrize(
     ("speed", "rest", "message"),
     [
-        (SPEEDS, "[refine]\ncoarse = 6", "coarse: 6 is no power of two; write 4 or 8"),
+        (SPEEDS, "[refine]\ncoarse = 6", "coarse: 6 is not a power of two; write 4 or 8"),
         (SPEEDS, '[refine]\nby = "regme"', "regme.*did you mean regime"),
         (SPEEDS, "[refine]\nby = []", "by: empty"),
         (SPEEDS, '[refine]\nby = ["peak_contact_force"]', "write { peak_contact_force = 0.1 }"),
         (SPEEDS, "[refine]\nby = { regime = 0.1 }", 'is a flag, which has no difference; write "regime"'),
         (SPEEDS, '[refine]\naxes = ["friction"]', "friction is a list"),
-        (SPEEDS, '[refine]\naxes = ["speed"]', "speed is no axis of"),
+        (SPEEDS, '[refine]\naxes = ["speed"]', "speed is not an axis of"),
         ('{ start = 1.0, stop = 2.0, num = 9, sweep = "up" }', "[refine]", "remove sweep or .refine."),
         ("{ start = 1.0, stop = 2.0 }", "[refine]\n[sample]\nn = 8\nmethod = 'random'", "remove .refine. or"),
         (SPEEDS, "[refine]\ncorse = 8", "did you mean coarse"),

@@ -140,7 +140,7 @@ def test_a_store_shows_its_sample(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("n = 8", "n = 12", "[sample] n: 12 is no power of two"),
+        ("n = 8", "n = 12", "[sample] n: 12 is not a power of two"),
         ("n = 8", "n = 4", "[sample] n: 4 is out of range; it must be at least 8"),
         ("n = 8", "n = 1048576", "4194304 cases, too many; the limit is 2000000, use a smaller n"),
         ("n = 8", "", "[sample] n: missing; add n = 1024"),
@@ -163,7 +163,7 @@ def test_a_store_shows_its_sample(tmp_path):
         ("start = 1.2", "start = -1.2", "contains 0, which is not a valid speed"),
         ("start = 0.05", "start = 0", "a logarithmic range from 0 to 0.5"),
         ('"log"', '"loog"', 'scale "loog" is unknown'),
-        ("{ start = 1.2, stop = 2.4 }", "1.7", "friction is the only range; write two"),
+        ("{ start = 1.2, stop = 2.4 }", "1.7", "friction is the only range; write at least two"),
         ("[sample]\nn = 8", "", "a range has either step or num; write one of them, or add [sample]"),
         ("[integrator]", '"stator.elements" = { start = 2, stop = 6 }\n[integrator]', "none but a quantity"),
         (

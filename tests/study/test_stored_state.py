@@ -84,9 +84,9 @@ def test_states_of_axes_and_samples_take_their_place(first, tmp_path):
     ("select", "grid", "message"),
     [
         ("{}", "", r"2 values of speed_ratio.*write select = \{ speed_ratio = 0.75 \}"),
-        ("{ speed_ratio = 0.9 }", "", "not on the grid of the store; take one of 0.75, 0.8"),
+        ("{ speed_ratio = 0.9 }", "", "not on the grid of the store; choose one of 0.75, 0.8"),
         ("{ speed = 80 }", "", "has no axis .*speed.*; it has speed_ratio, clearance, friction"),
-        ("{ speed_ratio = true }", "", "is no value"),
+        ("{ speed_ratio = true }", "", "is not a value"),
         ("5", "", "is not a table"),
         ("{ speed_ratio = 0.8 }", '"stator.elements" = [6, 8]\n', "does not fit this rig"),
     ],
@@ -105,7 +105,7 @@ def test_stores_without_a_state_are_refused(first, tmp_path):
     run(study, quiet=True)
     for start, message in (
         (str(study.output), "keeps no final states; run its study with"),
-        (str(tmp_path), "is no store of a study"),
+        (str(tmp_path), "is not a store of a study"),
         ("sweep.zarr", "is not available; choose one of .* or the path of a store"),
     ):
         with pytest.raises(InputError, match=message):

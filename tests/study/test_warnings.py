@@ -106,5 +106,5 @@ def test_a_sag_beyond_the_clearance_is_named(tmp_path, gravity, angle, n):
 def test_undamped_stators_are_named_with_how_many_rigs_have_them(tmp_path):
     grid = 'clearance_ratio = 0.7\nspeed_ratio = [0.5, 2.0]\n"stator.damping.beta" = [0.0, 1e-5]'
     (line,) = CaseGrid(study_of(tmp_path, grid)).warnings()
-    assert line.startswith("at 1 of 2 rigs: nothing damps 18 modes, first the lateral mode of ")
-    assert "Hz, of stator 1: once excited it does not die out" in line
+    assert line.startswith("at 1 of 2 rigs: no damping acts on 18 modes, first the lateral mode of ")
+    assert "Hz, of stator 1: once excited, it does not decay" in line

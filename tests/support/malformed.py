@@ -172,7 +172,7 @@ CASES = [
     ),
     _study("negative friction", _FRICTION, "friction = [0.1, -0.1]", "[grid] friction: -0.1", "at least 0"),
     _study("no clearance left", _GAP, "clearance = 0.0", "[grid] clearance: 0 m", "above 0"),
-    _study("standstill", _SPEED, "speed_ratio = [0, 1]", "[grid] speed_ratio: 0 is no speed"),
+    _study("standstill", _SPEED, "speed_ratio = [0, 1]", "[grid] speed_ratio: 0 is not a valid speed"),
     _study(
         "range without stop", _SPEED, "speed_ratio = { start = 1, step = 1 }", "[grid] speed_ratio:", "stop"
     ),
@@ -214,7 +214,7 @@ CASES = [
         "axes over each other",
         _FRICTION,
         f'{_FRICTION}\n"stator.angle" = [0, 1]\n"stator.1.angle" = [0, 1]',
-        "[grid] stator.1.angle: is set by the axis stator.angle too",
+        "[grid] stator.1.angle: is also set by the axis stator.angle",
     ),
     _study(
         "axis twice",
@@ -230,7 +230,7 @@ CASES = [
         "override of an axis",
         _FRICTION,
         f'{_FRICTION}\n"stator.length" = 0.04',
-        "[override] stator.length: is an axis",
+        "[override] stator.length: is also an axis",
     ),
     _study("unknown law", '"lagrange"', '"hertz"', '[contact] law: "hertz"', '"lagrange"', '"penalty"'),
     _study("penalty without stiffness", '"lagrange"', '"penalty"', "[contact] stiffness: missing"),

@@ -132,7 +132,7 @@ def follow(
                     if corner_there and _is_close(branching, base, corner_there.point):
                         point, follower = corner_there.point, other
                 if point is None:
-                    end = "no motion is found that goes on from here"
+                    end = "no neighbouring motion is found, so the branch ends here"
                     break
                 add(Event.GRAZING, point)
                 if follower is None:

@@ -73,7 +73,7 @@ class Branch:
     points : tuple of BranchPoint
         In order along the branch; the parameter turns at folds.
     end : str
-        Why it ends, at either side.
+        Why the branch ends, on each side.
     """
 
     along: str
@@ -94,7 +94,7 @@ class Branch:
         return np.array([point.is_stable for point in self.points])
 
     def events(self) -> list[tuple[str, float]]:
-        """What happens on the branch: name and parameter of each event in order, ends left out."""
+        """Events on the branch in order, without its ends: name and parameter of each."""
         quiet = (Event.NONE.name.lower(), Event.END.name.lower())
         return [(point.event, float(point.value)) for point in self.points if point.event not in quiet]
 

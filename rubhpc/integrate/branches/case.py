@@ -94,7 +94,7 @@ def record_branches(
     arrays, n_point = _arrays(branches, keys, check, say)
     remark = "" if n_point else "no periodic motion was found"
     if n_point > keys.points:
-        remark = f"{n_point} points, of which {keys.points} are stored; give more points in [branch]"
+        remark = f"{n_point} points, of which {keys.points} are stored; increase points in [branch]"
     measures = {"wall_time": time.perf_counter() - seconds_compiling() - began}
     return BranchRecord(arrays=arrays, measures=measures, remark=remark)
 

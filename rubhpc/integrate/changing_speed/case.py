@@ -72,7 +72,9 @@ def record_run_up(
     A case that ends early is a diverged one, and has its revolutions up to there.
     """
     if not isinstance(setup, ModalSetup):
-        raise InputError('[integrator] method: it holds the speed; take method = "modal"')
+        raise InputError(
+            '[integrator] method: central-difference keeps the speed constant; set method = "modal"'
+        )
     began = time.perf_counter() - seconds_compiling()
     case: dict[str, Any] = {"clearance": clearance, "friction": friction, "initial": initial, "check": check}
     found = (

@@ -110,7 +110,7 @@ class CurvedMarch(EventDrivenMarch):
             if not self._is_bent:
                 raise
             problem = "too many sets of contacts for second_order"
-            raise InputError(f'[stator] geometry: {problem}; take geometry = "linear"') from None
+            raise InputError(f'[stator] geometry: {problem}; set geometry = "linear"') from None
 
     def _use(self, tables: ModeTables) -> None:
         super()._use(tables)

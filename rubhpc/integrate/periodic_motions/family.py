@@ -141,7 +141,7 @@ class Family:
         for stator in model.stators:
             if clearance + stator.clearance_offset <= 0:
                 problem = f"{clearance:g} m and a stator's clearance_offset leave no gap"
-                raise InputError(f"{self.along}: {value:g}: {problem}; take a range without it")
+                raise InputError(f"{self.along}: {value:g}: {problem}; use a range without it")
         return self._setup(case, model, spin, is_measured), clearance, case.friction
 
     def carry(self, motion: Floats, before: PiecewiseMotion, after: PiecewiseMotion) -> Floats:
@@ -237,7 +237,7 @@ class Family:
             )
             if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
                 raise InputError(
-                    f"{self.along}: branches need motion in closed form between events; take method modal, "
+                    f"{self.along}: branches need motion in closed form between events; use method modal, "
                     "normal fixed, stators of linear geometry, and friction_law sliding or coulomb"
                 )
             self._setups[key] = setup

@@ -151,7 +151,7 @@ def shoot(
     except Unfollowed as problem:
         raise NotConverged(str(problem)) from None
     if not trial.residual <= most_residual:
-        raise NotConverged(f"the beginning is far from closing, residual {trial.residual:.2g}")
+        raise NotConverged(f"the initial state is far from periodic, residual {trial.residual:.2g}")
     derivative: list[Floats] | None = None
     is_fresh = False
     for iteration in range(most_iterations + 1):

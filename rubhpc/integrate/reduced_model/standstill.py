@@ -83,8 +83,8 @@ def at_standstill(model: Model) -> Standstill:
             square, shape = eigh(symmetric[pick], mass[pick])
         if square[0] <= FREE * square[-1]:
             raise InputError(
-                "[integrator] method: modal needs bodies that are held, and here one is free to move or to "
-                'turn; take method = "central-difference"'
+                "[integrator] method: modal needs constrained bodies, and here one is free to move or to "
+                'turn; set method = "central-difference"'
             )
         mode = np.zeros((mass.shape[0], rows.size))
         mode[rows] = shape

@@ -98,7 +98,7 @@ def _solve_part(part: Floats, worst: float) -> tuple[Complexes, Complexes, Compl
     if inverse is None:
         raise InputError(
             "[integrator] method: modal cannot separate the modes of this rig, some of which coincide (a "
-            'free body, critical damping); take method = "central-difference"'
+            'free body, critical damping); set method = "central-difference"'
         )
     is_real, keep = _kept(exponent)
     weight = np.where(is_real, 1.0, 2.0)

@@ -20,7 +20,7 @@ CASE = {"speed_ratio": 0.75, "clearance": "84 um", "friction": 0.3, "transient":
     ("limit", "text"),
     [
         ({"most_events": 1}, "more than 1 events in a revolution"),
-        ({"most_residual": 1e-12}, "the beginning is far from closing, residual "),
+        ({"most_residual": 1e-12}, "the initial state is far from periodic, residual "),
         ({"most_iterations": 1}, "no convergence within 1 iterations, residual "),
     ],
 )
