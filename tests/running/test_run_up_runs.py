@@ -169,7 +169,7 @@ def test_a_report_shows_measures_and_pictures(folder, monkeypatch, tmp_path):
     [
         ('start = "1800 rpm"', "", "[run_up] start: missing; give start, stop and time, or law"),
         ('"run_up.time" = ["0.3 s", "0.5 s"]', "", "[run_up] time: missing; give one, or the axis"),
-        ('stop = "1500 rpm"', 'stop = "1500 rpm"\ntime = "1 s"', "[run_up] time: run_up.time is also an axis"),
+        ('stop = "1500 rpm"', 'stop = "1500 rpm"\ntime = "1 s"', "run_up.time is also an axis"),
         ('stop = "1500 rpm"', 'stop = "1500 rpm"\nlaw = [[0, 9], [1, 9]]', "start: conflicts with law"),
         ('["0.3 s", "0.5 s"]', '"1 ms"', "run_up.time: 0.001 s: the shaft turns by 0.0275"),
         ('["0.3 s", "0.5 s"]', '"1e9 s"', "1e+09 s: the shaft turns by 2.75e+10 revolutions, above 100000"),
