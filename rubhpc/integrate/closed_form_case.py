@@ -84,8 +84,8 @@ def _kept(march: EventDrivenMarch) -> Trail | None:
         trail = _spare.pop()
     except IndexError:
         return None
-    m, n = march.width
-    return trail if (trail.begun.shape[2], trail.velocity.shape[2]) == (m, n) else None
+    width = trail.begun.shape[2], trail.velocity.shape[1], trail.given.shape[2]
+    return trail if width == march.width else None
 
 
 def neighbours_of(

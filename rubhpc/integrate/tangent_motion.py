@@ -131,7 +131,6 @@ class TangentMotion:
         tangent = new_tangent(
             trail.begun.shape[2],
             len(march.bodies.gap_jacobian),
-            march.impulse_of_change,
             self._motion,
             n_revolution,
         )

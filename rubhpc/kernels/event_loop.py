@@ -57,7 +57,7 @@ from rubhpc.kernels.measuring import begin_contact, begin_span, observe_step, re
 from rubhpc.kernels.mode_change import change_contacts
 from rubhpc.kernels.penalty_events import change_pressed
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.trail import Trail, no_trail, note_after, note_before, note_piece
+from rubhpc.kernels.trail import Trail, no_trail, note_after, note_event, note_piece
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -213,6 +213,7 @@ class EventWork(NamedTuple):
     """Work space of an event, q pairs."""
 
     force: Floats  # (q,)
+    given: Floats  # (2, q), normal impulses of the event, N s, and tractions, which none has
     speed: Floats  # (q,)
     impulse: Floats  # (q,), accumulated before the event, N s
     active: NDArray[np.bool_]  # (q,)
@@ -224,6 +225,7 @@ def event_work(q: int) -> EventWork:
     """Work space of the events of q pairs, without a trail."""
     return EventWork(
         force=np.zeros(q),
+        given=np.zeros((2, q)),
         speed=np.zeros(q),
         impulse=np.zeros(q),
         active=np.zeros(q, dtype=np.bool_),
@@ -324,7 +326,7 @@ def take_event(
         tables, reduced, clock, is_recorded, progress, z, motion, work.impulse, recorder, accumulator
     ):
         return DIVERGED
-    note_before(work.trail, progress.tick, crossing, motion)
+    note_event(work.trail, progress.tick, crossing)
     cosine, sine = shaft_turn(clock, progress.tick)
     moment = (1 << FORCED_LEVEL) * clock.tick
     if reduced.spring > 0.0:
@@ -341,6 +343,7 @@ def take_event(
             motion,
             is_recorded,
             work.force,
+            work.given[0],
             work.speed,
             work.active,
             work.elimination,
@@ -348,7 +351,7 @@ def take_event(
         )
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
         return CONTACT_UNSOLVED
-    note_after(work.trail, motion)
+    note_after(work.trail, motion, work.given)
     if is_recorded:
         for i in range(reduced.radius.size):
             record_event(clock, progress, work.impulse, i, samples, accumulator)

@@ -67,7 +67,7 @@ from rubhpc.kernels.friction_events import (
 from rubhpc.kernels.friction_measuring import begin_friction, observe_friction, resolved_friction
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.trail import note_after, note_before, note_piece
+from rubhpc.kernels.trail import note_after, note_event, note_piece
 from rubhpc.kernels.transitions import (
     UNKNOWN,
     WORTH_A_TABLE,
@@ -389,11 +389,11 @@ def take_change(
     is_read = passed < 0 or is_unsolved or (work.trail.tick.size > 0 and touches(states, crossing, q))
     if is_read and not is_left:
         leave_states(tables, mode, z, motion)
-    note_before(work.trail, progress.tick, crossing, motion)
+    note_event(work.trail, progress.tick, crossing)
     add_kick(work, motion)
     if is_unsolved:
         return CONTACT_UNSOLVED
-    note_after(work.trail, motion)
+    note_after(work.trail, motion, work.given)
     if passed < 0:
         progress.wanted = wanted
         return MODE_WANTED if passed == UNKNOWN - WORTH_A_TABLE else UNDER_WAY

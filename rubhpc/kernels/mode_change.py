@@ -45,6 +45,7 @@ def change_contacts(
     motion: Floats,
     is_recorded: bool,
     force: Floats,
+    given: Floats,
     speed: Floats,
     active: NDArray[np.bool_],
     elimination: Floats,
@@ -54,12 +55,13 @@ def change_contacts(
 
     `closed` are the pairs closed before, `crossing` those whose gap closes or whose force vanishes now. The
     impact sends every candidate that closes back at its restitution (0: inelastic); among those that do not
-    part for longer than `moment` (s), the accelerations decide.
+    part for longer than `moment` (s), the accelerations decide. Fills the impulses `given` (q,), N s.
     """
     q, n = reduced.gap_jacobian.shape
     candidates = (closed & ~crossing) | (crossing & ~closed)
     velocity = motion[n:]
     for i in range(q):
+        given[i] = 0.0
         speed[i] = product(reduced.gap_jacobian[i], velocity) if (candidates >> i) & 1 else np.inf
         active[i] = speed[i] < 0.0
         if active[i]:
@@ -74,6 +76,7 @@ def change_contacts(
         if force[i] > 0.0:
             if is_recorded:
                 observe_impact(reduced, i, spin, force[i], velocity, accumulator)
+            given[i] = force[i]
             for k in range(n):
                 velocity[k] += reduced.force_direction[i, k] * force[i]
     for i in range(q):
@@ -114,6 +117,7 @@ def change_contacts(
             if active[i]:
                 if is_recorded:
                     observe_impact(reduced, i, spin, force[i], velocity, accumulator)
+                given[i] += force[i]
                 for k in range(n):
                     velocity[k] += reduced.force_direction[i, k] * force[i]
     return remaining

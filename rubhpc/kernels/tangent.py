@@ -52,8 +52,6 @@ class Tangent(NamedTuple):
     d: Floats  # (2, m)
     z: Floats  # (2, m), the motion itself
     grown: Floats  # (n_revolution,), filled in: logarithm of the growth in each revolution
-    impulse_of_change: Floats  # (q or 2 q, n), impulses, then tractions, behind a change of velocities
-    impulse: Floats  # (2 q,)
     share: Floats  # (q,)
     compliance: Floats  # (2 q, 2 q)
     speed: Floats  # (2 q,)
@@ -64,7 +62,7 @@ class Tangent(NamedTuple):
     elimination: Floats  # (2 q, 2 q + 1)
 
 
-def new_tangent(m: int, q: int, impulse_of_change: Floats, generic: Floats, n_revolution: int) -> Tangent:
+def new_tangent(m: int, q: int, generic: Floats, n_revolution: int) -> Tangent:
     """Begin with the displacement `generic` (2 n,), for a trail of some revolutions."""
     return Tangent(
         reached=np.zeros(4, dtype=np.int64),
@@ -73,8 +71,6 @@ def new_tangent(m: int, q: int, impulse_of_change: Floats, generic: Floats, n_re
         d=np.zeros((2, m)),
         z=np.zeros((2, m)),
         grown=np.zeros(n_revolution),
-        impulse_of_change=impulse_of_change,
-        impulse=np.zeros(2 * q),
         share=np.zeros(q),
         compliance=np.zeros((2 * q, 2 * q)),
         speed=np.zeros(2 * q),
@@ -172,7 +168,7 @@ def carry_along(
             if strikes:
                 for i in range(q):
                     tangent.rate[0, i], tangent.rate[1, i], _, _ = see(transitions, place, m, i, m, d)
-                strike(reduced, True, trail.velocity[k], tangent)
+                strike(reduced, True, trail.given[k], trail.velocity[k], tangent)
             pass_over(transitions, passed, m, d, z)
             if strikes:
                 add_impulses(transitions, next_place, q, m, tangent.given, z)
@@ -181,7 +177,7 @@ def carry_along(
         else:
             read_displacement(tables, place, tangent)
             if strikes:
-                strike_motion(reduced, modes.has_states, trail.velocity[k], tangent)
+                strike_motion(reduced, modes.has_states, trail.given[k], trail.velocity[k], tangent)
             enter_displacement(tables, next_place, cosine_rate, sine_rate, tangent)
         if shift != 0.0:
             read_begun(trail, k + 1, z)
@@ -256,14 +252,16 @@ def size_of(motion: Floats, spin: float) -> float:
 
 
 @jit_lean_sum
-def strike_motion(reduced: Reduced, has_states: bool, velocity: Floats, tangent: Tangent) -> None:
+def strike_motion(
+    reduced: Reduced, has_states: bool, impulse: Floats, velocity: Floats, tangent: Tangent
+) -> None:
     """Apply the derivative of an impact to `tangent.motion`, as `strike` finds it."""
     q, n = reduced.gap_jacobian.shape
     moved = tangent.motion[n:]
     for i in range(q):
         tangent.rate[0, i] = product(reduced.gap_jacobian[i], moved)
         tangent.rate[1, i] = product(reduced.slip[i], moved)
-    strike(reduced, has_states, velocity, tangent)
+    strike(reduced, has_states, impulse, velocity, tangent)
     for i in range(q):
         given, along_slip = tangent.given[0, i], tangent.given[1, i]
         for k in range(n):
@@ -274,42 +272,36 @@ def strike_motion(reduced: Reduced, has_states: bool, velocity: Floats, tangent:
 
 
 @jit_lean_sum
-def strike(reduced: Reduced, has_states: bool, velocity: Floats, tangent: Tangent) -> None:
+def strike(reduced: Reduced, has_states: bool, impulse: Floats, velocity: Floats, tangent: Tangent) -> None:
     """Fill `tangent.given` with the impulses of the derivative of an impact: `dv+ = dv- - F (R F)^-1 R dv-`.
 
     The rows R are those of the gap velocities that impulses change, each times 1 + restitution where the pair
     parts, and of the slips that they stop; F are the directions of these impulses, friction in proportion
-    included. `velocity` (2, n) are those before and after it, `tangent.rate` what the displacement does to
-    the rates of gaps and to slips.
+    included. `impulse` are its impulses and tractions (2, q), `velocity` (n,) what it leaves, `tangent.rate`
+    what the displacement does to the rates of gaps and to slips.
     """
-    q, n = reduced.gap_jacobian.shape
-    impulse, active, share = tangent.impulse, tangent.active, tangent.share
+    q, active, share = reduced.radius.size, tangent.active, tangent.share
     tangent.given[:] = 0.0
     largest = 0.0
-    for i in range(tangent.impulse_of_change.shape[0]):
-        total = 0.0
-        for k in range(n):
-            total += tangent.impulse_of_change[i, k] * (velocity[1, k] - velocity[0, k])
-        impulse[i] = total
-        if i < q:
-            largest = max(largest, abs(total))
+    for i in range(q):
+        largest = max(largest, abs(impulse[0, i]))
     if largest == 0.0:
         return
     for i in range(q):
         active[q + i] = False
-        active[i] = impulse[i] > NO_IMPULSE * largest
+        active[i] = impulse[0, i] > NO_IMPULSE * largest
         share[i] = 0.0
         if active[i]:
-            parts = abs(product(reduced.gap_jacobian[i], velocity[1])) > AT_REST
+            parts = abs(product(reduced.gap_jacobian[i], velocity)) > AT_REST
             scale = 1.0 + reduced.restitution if parts else 1.0
             tangent.speed[i] = scale * tangent.rate[0, i]
             if has_states:
-                slip = reduced.rim_speed[i] + product(reduced.slip[i], velocity[1])
+                slip = reduced.rim_speed[i] + product(reduced.slip[i], velocity)
                 if abs(slip) <= STOPPED * reduced.rim_speed[i]:
                     active[q + i] = True
                     tangent.speed[q + i] = tangent.rate[1, i]
                 else:
-                    share[i] = impulse[q + i] / impulse[i]
+                    share[i] = impulse[1, i] / impulse[0, i]
     for j in range(q):
         if active[j]:
             for i in range(q):

@@ -18,7 +18,7 @@ BROKEN = -1  # in place of the number of events: there were more, or short steps
 
 
 class Trail(NamedTuple):
-    """Pieces of a motion, m modal coordinates and n reduced degrees; without room none are noted.
+    """Pieces of a motion, m modal coordinates, n reduced degrees, q pairs; without room none are noted.
 
     Piece k + 1 begins where event k ends piece k.
     """
@@ -28,28 +28,30 @@ class Trail(NamedTuple):
     tick: Ints  # (room,), of each event
     crossing: Ints  # (room,), bits of the switch functions that vanish there
     begun: Floats  # (room + 1, 2, m), modal coordinates with which each piece begins
-    velocity: Floats  # (room, 2, n), reduced velocities before and after each event
+    velocity: Floats  # (room, n), reduced velocity after each event
+    given: Floats  # (room, 2, q), normal impulses of each event and tractions, N s
 
 
-def new_trail(m: int, n: int) -> Trail:
-    """Room for a trail of a case with m modal coordinates and n reduced degrees."""
-    room = max(1, min(MOST_EVENTS, MOST_BYTES // (16 * (m + n))))
-    return _with_room(room, m, n)
+def new_trail(m: int, n: int, q: int) -> Trail:
+    """Room for a trail of a case with m modal coordinates, n reduced degrees and q pairs."""
+    room = max(1, min(MOST_EVENTS, MOST_BYTES // (8 * (2 * m + n + 2 * q))))
+    return _with_room(room, m, n, q)
 
 
 def no_trail() -> Trail:
     """Nothing is noted in this one."""
-    return _with_room(0, 1, 1)
+    return _with_room(0, 1, 1, 1)
 
 
-def _with_room(room: int, m: int, n: int) -> Trail:
+def _with_room(room: int, m: int, n: int, q: int) -> Trail:
     return Trail(
         n_event=np.zeros(1, dtype=np.int64),
         states=np.zeros(room + 1, dtype=np.int64),
         tick=np.zeros(room, dtype=np.int64),
         crossing=np.zeros(room, dtype=np.int64),
         begun=np.empty((room + 1, 2, m)),
-        velocity=np.empty((room, 2, n)),
+        velocity=np.empty((room, n)),
+        given=np.empty((room, 2, q)),
     )
 
 
@@ -59,25 +61,26 @@ def begin_trail(trail: Trail, states: int, z: Floats) -> None:
 
 
 @jit_inline
-def note_before(trail: Trail, tick: int, crossing: int, motion: Floats) -> None:
-    """Note an event, and the motion (2 n,) before it."""
+def note_event(trail: Trail, tick: int, crossing: int) -> None:
+    """Note an event."""
     room, k = trail.tick.size, trail.n_event[0]
     if room > 0 and k >= 0:
         if k == room:
             trail.n_event[0] = BROKEN
         else:
             trail.tick[k], trail.crossing[k] = tick, crossing
-            for i in range(trail.velocity.shape[2]):
-                trail.velocity[k, 0, i] = motion[trail.velocity.shape[2] + i]
 
 
 @jit_inline
-def note_after(trail: Trail, motion: Floats) -> None:
-    """Note the motion (2 n,) after the event."""
+def note_after(trail: Trail, motion: Floats, given: Floats) -> None:
+    """Note the motion (2 n,) after the event, and its impulses and tractions (2, q)."""
     k = trail.n_event[0]
     if trail.tick.size > 0 and k >= 0:
-        for i in range(trail.velocity.shape[2]):
-            trail.velocity[k, 1, i] = motion[trail.velocity.shape[2] + i]
+        n = trail.velocity.shape[1]
+        for i in range(n):
+            trail.velocity[k, i] = motion[n + i]
+        for i in range(given.shape[1]):
+            trail.given[k, 0, i], trail.given[k, 1, i] = given[0, i], given[1, i]
 
 
 @jit_inline

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, check_fields, count, quantity, series, text
 from rubhpc.input.messages import place
-from rubhpc.study.axes import FROM_REST, Axis
+from rubhpc.study.axes import FROM_REST, Axis, is_of_table
 from rubhpc.study.axis_reading import make_range
 
 if TYPE_CHECKING:
@@ -102,6 +102,9 @@ def check_branch(
     is_bent: bool,
 ) -> None:
     """Refuse what cannot be followed; `is_bent` where a stator is of the second order."""
+    if is_of_table(keys.along):
+        problem = f"{keys.along} cannot be followed; take a speed, a clearance, friction or a key of the rig"
+        raise InputError(f"[branch] along: {problem}")
     if all(axis.name != keys.along for axis in axes):
         raise InputError(
             f"[branch] along: {keys.along} is not an axis of the grid; add it as {{ start, stop }}"
@@ -119,3 +122,5 @@ def check_branch(
         )
     if recording.probe:
         raise InputError("[branch] along: branches have no probes; remove [[record.probe]]")
+    if recording.lyapunov:
+        raise InputError("[record] lyapunov: branches have multipliers in its place; remove it or [branch]")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from trial_rig import trial_rig
 
-from rubhpc import simulate
+from rubhpc import LumpedStator, simulate
 from rubhpc.integrate import tangent_motion
 from rubhpc.integrate.case import march_of
 from rubhpc.integrate.marches import met_modes
@@ -38,6 +38,11 @@ def ring(count):
     return replace(rig, stator=tuple(replace(rig.stator[0], angle=float(angle)) for angle in angles))
 
 
+def walls():
+    """The rig in a ring of rigid walls, whose impulses are more than the ways in which they move it."""
+    return replace(trial_rig(1), stator=(LumpedStator(node=3, count=5, rigid=True),))
+
+
 def prepared(rig, speed, law):
     """A set-up, and what starts its march from a state."""
     setup = prepare(rig, speed, contact=Contact(**law), integrator=Integrator(), samples_per_revolution=64)
@@ -52,8 +57,9 @@ def ended(rig, speed, transient, law):
 
 @pytest.mark.parametrize(
     ("rig", "law"),
-    [(trial_rig(3), law) for law in LAWS] + [(ring(16), {}), (ring(16), LAWS[2])],
-    ids=[*LAW_NAMES, "ring-sliding", "ring-coulomb"],
+    [(trial_rig(3), law) for law in LAWS]
+    + [(ring(16), {}), (ring(16), LAWS[2]), (walls(), {}), (walls(), LAWS[2])],
+    ids=[*LAW_NAMES, "ring-sliding", "ring-coulomb", "walls-sliding", "walls-coulomb"],
 )
 def test_tangent_is_that_of_the_saltation_matrices(rig, law):
     final = ended(rig, SPEED, 5, law)

@@ -57,6 +57,7 @@ def change(reduced, closed, crossing, motion, *, is_recorded=False):
         is_recorded,
         np.zeros(q),
         np.zeros(q),
+        np.zeros(q),
         np.zeros(q, dtype=np.bool_),
         np.zeros((q, q + 1)),
         accumulator,

@@ -169,6 +169,7 @@ def test_multipliers_are_drawn(store):
         ),
         ("[record]", "[sample]\nn = 8\n[record]", "a sample has no axis to follow"),
         ("[0.74, 0.75]", '{ values = [0.74, 0.75], sweep = "up" }', "branches need no sweep"),
+        ("[record]", "[record]\nlyapunov = 2", "lyapunov: branches have multipliers in its place"),
     ],
 )
 def test_bad_studies_are_refused(tmp_path, old, new, text):
@@ -176,6 +177,16 @@ def test_bad_studies_are_refused(tmp_path, old, new, text):
     with pytest.raises(InputError, match=text) as caught:
         read_study(tmp_path / "study.toml")
     assert "\n" not in str(caught.value)
+
+
+def test_keys_of_contact_are_not_followed(tmp_path):
+    text = STUDY.replace('{ start = "112 um", stop = "124 um" }', '"112 um"').replace(
+        "friction = 0.3", 'friction = 0.3\n"contact.restitution" = { start = 0.1, stop = 0.2 }'
+    )
+    text = text.replace('along = "clearance"', 'along = "contact.restitution"').replace('step = "4 um"', "")
+    (tmp_path / "study.toml").write_text(text)
+    with pytest.raises(InputError, match=r"\[branch\] along: contact\.restitution cannot be followed"):
+        read_study(tmp_path / "study.toml")
 
 
 def test_another_range_is_another_study(store, tmp_path):

@@ -63,7 +63,7 @@ def _opening(case: PiecewiseMotion, piece: Piece, time: float) -> tuple[Floats, 
     motion = piece.before.copy()
     if march.change(piece.states, piece.crossing, angle, motion, AT_ONCE * march.moment) < 0:
         return np.full(case.q, np.inf), np.zeros(case.q)
-    impulse = (march.impulse_of_change @ (motion - piece.before)[n:])[: case.q]
+    impulse = march.given[0]
     speed = bodies.gap_jacobian @ motion[n:]
     is_hit = (impulse > 0.0) & (np.abs(speed) <= max(AT_REST, OPENING))
     if is_hit.any():

@@ -63,12 +63,9 @@ class ContactSets(ModalMarch):
         return sum(1 << stride * int(i) for i in np.flatnonzero(self.opened(mask)))
 
     @cached_property
-    def impulse_of_change(self) -> Floats:
-        """Impulses of the pairs (q, n) behind a change of the velocities, the shortest where several are."""
-        bodies = self.bodies
-        if len(bodies.gap_jacobian) == 1:
-            return np.asarray(bodies.gap_jacobian / bodies.delassus)
-        return np.asarray(np.linalg.pinv(bodies.delassus, rcond=1e-12) @ bodies.gap_jacobian)
+    def given(self) -> Floats:
+        """Normal impulses and tractions (2, q), N s, of the last event that was taken by itself."""
+        return np.zeros((2, self._clearance.size))
 
     def forces(self, mode: int, z: Floats) -> Floats:
         """Forces (q,), N, at coordinates (2, m) of a contact mode, given by its index in the tables."""
@@ -97,6 +94,7 @@ class ContactSets(ModalMarch):
         `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft; `moment` (s) is
         `self.moment` where it is not given.
         """
+        force, speed, active, elimination = self._change_work
         return int(
             self.take_change(
                 self.bodies,
@@ -108,7 +106,11 @@ class ContactSets(ModalMarch):
                 np.sin(angle),
                 motion,
                 False,
-                *self._change_work,
+                force,
+                self.given[0],
+                speed,
+                active,
+                elimination,
                 self._unrecorded,
             )
         )

@@ -93,11 +93,10 @@ class FrictionMarch(EventDrivenMarch):
         self._n_short = 0
         return super().start_again(state)
 
-    @cached_property
-    def impulse_of_change(self) -> Floats:
-        """Impulses of the pairs, then their tractions, (2 q, n), behind a change of the velocities."""
-        both = np.concatenate([self.bodies.gap_jacobian, -self.bodies.slip])
-        return np.asarray(np.linalg.pinv(both.T, rcond=1e-12))
+    @property
+    def given(self) -> Floats:
+        """Normal impulses and tractions (2, q), N s, of the last event that was taken by itself."""
+        return self._work.given
 
     def _note_in(self, trail: Trail) -> None:
         self._work = self._work._replace(trail=trail)

@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 Change = Literal["touch", "release", "slip", "stick"]
 
 MOST_EVENTS = 1000  # in a revolution
-NO_PAIR, NO_SPEED = np.zeros(0, dtype=np.int64), np.zeros(0)
+NO_PAIR, NO_SPEED, NO_IMPULSE = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((2, 0))
 STEPS_PER_REVOLUTION = 128  # at least, so that no turn of a gap between two steps is missed
 
 
@@ -56,6 +56,8 @@ class Piece(NamedTuple):
         Its rate, its unit per second.
     touching, approach : (k,)
         Pairs whose gaps close at the end, and their speeds of approach, m/s.
+    given : (2, q)
+        Normal impulses of the event and tractions, N s.
     states_after : int
         What goes on.
     """
@@ -71,6 +73,7 @@ class Piece(NamedTuple):
     switch_rate: float
     touching: NDArray[np.int64]
     approach: Floats
+    given: Floats
     after: Floats
     states_after: int
 
@@ -228,7 +231,7 @@ class PiecewiseMotion:
                 least,
             )
             before = motions[BEFORE]
-            touching, approach, after, states_after = NO_PAIR, NO_SPEED, before, states
+            touching, approach, given, after, states_after = NO_PAIR, NO_SPEED, NO_IMPULSE, before, states
             if crossing < 0:
                 raise Unfollowed(f"a displacement passes {self.setup.displacement_limit:.3g} m")
             if crossing:
@@ -236,6 +239,7 @@ class PiecewiseMotion:
                 after = before.copy()
                 angle = self.setup.spin * (time + duration)
                 states_after = self.march.change(states, crossing, angle, after)
+                given = self.march.given.copy()
                 if states_after < 0:
                     raise Unfollowed("no contact forces that obey the laws were found")
             pieces.append(
@@ -251,6 +255,7 @@ class PiecewiseMotion:
                     switch_rate=float(rates[first_of(crossing)]) if crossing else math.nan,
                     touching=touching,
                     approach=approach,
+                    given=given,
                     after=after,
                     states_after=states_after,
                 )

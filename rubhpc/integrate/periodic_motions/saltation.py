@@ -109,11 +109,10 @@ class Impact:
     def __init__(self, motion: PiecewiseMotion, piece: Piece) -> None:
         """Find the impulses behind the change of the velocities."""
         self._n = motion.n
-        change = (piece.after - piece.before)[self._n :]
         self._gain: Floats | None = None
-        if piece.touching.size and change.any():
+        if piece.touching.size and piece.given.any():
             made = _with_states if motion.has_states else _sliding
-            self._direction, self._gain = made(motion, change, piece.after[self._n :])
+            self._direction, self._gain = made(motion, piece.given, piece.after[self._n :])
 
     def apply(self, columns: Floats) -> Floats:
         """Return columns (2 n, ...) of displacements and velocities after the impact."""
@@ -124,17 +123,17 @@ class Impact:
         return moved
 
 
-def _sliding(motion: PiecewiseMotion, change: Floats, velocity: Floats) -> tuple[Floats, Floats]:
-    """Directions F and `(R F)^-1 R` of the impulses behind a change (n,) to a velocity (n,), of sliding."""
+def _sliding(motion: PiecewiseMotion, given: Floats, velocity: Floats) -> tuple[Floats, Floats]:
+    """Directions F and `(R F)^-1 R` of impulses (2, q) that leave a velocity (n,), of sliding."""
     bodies = motion.bodies
     normal = bodies.gap_jacobian
     if motion.q == 1:
-        pressing = bool(motion.march.impulse_of_change[0] @ change > 0.0)
+        pressing = bool(given[0, 0] > 0.0)
         parted = pressing and bool(abs(normal[0] @ velocity) > AT_REST)
         key = bytes((pressing, parted))
         if key in motion.impacts:
             return motion.impacts[key]
-    hit = _pressing(motion.march.impulse_of_change @ change)
+    hit = _pressing(given[0])
     has_parted = hit & (np.abs(normal @ velocity) > AT_REST)
     key = hit.tobytes() + has_parted.tobytes()
     if key not in motion.impacts:
@@ -144,11 +143,11 @@ def _sliding(motion: PiecewiseMotion, change: Floats, velocity: Floats) -> tuple
     return motion.impacts[key]
 
 
-def _with_states(motion: PiecewiseMotion, change: Floats, velocity: Floats) -> tuple[Floats, Floats]:
+def _with_states(motion: PiecewiseMotion, given: Floats, velocity: Floats) -> tuple[Floats, Floats]:
     """The same under set-valued friction, whose impulses are in proportion or stop a slip."""
     bodies = motion.bodies
     normal, along = bodies.gap_jacobian, -bodies.slip
-    force, traction = np.split(motion.march.impulse_of_change @ change, 2)
+    force, traction = given
     hit = np.flatnonzero(_pressing(force))
     share = traction[hit] / force[hit]
     moved = bodies.slip[hit] @ velocity

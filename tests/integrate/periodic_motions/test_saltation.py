@@ -19,6 +19,7 @@ from rubhpc.study.study import Contact, Integrator, Recording
 PAPER = read_rig("mokhtar2017")
 SPRINGS = LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)
 RING = replace(PAPER, stator=(SPRINGS,))
+WALLS = replace(PAPER, stator=(LumpedStator(node=8, radius=0.06, count=5, rigid=True),))
 OVERHUNG = with_keys(PAPER, {"rotor.bearing.2.node": 5})
 HEAVY = with_keys(trial_rig(2), {"rotor.gravity": "9.81 m/s^2"})
 SLIDING = Contact()
@@ -62,6 +63,11 @@ CASES = {
     "gravity": (HEAVY, 1.2, 0.7, 0.2, SLIDING),
     "slip": (trial_rig(2), 0.15, 0.4, 0.4, COULOMB),
     "stick": (trial_rig(2), 1.7, 0.5, 1.0, COULOMB),
+    # More impulses than ways in which they move the rotor: its change does not determine them.
+    "masses that do not yield to friction": (RING, 1.2, 0.8, 0.2, COULOMB),
+    "rigid walls": (WALLS, 0.9, 0.9, 0.1, SLIDING),
+    "rigid walls, restitution": (WALLS, 0.9, 0.9, 0.1, Contact(restitution=0.5)),
+    "rigid walls under Coulomb's law": (WALLS, 0.9, 0.9, 0.1, COULOMB),
 }
 
 
