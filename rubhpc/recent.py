@@ -63,5 +63,5 @@ def recent(make: Callable[[], T], *content: object) -> T:
 
 
 def forget() -> None:
-    """Make everything anew from here on, after a change to what makes it; memory is freed."""
+    """Make everything again from here on, after a change to what makes it; memory is freed."""
     _made.by_content.clear()

@@ -317,7 +317,7 @@ def drive_measures() -> tuple[Variable, ...]:
 
 
 def role_of(name: str) -> str:
-    """Return the role of a variable, be it of a probe; "" where it is none of a store."""
+    """Return the role of a variable, also of a probe; "" where it is none of a store."""
     if name in VARIABLES:
         return VARIABLES[name].role
     if name.startswith(POINT):
@@ -328,7 +328,7 @@ def role_of(name: str) -> str:
 
 
 def is_signal(name: str) -> bool:
-    """Whether a name is that of a recorded signal, be it of a probe."""
+    """Whether a name is that of a recorded signal, also of a probe."""
     return name in SIGNAL_NAMES or name.startswith(PROBE)
 
 

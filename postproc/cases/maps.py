@@ -32,7 +32,7 @@ VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
 
 
 def is_mappable(name: str) -> bool:
-    """Whether a variable of this name, be it of a probe, has a value for every case."""
+    """Whether a variable of this name, also of a probe, has a value for every case."""
     return role_of(name) in _ROLES
 
 

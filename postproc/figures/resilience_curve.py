@@ -99,7 +99,7 @@ def resilience(knocks: xr.Dataset) -> Drawing:
 
 
 def _tried(line: xr.Dataset) -> str:
-    """The largest knock that was tried in vain, in words."""
+    """The largest knock that was tried without success, in words."""
     tried = line["harmless_impulse"].where(line["has_contact_free_motion"] & line["least_impulse"].isnull())
     scale = scale_of(tried)
     low, high = (f"{float(end) * scale.factor:.2g}" for end in (tried.min(), tried.max()))

@@ -263,7 +263,7 @@ def _pass_directly(
     if recording.is_transient_shared:
         assert isinstance(setup, ModalSetup)
         known, is_new = shared_motions(setup, clearance, friction, recording, start, begin)
-        if is_new:  # the tables may have been filled anew
+        if is_new:  # the tables may have been filled again
             again = start(initial)
             assert isinstance(again, EventDrivenMarch)
             march = again
@@ -285,7 +285,7 @@ def _pass_directly(
 def _solve_from(
     setup: Setup, clearance: float, friction: float, state: State, march: EventDrivenMarch | None = None
 ) -> PiecewiseMotion:
-    """Piecewise motion of a case in closed form; a march of it that is given is started anew."""
+    """Piecewise motion of a case in closed form; a march of it that is given is started again."""
     assert isinstance(setup, ModalSetup)
     return PiecewiseMotion(setup, clearance, friction, state, march)
 

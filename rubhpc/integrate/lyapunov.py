@@ -115,7 +115,7 @@ class Marches:
         self._other, self._size = self._displaced()
 
     def part(self, n_revolution: int) -> float | None:
-        """Start both marches anew, one after the other, and compare where they end."""
+        """Start both marches again, one after the other, and compare where they end."""
         ends = []
         for k, state in enumerate((self._state, self._other)):  # the first may empty the tables of the second
             march = self._started(k, state)

@@ -123,7 +123,7 @@ def find_periodic_motion(
 
     From a state the search begins there. Else it begins where a simulation has come to after the transient,
     and takes the first stable motion. Where it fails, the simulation goes on for up to 450 revolutions, from
-    which the search begins anew.
+    which the search begins again.
 
     Parameters
     ----------

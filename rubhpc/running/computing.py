@@ -140,8 +140,8 @@ class Computing:
     def _worker(self, kind: str, progress: Progress | None = None) -> Iterator[Worker]:
         """A worker with its journal and its in-progress record.
 
-        At its end all is on the disk; of a refined map it only survives this process, lest the other
-        ranks wait for the disk (`sync`).
+        At its end all is on the disk; of a refined map it only survives this process, so that the
+        other ranks do not wait for the disk (`sync`).
         """
         job, pool, store = self._job, self._pool, self._store
 

@@ -25,7 +25,7 @@ _PATIENCE = 15.0  # s that a part may take in any case: a whip that begins meets
 _LITTLE = 0.5  # of what a case has taken: as much more is worth knowing better what is to come
 _FIRST, _FIRST_STEPS = 1 / 16, 50_000  # of a case, and predicted steps: its first part
 _LATE = 0.25  # least pace of a part without its contact modes, over that with them
-_REPEATED = 1.25  # revolutions counted over a length: two motions that take over from a tangent align anew
+_REPEATED = 1.25  # revolutions counted over a length: two motions that take over from a tangent align again
 _PROBED = 8  # revolutions at most, of those that show what is left of a case will take
 
 

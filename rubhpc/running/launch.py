@@ -38,7 +38,7 @@ FIRST_SPEAKS = 1.0  # s, for which the other ranks leave the word to the first: 
 _LOOK = 0.5  # s between looks at whether the launcher still lives
 _FEW = 32
 _PR_SET_PDEATHSIG = 1  # from Linux's prctl.h
-_ORPHANED = 75  # exit code of a rank whose launcher is gone: run the same command again
+_ORPHANED = 75  # exit code of a rank whose launcher has ended: run the same command again
 
 
 def launch() -> Launch:
@@ -69,7 +69,7 @@ def leave(code: int | None) -> NoReturn:
 
 @contextmanager
 def killed_with_launcher() -> Iterator[None]:
-    """Around the start of Open MPI: it holds the interpreter, for 8 s if its launcher is gone.
+    """Around the start of Open MPI: it holds the interpreter, for 8 s if its launcher has ended.
 
     The kernel then kills this process with its parent. That is no way for longer: "parent" is the thread that
     forked, and Open MPI forks in passing threads where it starts more than `_FEW` ranks on a machine.
@@ -93,7 +93,7 @@ def killed_with_launcher() -> Iterator[None]:
 def _end_with_hydra() -> None:
     """Have the kernel kill this process with the proxy of MPICH's launcher, whatever call it is in.
 
-    MPI waits for ranks that are gone, and holds the interpreter meanwhile. The proxy forks in its only
+    MPI waits for ranks that have ended, and holds the interpreter meanwhile. The proxy forks in its only
     thread, so that the kernel's "parent" is the proxy, for as long as this process lives.
     """
     try:

@@ -87,9 +87,9 @@ class Pilots:
         self._followed: list[tuple[int, float]] = []  # of whole cases: revolutions behind the record, and s
         self._kept: dict[tuple[int, ...], FollowedCase] = {}  # that may be finished
         self._spent: dict[tuple[int, ...], float] = {}  # s, on cases that were shortened
-        self._first: dict[tuple[int, ...], tuple[Forecast, float]] = {}  # what was foreseen then, and spent
+        self._first: dict[tuple[int, ...], tuple[Forecast, float]] = {}  # what was predicted then, and spent
         self._usual = 0.0  # revolutions behind the record
-        self._longest = 0.0  # s, of the dearest case, as far as it was run
+        self._longest = 0.0  # s, of the longest case, as far as it was run
         self.was_cut, self.covered = False, 0.0
         self.loading = 0.0
         self.alike: dict[tuple[int, ...], tuple[int, ...]] = {}
@@ -110,7 +110,7 @@ class Pilots:
         """Revolutions likely to be followed behind the record of a case that takes long.
 
         The mean of the cases that were run whole, by their times, and of what is usual, which counts as much
-        as the dearest case so far: the tangent of a whip is often carried on where a cheap one is not.
+        as the longest case so far: the tangent of a whip is often carried on where a cheap one is not.
         """
         followed = sum(n * seconds for n, seconds in self._followed)
         whole = sum(seconds for _, seconds in self._followed)
@@ -194,7 +194,7 @@ class Pilots:
         self._longest = max(self._longest, self.foreseen(index))
 
     def _affordable(self) -> dict[tuple[int, ...], FollowedCase]:
-        """The dearest of the cases that may be finished, and others while contact modes leave memory."""
+        """The longest of the cases that may be finished, and others while contact modes leave memory."""
         kept: dict[tuple[int, ...], FollowedCase] = {}
         held: set[int] = set()
         n_byte, most = 0, min(_MOST_KEPT, max(MOST_BYTES, _OF_FREE * free_memory()))
@@ -246,7 +246,7 @@ class Pilots:
         return self._spent[index]
 
     def first(self, index: tuple[int, ...]) -> tuple[float, float]:
-        """What a case had taken when it was shortened, and what was foreseen to come then, s."""
+        """What a case had taken when it was shortened, and what was predicted to come then, s."""
         forecast, spent = self._first[index]
         return spent, forecast.whole(self.n_behind) - spent
 
@@ -272,11 +272,11 @@ class Pilots:
         return is_done
 
     def _branches(self, case: Case) -> float:
-        """Time of the branches of a case; where they were not followed to their ends it is foreseen.
+        """Time of the branches of a case; where they were not followed to their ends it is predicted.
 
         The first branch goes from where it begins to one end of the range, then to the other. What it has
         come by when it `was_cut` is taken for a sample of the whole range; that it turns, and that others
-        follow, is not foreseen.
+        follow, is not predicted.
         """
         study = self._study
         branch = study.branch

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-_WITHIN = 0.95  # by Student's distribution: few cases rarely hold the dearest, so that it is 0.8 to 0.95
+_WITHIN = 0.95  # by Student's distribution: few cases rarely hold the longest, so that it is 0.8 to 0.95
 _FEWEST_FREE = 3  # degrees of freedom of that distribution, at least
-_UPWARD = 1.3  # reach of a range upwards over that downwards: dear cases are rare, and missed more often
-_OFF = 0.25  # standard deviation of a time foreseen from part of a case, as a share of it (18 cases, 4 laws)
+_UPWARD = 1.3  # reach of a range upwards over that downwards: long cases are rare, and missed more often
+_OFF = 0.25  # standard deviation of a time predicted from part of a case, as a share of it (18 cases, 4 laws)
 _OFF_IRREGULAR = 0.4  # the same where its motion still met contact modes: it may settle, or meet yet more
 
 
@@ -31,13 +31,13 @@ class Sample:
     steps, probability, seconds : list of float
         Of each case: predicted steps, probability that a draw picks it, and the time it takes.
     is_whole : list of bool
-        Whether it was run to its end; the time of others is foreseen from a part.
+        Whether it was run to its end; the time of others is predicted from a part.
     spent : list of float
         What that part took, s.
     is_irregular : list of bool
         Whether its motion still met contact modes where that part ended.
     checked : list of (float, float)
-        Of cases that went on to their ends: what a part had foreseen to come, and what came, s.
+        Of cases that went on to their ends: what a part had predicted to come, and what came, s.
     """
 
     n_case: int

@@ -29,9 +29,9 @@ _MOST_PILOTS, _FEW_PILOTS, _FEW_BRANCHED = 64, 6, 2  # cases; timed even if slow
 _ENOUGH, _MOST = 3.0, 15.0  # processor seconds after which no more are begun: where they agree, and at all
 _AGREED = 0.25  # standard error of the mean pace, as a share of it, where cases agree
 _LONGEST = 75.0  # s, in which cases that were shortened are run whole, together
-_OF_A_BRANCH = 0.3  # standard error, as a share, of a time foreseen from part of the first branch
-_LEAST, _SHARE = 15.0, 0.4  # s that all may take, or that share of the time foreseen where it is more
-_HALF = 0.5  # of the time foreseen, or `_LEAST`, for cases that go on, at least
+_OF_A_BRANCH = 0.3  # standard error, as a share, of a time predicted from part of the first branch
+_LEAST, _SHARE = 15.0, 0.4  # s that all may take, or that share of the time predicted where it is more
+_HALF = 0.5  # of the time predicted, or `_LEAST`, for cases that go on, at least
 _LEAST_EACH = 1.0  # s, for each case
 _SMALL = 24  # cases: of a study of no more all are begun
 _FEWEST = 3  # cases, timed in any case
@@ -180,7 +180,7 @@ def _finish(pilots: Pilots, picked: list[tuple[int, ...]], sample: Sample, secon
     What such a case comes to is hardly known from its beginning: more and more sets of contacts, a tangent
     that is carried on and on. The next part is always that of the case of which most is to come. A record
     that has room is run too: it is not known whether anything is followed behind it. Cases that are not
-    finished are foreseen anew, and corrected by what the others came to.
+    finished are predicted again, and corrected by what the others came to.
     """
     shortened = {index: k for k, index in enumerate(picked) if index in pilots.shortened}
     end = time.process_time() + min(seconds, _LONGEST)

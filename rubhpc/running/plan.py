@@ -292,7 +292,7 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
 def _memory(timing: Timing, prepared: Preparations) -> float:
     """Bytes that a process holds at most, but for the measures of all cases.
 
-    In a ring those are contact modes: of the dearest case, and of set-ups and frictions that are kept beside
+    In a ring those are contact modes: of the longest case, and of set-ups and frictions that are kept beside
     them. Otherwise this process, which has run cases and written a block, has held as much.
     """
     if not timing.modes:

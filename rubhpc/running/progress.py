@@ -81,7 +81,7 @@ class Progress:
             self._bar.stop()
 
     def expect(self, n_case: int) -> None:
-        """Take the number of cases of a refined map as it is now foreseen."""
+        """Take the number of cases of a refined map as it is now predicted."""
         if n_case > self._n_done:
             self._cost *= (n_case - self._n_done) / max(self._n_case - self._n_done, 1)
             self._n_case = n_case

@@ -31,7 +31,7 @@ _FEWEST, _MOST = 3, 64  # lines along an axis
 _ALIKE = 16  # as long as all add the same, of which the spread of others is not known
 _PATIENCE = 1.5  # times as long as lines are begun, for the last of them
 _AGREED = 0.08  # standard error of the number of cases, as a share of it, up to which no more are refined
-_FOR_LINES, _LINES = 0.1, (3.0, 20.0)  # of the time foreseen, s from and to, for lines
+_FOR_LINES, _LINES = 0.1, (3.0, 20.0)  # of the time predicted, s from and to, for lines
 _OFF = 0.5  # standard error of the usual number of cases, as a share of it (0.5 to 1.9 of them)
 
 

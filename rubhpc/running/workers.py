@@ -36,7 +36,7 @@ T = TypeVar("T")
 
 _LOOK = 0.5  # s between looks at whether the parent still lives
 _PATIENCE = 10.0  # s for workers to end by themselves
-_ORPHANED = 75  # exit code of a worker whose parent is gone: run the same command again
+_ORPHANED = 75  # exit code of a worker whose parent has ended: run the same command again
 _LOST = RankLost("a worker process was lost; run the same command again")
 
 
@@ -60,7 +60,7 @@ class Sums:
         return before
 
     def reset(self) -> None:
-        """Begin anew at zero."""
+        """Begin again at zero."""
         np.frombuffer(self._memory, np.int64)[:] = 0
 
 

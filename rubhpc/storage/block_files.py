@@ -153,7 +153,7 @@ class BlockFiles:
         return found
 
     def compact(self) -> None:
-        """Write such shards anew; needs the store's lock."""
+        """Write such shards again; needs the store's lock."""
         for file in self.oversized():
             self._pack(file, {})
 

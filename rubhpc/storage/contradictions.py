@@ -57,7 +57,7 @@ def _read(path: Path, header: Header) -> tuple[set[int], set[int]]:
             if line[:8] != b"%08x" % crc32(text) or len(parts) < 6 or not parts[0].isdigit():
                 continue
             flat, said = int(parts[0]), _said(parts, kind)
-            if parts[2] not in _STORED:  # what follows is computed anew
+            if parts[2] not in _STORED:  # what follows is computed again
                 known[flat] = 0
                 twice.discard(flat)
             elif said is not None:

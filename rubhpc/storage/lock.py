@@ -31,7 +31,7 @@ STALE_AFTER = (
     180.0  # s without a heartbeat, for holders on other hosts; network file systems cache for a minute
 )
 _LATEST = 4e9  # s since 1970: a later start is no time
-ORPHAN_PATIENCE = 15.0  # s to wait for a holder whose launcher is gone: it is about to stop
+ORPHAN_PATIENCE = 15.0  # s to wait for a holder whose launcher has ended: it is about to stop
 
 
 class InUse(StoreError):  # noqa: N818 - it is a state, not an error

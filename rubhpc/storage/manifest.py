@@ -242,7 +242,7 @@ class Manifest:
         return manifest
 
     def damaged_copies(self, store: Path) -> list[str]:
-        """Names of the files of this manifest that are gone or damaged."""
+        """Names of the files of this manifest that are missing or damaged."""
         names = []
         for name in _NAMES:
             try:

@@ -38,7 +38,7 @@ def write_packed(path: Path, manifest: Manifest, variable: Variable, values: NDA
 
 
 def read_packed(path: Path, manifest: Manifest, variable: Variable) -> NDArray[Any] | None:
-    """Read a packed array of a store; None where a chunk is gone or damaged."""
+    """Read a packed array of a store; None where a chunk is missing or damaged."""
     chunk = _chunk(manifest, variable)
     values = np.empty((*manifest.shape, *manifest.extent(variable)), variable.dtype)
     for file, window in _chunks(path, manifest, variable):

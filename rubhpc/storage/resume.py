@@ -126,7 +126,7 @@ def _note_on(added: tuple[Variable, ...], store: Store) -> str:
 
 
 def cases_without_files(store: Store, ledger: Ledger) -> list[int]:
-    """Flat indices of the cases that have been stored, but whose files are gone or empty."""
+    """Flat indices of the cases that have been stored, but whose files are missing or empty."""
     gone: list[int] = []
     if not store.manifest.variables:
         return gone

@@ -130,7 +130,7 @@ def _name(store: Store, flat: int) -> str:
 
 
 def _damaged_cases(store: Store, ledger: Ledger) -> dict[int, str]:
-    """Cases whose arrays are gone, cannot be decoded, or have changed."""
+    """Cases whose arrays are missing, cannot be decoded, or have changed."""
     damaged = {}
     for start in store.blocks():
         flat = store.flat(start)

@@ -1,4 +1,4 @@
-"""Numbers that the documents state of the accuracy and the energy balance of cases, computed anew.
+"""Numbers that the documents state of the accuracy and the energy balance of cases, computed again.
 
     python tests/bench/documented.py [NAME ...]
 

@@ -267,7 +267,7 @@ def test_pilots_see_every_value_of_an_axis_within_blocks(tmp_path, monkeypatch):
 
 
 def test_pilots_stand_for_all_cases(tmp_path, monkeypatch):
-    """Their mean pace is that of the whole study where dear cases take more steps, too; few cases suffice."""
+    """Their mean pace is that of the whole study where long cases take more steps, too; few cases suffice."""
     from rubhpc.running import pilot_cases, plan
     from rubhpc.study.cases import CaseGrid
     from rubhpc.study.study import read_study

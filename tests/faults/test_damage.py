@@ -128,7 +128,7 @@ def test_what_is_no_case_is_written_anew_without_computing(store, finished, name
 
 
 def test_a_chunk_of_missing_values_is_deleted(store, finished):
-    """Readers see the same numbers without it; it is named and written anew."""
+    """Readers see the same numbers without it; it is named and written again."""
     chunk = store / "lyapunov_exponent" / "c" / "0" / "0" / "0"
     assert np.isnan(array_of(store, "lyapunov_exponent")[...]).all()
     chunk.unlink()

@@ -55,7 +55,7 @@ def test_threads_share_nothing():
 
 
 def test_classes_of_others_are_made_each_time():
-    """Their functions may be written anew while a program runs, in a notebook say."""
+    """Their functions may be written again while a program runs, in a notebook say."""
     assert recent(object, Foreign(1.0)) is not recent(object, Foreign(1.0))
 
 

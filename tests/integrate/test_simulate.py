@@ -198,7 +198,7 @@ def test_run_goes_on_from_its_final_state(phase, is_touching, normal, method):
     first, whole = simulate(RIG, **(given | {"revolutions": 1})), simulate(RIG, **given)
     assert (first.final.contact_force[0] > 1.0) == is_touching
     second = simulate(RIG, **(given | {"revolutions": 1}), initial=first.final)
-    # Steps of order 4 amid a contact begin anew with the run: their error, not rounding, is what differs.
+    # Steps of order 4 amid a contact begin again with the run: their error, not rounding, is what differs.
     is_stepped = normal == "updated" and method["method"] == "modal"
     for name in SIGNAL_NAMES:
         expected = getattr(whole, name)[..., 256:]

@@ -42,7 +42,7 @@ def test_no_function_changes_unseen_within_the_interval_that_is_promised():
             is_negative = values_of(np.linspace(0.0, known[1, j] - now, 400))[j] < -1e-12
             assert not (is_negative[:-1] & ~is_negative[1:]).any()
             n_seen += is_negative.any()
-        # What is known, and comes later than another, is not asked anew.
+        # What is known, and comes later than another, is not asked again.
         later = int(known[1].argmax())
         known[1, later] = marked = known[1, later] + 1
         assert plain(event_bounds.free_until)(*given, known) == (free, sure)

@@ -20,7 +20,7 @@ def changed(study: str, change: Callable[[xr.Dataset], xr.Dataset]) -> Spoil:
 
 
 def remade(study: str, **changes: float) -> Spoil:
-    """Make one store anew, with other natural frequencies."""
+    """Make one store again, with other natural frequencies."""
     return changed(study, lambda _: getattr(synthetic_paper, study)(**changes))
 
 

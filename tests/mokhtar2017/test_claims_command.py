@@ -26,7 +26,7 @@ NOT_OF_THEM = {"C60", "C61"}  # take stiffer stators
 
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory) -> Path:
-    """Folder of two studies of the paper, simulated anew over fewer revolutions."""
+    """Folder of two studies of the paper, simulated again over fewer revolutions."""
     folder = tmp_path_factory.mktemp("paper")
     for name, values in SIMULATED.items():
         study = read_study(STUDIES[name], output=folder / f"{name}.zarr")

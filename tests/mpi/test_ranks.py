@@ -97,7 +97,7 @@ def test_a_sample_killed_on_its_way_and_resumed_on_two_ranks_stores_equal_bytes(
 
 
 def test_no_rank_outlives_the_daemon_that_started_it(tmp_path):
-    """Not even while MPI waits, at its start, for ranks that are gone: only the daemon is killed."""
+    """Not even while MPI waits, at its start, for ranks that have ended: only the daemon is killed."""
     study = write_slow_study(tmp_path, **LONG)
     job = start(study, ranks=2)
     while len(processes_of(study)) < 3:  # mpirun and the ranks

@@ -33,6 +33,11 @@ INSTEAD_OF = {
     r"tall(y|ies)": "accumulator",
     r"yields to": "is replaced by",
     r"no fault can lose": "fault tolerance",
+    r"in vain": "without success",
+    r"dear(er|est)": "longer, longest (of cases), expensive",
+    r"foretells?": "predict",
+    r"lest": "so that ... not",
+    r"rub that stays": "sustained rub",
 }
 # Where a word is meant in its usual sense: file and line, as far as both are needed.
 ALLOWED = {

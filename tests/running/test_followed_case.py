@@ -167,7 +167,7 @@ def test_a_case_goes_on_part_by_part(monkeypatch):
 
 
 def test_length_of_a_tangent_is_that_of_the_cases_that_ran_whole():
-    """Each counts by its time; what is usual as much as the dearest of them."""
+    """Each counts by its time; what is usual as much as the longest of them."""
     found = pilot_cases.Pilots(SimpleNamespace(study=None))
     found._usual = 176
     assert found.n_behind == 176

@@ -28,7 +28,7 @@ def test_contact_modes_that_are_freed_are_solved_again_with_the_same_bits(study,
     for limit in (kept_setups.MOST_BYTES, 0):
         monkeypatch.setattr(kept_setups, "MOST_BYTES", limit)
         kept, found, held = kept_setups.KeptSetups(study), [], []
-        for case in [*cases, *cases]:  # once more, out of what is kept or anew
+        for case in [*cases, *cases]:  # once more, out of what is kept or again
             setup = kept.of(case)
             found.append(integrate(study, case, setup, case.initial))
             held.append({id(s): dict(s.n_byte) for _, s in kept._kept.values()})

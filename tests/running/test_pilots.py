@@ -77,7 +77,7 @@ def test_part_of_a_drive_is_its_beginning():
 
 
 class Shortened:
-    """Cases that were left after some seconds: what parts of them take, and what is foreseen in between."""
+    """Cases that were left after some seconds: what parts of them take, and what is predicted in between."""
 
     loading = compiling = 0.0
     was_cut, arrays, alike = False, {}, {}
@@ -235,7 +235,7 @@ def test_a_block_is_timed_with_its_folders(tmp_path, monkeypatch):
 
 
 def test_memory_holds_other_set_ups_of_a_ring(tmp_path, monkeypatch):
-    """Contact modes of the dearest case and of other set-ups and frictions, up to a bound."""
+    """Contact modes of the longest case and of other set-ups and frictions, up to a bound."""
     study = read_study(write_study(tmp_path))  # two speeds, three frictions
 
     def memory(*modes):
@@ -256,7 +256,7 @@ def test_peak_memory_is_that_of_this_process():
 
 
 def test_shortened_cases_of_a_ring_are_kept_while_memory_lasts(monkeypatch):
-    """The dearest in any case, those that share its set-up, and others whose contact modes find room."""
+    """The longest in any case, those that share its set-up, and others whose contact modes find room."""
     study = SimpleNamespace(recording=None)
     found = pilot_cases.Pilots(SimpleNamespace(study=study))
     sizes = {"a": 3 * MOST_BYTES // 4, "b": MOST_BYTES // 2, "c": MOST_BYTES // 8, "large": 4 * MOST_BYTES}

@@ -65,7 +65,7 @@ def test_libraries_are_held_to_one_thread_and_let_go():
 
 
 def test_a_script_stores_what_the_command_does_and_its_libraries_start_no_work_beside_it(tmp_path):
-    """A sampled study prepares every case anew, so linear algebra is most of it: hundreds of calls.
+    """A sampled study prepares every case again, so linear algebra is most of it: hundreds of calls.
 
     The threads of a library sleep until it gives them work, so it is enough to count how often they wake.
     """

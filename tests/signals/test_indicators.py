@@ -1,4 +1,4 @@
-"""Rub indicators of signals with known content, and rates of verdicts that statistics foretell."""
+"""Rub indicators of signals with known content, and rates of verdicts that statistics predict."""
 
 import math
 

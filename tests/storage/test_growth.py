@@ -230,7 +230,7 @@ def test_a_growth_at_the_ends_leaves_the_blocks_where_they_are(tmp_path):
 
 
 def test_a_damaged_case_is_left_behind(tmp_path):
-    """A block that moves is written anew: what no longer matches its checksum must not get a new one."""
+    """A block that moves is written again: what no longer matches its checksum must not get a new one."""
     grid = {"speed_ratio": [0.9], "clearance_ratio": [0.7], "friction": [0.1, 0.2]}
     store = open_store(grid_for(make_study(tmp_path, grid)))
     compute(store, all_of_it=True)

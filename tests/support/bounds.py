@@ -2,7 +2,7 @@
 
     python tests/support/bounds.py [SECONDS [SEED]]
 
-Kernels are compiled anew, into a cache of their own, 5 to 15 min for all. An index beyond an array ends
+Kernels are compiled again, into a cache of their own, 5 to 15 min for all. An index beyond an array ends
 a case with `IndexError`, and this program with the exit code 1; what the program refuses, or gives up, is no
 fault.
 """

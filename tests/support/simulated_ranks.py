@@ -61,7 +61,7 @@ class Simulation:
             thread.start()
         for thread in threads:
             thread.join(self.patience)
-            assert errors or not thread.is_alive(), "ranks wait for each other in vain"
+            assert errors or not thread.is_alive(), "ranks wait for each other forever"
         if errors:
             raise errors[0]
         return results

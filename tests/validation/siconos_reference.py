@@ -2,7 +2,7 @@
 
     python3 tests/validation/siconos_reference.py
 
-computes them anew with the interpreter for which Siconos is installed (Debian: python3-siconos, 4.4.0) and
+computes them again with the interpreter for which Siconos is installed (Debian: python3-siconos, 4.4.0) and
 writes tests/data/siconos_4.4.0.npz. Moreau and Jean's time stepping, theta = 1/2, with the contact problem of
 each step solved by its NSGS solver to 1e-13 (V. Acary, F. Perignon, https://github.com/siconos/siconos). What
 differs from the product: the law of impact alone decides in the normal direction too, at the level of

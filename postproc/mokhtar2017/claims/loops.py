@@ -19,7 +19,7 @@ _SMALLEST = 0.05  # size of a loop that counts, over that of the orbit
 def loops_of(case: xr.Dataset) -> int:
     """Return the number of loops in one period of a case's orbit; 0 where it has no period.
 
-    At every crossing the curve is cut and joined anew so that each branch goes on into the other, in the
+    At every crossing the curve is cut and joined again so that each branch goes on into the other, in the
     sense of its motion (Seifert 1934). An orbit that whirls n times round its centre falls into n loops,
     however often they cross each other, and a figure of eight into two.
     """

@@ -147,7 +147,7 @@ def _is_known(branching: Branching, tracks: list[Track], point: Point) -> bool:
 def _aside(branching: Branching, point: Point) -> list[Point] | None:
     """A motion of twice the period at its doubling, and one next to it on the branch that leaves.
 
-    It is to have the same contacts, lest an event be passed over; where there is none, the farthest is taken.
+    It has to have the same contacts, so that no event is skipped; where there is none, the farthest is taken.
     """
     base = branching.repeated(point, 2)
     values, vectors = np.linalg.eig(point.monodromy)

@@ -77,7 +77,7 @@ def carried(
     before : Standing
         At the same instant.
     march : EventDrivenMarch
-        Which stands nowhere afterwards, until it begins anew.
+        Which stands nowhere afterwards, until it begins again.
     begun : Place
         From which the piece would begin.
     """

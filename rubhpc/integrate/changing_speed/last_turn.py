@@ -1,4 +1,4 @@
-"""What braked the shaft a revolution ago: rub comes back at the same angle, and is foreseen by it."""
+"""What braked the shaft a revolution ago: rub comes back at the same angle, and is predicted by it."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class Passed(NamedTuple):
 
 
 class Passing:
-    """What takes the pieces of a case: one march that begins anew at each of their speeds."""
+    """What takes the pieces of a case: one march that begins again at each of their speeds."""
 
     def __init__(self, clearance: float, friction: float, check: Callable[[], None] | None) -> None:
         self._case = clearance, friction

@@ -292,7 +292,7 @@ class Pieces:
             force=np.stack([phasor.real, -phasor.imag]),
             probe=model.probe_rows @ self._basis,
         )
-        for name in ("translations", "project"):  # which need no computing anew
+        for name in ("translations", "project"):  # which need not be computed again
             reduced.__dict__[name] = getattr(fastest.reduced, name)
         return model, reduced
 

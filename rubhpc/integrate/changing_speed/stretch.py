@@ -72,7 +72,7 @@ def take_stretch(
     ----------
     march : EventDrivenMarch
         Whose case it is, at the beginning of the first of them (`begin_stretch`, whose library this is); it
-        stands nowhere afterwards, until it begins anew.
+        stands nowhere afterwards, until it begins again.
     setups : sequence of PieceSetup
         Of pieces of the same matrices.
     samples : Samples

@@ -69,7 +69,7 @@ class ContactSteppingMarch(ModalMarch):
         self._work = workspace(self._pairs, step)
         self._ends = np.full((4, q * N_DEGREE), np.nan)
         self._placed = np.zeros((2, self.bodies.stiffness.shape[0]))
-        self._work.force[:] = initial.contact_force  # a contact under way does not begin anew
+        self._work.force[:] = initial.contact_force  # a contact under way does not begin again
 
     def touching(self) -> NDArray[np.bool_]:
         """Which pairs pressed in the last step, (q,)."""

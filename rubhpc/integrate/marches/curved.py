@@ -55,7 +55,7 @@ class CurvedMarch(EventDrivenMarch):
         self._take_pairs()
 
     def begin(self, setup: ModalSetup, place: Place) -> None:
-        """Begin anew at another speed in the same reduced coordinates, from where a march has come."""
+        """Begin again at another speed in the same reduced coordinates, from where a march has come."""
         before, self._force = self._setup, place.contact_force.copy()
         super().begin(setup, place)
         if setup.reduced.stiffness is not before.reduced.stiffness or setup.model is not before.model:
@@ -64,7 +64,7 @@ class CurvedMarch(EventDrivenMarch):
             self._make_work()
 
     def start_again(self, state: State) -> bool:
-        """Start the same case anew at another state, with what was found of its matrices and contacts."""
+        """Start the same case again at another state, with what was found of its matrices and contacts."""
         self._force = state.contact_force.copy()
         self._start_at(state)
         return True

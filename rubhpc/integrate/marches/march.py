@@ -61,7 +61,7 @@ class March(ABC):
         """Advance from `self.sample` to sample `stop` in one kernel call."""
 
     def start_again(self, state: State) -> bool:
-        """Start the same case anew at another state; False where that takes a new march."""
+        """Start the same case again at another state; False where that takes a new march."""
         return False
 
     @abstractmethod

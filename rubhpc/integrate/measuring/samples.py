@@ -58,12 +58,12 @@ def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
 
 
 def following_accumulator(before: Accumulator, passed: float) -> Accumulator:
-    """Sums of what follows in a march that counts its time anew, after `passed` (s) of the march before.
+    """Sums of what follows in a march that restarts its time, after `passed` (s) of the march before.
 
     Means of the contact force reach back beyond it.
     """
     pieces = before.force_piece.copy()
-    pieces[:, LOUD, 0] = np.inf  # to a peak that begins anew
+    pieces[:, LOUD, 0] = np.inf  # to a peak that begins again
     return _accumulator(
         before.impulse.size,
         before.peak_lateral.size,

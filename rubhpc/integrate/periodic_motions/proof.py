@@ -56,7 +56,7 @@ class Solver:
     ) -> None:
         """Take the end of a case in closed form, and the stable motion that it was begun on, if any.
 
-        A march of the case that is needed no more may be given, to be started anew.
+        A march of the case that is needed no more may be given, to be started again.
         """
         self._case = setup, clearance, friction, final
         self._piecewise: PiecewiseMotion | None = None

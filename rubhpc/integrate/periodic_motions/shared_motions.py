@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 SPEEDS, DIRECTIONS = (1.0, 3.0), 4  # of the output node, over spin times clearance; on the way to a motion
 MOST_POINTS = 16  # operating points of one set-up whose motions are kept
 LONGEST = 128  # revolutions in which a fixed start is to reach its motion
-MOST_VAIN = 3  # starts in a row that reach none: where motions are not periodic, all are in vain
+MOST_VAIN = 3  # starts in a row that reach none: where motions are not periodic, all fail
 
 _Kept = OrderedDict[tuple[float, float, "Recording"], KnownMotions]
 _KEPT: WeakKeyDictionary[ModalSetup, _Kept] = WeakKeyDictionary()

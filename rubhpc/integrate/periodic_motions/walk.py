@@ -48,7 +48,7 @@ class Walk:
     ----------
     march : EventDrivenMarch
     n_revolution, n_step : int
-        Revolutions simulated, and steps taken before the march was last begun anew.
+        Revolutions simulated, and steps taken before the march was last begun again.
     passed : (k, 2 n)
         Motions at the ends of the last revolutions, the present one last.
     """
@@ -87,7 +87,7 @@ class Walk:
         return (self.passed[-1] if reason is None else None), reason
 
     def begin_at(self, setup: ModalSetup, place: Place) -> None:
-        """Go on with another motion, or with the same and tables that may have been filled anew."""
+        """Go on with another motion, or with the same and tables that may have been filled again."""
         self._place = setup, place
 
     def stand(self) -> None:

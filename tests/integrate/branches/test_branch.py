@@ -75,7 +75,7 @@ def test_points_are_periodic_motions(found):
 
 
 def test_points_let_go_of_the_tables_of_their_cases(monkeypatch):
-    """Without room some cases are kept, whatever the length of a branch; others are set up anew, alike."""
+    """Without room some cases are kept, whatever the length of a branch; others are set up again, alike."""
     monkeypatch.setattr(family_module, "ROOM", 0)
     family = family_of("clearance", (1.05e-4, 1.2e-4))
     motion = rubhpc.periodic("mokhtar2017", clearance=1.06e-4, period=2, keep=(), **CASE)

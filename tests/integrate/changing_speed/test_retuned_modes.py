@@ -1,4 +1,4 @@
-"""Tables tuned to a speed are those made anew for it; matrices are held where that changes little."""
+"""Tables tuned to a speed are those made again for it; matrices are held where that changes little."""
 
 from dataclasses import replace
 

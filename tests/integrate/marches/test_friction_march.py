@@ -1,4 +1,4 @@
-"""A march under Coulomb's law: how friction comes to slide, and a case begun anew."""
+"""A march under Coulomb's law: how friction comes to slide, and a case begun again."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Contacts of cases near a periodic motion, foreseen by the linear theory."""
+"""Contacts of cases near a periodic motion, predicted by the linear theory."""
 
 from itertools import pairwise
 
@@ -53,7 +53,7 @@ def test_gaps_and_forces_nearby_are_those_of_the_motion_to_first_order(settled):
 
 
 def test_another_contact_comes_where_it_is_foreseen(settled):
-    """Least share of the distance at which the order of contacts is another one: 1.11 foreseen, 1.44 met."""
+    """Least share of the distance at which the order of contacts is another one: 1.11 predicted, 1.44 met."""
     piecewise, orbit, apart = settled
     apart = apart * piecewise.size(orbit.motion) / piecewise.size(apart)
     onward, usual = Onward(piecewise, orbit), sequence(piecewise, orbit, 0.0 * apart)
