@@ -34,7 +34,7 @@ class Probe:
     """
 
     name: str = text(
-        doc="Name, of which those of the stored variables are made: probe_NAME.", example='"bearing_1_left"'
+        doc="Name; the stored variables are named after it: probe_NAME.", example='"bearing_1_left"'
     )
     node: int | None = count(doc="Node of the rotor, from 1.", example="1", default=None)
     stator: int | None = count(doc="Number of the stator, in place of a node.", example="2", default=None)

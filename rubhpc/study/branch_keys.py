@@ -57,7 +57,11 @@ class BranchKeys:
         at_most=6,
     )
     points: int = count(
-        doc="Points stored of a case at most.", example="4000", default=2000, at_least=10, at_most=1_000_000
+        doc="Largest number of stored points of a case.",
+        example="4000",
+        default=2000,
+        at_least=10,
+        at_most=1_000_000,
     )
 
     def __post_init__(self) -> None:

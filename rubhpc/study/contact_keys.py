@@ -88,7 +88,7 @@ class ContactKeys:
     )
     friction_ratio: tuple[float, ...] | None = series(
         "",
-        doc="Coefficients there over the friction of the case; linear between, constant beyond.",
+        doc="Coefficients at these speeds over the friction of the case; linear between, constant beyond.",
         example="[1.3, 1.1, 1.0]",
         default=None,
         at_least=0,

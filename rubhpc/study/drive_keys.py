@@ -25,7 +25,7 @@ LOWEST_SHARE = 0.1  # of the first speed: where a record ends that names no lowe
 
 @dataclass(frozen=True, kw_only=True)
 class DriveKeys:
-    """What turns a rotor whose speed is free; torque, start and inertia may be axes, as `"drive.torque"`."""
+    """Drive of a rotor of free speed; torque, start and inertia may be axes, as `"drive.torque"`."""
 
     torque: tuple[float, ...] | None = series(
         "N*m",

@@ -12,7 +12,7 @@ MARGIN = 1.05  # vibration may give back to the spin what it holds
 
 @dataclass(frozen=True, kw_only=True)
 class DriveLaw:
-    """What turns a rotor whose speed is free.
+    """Drive of a rotor whose speed is not prescribed.
 
     Attributes
     ----------

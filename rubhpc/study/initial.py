@@ -24,7 +24,7 @@ KNOCKED = PREFIX + "impulse_node"
 
 @dataclass(frozen=True, kw_only=True)
 class Initial:
-    """Where a case starts: at rest, contact-free or where another has ended, disturbed by what follows.
+    """Where a case starts: at rest, contact-free or at the end of another case; other keys disturb it.
 
     Displacement and velocity are those of the output node relative to that motion, at the shaft's angle 0;
     the rotor follows by the static shape under a force there. What they overlap is pushed apart, by static

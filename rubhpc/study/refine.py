@@ -28,7 +28,7 @@ _MEASURES = tuple(
 
 @dataclass(frozen=True, kw_only=True)
 class Refine:
-    """A map of which only those cases are computed that it needs; the others are inferred from them.
+    """A map of which only the necessary cases are computed; the others are inferred from them.
 
     Every `coarse`-th value of the refined axes is computed first. Then one axis after another is halved until
     it has all its values, where neighbours differ.

@@ -48,7 +48,7 @@ class Integrator:
     )
     accuracy: float = quantity(
         "",
-        doc="Relative error of signals and forces, modal: by modes left out, by steps where gaps are curved.",
+        doc="Relative error of signals and forces (modal): of omitted modes and, in curved gaps, of steps.",
         example="1e-3",
         default=1e-3,
         above=0,
@@ -94,8 +94,8 @@ class Recording:
     """How long a case runs, in revolutions, and what is kept of it."""
 
     transient: int | str = count(
-        doc='Revolutions discarded; "auto" until the motion has settled, "direct" until it draws near to a '
-        'periodic motion that is solved for, "shared" to one that is solved once for all its starts.',
+        doc='Revolutions discarded; "auto" until the motion has settled, "direct" until it approaches a '
+        'periodic motion that is solved for, "shared" the same with motions solved once for all starts.',
         example='"auto"',
         default=120,
         at_least=0,
