@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numba
 
 from rubhpc.integrate.marches.closed_form import closed_form_march
-from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.samples import new_accumulator
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
@@ -29,10 +29,9 @@ from rubhpc.integrate.record import State
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels._jit import cache_of, plain
-from rubhpc.kernels.flow import follow_piece
 from rubhpc.kernels.force_average import add_force
 from rubhpc.kernels.laws import FRICTION_LAWS, is_penalty
-from rubhpc.kernels.penalty_events import change_pressed
+from rubhpc.kernels.revolutions import follow_revolutions
 from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import Contact, Integrator
 from rubhpc.threads import VARIABLES
@@ -56,7 +55,8 @@ def compile_ahead(setup: Setup) -> None:
     if march in _asked:
         return
     _asked.add(march)
-    is_known = all(cache_of(kernel).exists() for kernel in (follow_piece, march.take_change))
+    kernels = (follow_revolutions, march.take_change)[: 1 + issubclass(march, FrictionMarch)]
+    is_known = all(cache_of(kernel).exists() for kernel in kernels)
     if not is_known and len(os.sched_getaffinity(0)) > 1 and Path(sys.executable).stem.startswith("python"):
         with suppress(OSError):  # the lock of another, or no room for a process
             _start(FRICTION_LAWS[setup.law.friction_law], is_soft=plain(is_penalty)(setup.law))
@@ -64,7 +64,7 @@ def compile_ahead(setup: Setup) -> None:
 
 def _start(friction_law: str, *, is_soft: bool) -> None:
     """Start the process; it holds the lock, and ends with this one, which holds its input."""
-    path = cache_of(follow_piece).parent / "ahead.lock"
+    path = cache_of(follow_revolutions).parent / "ahead.lock"
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -94,9 +94,10 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def _compile(friction_law: str, *, is_soft: bool) -> None:
-    """Compile what takes an event, then what finds the next one, on a rotor that touches nothing.
+    """Compile what follows a motion from event to event, on a rotor that touches nothing.
 
-    Before these what the march needs towards its end: both processes then end at about the same time.
+    Under set-valued friction what takes an event is a kernel of its own. Before these what the march needs
+    towards its end: both processes then end at about the same time.
     """
     seen = new_accumulator(1)
     add_force(0, 0.0, 0.0, 0.0, 0.0, 0.0, seen.origin, seen.force_piece, seen.force_held, seen.peak_force)
@@ -106,9 +107,8 @@ def _compile(friction_law: str, *, is_soft: bool) -> None:
     )
     assert isinstance(setup, ModalSetup)
     motion = PiecewiseMotion(setup, 1.0, 0.3, State.at_rest(setup.model))
-    if type(motion.march) is EventDrivenMarch:
-        change_pressed(motion.march.bodies, 0, 0, motion.start.copy())
-    motion.march.change(motion.states, 1, 0.0, motion.start.copy())
+    if motion.has_states:
+        motion.march.change(motion.states, 1, 0.0, motion.start.copy())
     motion.revolve(motion.start, motion.states)
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _PARTS = {
     "advance_by_steps": "for contact in short steps",
     "advance_curved": "for curved gaps",
-    "follow_piece": "for periodic motions",
+    "follow_revolutions": "for periodic motions",
     "advance_pieces": "for run-ups",
     "advance_friction_pieces": "for run-ups under friction with stick",
     "carry_along": "for neighbouring motions, which distinguish chaos from order",

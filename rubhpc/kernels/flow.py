@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
 from rubhpc.kernels.case_progress import NONE
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, bounded, dot, floor_log2, propagate
 from rubhpc.kernels.cubics import turning_value
@@ -58,7 +58,7 @@ def piece_room(n_switch: int, width: int) -> PieceRoom:
 BEFORE, RATE_BEGUN, RATE_ENDED, GRADIENT = range(4)  # rows of the motions of a piece
 
 
-@jit_lean_sum
+@jit_part_sum
 def follow_piece(
     tables: PieceTables,
     room: PieceRoom,

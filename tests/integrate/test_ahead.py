@@ -9,8 +9,8 @@ import pytest
 import rubhpc
 from rubhpc.integrate import ahead
 from rubhpc.integrate.setup import prepare
-from rubhpc.kernels.flow import follow_piece
 from rubhpc.kernels.mode_change import change_contacts
+from rubhpc.kernels.revolutions import follow_revolutions
 from rubhpc.study.study import Contact, Integrator
 
 
@@ -75,11 +75,11 @@ def test_none_where_it_would_not_help(started, monkeypatch, tmp_path):
 
 @pytest.mark.parametrize("friction_law", ["sliding", "coulomb"])
 def test_what_it_compiles(monkeypatch, friction_law):
-    """Both kernels are called that a proof calls."""
+    """All kernels are called that a proof calls; one takes the events of sliding pairs itself."""
     called = []
     monkeypatch.setattr(
-        "rubhpc.integrate.periodic_motions.piecewise_motion.follow_piece",
-        lambda *arguments: (called.append("follow_piece"), follow_piece(*arguments))[1],
+        "rubhpc.integrate.periodic_motions.piecewise_motion.follow_revolutions",
+        lambda *arguments: (called.append("follow_revolutions"), follow_revolutions(*arguments))[1],
     )
     march = ahead.closed_form_march(setup_of(friction_law=friction_law))
     take_change = march.take_change
@@ -89,8 +89,9 @@ def test_what_it_compiles(monkeypatch, friction_law):
         staticmethod(lambda *arguments: (called.append("change"), take_change(*arguments))[1]),
     )
     ahead._compile(friction_law, is_soft=False)
-    assert {"change", "follow_piece"} == set(called)
-    assert (take_change is change_contacts) == (friction_law == "sliding")
+    is_sliding = friction_law == "sliding"
+    assert {"follow_revolutions", *([] if is_sliding else ["change"])} == set(called)
+    assert (take_change is change_contacts) == is_sliding
 
 
 def test_it_ends_with_its_parent(monkeypatch):

@@ -25,9 +25,9 @@ def test_each_part_is_announced_once(monkeypatch):
 
 
 def test_parts_are_names_of_kernels():
-    from rubhpc.kernels import curved_loop, flow, friction_pieces, piece_loop, stepping_loop, tangent
+    from rubhpc.kernels import curved_loop, friction_pieces, piece_loop, revolutions, stepping_loop, tangent
 
-    modules = flow, tangent, stepping_loop, curved_loop, friction_pieces, piece_loop
+    modules = revolutions, tangent, stepping_loop, curved_loop, friction_pieces, piece_loop
     kernels = {name for module in modules for name in vars(module)}
     assert all(name in kernels for name in compilation._PARTS)
 
@@ -59,9 +59,7 @@ MAY_COMPILE = {
     "advance",
     "is_within",
     "normal_and_gap",
-    "follow_piece",
-    "change_contacts",
-    "change_pressed",
+    "follow_revolutions",
     "add_force",
 }
 FIRST_CASE = """

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.periodic_motions.piecewise_motion import Piece, PiecewiseMotion, Revolution
+    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.revolution import Piece, Revolution
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.branches.point import Point
-    from rubhpc.integrate.periodic_motions.piecewise_motion import Piece, PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.revolution import Piece
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]

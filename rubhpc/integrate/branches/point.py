@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.periodic_motions.family import Family
-    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Revolution
+    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.revolution import Revolution
     from rubhpc.integrate.record import State
 
     Floats = NDArray[np.float64]

@@ -94,7 +94,7 @@ class ContactSets(ModalMarch):
         `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft; `moment` (s) is
         `self.moment` where it is not given.
         """
-        force, speed, active, elimination = self._change_work
+        force, *room = self.change_work
         return int(
             self.take_change(
                 self.bodies,
@@ -108,18 +108,16 @@ class ContactSets(ModalMarch):
                 False,
                 force,
                 self.given[0],
-                speed,
-                active,
-                elimination,
-                self._unrecorded,
+                *room,
             )
         )
 
     @cached_property
-    def _change_work(self) -> tuple[Floats, Floats, NDArray[np.bool_], Floats]:
-        """Room for an event that is taken by itself."""
+    def change_work(self) -> tuple[Floats, Floats, NDArray[np.bool_], Floats, Accumulator]:
+        """Work space of an event that is taken by itself (`change_contacts`)."""
         q = self._clearance.size
-        return np.zeros(q), np.zeros(q), np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
+        room = np.zeros(q), np.zeros(q), np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
+        return *room, self._unrecorded
 
     @cached_property
     def _unrecorded(self) -> Accumulator:

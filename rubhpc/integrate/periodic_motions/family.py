@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.periodic_motions.piecewise_motion import Revolution
+    from rubhpc.integrate.periodic_motions.revolution import Revolution
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.rig.rig import Rig
     from rubhpc.study.contact_keys import Contact

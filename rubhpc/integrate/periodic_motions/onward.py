@@ -9,7 +9,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.periodic_motions.piecewise_motion import Piece, PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.revolution import Piece
     from rubhpc.integrate.periodic_motions.shooting import Orbit
 
     Floats = NDArray[np.float64]

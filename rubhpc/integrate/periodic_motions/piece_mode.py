@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from rubhpc.kernels.case_progress import NONE
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.flow import PieceTables
+from rubhpc.kernels.revolutions import PieceModes
 
 if TYPE_CHECKING:
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+    from rubhpc.kernels.contact_modes import ModeTables
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -70,6 +72,42 @@ def mode_of(march: EventDrivenMarch, states: int) -> Mode:
         displacement_limit=march.bodies.displacement_limit,
     )
     return mode._replace(tables=followed)
+
+
+def unknown_modes(tables: ModeTables) -> PieceModes:
+    """Return the contact modes of tables for whole revolutions, none of them known yet (`know`)."""
+    p, n_switch, m = tables.switch_re.shape
+    return PieceModes(
+        mask=tables.mask,
+        is_known=np.zeros(p, dtype=np.bool_),
+        gaps=np.empty(p, dtype=np.int64),
+        switch_re=tables.switch_re,
+        switch_im=tables.switch_im,
+        rate_re=tables.rate_re,
+        rate_im=tables.rate_im,
+        bound=tables.bound,
+        power_re=tables.power_re,
+        power_im=tables.power_im,
+        exponent=np.empty((p, 2, m)),
+        drift=np.empty((p, m)),
+        floor=np.empty((p, n_switch)),
+        kind=np.empty((p, n_switch), dtype=np.int64),
+        enter_re=tables.enter_re,
+        enter_im=tables.enter_im,
+        offset=np.empty((p, 2, 3, m)),
+        shape_re=tables.motion_re,
+        shape_im=tables.motion_im,
+    )
+
+
+def know(modes: PieceModes, mode: Mode, gaps: int) -> None:
+    """Fill in the row of a mode; `gaps` are the bits of its switch functions that are gaps."""
+    place, tables = mode.place, mode.tables
+    modes.gaps[place] = gaps
+    modes.exponent[place], modes.drift[place] = tables.exponent, tables.drift
+    modes.floor[place], modes.kind[place] = tables.floor, tables.kind
+    modes.offset[place] = tables.offset
+    modes.is_known[place] = True
 
 
 def _read_mode(march: EventDrivenMarch, states: int) -> Mode:

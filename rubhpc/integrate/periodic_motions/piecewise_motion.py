@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,25 @@ from numpy.typing import NDArray
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.periodic_motions.piece_mode import Mode, mode_of
+from rubhpc.integrate.periodic_motions.piece_mode import Mode, know, mode_of, unknown_modes
+from rubhpc.integrate.periodic_motions.revolution import Piece, Revolution, copied, cut, first_of, longer
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.case_progress import closed_pairs
-from rubhpc.kernels.flow import BEFORE, GRADIENT, RATE_BEGUN, RATE_ENDED, follow_piece, piece_room
+from rubhpc.kernels.flow import piece_room
 from rubhpc.kernels.friction_states import STUCK, state_of
+from rubhpc.kernels.revolutions import (
+    AFTER,
+    AT_EVENT,
+    BEYOND,
+    FOLLOWED,
+    FULL,
+    MODE_UNKNOWN,
+    PIECE,
+    STATES,
+    UNSOLVED,
+    follow_revolutions,
+    piece_rows,
+)
 
 if TYPE_CHECKING:
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
@@ -24,79 +38,16 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import State
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Change = Literal["touch", "release", "slip", "stick"]
 
 MOST_EVENTS = 1000  # in a revolution
-NO_PAIR, NO_SPEED, NO_IMPULSE = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((2, 0))
+FEW_PIECES = 32  # that there is room for at first
 STEPS_PER_REVOLUTION = 128  # at least, so that no turn of a gap between two steps is missed
 
 
 class Unfollowed(Exception):  # noqa: N818 - a state of the motion, never seen by users
     """A motion that cannot be followed from event to event: its text says why."""
-
-
-class Piece(NamedTuple):
-    """Motion in one contact mode, n reduced degrees.
-
-    Attributes
-    ----------
-    states : int
-        Set of closed pairs, or of the states of all pairs under set-valued friction.
-    begin, duration : float, s
-        Since the shaft passed its angle 0, and until the event or the end of the revolution.
-    crossing : int
-        Bits of the switch functions that vanish at the end; 0 where the revolution ends.
-    rate_begun, rate_ended : (2 n,)
-        Rate of the motion at the beginning, and at the end before the event.
-    before, after : (2 n,)
-        Reduced displacements and velocities at the end, before and after the event.
-    gradient : (2 n,)
-        Of the first switch function that vanishes, by the motion; of no meaning where none does.
-    switch_rate : float
-        Its rate, its unit per second.
-    touching, approach : (k,)
-        Pairs whose gaps close at the end, and their speeds of approach, m/s.
-    given : (2, q)
-        Normal impulses of the event and tractions, N s.
-    states_after : int
-        What goes on.
-    """
-
-    states: int
-    begin: float
-    duration: float
-    crossing: int
-    rate_begun: Floats
-    rate_ended: Floats
-    before: Floats
-    gradient: Floats
-    switch_rate: float
-    touching: NDArray[np.int64]
-    approach: Floats
-    given: Floats
-    after: Floats
-    states_after: int
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Revolution:
-    """One revolution of the shaft, from angle 0 to angle 0 unless another was asked for.
-
-    Attributes
-    ----------
-    pieces : list of Piece
-        One more than there are events.
-    end, states : (2 n,)
-        Motion at the end, and the states then.
-    least_gap, least_force : (q,), m, N
-        Smallest gap and force of each pair where it turns between events; inf where it never does.
-    """
-
-    pieces: list[Piece]
-    end: Floats
-    states: int
-    least_gap: Floats
-    least_force: Floats
 
 
 class PiecewiseMotion:
@@ -144,6 +95,7 @@ class PiecewiseMotion:
         self.impacts: dict[bytes, tuple[Floats, Floats]] = {}  # those met (`saltation.Impact`)
         self._modes: dict[int, Mode] = {}
         self._take_tables()
+        self._rows = piece_rows(FEW_PIECES, 2 * self.n, self.n_switch, self.q)
         clock = self.march.clock
         self._longest = min(
             self._tables.power_re.shape[1] - 1, int(math.log2(self.turn / STEPS_PER_REVOLUTION / clock.tick))
@@ -174,7 +126,8 @@ class PiecewiseMotion:
                     raise Unfollowed("more sets of closed contacts than can be tabulated") from None
             if self.march.tables is not self._tables:
                 self._take_tables()
-            self._modes[states] = mode_of(self.march, states)
+            self._modes[states] = mode = mode_of(self.march, states)
+            know(self._known, mode, self.march.gaps_watched(states))
         return self._modes[states]
 
     def enter(self, mode: Mode, time: float, motion: Floats) -> Floats:
@@ -208,65 +161,73 @@ class PiecewiseMotion:
         Unfollowed
             A displacement passes its limit, no contact forces obey the laws, or events follow without end.
         """
-        pieces: list[Piece] = []
-        time, clock = phase * self.turn, self.march.clock
-        stop = (phase + share) * self.turn
-        least = np.full((2, self.q), np.inf)
-        while True:
-            mode = self.mode(states)
-            motions, rates = np.empty((4, motion.size)), np.empty(self.n_switch)
-            duration, crossing = follow_piece(
-                mode.tables,
+        return self.follow(motion, states, 1, most_events, phase=phase, share=share)[0]
+
+    def follow(
+        self,
+        motion: Floats,
+        states: int,
+        n_revolution: int,
+        most_events: int = MOST_EVENTS,
+        *,
+        phase: float = 0.0,
+        share: float = 1.0,
+    ) -> list[Revolution]:
+        """Follow a motion through several revolutions, each as `revolve` does."""
+        reached, motion = np.array([0, states, 0, 0]), motion.copy()
+        begin, end, clock = phase * self.turn, (phase + share) * self.turn, self.march.clock
+        passed, least = np.array([begin]), np.full((n_revolution, 2, self.q), np.inf)
+        outcome = MODE_UNKNOWN
+        while outcome != FOLLOWED:
+            if outcome == MODE_UNKNOWN:
+                self.mode(int(reached[STATES]))
+            elif outcome == FULL:
+                self._rows = longer(self._rows)
+            elif outcome == AT_EVENT:
+                self._take_event(reached, passed, motion)
+            elif outcome == BEYOND:
+                raise Unfollowed(f"a displacement passes {self.setup.displacement_limit:.3g} m")
+            elif outcome == UNSOLVED:
+                raise Unfollowed("no contact forces that obey the laws were found")
+            else:
+                raise Unfollowed(f"more than {most_events} events in a revolution")
+            outcome = follow_revolutions(
+                self._known,
+                self.bodies,
                 self._room,
-                motion,
-                time,
+                self._coordinates,
                 self.setup.spin,
                 clock.tick,
                 clock.search_level,
                 self._longest,
-                stop - time,
-                self._coordinates,
-                motions,
-                rates,
+                begin,
+                end,
+                self.march.moment,
+                not self.has_states,
+                most_events,
+                reached,
+                passed,
+                motion,
+                self._rows,
                 least,
+                *self.march.change_work,
             )
-            before = motions[BEFORE]
-            touching, approach, given, after, states_after = NO_PAIR, NO_SPEED, NO_IMPULSE, before, states
-            if crossing < 0:
-                raise Unfollowed(f"a displacement passes {self.setup.displacement_limit:.3g} m")
-            if crossing:
-                touching, approach = self._touch(mode, crossing, rates)
-                after = before.copy()
-                angle = self.setup.spin * (time + duration)
-                states_after = self.march.change(states, crossing, angle, after)
-                given = self.march.given.copy()
-                if states_after < 0:
-                    raise Unfollowed("no contact forces that obey the laws were found")
-            pieces.append(
-                Piece(
-                    states=states,
-                    begin=time,
-                    duration=duration,
-                    crossing=crossing,
-                    rate_begun=motions[RATE_BEGUN],
-                    rate_ended=motions[RATE_ENDED],
-                    before=before,
-                    gradient=motions[GRADIENT],
-                    switch_rate=float(rates[first_of(crossing)]) if crossing else math.nan,
-                    touching=touching,
-                    approach=approach,
-                    given=given,
-                    after=after,
-                    states_after=states_after,
-                )
-            )
-            time, motion, states = time + duration, after, states_after
-            if not crossing:
-                return Revolution(
-                    pieces=pieces, end=motion, states=states, least_gap=least[0], least_force=least[1]
-                )
-            if len(pieces) > most_events:
-                raise Unfollowed(f"more than {most_events} events in a revolution")
+        rows = copied(self._rows, int(reached[PIECE]))
+        ends = (np.flatnonzero(rows.states[:, 1] == 0) + 1).tolist()
+        return [
+            Revolution(rows=cut(rows, first, last), least_gap=least[i, 0], least_force=least[i, 1])
+            for i, (first, last) in enumerate(pairwise([0, *ends]))
+        ]
+
+    def _take_event(self, reached: Ints, passed: Floats, motion: Floats) -> None:
+        """Take the event that ends the last piece."""
+        k, angle = int(reached[PIECE]) - 1, self.setup.spin * passed[0]
+        states, crossing = self._rows.states[k, :2].tolist()
+        after = self.march.change(states, crossing, angle, motion)
+        if after < 0:
+            raise Unfollowed("no contact forces that obey the laws were found")
+        self._rows.motions[k, AFTER], self._rows.given[k] = motion, self.march.given
+        self._rows.states[k, 3] = reached[STATES] = after
 
     def contact_force(self, states: int, motion: Floats) -> Floats:
         """Force of each pair (q,), N, at the angle 0; of a closed one at least the smallest number."""
@@ -301,17 +262,4 @@ class PiecewiseMotion:
         self._tables = self.march.tables
         width = self._tables.switch_re.shape[2]
         self._room, self._coordinates = piece_room(self.n_switch, width), np.empty((2, 2, width))
-
-    def _touch(self, mode: Mode, crossing: int, rates: Floats) -> tuple[NDArray[np.int64], Floats]:
-        """Pairs whose gaps close at an event, and their speeds of approach, m/s."""
-        stride = self.n_switch // self.q
-        found = [i for i in range(self.q) if crossing >> stride * i & 1 and mode.is_open[i]]
-        if not found:
-            return NO_PAIR, NO_SPEED
-        pairs = np.array(found)
-        return pairs, -rates[stride * pairs]
-
-
-def first_of(crossing: int) -> int:
-    """Index of the lowest bit."""
-    return (crossing & -crossing).bit_length() - 1
+        self._known = unknown_modes(self._tables)

@@ -9,17 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.periodic_motions.piecewise_motion import (
-    MOST_EVENTS,
-    PiecewiseMotion,
-    Revolution,
-    Unfollowed,
-)
+from rubhpc.integrate.periodic_motions.piecewise_motion import MOST_EVENTS, PiecewiseMotion, Unfollowed
 from rubhpc.integrate.periodic_motions.powers import Powers
 from rubhpc.integrate.periodic_motions.saltation import tangents
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from rubhpc.integrate.periodic_motions.revolution import Revolution
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -95,12 +92,8 @@ class _Trial:
         self, piecewise: PiecewiseMotion, motion: Floats, states: int, period: int, most_events: int
     ) -> None:
         self.motion, self.states = motion, states
-        self.revolutions: list[Revolution] = []
-        self.end, self.end_states = motion, states
-        for _ in range(period):
-            revolution = piecewise.revolve(self.end, self.end_states, most_events)
-            self.revolutions.append(revolution)
-            self.end, self.end_states = revolution.end, revolution.states
+        self.revolutions = piecewise.follow(motion, states, period, most_events)
+        self.end, self.end_states = self.revolutions[-1].end, self.revolutions[-1].states
         self.defect = self.end - motion
         scale = max(piecewise.size(self.end), np.finfo(float).tiny)
         self.residual = piecewise.size(self.defect) / scale

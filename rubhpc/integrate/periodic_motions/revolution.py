@@ -1,0 +1,161 @@
+"""A revolution of a motion, and its linear pieces: what happened from one event to the next."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels.flow import BEFORE, GRADIENT, RATE_BEGUN, RATE_ENDED
+from rubhpc.kernels.revolutions import AFTER, PieceRows, piece_rows
+
+Floats = NDArray[np.float64]
+
+NO_PAIR, NO_SPEED = np.zeros(0, dtype=np.int64), np.zeros(0)
+
+
+class Piece(NamedTuple):
+    """Motion in one contact mode, n reduced degrees.
+
+    Attributes
+    ----------
+    states : int
+        Set of closed pairs, or of the states of all pairs under set-valued friction.
+    begin, duration : float, s
+        Since the shaft passed its angle 0, and until the event or the end of the revolution.
+    crossing : int
+        Bits of the switch functions that vanish at the end; 0 where the revolution ends.
+    rate_begun, rate_ended : (2 n,)
+        Rate of the motion at the beginning, and at the end before the event.
+    before, after : (2 n,)
+        Reduced displacements and velocities at the end, before and after the event.
+    gradient : (2 n,)
+        Of the first switch function that vanishes, by the motion; of no meaning where none does.
+    switch_rate : float
+        Its rate, its unit per second.
+    touching, approach : (k,)
+        Pairs whose gaps close at the end, and their speeds of approach, m/s.
+    given : (2, q)
+        Normal impulses of the event and tractions, N s.
+    states_after : int
+        What goes on.
+    """
+
+    states: int
+    begin: float
+    duration: float
+    crossing: int
+    rate_begun: Floats
+    rate_ended: Floats
+    before: Floats
+    gradient: Floats
+    switch_rate: float
+    touching: NDArray[np.int64]
+    approach: Floats
+    given: Floats
+    after: Floats
+    states_after: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Revolution:
+    """One revolution of the shaft, from angle 0 to angle 0 unless another was asked for.
+
+    Attributes
+    ----------
+    rows : PieceRows
+        Its pieces, one more than there are events.
+    least_gap, least_force : (q,), m, N
+        Smallest gap and force of each pair where it turns between events; inf where it never does.
+    """
+
+    rows: PieceRows
+    least_gap: Floats
+    least_force: Floats
+
+    @property
+    def end(self) -> Floats:
+        """Motion at the end, (2 n,)."""
+        return np.asarray(self.rows.motions[-1, AFTER])
+
+    @property
+    def states(self) -> int:
+        """States of the pairs at the end."""
+        return int(self.rows.states[-1, 3])
+
+    @cached_property
+    def pieces(self) -> list[Piece]:
+        """Its pieces."""
+        stride = self.rows.rates.shape[1] // self.least_gap.size
+        rows = self.rows
+        return [
+            _piece(stride, *row)
+            for row in zip(rows.states.tolist(), rows.times.tolist(), *rows[2:], strict=True)
+        ]
+
+
+def _piece(
+    stride: int, states: list[int], times: list[float], motions: Floats, rates: Floats, given: Floats
+) -> Piece:
+    """Return the piece of a row; a pair has its switch functions `stride` apart."""
+    before, crossing, gaps, after = states
+    touching, approach = NO_PAIR, NO_SPEED
+    if gaps:
+        touching = np.array([i for i in range(rates.size // stride) if gaps >> stride * i & 1])
+        approach = -rates[stride * touching]
+    return Piece(
+        states=before,
+        begin=times[0],
+        duration=times[1],
+        crossing=crossing,
+        rate_begun=motions[RATE_BEGUN],
+        rate_ended=motions[RATE_ENDED],
+        before=motions[BEFORE],
+        gradient=motions[GRADIENT],
+        switch_rate=float(rates[first_of(crossing)]) if crossing else math.nan,
+        touching=touching,
+        approach=approach,
+        given=given,
+        after=motions[AFTER],
+        states_after=after,
+    )
+
+
+def first_of(crossing: int) -> int:
+    """Index of the lowest bit."""
+    return (crossing & -crossing).bit_length() - 1
+
+
+def cut(rows: PieceRows, first: int, last: int) -> PieceRows:
+    """Rows from the first up to the last, which is not among them."""
+    return PieceRows(
+        states=rows.states[first:last],
+        times=rows.times[first:last],
+        motions=rows.motions[first:last],
+        rates=rows.rates[first:last],
+        given=rows.given[first:last],
+    )
+
+
+def copied(rows: PieceRows, k: int) -> PieceRows:
+    """Copy the first k rows."""
+    return PieceRows(
+        states=rows.states[:k].copy(),
+        times=rows.times[:k].copy(),
+        motions=rows.motions[:k].copy(),
+        rates=rows.rates[:k].copy(),
+        given=rows.given[:k].copy(),
+    )
+
+
+def longer(rows: PieceRows) -> PieceRows:
+    """Return these rows, and room for as many again."""
+    k, _, q = rows.given.shape
+    found = piece_rows(2 * k, rows.motions.shape[2], rows.rates.shape[1], q)
+    for part, old in zip(found, rows, strict=True):
+        part[:k] = old
+    return found

@@ -1,0 +1,212 @@
+"""Whole revolutions of a motion, piece by piece, and the events between the pieces."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels.accumulators import Accumulator  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.contact_modes import Reduced, find_mode
+from rubhpc.kernels.flow import BEFORE, PieceRoom, PieceTables, follow_piece
+from rubhpc.kernels.mode_change import change_contacts
+from rubhpc.kernels.penalty_events import change_pressed
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+# Outcomes: all are followed, a contact mode is not known, the rows are full, an event is left to the caller,
+# a displacement passes its limit, no contact forces obey the laws, and too many events in a revolution.
+FOLLOWED, MODE_UNKNOWN, FULL, AT_EVENT, BEYOND, UNSOLVED, TOO_MANY = range(7)
+PIECE, STATES, REVOLUTION, BEGUN = range(4)  # items of `reached`
+AFTER = 4  # row of the motions of a piece, after those of `flow.follow_piece`
+
+
+class PieceModes(NamedTuple):
+    """The contact modes of a case as `flow.PieceTables` has each of them, p of them."""
+
+    mask: Ints  # (p,)
+    is_known: Flags  # (p,), whether its row is filled in
+    gaps: Ints  # (p,), bits of the switch functions that are gaps
+    switch_re: Floats  # (p, s, m)
+    switch_im: Floats
+    rate_re: Floats  # (p, s, m)
+    rate_im: Floats
+    bound: Floats  # (p, s, m)
+    power_re: Floats  # (p, levels, m)
+    power_im: Floats
+    exponent: Floats  # (p, 2, m)
+    drift: Floats  # (p, m)
+    floor: Floats  # (p, s)
+    kind: Ints  # (p, s)
+    enter_re: Floats  # (p, 2 n, m)
+    enter_im: Floats
+    offset: Floats  # (p, 2, 3, m)
+    shape_re: Floats  # (p, 2 n, m)
+    shape_im: Floats
+
+
+class PieceRows(NamedTuple):
+    """Pieces of a motion, one a row."""
+
+    states: Ints  # (k, 4), those of the piece, `crossing`, the gaps among it, and the states after it
+    times: Floats  # (k, 2), s, when it begins after the shaft's angle 0, and for how long
+    motions: Floats  # (k, 5, 2 n), as `flow.follow_piece` has them, and the motion after the event
+    rates: Floats  # (k, s), of the switch functions at the end
+    given: Floats  # (k, 2, q), normal impulses of the event and tractions, N s
+
+
+def piece_rows(k: int, width: int, n_switch: int, q: int) -> PieceRows:
+    """Room for k pieces of motions of this width (2 n) with q pairs."""
+    return PieceRows(
+        states=np.empty((k, 4), dtype=np.int64),
+        times=np.empty((k, 2)),
+        motions=np.empty((k, 5, width)),
+        rates=np.empty((k, n_switch)),
+        given=np.empty((k, 2, q)),
+    )
+
+
+@jit_lean_sum
+def follow_revolutions(
+    modes: PieceModes,
+    reduced: Reduced,
+    room: PieceRoom,
+    coordinates: Floats,
+    spin: float,
+    tick: float,
+    search_level: int,
+    longest_level: int,
+    begin: float,
+    end: float,
+    moment: float,
+    takes_events: bool,
+    most_events: int,
+    reached: Ints,
+    passed: Floats,
+    motion: Floats,
+    rows: PieceRows,
+    least: Floats,
+    force: Floats,
+    speed: Floats,
+    active: Flags,
+    elimination: Floats,
+    accumulator: Accumulator,
+) -> int:
+    """Follow a motion from one event to the next through several revolutions.
+
+    Parameters
+    ----------
+    coordinates : (2, 2, m)
+        Work space, as are `room`, `force`, `speed`, `active` and `elimination`; `accumulator` stays as it is.
+    begin, end : float, s
+        Times after the shaft's angle 0 at which each revolution begins and ends.
+    moment : float, s
+        As `mode_change.change_contacts` has it.
+    takes_events : bool
+        Whether events are taken here; else each is left to the caller, who changes motion and states.
+    most_events : int
+        In a revolution.
+    reached : (4,)
+        Pieces filled in, states of the pairs, revolution, and pieces before it began; in place.
+    passed : (1,), s
+        Time reached in the revolution; in place.
+    motion : (2 n,)
+        In place.
+    least : (r, 2, q)
+        As `flow.follow_piece` lowers it, in each of the r revolutions.
+    """
+    while reached[REVOLUTION] < least.shape[0]:
+        k, states = reached[PIECE], reached[STATES]
+        if k - reached[BEGUN] > most_events:
+            return TOO_MANY
+        if k == rows.times.shape[0]:
+            return FULL
+        place = find_mode(modes.mask, states)
+        if place < 0 or not modes.is_known[place]:
+            return MODE_UNKNOWN
+        tables = PieceTables(
+            modes.switch_re[place],
+            modes.switch_im[place],
+            modes.rate_re[place],
+            modes.rate_im[place],
+            modes.bound[place],
+            modes.power_re[place],
+            modes.power_im[place],
+            modes.exponent[place],
+            modes.drift[place],
+            modes.floor[place],
+            modes.kind[place],
+            modes.enter_re[place],
+            modes.enter_im[place],
+            modes.offset[place],
+            modes.shape_re[place],
+            modes.shape_im[place],
+            reduced.translations,
+            reduced.displacement_limit,
+        )
+        begun = passed[0]
+        duration, crossing = follow_piece(
+            tables,
+            room,
+            motion,
+            begun,
+            spin,
+            tick,
+            search_level,
+            longest_level,
+            end - begun,
+            coordinates,
+            rows.motions[k],
+            rows.rates[k],
+            least[reached[REVOLUTION]],
+        )
+        if crossing < 0:
+            return BEYOND
+        after, given = rows.motions[k, AFTER], rows.given[k]
+        for i in range(given.shape[1]):
+            given[0, i], given[1, i] = 0.0, 0.0
+        for i in range(motion.size):
+            after[i] = rows.motions[k, BEFORE, i]
+        passed[0] = begun + duration
+        states_after = states
+        if crossing != 0 and takes_events:
+            if reduced.spring > 0.0:
+                states_after = change_pressed(reduced, states, crossing, after)
+            else:
+                angle = spin * passed[0]
+                states_after = change_contacts(
+                    reduced,
+                    states,
+                    crossing,
+                    spin,
+                    moment,
+                    np.cos(angle),
+                    np.sin(angle),
+                    after,
+                    False,
+                    force,
+                    given[0],
+                    speed,
+                    active,
+                    elimination,
+                    accumulator,
+                )
+            if states_after < 0:
+                return UNSOLVED
+        rows.states[k, 0], rows.states[k, 1] = states, crossing
+        rows.states[k, 2], rows.states[k, 3] = crossing & modes.gaps[place], states_after
+        rows.times[k, 0], rows.times[k, 1] = begun, duration
+        for i in range(motion.size):
+            motion[i] = after[i]
+        reached[PIECE], reached[STATES] = k + 1, states_after
+        if crossing == 0:
+            reached[REVOLUTION] += 1
+            reached[BEGUN] = k + 1
+            passed[0] = begin
+        elif not takes_events:
+            return AT_EVENT
+    return FOLLOWED
