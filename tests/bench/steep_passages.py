@@ -30,6 +30,7 @@ from rubhpc.study.study import Contact, Integrator, Recording  # noqa: E402
 from rubhpc.threads import on_one_thread  # noqa: E402
 
 STEADY = 5  # constant speeds
+ROUNDS = 3  # of which the least counts
 LAWS = {
     "five bends, up to 450 rad/s2": SpeedLaw(
         time=(0.0, 0.1, 0.14, 0.24, 0.3, 0.46, 0.54), speed=(300.0, 302.0, 320.0, 323.0, 332.0, 334.0, 352.0)
@@ -74,10 +75,14 @@ def main() -> None:
             transient=0, revolutions=law.n_revolution, samples_per_revolution=PER_REVOLUTION
         )
         speeds = np.linspace(law.speed[0], law.speed[-1], STEADY)
-        steady = np.mean([seconds_of(run_case, speed, recording) for speed in speeds])
-        passage = seconds_of(record_run_up, max(law.speed), recording, law)
-        if i:  # the first one compiles
-            print(f"{name}: {law.n_revolution} revolutions {passage:.2f} s, {passage / steady:.1f} times")
+        steady, passage = [], []
+        for _ in range(ROUNDS if i else 1):  # the first law compiles
+            steady.append([seconds_of(run_case, speed, recording) for speed in speeds])
+            passage.append(seconds_of(record_run_up, max(law.speed), recording, law))
+        if i:
+            least = min(passage)
+            ratio = least / np.min(steady, axis=0).mean()
+            print(f"{name}: {law.n_revolution} revolutions {least:.2f} s, {ratio:.1f} times")
             print_errors(law)
 
 

@@ -3,14 +3,15 @@
 Eigenvectors of the speeds at either side are brought to the length and phase that those in the middle see as
 theirs (`near_modes`), so that exponents, shapes, their inverse and what is made of them go smoothly:
 parabolas follow them, with errors of the third order in the range. The inverse has to be their inverse, or
-each event would lose or gain motion: it is exact at five places, and goes through these by polynomials of the
-fourth order. With the
+each event would lose or gain motion: it is exact at seven places, and goes through these by polynomials of
+the sixth order. With the
 acceleration, which changes the matrices little, all of it goes evenly: from that in the middle to that of
 another acceleration there.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -32,11 +33,13 @@ Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 A = TypeVar("A", Floats, Complexes)
 
-# Places of the three speeds in the range, and of those where the inverse is exact, the middle first.
-NODES, EXACT = (0.0, -0.8, 0.8), (0.0, -0.5, 0.5, -1.0, 1.0)
+# Places of the three speeds in the range, and of those where the inverse is exact, the middle first: these
+# are zeros of Chebyshev's polynomial.
+NODES = 0.0, -0.8, 0.8
+EXACT = 0.0, *(sign * math.cos(k * math.pi / 14.0) for k in (5, 3, 1) for sign in (-1.0, 1.0))
 POWERS = {len(places): np.linalg.inv(np.vander(places, increasing=True)) for places in (NODES, EXACT)}
-JUDGED = -0.8, -0.3, 0.3, 0.8  # places at which modes are judged
-MOST_LOST = 1e-4  # share of a mode in another; sets that are followed well have a tenth of it
+JUDGED = -1.0, -0.62, 0.62, 1.0  # places between those, at which the inverse is judged
+MOST_LOST = 1e-4  # share of a mode in another, beyond which modes go with the speed too fast
 FAR = 0.5  # share of a mode in another of a speed beside it, over its own, from which it is not the same
 EQUAL = 1e-9  # relative difference of two exponents that repeat
 STILL, LEAST = 1e-13, 1e-16  # change of an entry over it, and over the greatest, below which it stays
@@ -59,8 +62,8 @@ class Tabulated(NamedTuple):
 def between(values: Sequence[A], place: float) -> A:
     """What goes through values at `NODES` or `EXACT`, the middle first, at a place in the range."""
     middle, *others = values
-    weight = place ** np.arange(len(values)) @ POWERS[len(values)]
-    found: A = middle + sum(share * (other - middle) for share, other in zip(weight[1:], others, strict=True))
+    shares = _shares(place, len(values))
+    found: A = middle + sum(share * (other - middle) for share, other in zip(shares, others, strict=True))
     return found
 
 
@@ -123,23 +126,8 @@ def aligned(seen: Complexes, exponent: Complexes) -> tuple[NDArray[np.int64], Co
     return place, turn
 
 
-def lost(nodes: Sequence[Tabulated], enters: Complexes) -> float:
-    """Share of a mode in another, at most, by which what enters modes that follow the speed is no inverse.
-
-    `enters` (5, m, 2 n) is that at `EXACT`. Beyond `MOST_LOST` the modes of these contacts go with the speed
-    too fast, as where two of them meet.
-    """
-    modes = [node.mode for node in nodes]
-    m, worst = modes[0].n_eigenmode, 0.0
-    for place in JUDGED:
-        shape = between([mode.motion[:, :m] for mode in modes], place) / weights(modes[0])
-        off = between(list(enters), place) @ shape - np.eye(m)
-        worst = max(worst, most_of(off))
-    return worst
-
-
 def followed(
-    nodes: Sequence[Tabulated], risen: Tabulated | None, entered: tuple[Complexes, Complexes], seen: Complexes
+    nodes: Sequence[Tabulated], risen: Tabulated | None, entered: Entries, seen: Complexes
 ) -> HeldMode:
     """What is held of the mode in the middle, with what of it goes with the speed and its acceleration.
 
@@ -151,7 +139,7 @@ def followed(
     held, m, n = middle.held, mode.n_eigenmode, seen.size
     of_all, n_node = [*nodes, *([risen] if risen else [])], len(nodes)
     courses = {name: _through([getattr(node.row, name)[0] for node in of_all], m, n_node) for name in _TABLES}
-    enter, take_off = entered
+    enter, take_off = entered.enter, entered.take_off
     padded = np.zeros((len(enter), *middle.row.enter_re.shape[1:]), dtype=np.complex128)
     padded[:, :, :m] = enter.transpose(0, 2, 1)
     constant = np.zeros((len(enter), *middle.row.enter_constant.shape[1:]))
@@ -197,36 +185,35 @@ def _groups(exponent: Complexes) -> list[NDArray[np.int64]]:
     return [np.array(group) for group in sorted({tuple(np.flatnonzero(row)) for row in near})]
 
 
-def entries(nodes: Sequence[Tabulated], risen: Tabulated | None) -> tuple[Complexes, Complexes]:
-    """What enters a mode (5, m, 2 n), and what constants take off it (5, c, m), at `EXACT`.
+class Entries(NamedTuple):
+    """What enters a mode of m eigenmodes that follows the speed, at `EXACT`, and at another acceleration."""
 
-    With that at another acceleration as a sixth.
-    """
-    modes = [node.mode for node in nodes]
-    mode, m = modes[0], modes[0].n_eigenmode
-    constants = slice(m + 1, m + 1 + len(mode.take_off) - 2)
-    motions = [between([other.motion for other in modes], place) for place in EXACT]
-    if risen:
-        motions.append(risen.mode.motion)
-    enters = _inverses(mode, np.array(motions))
-    return enters, np.array(
-        [(enter @ motion[:, constants]).T for enter, motion in zip(enters, motions, strict=True)]
-    )
+    enter: Complexes  # (7, m, 2 n), or (8, m, 2 n) with that at another acceleration
+    take_off: Complexes  # (7, c, m), of constants
+    lost: float  # share of a mode in another, at most, by which it is no inverse between these places
 
 
-def _inverses(mode: ContactMode, motions: Complexes) -> Complexes:
-    """What enters each of some motions (k, 2 n, coordinates), of which the first is that of a mode.
+def entries(nodes: Sequence[Tabulated], risen: Tabulated | None) -> Entries:
+    """What enters a mode between `NODES`: inverses of its shapes, in the coordinates of those in the middle.
 
     Modes that stand for a pair have their conjugates behind them; others are complex too where two real
     exponents come as a pair.
     """
+    mode, n_node = nodes[0].mode, len(nodes)
     m, weight = mode.n_eigenmode, weights(mode)
-    change = motions[1:, :, :m] - motions[0, :, :m]
-    columns = np.flatnonzero(change.any(axis=(0, 1)))
-    change = change[..., columns] / weight[columns]
+    of_all = [*nodes[1:], *([risen] if risen else [])]
+    change = np.array([node.mode.motion for node in of_all]) - mode.motion
+    places = [_shares(place, n_node) for place in EXACT]
+    shares = np.zeros((len(places) + bool(risen), len(change)))
+    shares[: len(places), : n_node - 1] = places
+    if risen:
+        shares[-1, -1] = 1.0
+    is_moved = (change[..., :m] != 0.0).any(axis=(0, 1))
+    columns = np.flatnonzero(is_moved)
+    moved = change[..., columns] / weight[columns]
     is_paired, paired = weight[columns] > 1.5, np.flatnonzero(weight > 1.5)
     every = np.vstack([mode.enter[:m], mode.enter[paired].conj()])
-    seen = every @ np.concatenate([change, change[..., is_paired].conj()], axis=2)
+    seen = every @ np.concatenate([moved, moved[..., is_paired].conj()], axis=2)
     # Modes that change, or that others change into, and behind them the conjugates of those that are pairs.
     pushed = np.abs(seen.view(np.float64)).max(axis=(0, 2), initial=0.0) > LEAST
     pushed[columns] = True
@@ -235,16 +222,37 @@ def _inverses(mode: ContactMode, motions: Complexes) -> Complexes:
     pushed[m:] = pushed[paired]
     both = np.flatnonzero(pushed)
     behind = m + np.searchsorted(paired, columns[is_paired])
-    turned = np.tile(np.eye(both.size, dtype=np.complex128), (len(change), 1, 1))
-    turned[..., np.searchsorted(both, np.concatenate([columns, behind]))] += seen[:, both]
+    mixed = np.zeros((len(change), both.size, both.size), dtype=np.complex128)
+    mixed[..., np.searchsorted(both, np.concatenate([columns, behind]))] = seen[:, both]
+
+    def turned(shares: Floats) -> Complexes:
+        flat = shares @ mixed.view(np.float64).reshape(len(mixed), -1)
+        return flat.view(np.complex128).reshape(-1, both.size, both.size) + np.eye(both.size)
+
     unit = np.eye(both.size, rows.size)
-    back = np.linalg.solve(turned.transpose(0, 2, 1), unit).transpose(0, 2, 1)
-    found = np.tile(mode.enter[:m], (len(motions), 1, 1))
+    back = np.linalg.solve(turned(shares[1:]).transpose(0, 2, 1), unit).transpose(0, 2, 1)
+    through = [unit.T, *back[: len(EXACT) - 1]]
+    judged = np.zeros((len(JUDGED), len(change)))
+    judged[:, : n_node - 1] = [_shares(place, n_node) for place in JUDGED]
+    kept = turned(judged)[..., : rows.size]
+    lost = max(
+        most_of(between(through, place) @ kept[i] - np.eye(rows.size)) for i, place in enumerate(JUDGED)
+    )
+    found = np.tile(mode.enter[:m], (len(shares), 1, 1))
     found[1:, rows] = back @ every[both]
+    beyond = mode.motion[:, m:] + np.tensordot(shares, change[..., m:], axes=1)
     for k in range(m, len(mode.enter)):  # coordinates beside the eigenmodes that motion enters
         if mode.enter[k].any():
-            found[1:] -= (found[1:] @ motions[1:, :, k, np.newaxis]) * mode.enter[k]
-    return found
+            found[1:] -= (found[1:] @ beyond[1:, :, k - m, np.newaxis]) * mode.enter[k]
+    constants = beyond[..., 1 : 1 + len(mode.take_off) - 2]
+    return Entries(found, (found @ constants).transpose(0, 2, 1), lost)
+
+
+def _shares(place: float, count: int) -> Floats:
+    """What goes through values at `count` places has of each but the first, less that, at a place."""
+    powers: Floats = place ** np.arange(count, dtype=np.float64)
+    shares: Floats = (powers @ POWERS[count])[1:]
+    return shares
 
 
 def _through(values: Any, m: int, n_node: int, *, skips_response: bool = True) -> Course:

@@ -7,11 +7,13 @@ matrices err by the first order of a range, the modes followed by the third.
 
 from __future__ import annotations
 
+import math
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.followed_modes import EQUAL, EXACT, NODES, aligned, between
+from rubhpc.integrate.changing_speed.followed_modes import EQUAL, EXACT, JUDGED, NODES, aligned, between
 from rubhpc.integrate.changing_speed.held_matrices import NARROWEST
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.integrate.reduced_model.standstill import cutoff_frequency
@@ -37,7 +39,9 @@ BY_ACCELERATION = 1.0  # the same by the acceleration, at the ends of its range
 PLACES = -1.0, -0.8, -0.4, 0.4, 0.8, 1.0  # between those of the modes, where a range is judged
 LEAK = 1.0  # of it by which an event may change a motion, over the accuracy
 SAFE = 0.9  # share of the range that would just do
-LEAST, MOST = 0.2, 0.85  # factors by which a range shrinks
+LEAST, MOST = 0.5, 0.85  # factors by which a range shrinks
+STEEPEST = 5.0  # power of the range with which its error is taken to grow
+CLOSE = 1.2  # ratio of a range that will not do and one that does, to be left at that
 
 
 class Rotor(NamedTuple):
@@ -56,6 +60,15 @@ class Reach(NamedTuple):
     half: float  # rad/s
     swing: float  # rad/s^2, by which the acceleration may change where nothing goes with it
     judge: Judge | None = None  # where modes go with the acceleration too
+
+
+class AtPlace(NamedTuple):
+    """What a range has at one of its speeds."""
+
+    speed: float  # rad/s
+    matrices: tuple[Floats, Floats]  # stiffness and damping
+    modes: tuple[Complexes, Complexes]  # exponents and shapes that follow the speed
+    inverse: Complexes  # of the shapes, as it follows
 
 
 class Judge:
@@ -99,24 +112,35 @@ class Judge:
 
     def error(self, acceleration: float) -> float:
         """Relative error of the worst signal in the range."""
-        middle, half, nodes, risen = self._middle, self._half, self._nodes[:-1], self._nodes[-1]
         change = acceleration - self._acceleration
         share = change / self.rise
-        exponents, shapes = [node[0] for node in nodes], [node[1] for node in nodes]
-        inverses = _inverses(shapes)
-        risen_by = [share * (other - own) for other, own in zip(risen, nodes[0], strict=True)]
-        inverse_by = share * (_inverse(risen[1]) - inverses[0])
+        (exponent_by, shape_by), inverse_by = self._risen_by
         worst = 0.0
+        for speed, (stiffness, damping), (exponent, shape), inverse in self._at_places:
+            matrices = stiffness + change * self._momentum, damping
+            modes = exponent + share * exponent_by, shape + share * shape_by
+            worst = max(worst, _lost(modes[1], inverse + share * inverse_by, self._middle) / LEAK)
+            growth = min(PASSING * speed, abs(acceleration) / self._half)
+            worst = max(worst, _off(self._rotor, matrices, modes, speed, growth))
+        return worst
+
+    @cached_property
+    def _risen_by(self) -> tuple[tuple[Complexes, Complexes], Complexes]:
+        """Change of exponents, shapes and their inverse to the other acceleration."""
+        (exponent, shape), risen = self._nodes[0], self._nodes[-1]
+        return (risen[0] - exponent, risen[1] - shape), _inverse(risen[1]) - _inverse(shape)
+
+    @cached_property
+    def _at_places(self) -> list[AtPlace]:
+        """What the range has where it is judged, at the acceleration in its middle."""
+        nodes, middle, half = self._nodes[:-1], self._middle, self._half
+        exponents, shapes = [node[0] for node in nodes], [node[1] for node in nodes]
+        inverses, found = _inverses(shapes), []
         for place in (*PLACES, 0.0, *_resonances(nodes, middle, half)):
             speed = middle + place * half
-            stiffness, damping = self._rotor.matrices(speed)
-            matrices = stiffness + change * self._momentum, damping
-            exponent = between(exponents, place) + risen_by[0]
-            shape = between(shapes, place) + risen_by[1]
-            worst = max(worst, _lost(shape, between(inverses, place) + inverse_by, middle) / LEAK)
-            growth = min(PASSING * speed, abs(acceleration) / half)
-            worst = max(worst, _off(self._rotor, matrices, (exponent, shape), speed, growth))
-        return worst
+            modes = between(exponents, place), between(shapes, place)
+            found.append(AtPlace(speed, self._rotor.matrices(speed), modes, between(inverses, place)))
+        return found
 
 
 def rotor_of(setup: ModalSetup, matrices: Matrices, phasor: Complexes, seen: Floats) -> Rotor:
@@ -157,14 +181,8 @@ def followed_reach(
     if not part.size:
         return Reach(widest, _swing(rotor, speed, momentum, accuracy))
     of_part = _of_part(rotor, part)
-    half, allowed = widest, AT_ENDS * accuracy
-    while True:
-        middle = speed + sense * half
-        nodes = _nodes(of_part, middle, half)
-        error = _error(of_part, nodes, middle, half, abs(acceleration), allowed) if nodes else np.inf
-        if error <= allowed or half <= NARROWEST * speed:
-            break
-        half *= float(np.clip(SAFE * (allowed / error) ** (1.0 / 3.0), LEAST, MOST))
+    half, nodes = _widest_within(of_part, speed, sense, widest, abs(acceleration), AT_ENDS * accuracy)
+    middle = speed + sense * half
     turning = momentum[np.ix_(part, part)]
     swing = _swing(of_part, middle, turning, accuracy)
     rise = max((other - acceleration for other in others), key=abs)
@@ -177,6 +195,33 @@ def followed_reach(
     at = middle, half, acceleration
     judge = Judge(of_part, [*nodes, risen], turning, at, rise=rise, accuracy=accuracy)
     return Reach(half, swing, judge)
+
+
+def _widest_within(
+    rotor: Rotor, speed: float, sense: float, widest: float, acceleration: float, allowed: float
+) -> tuple[float, list[tuple[Complexes, Complexes]] | None]:
+    """Half of the widest range whose error is allowed, at most `widest` (rad/s), and its modes.
+
+    Narrower ranges are asked until one will do, and then those between it and the last that will not.
+    """
+    half, too_wide, least = widest, math.inf, NARROWEST * speed
+    best: tuple[float, list[tuple[Complexes, Complexes]]] | None = None
+    while True:
+        middle = speed + sense * half
+        nodes = _nodes(rotor, middle, half)
+        error = _error(rotor, nodes, middle, half, acceleration) if nodes else np.inf
+        if nodes and error <= allowed:
+            best = half, nodes
+        elif half <= least:
+            return half, nodes
+        else:
+            too_wide = half
+        if best is None:
+            half *= float(np.clip(SAFE * (allowed / error) ** (1.0 / STEEPEST), LEAST, MOST))
+        elif CLOSE * best[0] < too_wide < np.inf:
+            half = math.sqrt(best[0] * too_wide)
+        else:
+            return best
 
 
 def _part(rotor: Rotor, speed: float, other: float) -> Ints:
@@ -221,7 +266,6 @@ def _error(
     middle: float,
     half: float,
     acceleration: float,
-    allowed: float,
 ) -> float:
     """Relative error of the worst signal in a range."""
     exponents, shapes = [node[0] for node in nodes], [node[1] for node in nodes]
@@ -255,7 +299,7 @@ def _off(
 def _leak(shapes: list[Complexes], speed: float) -> float:
     """What a motion gains or loses, over it, as it enters shapes by what stands for their inverse."""
     inverses = _inverses(shapes)
-    return max(_lost(between(shapes, place), between(inverses, place), speed) for place in PLACES)
+    return max(_lost(between(shapes, place), between(inverses, place), speed) for place in JUDGED)
 
 
 def _inverses(shapes: list[Complexes]) -> list[Complexes]:

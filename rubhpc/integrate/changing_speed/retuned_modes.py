@@ -13,12 +13,10 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
 from rubhpc.integrate.changing_speed.followed_modes import (
-    EXACT,
     MOST_LOST,
     Tabulated,
     entries,
     followed,
-    lost,
     matched,
     taken,
 )
@@ -117,7 +115,7 @@ class RetunedLibrary(ModeLibrary):
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self._phasor, self._output = phasor, np.hstack(output_operators(reduced))
         self._among: OpenBodies | None = None
-        self._opened = self._solve(0)
+        self._opened, self._is_open = self._solve(0), True
         self._among = open_bodies(reduced, model, self._opened)
         self.first_masks = [0]
         self.width = self._width_of(model, friction)
@@ -282,7 +280,7 @@ class RetunedLibrary(ModeLibrary):
             if len(nodes) > len(found):
                 risen = nodes[n] if self._risen else None
                 entered = entries(nodes[:n], risen)
-                if lost(nodes[:n], entered[0][: len(EXACT)]) <= MOST_LOST:
+                if entered.lost <= MOST_LOST:
                     held = followed(nodes[:n], risen, entered, own.seen)
             if held is middle.held:
                 self._strange.add(mode.mask)
@@ -320,8 +318,7 @@ class RetunedLibrary(ModeLibrary):
         """A library with other matrices that solves and tabulates as this one does, and holds nothing."""
         other = copy(self)
         other.reduced, other._output = reduced, np.hstack(output_operators(reduced))
-        other._beside, other._opened = [], other._solve(0)
-        other._among = self._among.at(reduced, other._opened) if self._among else None
+        other._beside, other._is_open = [], False
         return other
 
     def _solve_at(self, mask: int, place: int, within: float, rise: float) -> None:
@@ -359,6 +356,9 @@ class RetunedLibrary(ModeLibrary):
         return contact_mode_among(self._among, self.reduced, directions, mask, self._known)
 
     def _solved(self, mask: int) -> ContactMode:
+        if not self._is_open:  # one beside another, most of whose modes follow from those of that
+            self._is_open, self._opened = True, self._solve(0)
+            self._among = self._among.at(self.reduced, self._opened) if self._among else None
         return self._opened if mask == 0 else self._solve(mask)
 
     def _width_of(self, model: Model, friction: float) -> int:
