@@ -163,3 +163,11 @@ class PartCompiler(LinkedCompiler):
     """Compile a function that is optimised with its callers alone."""
 
     _code = _PartCode
+
+
+class ApartCompiler(PartCompiler):
+    """Compile such a function for arrays that do not overlap, which are then not compared at each loop."""
+
+    def compile_extra(self, func: Any) -> Any:
+        self.state.flags.noalias = True
+        return super().compile_extra(func)

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numba
 from numba.core.compiler_lock import global_compiler_lock
 
-from rubhpc.kernels._compiler import Flags, KernelCompiler, LinkedCompiler, PartCompiler
+from rubhpc.kernels._compiler import ApartCompiler, Flags, KernelCompiler, LinkedCompiler, PartCompiler
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -255,3 +255,8 @@ def jit_lean_sum(function: F) -> F:
 def jit_part_sum(function: F) -> F:
     """Compile such a kernel that only kernels call: LLVM optimises it with its callers, not before them."""
     return _compiled(function, _LEAN_SUM_FLAGS, PartCompiler)
+
+
+def jit_apart_sum(function: F) -> F:
+    """Compile such a kernel whose arrays never overlap."""
+    return _compiled(function, _LEAN_SUM_FLAGS, ApartCompiler)

@@ -42,7 +42,7 @@ class ModeTables(NamedTuple):
     bound: Floats  # (p, q, m), bound on its second time derivative for a unit coordinate (`BOUND_LEVEL`)
     bend_re: Floats  # (p, q, m), its second time derivative; under set-valued friction alone, as the next
     bend_im: Floats
-    turn: Floats  # (p, q, m), bound on its third time derivative for a unit coordinate
+    turn: Floats  # (p, q, m), bound on its third time derivative; negative: decays within a sample
     pace: Floats  # (p, m), size of the exponent, 1/s, or DYING
     power_re: Floats  # (p, n_level, m), exponential of each mode over 2^level ticks
     power_im: Floats

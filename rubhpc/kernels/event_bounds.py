@@ -41,6 +41,9 @@ def free_until(
     ----------
     now : int
         Tick at which the coordinates stand; each lasts `tick` (s).
+    turn : (p, 2 q, m)
+        As in `ModeTables`: negative for coordinates that decay fast without vibration. They are bounded by
+        what they are now, not by a series.
     longest : int
         Ticks beyond which none is asked for.
     known : (2, 2 q)
@@ -78,19 +81,35 @@ def free_until(
                 turn[mode, j],
             )
             value, rate, bend, most_bend, most_turn = 0.0, 0.0, 0.0, 0.0, 0.0
-            for k in range(z_re.size):  # in one loop: five would wait for their sums five times
+            fast_size, fast_rate, gain, rise = 0.0, 0.0, 0.0, 0.0
+            for k in range(z_re.size):  # in one loop: several would wait for their sums as often
                 a, b = z_re[k], z_im[k]
-                size = abs(a) + abs(b)
-                value += re[k] * a - im[k] * b
-                rate += turning_re[k] * a - turning_im[k] * b
-                bend += bending_re[k] * a - bending_im[k] * b
+                size, cubed = abs(a) + abs(b), next_weight[k]
+                part, turned = re[k] * a - im[k] * b, turning_re[k] * a - turning_im[k] * b
+                bent = bending_re[k] * a - bending_im[k] * b
+                value += part
+                rate += turned
                 most_bend += weight[k] * size
-                most_turn += next_weight[k] * size
+                fast = 1.0 if cubed < 0.0 else 0.0
+                fast_rate += fast * turned
+                fast_size += fast * part
+                gain += fast * abs(part)
+                rise += fast * abs(turned)
+                bend += bent - fast * bent
+                most_turn += max(cubed, 0.0) * size
+            gain, rise = 0.5 * (gain + fast_size), 0.5 * (rise + fast_rate)
+            slow_rate = rate - fast_rate
             free = min(positive_interval(value, rate, most_bend), most)
-            if value > 0.0:
-                while free < most and is_positive(value, rate, bend, most_turn, 2.0 * free):
+            # What decays adds no less than nothing where it is positive, and no less than now elsewhere.
+            least = value - gain
+            if least > 0.0:
+                while free < most and is_positive(least, slow_rate, bend, most_turn, 2.0 * free):
                     free *= 2.0
-            sure = max(free, falling_until(rate, bend, most_turn, free)) if value > 0.0 else free
+                if free < most and is_positive(least, slow_rate, bend, most_turn, 1.5 * free):
+                    free *= 1.5
+            sure = free
+            if value > 0.0:
+                sure = max(free, falling_until(slow_rate + rise, bend, most_turn, free))
             known[FREE, j] = now + int(free / tick)
             known[SURE, j] = now + int(min(sure, most) / tick)
             reached = min(reached, known[SURE, j])

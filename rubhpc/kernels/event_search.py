@@ -1,8 +1,8 @@
 """Where an event falls within a step at whose end a switch function is found negative.
 
 A bracket of whole ticks is narrowed by Newton's method on the closed-form switch functions, from a parabola
-through what is known at both ends, and by bisection where that fails. Coordinates at a tick are reached by
-powers of two of ticks, the shortest first, so that they are the same whatever was tried before.
+through what is known at both ends, and by bisection where that fails. Each place is reached from the last
+one that is known to lie before the event, in few powers of two of ticks where it is near.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum
-from rubhpc.kernels.contact_modes import ModeTables, dot, floor_log2, propagate
+from rubhpc.kernels.contact_modes import ModeTables, dot, floor_log2
+from rubhpc.kernels.coordinate_steps import go_on
 from rubhpc.kernels.event_bounds import FREE
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.friction_coordinates import used_width
@@ -26,6 +27,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 NEWTON_TRIES = 6  # places tried before the bracket is halved instead
+KNOWN_BITS = 4  # of the first of them, behind the first bit
 
 
 @jit_inline_sum
@@ -84,92 +86,73 @@ def changes_at(tables: ModeTables, mode: int, z: Floats, overlap: float, tick: i
 
 
 @jit_inline_sum
-def turn_by(re: Floats, im: Floats, z_re: Floats, z_im: Floats) -> None:
-    """Take modal coordinates on by a tabulated step, in place."""
-    for k in range(z_re.size):
-        a, b = z_re[k], z_im[k]
-        z_re[k] = re[k] * a - im[k] * b
-        z_im[k] = re[k] * b + im[k] * a
-
-
-@jit_inline_sum
-def take_step(
-    count: int,
-    mode: int,
-    power_re: Floats,
-    power_im: Floats,
-    z_re: Floats,
-    z_im: Floats,
-    re: Floats,
-    im: Floats,
-) -> None:
-    """Fill `re` and `im` with modal coordinates `count` ticks later, at least one, as `move_ticks` does."""
-    level = lowest_level(count)
-    propagate(power_re[mode, level], power_im[mode, level], z_re, z_im, re, im)
-    rest = count >> (level + 1)
-    while rest > 0:
-        level += 1
-        if rest & 1 == 1:
-            turn_by(power_re[mode, level], power_im[mode, level], re, im)
-        rest >>= 1
-
-
-@jit_inline_sum
-def lowest_level(count: int) -> int:
-    """Level of the shortest of the powers of two that make up a count of at least one."""
-    level = 0
-    while (count >> level) & 1 == 0:
-        level += 1
-    return level
-
-
-@jit_inline_sum
 def move_ticks(
     tables: ModeTables, bodies: FrictionBodies, mode: int, count: int, tick: float, z: Floats, target: Floats
 ) -> None:
     """Fill `target` (2, m) with the coordinates `count` ticks (s) after `z`, as many as are used."""
     used = used_width(tables, mode)
     z_re, z_im = target[0, :used], target[1, :used]
-    for k in range(used):
-        z_re[k], z_im[k] = z[0, k], z[1, k]
-    q = bodies.rim_speed.size
-    states, first = tables.mask[mode], tables.n_eigenmode[mode] + 2 + q
-    for level in range(floor_log2(max(1, count)) + 1):  # downwards no compiler would prove them apart
-        if (count >> level) & 1 == 1:
-            turn_by(tables.power_re[mode, level], tables.power_im[mode, level], z_re, z_im)
-            if stuck_pairs(states) != 0:
-                for i in range(q):
-                    if state_of(states, i) == STUCK:
-                        z_re[first + i] += bodies.rim_speed[i] * ((1 << level) * tick)
+    go_on(count, tables.power_re[mode], tables.power_im[mode], z[0, :used], z[1, :used], z_re, z_im)
+    states = tables.mask[mode]
+    if stuck_pairs(states) != 0:
+        move_stuck(states, tables.n_eigenmode[mode], bodies.rim_speed, count * tick, z_re)
 
 
 @jit_inline_sum
-def root_ahead(tables: ModeTables, mode: int, crossing: int, tick: float, z: Floats) -> float:
-    """Ticks (s) to the first root of the switch functions `crossing`, by Newton's method from `z` (2, m).
+def move_stuck(states: int, n_eigenmode: int, rim_speed: Floats, time: float, z_re: Floats) -> None:
+    """Add to the displacements along the rims of pairs that stick what the rims move in a time (s)."""
+    q = rim_speed.size
+    for i in range(q):
+        if state_of(states, i) == STUCK:
+            z_re[n_eigenmode + 2 + q + i] += rim_speed[i] * time
 
-    -inf where one is not falling.
+
+@jit_inline_sum
+def root_ahead(
+    tables: ModeTables, mode: int, crossing: int, tick: float, z_re: Floats, z_im: Floats
+) -> float:
+    """Ticks (s) to the first root of the switch functions `crossing`, by parabolas at coordinates (m,).
+
+    Negative where it lies behind, -inf where none is found.
     """
-    states, used = tables.mask[mode], used_width(tables, mode)
-    z_re, z_im = z[0, :used], z[1, :used]
-    found = np.inf
+    states, found = tables.mask[mode], np.inf
     for j in range(tables.switch_re.shape[1]):
         if (crossing >> j) & 1 == 0:
             continue
-        value = dot(tables.switch_re[mode, j], tables.switch_im[mode, j], z_re, z_im)
+        re, im, turning_re, turning_im, bending_re, bending_im = (
+            tables.switch_re[mode, j],
+            tables.switch_im[mode, j],
+            tables.rate_re[mode, j],
+            tables.rate_im[mode, j],
+            tables.bend_re[mode, j],
+            tables.bend_im[mode, j],
+        )
+        value, rate, bend = 0.0, 0.0, 0.0
+        for k in range(z_re.size):
+            a, b = z_re[k], z_im[k]
+            value += re[k] * a - im[k] * b
+            rate += turning_re[k] * a - turning_im[k] * b
+            bend += bending_re[k] * a - bending_im[k] * b
         value += GAP_TOLERANCE if state_of(states, j // 2) == OPEN else 0.0
-        rate = dot(tables.rate_re[mode, j], tables.rate_im[mode, j], z_re, z_im) * tick
-        found = min(found, -value / rate if rate < 0.0 else -np.inf)
-    return found
+        root = np.sqrt(max(rate * rate - 2.0 * bend * value, 0.0))
+        found = min(found, 2.0 * value / (root - rate) if rate < 0.0 else -np.inf)
+    return found / tick
 
 
 @jit_inline_sum
 def root_between(
-    tables: ModeTables, mode: int, crossing: int, count: int, tick: float, z: Floats, end: Floats
+    tables: ModeTables,
+    mode: int,
+    crossing: int,
+    count: int,
+    tick: float,
+    z_re: Floats,
+    z_im: Floats,
+    end_re: Floats,
+    end_im: Floats,
 ) -> float:
-    """Ticks (s) after `z` (2, m) of the first root, by parabolas through both ends of `count` ticks."""
-    states, used = tables.mask[mode], used_width(tables, mode)
-    z_re, z_im, end_re, end_im = z[0, :used], z[1, :used], end[0, :used], end[1, :used]
-    found = 1.0 * count
+    """Ticks (s) after coordinates (m,) of the first root, by parabolas through both ends of `count` ticks."""
+    states, found = tables.mask[mode], 1.0 * count
     for j in range(tables.switch_re.shape[1]):
         if (crossing >> j) & 1 == 0:
             continue
@@ -197,7 +180,6 @@ def approach_change(
     count: int,
     z: Floats,
     work: Floats,
-    kept: Floats,
     now: int,
     known: Ints,
 ) -> tuple[int, int]:
@@ -208,13 +190,11 @@ def approach_change(
     crossing : int
         Bits of the switch functions that are negative at its end.
     overlap : float, m
-        As in `find_change`.
+        As of `find_change`.
     z : (2, m)
         Coordinates at its beginning; in place, those at that tick.
     work : (2, m)
         Those at its end; overwritten.
-    kept : (2, m)
-        Work space: those at the last tick that is known to lie before.
     now : int
         Tick at the beginning.
     known : (2, 2 q)
@@ -229,26 +209,27 @@ def approach_change(
     """
     before, after = 0, count
     used = used_width(tables, mode)
-    root = root_between(tables, mode, crossing, after, clock.tick, z, work)
+    z_re, z_im, work_re, work_im = z[0, :used], z[1, :used], work[0, :used], work[1, :used]
+    root = root_between(tables, mode, crossing, count, clock.tick, z_re, z_im, work_re, work_im)
     tried = 0
     while after - before > 1:
         tried += 1
         place = (before + after) // 2
-        if tried <= NEWTON_TRIES and 0.0 <= root < 1.0 * after:
+        if tried <= NEWTON_TRIES and 1.0 * before <= root < 1.0 * after:
             place = min(max(int(root), before + 1), after - 1)
-        move_ticks(tables, bodies, mode, place, clock.tick, z, work)
+            if tried == 1:  # no more digits than are known
+                place = max(place - place % (1 << floor_log2(max(1, place >> KNOWN_BITS))), 1)
+        move_ticks(tables, bodies, mode, place - before, clock.tick, z, work)
         found = changes_at(tables, mode, work, overlap, now + place, known)
-        if found != 0:
-            after, crossing = place, found
-        else:
-            before = place
-            for k in range(used):
-                kept[0, k], kept[1, k] = work[0, k], work[1, k]
+        crossing = found if found != 0 else crossing
         # Where the root is between this tick and the next one, that is looked at; then this.
-        root = place + root_ahead(tables, mode, crossing, clock.tick, work)
-        if found == 0 and place <= root < place + 1.0:
-            root = place + 1.0
-    if before > 0:
+        root = place + root_ahead(tables, mode, crossing, clock.tick, work_re, work_im)
+        if found != 0:
+            after = place
+            continue
+        before = place
         for k in range(used):
-            z[0, k], z[1, k] = kept[0, k], kept[1, k]
+            z_re[k], z_im[k] = work_re[k], work_im[k]
+        if place <= root < place + 1.0:
+            root = place + 1.0
     return before, crossing

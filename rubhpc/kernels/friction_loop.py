@@ -35,8 +35,9 @@ from rubhpc.kernels.contact_modes import (
     floor_log2,
     is_beyond,
 )
+from rubhpc.kernels.coordinate_steps import go_on, turn_on
 from rubhpc.kernels.event_bounds import free_until
-from rubhpc.kernels.event_search import approach_change, find_change, take_step
+from rubhpc.kernels.event_search import approach_change, find_change, move_stuck
 from rubhpc.kernels.event_steps import (
     choose_step,
     contact_age,
@@ -65,7 +66,7 @@ from rubhpc.kernels.friction_events import (
     touches,
 )
 from rubhpc.kernels.friction_measuring import begin_friction, observe_friction, resolved_friction
-from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
+from rubhpc.kernels.friction_states import OPEN, FrictionBodies, state_of, stuck_pairs
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import note_after, note_event, note_piece
 from rubhpc.kernels.transitions import (
@@ -99,7 +100,6 @@ def advance_with_friction(
     progress: Progress,
     z: Floats,
     z_next: Floats,
-    z_kept: Floats,
     motion: Floats,
     work: FrictionWork,
     recorder: Recorder,
@@ -124,7 +124,6 @@ def advance_with_friction(
     bend_re, bend_im, turn = tables.bend_re, tables.bend_im, tables.turn
     power_re, power_im, n_eigenmode = tables.power_re, tables.power_im, tables.n_eigenmode
     rim_speed = bodies.rim_speed
-    q = rim_speed.size
     interval, overlap = clock.tick * (1 << clock.sample_level), reduced.overlap
     highest_level = power_re.shape[1] - 1
     last_step = progress.n_step + MOST_STEPS
@@ -196,19 +195,20 @@ def advance_with_friction(
         is_forced = progress.is_after_event == 1
         level, _ = choose_step(clock, progress, longest, (sure_to - progress.tick) * clock.tick)
         count = 1 << level
-        if is_measured and not is_forced and not is_at_event:
-            count = measured_step(clock, last_tick, finest, sure_to, progress)
-        step = count * clock.tick
-        take_step(count, mode, power_re, power_im, z_re, z_im, next_re, next_im)
-        if stuck_pairs(states) != 0:
-            first = n_eigenmode[mode] + 2 + q
-            for i in range(q):
-                if state_of(states, i) == STUCK:
-                    next_re[first + i] += rim_speed[i] * step
+        if not is_forced and not is_at_event:
+            if is_measured:
+                count = measured_step(clock, last_tick, finest, sure_to, progress)
+            elif not is_recorded:
+                reach = min(sure_to, last_tick) - progress.tick
+                count = max(count, leading(min(reach, 1 << highest_level)))
+                level = floor_log2(count)
+        step, ends = count * clock.tick, progress.tick + count
         progress.n_step += 1
-        crossing = int(np.int64(0))
-        ends = progress.tick + count
-        if not is_forced and ends > free_to:
+        is_checked, crossing = not is_forced and ends > free_to, int(np.int64(0))
+        if is_checked:
+            go_on(count, power_re[mode], power_im[mode], z_re, z_im, next_re, next_im)
+            if stuck_pairs(states) != 0:
+                move_stuck(states, n_eigenmode[mode], rim_speed, step, next_re)
             crossing = find_change(
                 states,
                 mode,
@@ -222,9 +222,9 @@ def advance_with_friction(
                 ends,
                 work.free_until,
             )
-        if crossing != 0 and level > clock.sample_level:
-            progress.halving_level = level - 1
-            continue
+            if crossing != 0 and level > clock.sample_level:
+                progress.halving_level = level - 1
+                continue
         if is_sample:
             sample_step(tables, clock, level, z[0], z[1], progress, recorder, samples, accumulator)
         passed = count
@@ -239,13 +239,16 @@ def advance_with_friction(
                 count,
                 z,
                 z_next,
-                z_kept,
                 progress.tick,
                 work.free_until,
             )
-        else:
+        elif is_checked:
             for k in range(z_re.size):
                 z_re[k], z_im[k] = next_re[k], next_im[k]
+        else:
+            turn_on(count, power_re[mode], power_im[mode], z_re, z_im)
+            if stuck_pairs(states) != 0:
+                move_stuck(states, n_eigenmode[mode], rim_speed, step, z_re)
         if is_recorded and states != 0 and passed > 0:
             observe_friction(
                 tables,
@@ -286,6 +289,13 @@ def advance_with_friction(
             if progress.wanted < 0:
                 note_piece(work.trail, mask[progress.mode], z)
                 is_new = True
+
+
+@jit_inline_sum
+def leading(count: int) -> int:
+    """The count of ticks less all but its first bits; 0 of none."""
+    unit = 1 << max(floor_log2(max(count, 1)) - FEW_BITS, 0)
+    return int(max(count, 0) // unit * unit)
 
 
 @jit_inline_sum

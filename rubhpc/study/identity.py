@@ -26,7 +26,7 @@ PHYSICS = 22  # version of the physics: raised whenever a study gives other resu
 MODAL = 4  # method = "modal": modes kept, and `modal_error`
 DIRECT = 5  # transient = "direct"
 CHANGING_SPEED = 26  # run-ups and drives
-COULOMB = 14  # set-valued friction
+COULOMB = 15  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 10  # method = "modal" with gaps that are curved

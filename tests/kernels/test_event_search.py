@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rubhpc.kernels import event_loop, event_search
+from rubhpc.kernels import coordinate_steps, event_loop, event_search
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.friction_states import FORWARD, OPEN, FrictionBodies
@@ -19,17 +19,20 @@ NAMES = (
     "move_ticks",
     "changes_at",
     "find_change",
-    "turn_by",
+    "go_on",
     "dot",
     "state_of",
 )
 NAMES += ("stuck_pairs", "used_width", "floor_log2")
+STEPS = ("turn_on", "lowest_level")
 
 
 @pytest.fixture(autouse=True)
 def in_python(monkeypatch):
     for name in NAMES:
         monkeypatch.setattr(event_search, name, plain(getattr(event_search, name)))
+    for name in STEPS:
+        monkeypatch.setattr(coordinate_steps, name, plain(getattr(coordinate_steps, name)))
 
 
 def tables_of(exponents, rows, state):
@@ -61,14 +64,14 @@ def search(exponents, rows, state=FORWARD):
     """Ticks passed, and what is negative a tick later; coordinates stand at that tick."""
     tables = tables_of(exponents, rows, state)
     z = np.array([np.ones(exponents.size), np.zeros(exponents.size)])
-    end, kept = np.empty((2, 2, exponents.size))
+    end = np.empty((2, exponents.size))
     plain(event_search.move_ticks)(tables, BODIES, 0, N_TICK, TICK, z, end)
     known = np.zeros((2, 2), dtype=np.int64)
     crossing = plain(event_search.changes_at)(tables, 0, end, GAP_TOLERANCE, N_TICK, known)
     assert crossing != 0
     clock = SimpleNamespace(tick=TICK)
     passed, crossing = plain(event_search.approach_change)(
-        tables, BODIES, clock, 0, crossing, GAP_TOLERANCE, N_TICK, z, end, kept, 0, known
+        tables, BODIES, clock, 0, crossing, GAP_TOLERANCE, N_TICK, z, end, 0, known
     )
     assert z[0] + 1j * z[1] == pytest.approx(np.exp(exponents * TICK * passed), rel=1e-12)
     return passed, crossing
@@ -139,17 +142,16 @@ def test_an_open_pair_is_looked_at_for_its_gap_alone():
     assert search(exponents, np.stack([row, -row]), state=OPEN) == (400, 1)
 
 
-def test_a_step_of_any_ticks_is_made_up_of_powers_of_two(monkeypatch):
-    for name in ("propagate", "lowest_level", "turn_by"):
-        monkeypatch.setattr(event_search, name, plain(getattr(event_search, name)))
+def test_a_step_of_any_ticks_is_made_up_of_powers_of_two():
     exponents = np.array([-300.0 + 4000.0j, -5.0 + 90.0j])
     tables = tables_of(exponents, np.ones((2, 2), dtype=complex), FORWARD)
     for count in (1, 2, 3, 12, 37, 640, 1023, N_TICK):
-        re, im = np.empty((2, 2))
-        plain(event_search.take_step)(
-            count, 0, tables.power_re, tables.power_im, np.ones(2), np.zeros(2), re, im
-        )
-        assert re + 1j * im == pytest.approx(np.exp(exponents * TICK * count), rel=1e-12)
+        after, z = np.exp(exponents * TICK * count), np.array([np.ones(2), np.zeros(2)])
+        end = np.empty((2, 2))
+        plain(coordinate_steps.go_on)(count, tables.power_re[0], tables.power_im[0], *z, *end)
+        assert end[0] + 1j * end[1] == pytest.approx(after, rel=1e-12)
+        plain(coordinate_steps.turn_on)(count, tables.power_re[0], tables.power_im[0], *z)
+        assert np.array_equal(z, end)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.marches.workspace import empty_workspace
 from rubhpc.integrate.record import State
+from rubhpc.integrate.reduced_model.array_room import aligned
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, states_of
 from rubhpc.integrate.reduced_model.transitions import MetTransitions
 from rubhpc.kernels.case_progress import (
@@ -177,9 +178,8 @@ class FrictionMarch(EventDrivenMarch):
     def _use(self, tables: ModeTables) -> None:
         super()._use(tables)
         self._transitions = None
-        self._z_kept = np.zeros_like(self._z)
         if self._recorder.begun.shape != self._z.shape:
-            self._recorder = self._recorder._replace(begun=np.zeros_like(self._z))
+            self._recorder = self._recorder._replace(begun=aligned(self._z.shape))
 
     def _soften(self, solver: Workspace) -> None:
         """Change how normal forces follow from gaps: here they hold them, and nothing changes."""
@@ -251,7 +251,6 @@ class FrictionMarch(EventDrivenMarch):
             self._bare_progress,
             self._z,
             self._z_next,
-            self._z_kept,
             self._motion,
             self._work,
             self._recorder,
@@ -283,7 +282,6 @@ class FrictionMarch(EventDrivenMarch):
             self._bare_progress,
             self._z,
             self._z_next,
-            self._z_kept,
             self._motion,
             self._work,
             self._recorder,
@@ -302,7 +300,6 @@ class FrictionMarch(EventDrivenMarch):
             self._bare_progress,
             self._z,
             self._z_next,
-            self._z_kept,
             self._motion,
             self._work,
             self._recorder,

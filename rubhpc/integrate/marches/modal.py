@@ -12,6 +12,7 @@ from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.marches.march import ALL_SAMPLES, March
 from rubhpc.integrate.measuring.divergence import displacement_reason, energy_reason
 from rubhpc.integrate.record import State
+from rubhpc.integrate.reduced_model.array_room import aligned
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -153,7 +154,9 @@ class ModalMarch(March):
     def _use(self, tables: ModeTables) -> None:
         """Take tables, and coordinates of their width."""
         self.tables = tables
-        self._z, self._z_next = np.zeros((2, 2, tables.switch_re.shape[2]))
+        m = tables.switch_re.shape[2]
+        self._z: Floats = aligned((2, m))
+        self._z_next: Floats = aligned((2, m))
 
     def _start(self, mode: int) -> None:
         """Begin in a contact mode of the tables, at the shaft's angle 0."""

@@ -78,6 +78,7 @@ def tabulate(
     bounded_over = max(steps[-1], tick * 2.0 ** (sample_level + kernel.BOUND_LEVEL))
     growth = np.exp(np.maximum(exponent.real, 0.0) * bounded_over)
     power = np.exp(exponent * steps[:, None]) * used
+    is_fast = (exponent.imag == 0.0) & (exponent.real * tick * 2.0**sample_level < -1.0)
     rate = switch * exponent
     sliding = (slip if is_measured else slip[:0]) @ motion[n:]
     bend = np.zeros((0, m), dtype=complex)
@@ -100,7 +101,7 @@ def tabulate(
         bound=np.abs(switch) * np.abs(exponent) ** 2 * growth,
         bend_re=bend.real,
         bend_im=bend.imag,
-        turn=np.abs(bend) * np.abs(exponent) * growth,
+        turn=np.abs(bend) * np.abs(exponent) * np.where(is_fast, -1.0, growth),
         pace=np.where(exponent.real * tick * 2**kernel.FORCED_LEVEL < GONE, kernel.DYING, np.abs(exponent)),
         power_re=power.real,
         power_im=power.imag,

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import math
-import mmap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from rubhpc.integrate.reduced_model.array_room import room_for
 
 MOST_MODES = 1024  # sets of closed contacts of one speed and friction
 FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
 NEXT_ROOM = 16  # for a case that goes on rubbing; then for all, since what is there has to be copied
 MOST_BYTES = 2**30  # of their tables
-_PAGES = 2**16  # bytes from which an array has pages of its own
 _KEPT = 2**24  # bytes of an array up to which the C library keeps what is freed
 
 # It takes arrays smaller than the largest that was ever freed from its heap, which keeps twice as much
@@ -54,12 +50,12 @@ class TableStack:
             n_bytes = sum(field.nbytes for field in rows)
             self.n_most = max(self._n_least, min(self.n_most, self._most_bytes // n_bytes))
             n_room = max(count, min(self._n_least, FIRST_ROOM))
-            self._room = [_room_for((n_room, *field.shape[1:]), field.dtype) for field in rows]
+            self._room = [room_for((n_room, *field.shape[1:]), field.dtype) for field in rows]
             self._kind = type(row)
         elif end > len(self._room[0]):  # memory that is not written yet is not taken
             n_room = max(end, min(NEXT_ROOM, self.n_most) if end <= NEXT_ROOM else self.n_most)
             for i, field in enumerate(self._room):  # one after the other: all at once would take it twice
-                self._room[i] = _room_for((n_room, *field.shape[1:]), field.dtype)
+                self._room[i] = room_for((n_room, *field.shape[1:]), field.dtype)
                 self._room[i][:first] = field[:first]
         for field, new in zip(self._room, rows, strict=True):
             field[first:end] = new
@@ -93,17 +89,3 @@ class TableStack:
         if self._view is None:
             self._view = self._kind(*(field[: self._n_filled] for field in self._room))
         return self._view
-
-
-def _room_for(shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """An array with pages of its own, which go back to the system with it.
-
-    Those of the C library would not: once a few megabytes have been given back it takes arrays up to 32 MB
-    from its heap, which smaller ones behind them keep from shrinking (M_MMAP_THRESHOLD in mallopt(3)): 24
-    set-ups of a ring of eight, of which four are held at a time, took 840 MB so, and take 430.
-    """
-    n_byte = math.prod(shape) * dtype.itemsize
-    if n_byte < _PAGES:
-        return np.empty(shape, dtype)
-    pages = mmap.mmap(-1, n_byte, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-    return np.ndarray(shape, dtype, buffer=pages)

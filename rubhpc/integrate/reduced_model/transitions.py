@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rubhpc.integrate.reduced_model.array_room import aligned, room_for
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.kernels.transitions import LANES, UNKNOWN, WORTH_A_TABLE, Transitions
 
@@ -66,7 +67,7 @@ class MetTransitions:
             for mask in known.keys() & place.keys():
                 at[place[mask]] = known[mask]
         self._placed = Transitions(
-            entry, mode, energy, self._number, self._value, np.zeros(4 * m), np.zeros(4 * m)
+            entry, mode, energy, self._number, self._value, aligned((4 * m,)), aligned((4 * m,))
         )
         return self._placed
 
@@ -124,7 +125,7 @@ def _with_room(array: NDArray[Any], n_filled: int, n_more: int) -> NDArray[Any]:
     """The array, or a longer one that begins with what it is filled with."""
     if n_filled + n_more <= array.size:
         return array
-    longer = np.empty(2 * (n_filled + n_more), array.dtype)
+    longer = room_for((2 * (n_filled + n_more),), array.dtype)
     longer[:n_filled] = array[:n_filled]
     return longer
 

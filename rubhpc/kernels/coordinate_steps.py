@@ -1,0 +1,74 @@
+"""Modal coordinates some ticks later: their exponentials over powers of two of ticks, multiplied."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum
+
+Floats = NDArray[np.float64]
+
+
+@jit_inline_sum
+def lowest_level(count: int) -> int:
+    """Level of the shortest of the powers of two that make up a count of at least one."""
+    level = 0
+    while (count >> level) & 1 == 0:
+        level += 1
+    return level
+
+
+@jit_apart_sum
+def go_on(
+    count: int, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats, re: Floats, im: Floats
+) -> None:
+    """Fill `re` and `im` (m,) with modal coordinates `count` ticks later, at least one.
+
+    `power` (n_level, m) are those of a contact mode. The shortest steps are taken first, two at once.
+    """
+    level = lowest_level(count)
+    rest = count >> (level + 1)
+    a_re, a_im = power_re[level], power_im[level]
+    if rest == 0:
+        for k in range(z_re.size):
+            x, y = z_re[k], z_im[k]
+            re[k] = a_re[k] * x - a_im[k] * y
+            im[k] = a_re[k] * y + a_im[k] * x
+        return
+    level += 1 + lowest_level(rest)
+    b_re, b_im = power_re[level], power_im[level]
+    for k in range(z_re.size):
+        x, y = z_re[k], z_im[k]
+        u, v = a_re[k] * x - a_im[k] * y, a_re[k] * y + a_im[k] * x
+        re[k] = b_re[k] * u - b_im[k] * v
+        im[k] = b_re[k] * v + b_im[k] * u
+    rest = count >> (level + 1)
+    if rest != 0:
+        turn_on(rest << (level + 1), power_re, power_im, re, im)
+
+
+@jit_apart_sum
+def turn_on(count: int, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats) -> None:
+    """Take modal coordinates (m,) on by `count` ticks, in place, as `go_on` does."""
+    level, rest = 0, count
+    while rest != 0:
+        shift = lowest_level(rest)
+        level, rest = level + shift, rest >> (shift + 1)
+        a_re, a_im = power_re[level], power_im[level]
+        level += 1
+        if rest == 0:
+            for k in range(z_re.size):
+                x, y = z_re[k], z_im[k]
+                z_re[k] = a_re[k] * x - a_im[k] * y
+                z_im[k] = a_re[k] * y + a_im[k] * x
+            return
+        shift = lowest_level(rest)
+        level, rest = level + shift, rest >> (shift + 1)
+        b_re, b_im = power_re[level], power_im[level]
+        level += 1
+        for k in range(z_re.size):
+            x, y = z_re[k], z_im[k]
+            u, v = a_re[k] * x - a_im[k] * y, a_re[k] * y + a_im[k] * x
+            z_re[k] = b_re[k] * u - b_im[k] * v
+            z_im[k] = b_re[k] * v + b_im[k] * u
