@@ -107,7 +107,7 @@ def check_branch(
 ) -> None:
     """Refuse what cannot be followed; `is_bent` where a stator is of the second order."""
     if is_of_table(keys.along):
-        problem = f"{keys.along} cannot be followed; take a speed, a clearance, friction or a key of the rig"
+        problem = f"{keys.along} cannot be followed; use a speed, a clearance, friction or a key of the rig"
         raise InputError(f"[branch] along: {problem}")
     if all(axis.name != keys.along for axis in axes):
         raise InputError(
