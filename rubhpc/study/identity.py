@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PHYSICS = 22  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
 MODAL = 4  # method = "modal": modes kept, and `modal_error`
-DIRECT = 5  # transient = "direct"
+DIRECT = 6  # transient = "direct"
 CHANGING_SPEED = 26  # run-ups and drives
 COULOMB = 15  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept

@@ -122,6 +122,21 @@ def test_direct_way_leads_where_a_long_simulation_does(speed_ratio, clearance_ra
     assert min(away) < 2e-7 * np.abs(expected).max()
 
 
+def test_direct_way_takes_up_a_motion_that_it_found_too_early(monkeypatch):
+    """Found after 64 revolutions, at 0.7 of its size away; followed after 128, and not solved for again."""
+    solved = []
+    shoot = direct.shoot
+    monkeypatch.setattr(direct, "shoot", lambda *a, **k: (solved.append(a[3]), shoot(*a, **k))[1])
+    case = {"speed_ratio": 3.0, "clearance_ratio": 0.5, "friction": 0.2} | LIGHT
+    case["overrides"] = {"rotor.damping.alpha": 0.8}
+    found = simulate("mokhtar2017", transient="direct", transient_limit=1000, **case)
+    assert 2 * direct.FIRST <= found.transient_revolutions < 4 * direct.FIRST
+    assert solved == [1, 2]  # of one revolution nothing is near
+    settled = simulate("mokhtar2017", transient=5000, **case)
+    away = [np.abs(np.roll(found.section_vertical, k) - settled.section_vertical).max() for k in range(2)]
+    assert min(away) < 2e-7 * np.abs(settled.section_vertical).max()
+
+
 def test_direct_way_meets_a_motion_that_is_reached_exactly():
     """Without contact; the linear theory leaves a distance of 0 to the last bit."""
     case = {"speed": 70.5, "clearance": "100 um", "samples_per_revolution": 1024, "revolutions": 1}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING
 
@@ -41,6 +42,9 @@ MOST_ITERATIONS, LEAST_STEP = 10, 1 / 4  # of Newton's method
 LOST = 3 / 4  # of what the linear theory takes from its distance, that it loses at least
 FAR = 1e-2  # of the square of its distance, until which the linear theory must keep its contacts
 AGAIN = 0.7  # of that square, at which they are looked at once more
+STRAYS = (
+    0.3  # of its distance a period before: a case that strays less from the linear theory may be led by it
+)
 MOST_EVENTS = 24, 8  # in a revolution: of one pair, and more for each further one
 
 
@@ -68,7 +72,7 @@ def pass_directly(
     """
     walk, wanted = Walk(march, recording), FIRST
     piecewise: PiecewiseMotion | None = None
-    vain: set[int] = set()  # periods of motions that were found, and that the case did not draw near to
+    vain: list[Candidate] = []  # motions that were found, and that the case did not draw near to
     while True:
         if known is not None:
             reached, reason = walk.arrive(known, wanted)
@@ -83,11 +87,14 @@ def pass_directly(
         piecewise = piecewise or _piecewise(walk, solve_from)
         if piecewise is None:
             continue
-        orbit = _search(piecewise, states, walk.passed, walk.n_revolution, vain)
-        if orbit is None:
-            continue
-        until = int(FURTHER * walk.n_revolution)
-        is_near, reason = draws_near(walk, piecewise, orbit, until)
+        candidate = _again(vain, walk.passed)
+        if candidate is None:
+            orbit = _search(piecewise, states, walk.passed, walk.n_revolution, {one.period for one in vain})
+            if orbit is None:
+                continue
+            candidate = Candidate(piecewise, orbit)
+        until, orbit = int(FURTHER * walk.n_revolution), candidate.orbit
+        is_near, reason = draws_near(walk, candidate, until)
         if is_near and known is not None and (same := known.nearest(orbit.motion, SAME)) is not None:
             return walk.ended(reason, same)
         if is_near:
@@ -95,7 +102,48 @@ def pass_directly(
             walk.begin_at(piecewise.setup, Place(orbit.motion, piecewise.setup.model.sag, force))
         if is_near or reason is not None:
             return walk.ended(reason, found=(piecewise, orbit) if is_near else None)
-        vain.add(orbit.period)
+        candidate.n_vain += 1
+        if candidate not in vain:
+            vain.append(candidate)
+
+
+class Candidate:
+    """A stable periodic motion that a case may draw near to, and the linear theory about it.
+
+    Attributes
+    ----------
+    n_vain : int
+        How often the case was seen not to draw near.
+    """
+
+    def __init__(self, piecewise: PiecewiseMotion, orbit: Orbit) -> None:
+        """Take a motion that was found."""
+        self.piecewise, self.orbit, self.period = piecewise, orbit, orbit.period
+        self.n_vain = 0
+
+    def strays(self, passed: Floats) -> float:
+        """Distance of the last motion from where the theory takes that a period before, over its distance."""
+        if len(passed) <= self.period:
+            return math.inf
+        before, apart = passed[-1 - self.period] - self.orbit.motion, passed[-1] - self.orbit.motion
+        left = self.piecewise.size(apart - self.orbit.monodromy @ before)
+        return left / max(self.piecewise.size(before), np.finfo(float).tiny)
+
+    @cached_property
+    def approach(self) -> Approach:
+        """Distances from it."""
+        return Approach(self.orbit.powers, np.repeat([self.piecewise.setup.spin**2, 1.0], self.piecewise.n))
+
+    @cached_property
+    def onward(self) -> Onward:
+        """Contacts of cases near it."""
+        return Onward(self.piecewise, self.orbit)
+
+
+def _again(vain: list[Candidate], passed: Floats) -> Candidate | None:
+    """Return a motion that was found too early, and that the case may follow now; each is tried once more."""
+    near = (one for one in vain if one.n_vain == 1 and one.strays(passed) <= STRAYS)
+    return next(near, None)
 
 
 def _piecewise(
@@ -108,7 +156,7 @@ def _piecewise(
         return None
 
 
-def draws_near(walk: Walk, piecewise: PiecewiseMotion, orbit: Orbit, until: int) -> tuple[bool, str | None]:
+def draws_near(walk: Walk, candidate: Candidate, until: int) -> tuple[bool, str | None]:
     """Whether a case draws near to a stable motion, in its last revolutions or further ones.
 
     Returned with why it cannot go on. Its distance (`Approach`) is to fall from one look to the next, four
@@ -120,12 +168,11 @@ def draws_near(walk: Walk, piecewise: PiecewiseMotion, orbit: Orbit, until: int)
     only passes by, does not draw near so. It is watched until so many revolutions have passed, or
     it disobeys the theory in further ones.
     """
-    approach = Approach(orbit.powers, np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n))
+    piecewise, orbit, approach = candidate.piecewise, candidate.orbit, candidate.approach
     doubled = max(1, LOOK // orbit.period).bit_length() - 1
     span, onward = (1 << doubled) * orbit.period, orbit.powers.of(doubled)  # from one look to the next
     least = -(-WATCHED // span)
     there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
-    theory: Onward | None = None
     looks: list[tuple[float, float, float]] = []  # what it strays, is to lose and loses, as shares
     is_further = False
     untried = math.inf  # square of the distance at which contacts are looked at next
@@ -144,8 +191,7 @@ def draws_near(walk: Walk, piecewise: PiecewiseMotion, orbit: Orbit, until: int)
             return True, None
         if last <= untried and _agree(looks, least):
             walk.stand()
-            theory = theory or Onward(piecewise, orbit)
-            if theory.keeps_contacts(apart, approach.periods_to(FAR, apart)):
+            if candidate.onward.keeps_contacts(apart, approach.periods_to(FAR, apart)):
                 return True, None
             untried = AGAIN * last
         if is_further and not looks:
@@ -187,7 +233,7 @@ def _search(
         while orbit and orbit.multipliers[0].real < -1.0 and (asked := 2 * asked) <= LONGEST_PERIOD:
             orbit = _solved(piecewise, states, passed, asked)
         if orbit and abs(orbit.multipliers[0]) < 1.0:
-            if _follows(piecewise, orbit, passed):
+            if Candidate(piecewise, orbit).strays(passed) <= LINEAR:
                 return orbit
             found.append((piecewise.size(orbit.motion - passed[-1]), orbit))
     return min(found, key=lambda one: one[0])[1] if found else None
@@ -199,14 +245,6 @@ def _periods(piecewise: PiecewiseMotion, passed: Floats, n_revolution: int) -> l
     back = [piecewise.size(passed[-1] - passed[-1 - n]) for n in range(1, longest + 1)]
     nearer = (n for n in range(2, longest + 1) if back[n - 1] <= NEARER * back[0])
     return [1, *islice(nearer, 1)]
-
-
-def _follows(piecewise: PiecewiseMotion, orbit: Orbit, passed: Floats) -> bool:
-    """Whether the last period is what the linear theory about a periodic motion makes of the one before."""
-    if len(passed) <= orbit.period:
-        return False
-    before, apart = passed[-1 - orbit.period] - orbit.motion, passed[-1] - orbit.motion
-    return piecewise.size(apart - orbit.monodromy @ before) <= LINEAR * piecewise.size(before)
 
 
 def _solved(piecewise: PiecewiseMotion, states: int, passed: Floats, period: int) -> Orbit | None:

@@ -16,9 +16,9 @@ def settled():
     found = []
     draws_near = direct.draws_near
 
-    def note(walk, piecewise, orbit, until):
-        found.append((piecewise, orbit))
-        return draws_near(walk, piecewise, orbit, until)
+    def note(walk, candidate, until):
+        found.append((candidate.piecewise, candidate.orbit))
+        return draws_near(walk, candidate, until)
 
     case = {
         "speed_ratio": 1.6, "clearance_ratio": 0.74, "friction": 0.33, "samples_per_revolution": 64,
