@@ -247,7 +247,7 @@ def test_motion_that_draws_near_loses_its_distance_as_the_linear_theory_says(
     """Those that do not are watched until 100 revolutions, or given up where they disobey the theory."""
     monkeypatch.setattr(direct, "Onward", lambda *_: SimpleNamespace(keeps_contacts=lambda *_: True))
     walk = Spiral(change)
-    is_near, reason = draws_near(walk, STILL, ORBIT, 100)
+    is_near, reason = draws_near(walk, direct.Candidate(STILL, ORBIT), 100)
     assert reason is None
     assert is_near == is_expected
     if is_expected:
@@ -261,13 +261,13 @@ def test_last_revolutions_show_that_a_motion_draws_near(monkeypatch):
     monkeypatch.setattr(direct, "Onward", lambda *_: SimpleNamespace(keeps_contacts=lambda *_: True))
     walk = Spiral(lambda at: 0.98 * TURN @ at)
     walk.on(16)
-    assert draws_near(walk, STILL, ORBIT, 100) == (True, None)
+    assert draws_near(walk, direct.Candidate(STILL, ORBIT), 100) == (True, None)
     assert walk.n_revolution == 16
 
 
 def test_transient_ends_before_a_motion_has_drawn_near():
     walk = Spiral(lambda at: 0.98 * TURN @ at, most=12)
-    assert draws_near(walk, STILL, ORBIT, 100) == (False, None)
+    assert draws_near(walk, direct.Candidate(STILL, ORBIT), 100) == (False, None)
     assert walk.n_revolution == 12
 
 
@@ -290,7 +290,7 @@ def test_motion_that_would_meet_another_contact_is_watched_until_it_would_not(mo
 
     monkeypatch.setattr(direct, "Onward", lambda *_: SimpleNamespace(keeps_contacts=keeps_contacts))
     walk = Spiral(lambda at: 0.98 * TURN @ at)
-    assert draws_near(walk, STILL, ORBIT, 100) == (True, None)
+    assert draws_near(walk, direct.Candidate(STILL, ORBIT), 100) == (True, None)
     assert walk.n_revolution == pytest.approx(56, abs=8)  # 0.3 x 0.98^55 = 0.1
     assert len(asked) == 4
     assert all(n_period == pytest.approx(np.log(0.1) / np.log(0.98), abs=1) for _, n_period in asked)

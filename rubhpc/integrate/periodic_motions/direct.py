@@ -19,7 +19,7 @@ from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoo
 from rubhpc.integrate.periodic_motions.walk import LEADING, LOOK, Passed, Walk
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Iterator
 
     from numpy.typing import NDArray
 
@@ -82,29 +82,21 @@ def pass_directly(
         if reason is not None or walk.n_left <= 0:
             return walk.ended(reason)
         wanted = int(LONGER * walk.n_revolution)
-        states = march.mask
         walk.stand()
         piecewise = piecewise or _piecewise(walk, solve_from)
         if piecewise is None:
             continue
-        candidate = _again(vain, walk.passed)
-        if candidate is None:
-            orbit = _search(piecewise, states, walk.passed, walk.n_revolution, {one.period for one in vain})
-            if orbit is None:
-                continue
-            candidate = Candidate(piecewise, orbit)
-        until, orbit = int(FURTHER * walk.n_revolution), candidate.orbit
-        is_near, reason = draws_near(walk, candidate, until)
-        if is_near and known is not None and (same := known.nearest(orbit.motion, SAME)) is not None:
-            return walk.ended(reason, same)
-        if is_near:
-            force = piecewise.contact_force(orbit.states, orbit.motion)
-            walk.begin_at(piecewise.setup, Place(orbit.motion, piecewise.setup.model.sag, force))
-        if is_near or reason is not None:
-            return walk.ended(reason, found=(piecewise, orbit) if is_near else None)
-        candidate.n_vain += 1
-        if candidate not in vain:
-            vain.append(candidate)
+        for candidate in _candidates(piecewise, walk, vain):
+            orbit = candidate.orbit
+            is_near, reason = draws_near(walk, candidate, int(FURTHER * walk.n_revolution))
+            if is_near and known is not None and (same := known.nearest(orbit.motion, SAME)) is not None:
+                return walk.ended(reason, same)
+            if is_near:
+                force = piecewise.contact_force(orbit.states, orbit.motion)
+                walk.begin_at(piecewise.setup, Place(orbit.motion, piecewise.setup.model.sag, force))
+            if is_near or reason is not None:
+                return walk.ended(reason, found=(piecewise, orbit) if is_near else None)
+            candidate.n_vain += 1
 
 
 class Candidate:
@@ -140,10 +132,19 @@ class Candidate:
         return Onward(self.piecewise, self.orbit)
 
 
-def _again(vain: list[Candidate], passed: Floats) -> Candidate | None:
-    """Return a motion that was found too early, and that the case may follow now; each is tried once more."""
-    near = (one for one in vain if one.n_vain == 1 and one.strays(passed) <= STRAYS)
-    return next(near, None)
+def _candidates(piecewise: PiecewiseMotion, walk: Walk, vain: list[Candidate]) -> Iterator[Candidate]:
+    """Motions that a case may draw near to now: one that was found too early, then what a search finds.
+
+    Each that was found is taken up once more, if the last period is nearly what the linear theory about it
+    makes of the one before.
+    """
+    again = (one for one in vain if one.n_vain == 1 and one.strays(walk.passed) <= STRAYS)
+    yield from islice(again, 1)
+    walk.stand()
+    orbit = _search(piecewise, walk.states, walk.passed, walk.n_revolution, {one.period for one in vain})
+    if orbit is not None:
+        vain.append(Candidate(piecewise, orbit))
+        yield vain[-1]
 
 
 def _piecewise(
@@ -174,7 +175,7 @@ def draws_near(walk: Walk, candidate: Candidate, until: int) -> tuple[bool, str 
     least = -(-WATCHED // span)
     there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
     looks: list[tuple[float, float, float]] = []  # what it strays, is to lose and loses, as shares
-    is_further = False
+    is_further = candidate.n_vain > 0  # what was found before must lead the case at once
     untried = math.inf  # square of the distance at which contacts are looked at next
     seen = walk.passed[::-1][::span][::-1] - orbit.motion  # its distances from one look to the next
     while True:

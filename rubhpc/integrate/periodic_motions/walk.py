@@ -51,6 +51,8 @@ class Walk:
         Revolutions simulated, and steps taken before the march was last begun again.
     passed : (k, 2 n)
         Motions at the ends of the last revolutions, the present one last.
+    states : int
+        Those of the pairs now.
     """
 
     def __init__(self, march: EventDrivenMarch, recording: Recording) -> None:
@@ -58,6 +60,7 @@ class Walk:
         self.march, self._recording = march, recording
         self._idle = idle_of(march)
         self.n_revolution = self.n_step = 0
+        self.states = march.mask
         self.passed = march.motion()[np.newaxis]
         self._place: tuple[ModalSetup, Place] | None = None  # where to begin before going on
 
@@ -76,7 +79,7 @@ class Walk:
             self.n_revolution, left = self.n_revolution + now, left - now
             if reason is not None:
                 return reason
-            self.passed = np.concatenate([self.passed, sections])[-KEPT - 1 :]
+            self.passed, self.states = np.concatenate([self.passed, sections])[-KEPT - 1 :], self.march.mask
         return None
 
     def repeat(self, period: int) -> tuple[Floats | None, str | None]:
