@@ -72,7 +72,7 @@ def pass_directly(
     """
     walk, wanted = Walk(march, recording), FIRST
     piecewise: PiecewiseMotion | None = None
-    vain: list[Candidate] = []  # motions that were found, and that the case did not draw near to
+    missed: list[Candidate] = []  # motions that were found, and that the case did not draw near to
     while True:
         if known is not None:
             reached, reason = walk.arrive(known, wanted)
@@ -86,7 +86,7 @@ def pass_directly(
         piecewise = piecewise or _piecewise(walk, solve_from)
         if piecewise is None:
             continue
-        for candidate in _candidates(piecewise, walk, vain):
+        for candidate in _candidates(piecewise, walk, missed):
             orbit = candidate.orbit
             is_near, reason = draws_near(walk, candidate, int(FURTHER * walk.n_revolution))
             if is_near and known is not None and (same := known.nearest(orbit.motion, SAME)) is not None:
@@ -96,7 +96,7 @@ def pass_directly(
                 walk.begin_at(piecewise.setup, Place(orbit.motion, piecewise.setup.model.sag, force))
             if is_near or reason is not None:
                 return walk.ended(reason, found=(piecewise, orbit) if is_near else None)
-            candidate.n_vain += 1
+            candidate.n_missed += 1
 
 
 class Candidate:
@@ -104,14 +104,14 @@ class Candidate:
 
     Attributes
     ----------
-    n_vain : int
+    n_missed : int
         How often the case was seen not to draw near.
     """
 
     def __init__(self, piecewise: PiecewiseMotion, orbit: Orbit) -> None:
         """Take a motion that was found."""
         self.piecewise, self.orbit, self.period = piecewise, orbit, orbit.period
-        self.n_vain = 0
+        self.n_missed = 0
 
     def strays(self, passed: Floats) -> float:
         """Distance of the last motion from where the theory takes that a period before, over its distance."""
@@ -132,19 +132,19 @@ class Candidate:
         return Onward(self.piecewise, self.orbit)
 
 
-def _candidates(piecewise: PiecewiseMotion, walk: Walk, vain: list[Candidate]) -> Iterator[Candidate]:
+def _candidates(piecewise: PiecewiseMotion, walk: Walk, missed: list[Candidate]) -> Iterator[Candidate]:
     """Motions that a case may draw near to now: one that was found too early, then what a search finds.
 
     Each that was found is taken up once more, if the last period is nearly what the linear theory about it
     makes of the one before.
     """
-    again = (one for one in vain if one.n_vain == 1 and one.strays(walk.passed) <= STRAYS)
+    again = (one for one in missed if one.n_missed == 1 and one.strays(walk.passed) <= STRAYS)
     yield from islice(again, 1)
     walk.stand()
-    orbit = _search(piecewise, walk.states, walk.passed, walk.n_revolution, {one.period for one in vain})
+    orbit = _search(piecewise, walk.states, walk.passed, walk.n_revolution, {one.period for one in missed})
     if orbit is not None:
-        vain.append(Candidate(piecewise, orbit))
-        yield vain[-1]
+        missed.append(Candidate(piecewise, orbit))
+        yield missed[-1]
 
 
 def _piecewise(
@@ -175,7 +175,7 @@ def draws_near(walk: Walk, candidate: Candidate, until: int) -> tuple[bool, str 
     least = -(-WATCHED // span)
     there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
     looks: list[tuple[float, float, float]] = []  # what it strays, is to lose and loses, as shares
-    is_further = candidate.n_vain > 0  # what was found before must lead the case at once
+    is_further = candidate.n_missed > 0  # what was found before must lead the case at once
     untried = math.inf  # square of the distance at which contacts are looked at next
     seen = walk.passed[::-1][::span][::-1] - orbit.motion  # its distances from one look to the next
     while True:
@@ -221,15 +221,15 @@ def _agree(looks: list[tuple[float, float, float]], least: int) -> bool:
 
 
 def _search(
-    piecewise: PiecewiseMotion, states: int, passed: Floats, n_revolution: int, vain: Collection[int]
+    piecewise: PiecewiseMotion, states: int, passed: Floats, n_revolution: int, missed: Collection[int]
 ) -> Orbit | None:
     """Return the stable periodic motion that the last ones lead to: of one revolution, or as they return.
 
     The first that they follow to, else of two the nearer one. An unstable motion whose disturbances change
-    sides in every period is followed to twice its period. Periods that were `vain` before come last.
+    sides in every period is followed to twice its period. Periods that were `missed` before come last.
     """
     found: list[tuple[float, Orbit]] = []
-    for period in sorted(_periods(piecewise, passed, n_revolution), key=vain.__contains__):
+    for period in sorted(_periods(piecewise, passed, n_revolution), key=missed.__contains__):
         orbit = _solved(piecewise, states, passed, asked := period)
         while orbit and orbit.multipliers[0].real < -1.0 and (asked := 2 * asked) <= LONGEST_PERIOD:
             orbit = _solved(piecewise, states, passed, asked)
