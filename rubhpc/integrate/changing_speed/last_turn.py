@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray  # noqa: TC002
 
 
 class LastTurn:
@@ -14,12 +15,11 @@ class LastTurn:
 
     def torque(self, at: int, length: int) -> float:
         """Mean torque that braked over so many samples from `at` on, N m."""
-        return float(self._torque[self._part(at, length)].mean())
+        return _mean(self._torque[self._part(at, length)])
 
     def rubbed(self, at: int, length: int) -> float:
         """What friction took over so many samples from `at` on, J."""
-        part = self._rubbed[self._part(at, length)]
-        return float(part.mean()) * length
+        return _mean(self._rubbed[self._part(at, length)]) * length
 
     def note_torque(self, at: int, length: int, torque: float) -> None:
         """Note the mean torque, N m, that braked a piece; what was not reached yet is taken for as much."""
@@ -33,3 +33,7 @@ class LastTurn:
     def _part(self, at: int, length: int) -> slice:
         first = at % self._torque.size
         return slice(first, min(first + length, self._torque.size))
+
+
+def _mean(part: NDArray[np.float64]) -> float:
+    return float(part.sum()) / part.size  # `mean` takes three times as long for a few

@@ -234,25 +234,27 @@ class PieceSetup(ModalSetup):
     def bodies(self, friction: float, clearance: Floats) -> Reduced:
         """The reduced bodies of a case as kernels take them; clearance (q,), m."""
         known = self.held.bodies
-        if friction not in known or known[friction].clearance is not clearance:
-            made = super().bodies(friction, clearance)
-            known[friction] = made._replace(
-                force_cosine=made.force_cosine.copy(),
-                force_sine=made.force_sine.copy(),
-                stiffness=made.stiffness.copy(),
-                damping=made.damping.copy(),
-                overlap=self._overlap(clearance)
-                if self.held.is_followed and not made.spring
-                else made.overlap,
+        made = known.get(friction)
+        if made is None:
+            of_range = super().bodies(friction, clearance)
+            made = of_range._replace(
+                force_cosine=of_range.force_cosine.copy(),
+                force_sine=of_range.force_sine.copy(),
+                stiffness=of_range.stiffness.copy(),
+                damping=of_range.damping.copy(),
             )
+        if friction not in known or made.clearance is not clearance:
+            known[friction] = made._replace(clearance=clearance, overlap=self._overlap(made, clearance))
         of_pieces = known[friction]
         of_pieces.stiffness[:], of_pieces.damping[:] = self.reduced.stiffness, self.reduced.damping
         of_pieces.force_cosine[:], of_pieces.force_sine[:] = self.reduced.force
         np.multiply(of_pieces.radius, abs(self.spin), out=of_pieces.rim_speed)
         return of_pieces
 
-    def _overlap(self, clearance: Floats) -> float:
+    def _overlap(self, made: Reduced, clearance: Floats) -> float:
         """Overlap, m, that modes which follow the speed may leave as a pair opens, and that is no event."""
+        if not self.held.is_followed or made.spring:
+            return made.overlap
         return float(self.accuracy * clearance[: len(self.model.stators)].min())
 
     def library(self, friction: float) -> ModeLibrary:

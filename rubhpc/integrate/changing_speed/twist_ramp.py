@@ -27,9 +27,14 @@ class TwistRamp(NamedTuple):
     half: Floats  # (n_rotor_dof,), from the middle of the piece to its end, m and rad
     rate: Floats  # (n_rotor_dof,), m/s and rad/s
 
+    @property
+    def moves(self) -> bool:
+        """Whether the sag moves at all."""
+        return bool(self.half.any() or self.rate.any())
+
     def about_middle(self, begun: State | Place, setup: PieceSetup) -> State | Place:
         """The motion with which a piece begins, about the sag of its middle, from that of the rotor."""
-        return moved(begun, setup, self.half, -self.rate)
+        return moved(begun, setup, self.half, -self.rate) if self.moves else begun
 
     def of_rotor(self, begun: State | Place, setup: PieceSetup) -> State | Place:
         """The motion of the rotor, from one about the sag at the beginning of the piece."""
@@ -37,12 +42,14 @@ class TwistRamp(NamedTuple):
 
     def after(self, end: Place, setup: PieceSetup) -> Place:
         """The motion of the rotor where a piece ends, from that about the sag of its middle."""
-        reached = moved(end, setup, self.half, self.rate)
+        reached = moved(end, setup, self.half, self.rate) if self.moves else end
         assert isinstance(reached, Place)
         return reached
 
     def lift(self, whole: Floats, setup: PieceSetup) -> None:
         """Count the samples of a piece (`Samples.whole`) from the shaft without loads."""
+        if not self.moves:
+            return
         model, n_sample = setup.model, whole.shape[1]
         share = 2.0 * np.arange(n_sample) / n_sample - 1.0  # of the half, at each sample
         n, first_probe = self.half.size, 4 + 3 * model.n_place
