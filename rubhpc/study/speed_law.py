@@ -153,25 +153,24 @@ def cut(
     if pieces_per_revolution is not None:
         length = piece_length(per_revolution, pieces_per_revolution)
         return _around(law.bends(per_revolution), np.arange(n * pieces_per_revolution + 1) * length)
-    time, speed, rate = law.at_angle(2.0 * np.pi * np.arange(n + 1))
+    time, speed, rate = (values.tolist() for values in law.at_angle(2.0 * np.pi * np.arange(n + 1)))
     bends = law.bends(per_revolution)
+    corners = (bends / per_revolution).tolist()
     cuts, turn = [0], 0
     while turn < n:
         count = LONGEST_PIECE
         while count > 1 and (
             turn + count > n
-            or np.any((bends > turn * per_revolution) & (bends < (turn + count) * per_revolution))
+            or any(turn < corner < turn + count for corner in corners)
             or abs(rate[turn]) * (time[turn + count] - time[turn]) ** 2 > 12.0 * allowed(speed[turn], count)
         ):
             count //= 2
-        within = law.acceleration[law.between(time[turn], time[turn + 1])]
-        parts, lag = 1, np.abs(within).max() * (time[turn + 1] - time[turn]) ** 2 / 12.0
-        while (
-            count == 1
-            and lag > allowed(speed[turn], 1.0 / parts) * parts**2
-            and per_revolution % (2 * parts) == 0
-        ):
-            parts *= 2
+        parts = 1
+        if count == 1:
+            within = law.acceleration[law.between(time[turn], time[turn + 1])]
+            lag = float(np.abs(within).max()) * (time[turn + 1] - time[turn]) ** 2 / 12.0
+            while lag > allowed(speed[turn], 1.0 / parts) * parts**2 and per_revolution % (2 * parts) == 0:
+                parts *= 2
         stride = per_revolution * count // parts
         cuts += range(cuts[-1] + stride, cuts[-1] + per_revolution * count + 1, stride)
         turn += count

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.followed_modes import between
+from rubhpc.integrate.changing_speed.followed_modes import between, between_all
 from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
 from rubhpc.integrate.changing_speed.retuned_modes import Desk, RetunedLibrary
@@ -128,18 +128,25 @@ class HeldMatrices:
 
     def at_place(self, within: float, rise: float) -> ReducedModel:
         """The model at a place in the range and of the acceleration; its unbalance is that of the middle."""
+        return self.at_places([within], rise)[0]
+
+    def at_places(self, within: Sequence[float], rise: float) -> list[ReducedModel]:
+        """The same at several places in the range."""
         if not self._beside:
-            return self.reduced
-        nodes = [self.reduced, *(reduced for _, reduced in self._beside)]
-        stiffness = between([node.stiffness for node in nodes], within)
+            return [self.reduced] * len(within)
+        values = {name: between_all(nodes, within) for name, nodes in self._at_nodes.items()}
         if self.risen is not None and rise:
-            stiffness = stiffness + rise * (self.risen.stiffness - self.reduced.stiffness)
-        return with_values(
-            self.reduced,
-            stiffness=stiffness,
-            damping=between([node.damping for node in nodes], within),
-            probe=between([node.probe for node in nodes], within),
-        )
+            values["stiffness"] += rise * (self.risen.stiffness - self.reduced.stiffness)
+        return [
+            with_values(self.reduced, **dict(zip(values, each, strict=True)))
+            for each in zip(*values.values(), strict=True)
+        ]
+
+    @cached_property
+    def _at_nodes(self) -> dict[str, list[Floats]]:
+        """What of the model goes with the speed, at `followed_modes.NODES`."""
+        nodes = [self.reduced, *(reduced for _, reduced in self._beside)]
+        return {name: [getattr(node, name) for node in nodes] for name in ("stiffness", "damping", "probe")}
 
     def sagging(self, torque: float, acceleration: float, speed: float) -> Model:
         """The model with the sag under a drive's torque, N m, at an acceleration and a speed, rad/s."""

@@ -179,10 +179,11 @@ class Pieces:
         longest = np.floor(np.log2(template.step / tick)).astype(int)
         search_level = np.clip(longest, 0, held.sample_level)
         lists = (column.tolist() for column in (speed, interval, tick, search_level, growth))
-        for place, (spin, every, resolution, search, grows, pushing) in enumerate(
-            zip(*lists, force, strict=True)
+        models = held.at_places([held.within(spin) for spin in speed.tolist()], rise)
+        for place, (spin, every, resolution, search, grows, pushing, at_place) in enumerate(
+            zip(*lists, force, models, strict=True)
         ):
-            reduced = with_values(held.at_place(held.within(spin), rise), spin=spin, force=pushing)
+            reduced = with_values(at_place, spin=spin, force=pushing)
             found.append(
                 with_values(
                     template,

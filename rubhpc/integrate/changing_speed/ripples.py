@@ -14,15 +14,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.study.speed_law import LAG
+from rubhpc.study.speed_law import LAG, cut
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from rubhpc.study.speed_law import SpeedLaw
+
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
+    Ints = NDArray[np.int64]
 
 SIDEBANDS, HIGHEST = 3, 2.0  # on either side at least, and up to this multiple of the speed away
 SHARE = 0.75  # of the accuracy asked for, by which a signal may err in its 1X
@@ -77,11 +80,19 @@ class Ripples:
         self._linear, self._accuracy = linear, accuracy
         self._known: dict[int, Linear] = {}
         self._errors: dict[tuple[int, float], Floats] = {}
+        self._cuts: dict[tuple[SpeedLaw, int, int | None], Ints] = {}
 
     def allowed(self, speed: float, turns: float) -> float:
         """Lag (rad) of a piece at a speed, rad/s, that takes so many revolutions."""
         error = self._per_lag(speed, turns).max(initial=0.0) / (SHARE * self._accuracy)
         return max(LAG / max(LAG * float(error), 1.0), LEAST)
+
+    def cut(self, law: SpeedLaw, per_revolution: int, pieces_per_revolution: int | None) -> Ints:
+        """Samples between which the pieces of a law lie (`speed_law.cut`), also for other cases."""
+        asked = law, per_revolution, pieces_per_revolution
+        if asked not in self._cuts:
+            self._cuts[asked] = cut(law, per_revolution, pieces_per_revolution, self.allowed)
+        return self._cuts[asked]
 
     def advice(self, speed: Floats, turns: Floats, lag: Floats, names: Sequence[str]) -> str:
         """What to do where pieces, (n,) each, are too long for a signal; "" where they are not.

@@ -26,7 +26,6 @@ from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_
 from rubhpc.integrate.record import State
 from rubhpc.integrate.start import start_of
 from rubhpc.study.initial import CONTACT_FREE, Initial
-from rubhpc.study.speed_law import cut
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -106,7 +105,7 @@ def integrate_run_up(
     """
     model, per_revolution = fastest.model, fastest.samples_per_revolution
     pieces, passing = Pieces(fastest), Passing(clearance, friction, check)
-    cuts = cut(law, per_revolution, pieces_per_revolution, pieces.ripples.allowed)
+    cuts = pieces.ripples.cut(law, per_revolution, pieces_per_revolution)
     n_stator, n = len(model.stators), law.n_revolution
     angles = 2.0 * np.pi / per_revolution * cuts.astype(np.float64)
     times, at_cuts, _ = law.at_angle(angles)
