@@ -34,7 +34,7 @@ RESTITUTION = 1  # method = "modal" with restitution, for whose sake modes are k
 CURVED_RINGS = 1  # the same with several stators
 SEVERAL_STATORS = 3  # method = "modal" with more than one
 MANY_STATORS = 8  # more than five, whose sets of closed contacts or states may be more than 256
-BRANCHES = 9  # [branch]
+BRANCHES = 10  # [branch]
 MANY_EVENTS = 2  # restitution, or method = "modal" where a case may have 200 000 events
 ALONG_SPEED = 1  # branches along a speed
 PROBED = 1  # method = "modal" with probes, for whose sake modes are kept

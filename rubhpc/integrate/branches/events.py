@@ -47,9 +47,10 @@ def crossings(branching: Branching, a: Point, b: Point) -> Iterator[tuple[Event,
     """
     if a is b or len(a.sequence) != len(b.sequence):
         return
-    change = branching.difference(a, b)
+    change = -branching.difference(b, a)  # in the coordinates of the first
     length = float(np.linalg.norm(change))
-    was, now = (np.abs(point.multipliers) - 1.0 for point in (a, b))
+    n_both = min(a.multipliers.size, b.multipliers.size)  # one may have more coordinates, well damped
+    was, now = (np.abs(point.multipliers[:n_both]) - 1.0 for point in (a, b))
     has_left = (was * now < 0.0) & (np.minimum(np.abs(was), np.abs(now)) > LEFT)
     ranks: list[int] = np.flatnonzero(has_left).tolist()
     may_fold = any(_is_real(point.multipliers[rank]) for point in (a, b) for rank in ranks)

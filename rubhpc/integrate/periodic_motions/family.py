@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fem.assemble import assemble
+from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.modal_setup import ModalSetup
@@ -18,7 +18,9 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, 
 from rubhpc.integrate.periodic_motions.saltation import by_clearance
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.along_speeds import AlongSpeeds
-from rubhpc.integrate.reduced_model.truncation import touch_of
+from rubhpc.integrate.reduced_model.reduction import reduce_to
+from rubhpc.integrate.reduced_model.standstill import at_standstill, completed
+from rubhpc.integrate.reduced_model.truncation import Touch, kept_modes, touch_of
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
@@ -93,6 +95,7 @@ class Family:
         self.along, self.span = along, abs(ends[1] - ends[0])
         self._operation, self._ends = operation, ends
         self._speeds: AlongSpeeds | None = None
+        self._kept: list[NDArray[np.bool_]] = []  # modes that either end of the range keeps
         self._models: OrderedDict[int, tuple[Rig, Model]] = OrderedDict()
         self._frequency: tuple[Model, float] | None = None
         self._setups: OrderedDict[tuple[int, float, bool], ModalSetup] = OrderedDict()
@@ -211,16 +214,42 @@ class Family:
         return self._models[id(rig)][1]
 
     def _reduced(self, model: Model, spin: float) -> ReducedModel | None:
-        """A model whose speed alone changes, in the coordinates of the whole range; None for others."""
-        is_modal = self._operation.integrator.method == "modal"
-        if self.along not in SPEEDS or model.rotor.by_speed is not None or not is_modal:
+        """A model with the modes of the whole range; None where it has one model, at one speed.
+
+        Where its speed alone changes it is in the same coordinates everywhere.
+        """
+        integrator = self._operation.integrator
+        if self.along in (*CLEARANCES, "friction") or integrator.method != "modal":
             return None
+        if self.along not in SPEEDS or model.rotor.by_speed is not None:
+            self._kept = self._kept or self._kept_at_ends()
+            model = model_at(model, spin)
+            parts = at_standstill(model).parts
+            if [part.frequency.size for part in parts] != [of.size for of in self._kept]:
+                return None  # it is coupled otherwise
+            are_kept = [completed(part, of) for part, of in zip(parts, self._kept, strict=True)]
+            return reduce_to(model, spin, integrator.accuracy, are_kept)
         if self._speeds is None:
             spins = [self._spin(self._operation.at(self.along, end), model) for end in self._ends]
-            contact = self._operation.contact
-            touch = touch_of(model, law_of(contact), is_updated=contact.normal == "updated")
-            self._speeds = AlongSpeeds(model, spins, self._operation.integrator.accuracy, touch)
+            self._speeds = AlongSpeeds(model, spins, integrator.accuracy, self._touch(model))
         return self._speeds.at(spin)
+
+    def _kept_at_ends(self) -> list[NDArray[np.bool_]]:
+        """Modes of each part that either end of the range keeps."""
+        ends = []
+        for end in self._ends:
+            case = self._operation.at(self.along, end)
+            model = self._model(case.rig)
+            spin = self._spin(case, model)
+            model = model_at(model, spin)
+            ends.append(kept_modes(model, spin, self._operation.integrator.accuracy, self._touch(model)))
+        if [of.size for of in ends[0]] != [of.size for of in ends[1]]:
+            return ends[0]
+        return [one | other for one, other in zip(*ends, strict=True)]
+
+    def _touch(self, model: Model) -> Touch:
+        contact = self._operation.contact
+        return touch_of(model, law_of(contact), is_updated=contact.normal == "updated")
 
     def _setup(self, case: Operation, model: Model, spin: float, is_measured: bool) -> ModalSetup:
         key = id(case.rig), spin, is_measured

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import rubhpc
+from rubhpc import LumpedStator
 from rubhpc.errors import InputError
 from rubhpc.integrate.branches.arclength import follow
 from rubhpc.integrate.branches.branching import Branching
@@ -197,6 +198,22 @@ def test_bad_arguments_are_refused(arguments, text):
     with pytest.raises(InputError, match=text) as caught:
         rubhpc.branch("mokhtar2017", **CASE | ALONG | arguments)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("keeps_those_of_both_ends", [True, False])
+def test_a_stiffness_may_ask_for_other_modes_at_either_end(monkeypatch, keeps_those_of_both_ends):
+    """The stiffer stator needs more modes; one that is coupled otherwise keeps each value's own."""
+    if not keeps_those_of_both_ends:
+        monkeypatch.setattr(Family, "_reduced", lambda *_: None)
+    spring = LumpedStator(node=8, radius=0.06, mass=1e-3, damping=2.0, stiffness=1e5)
+    (found,) = rubhpc.branch(
+        replace(rubhpc.read_rig("mokhtar2017"), stator=(spring,)), along="stator.stiffness", start="20 kN/m",
+        stop="2 MN/m", speed_ratio=1.42, clearance="150 um", friction=0.05, transient=60,
+        samples_per_revolution=64, keep=(),
+    )  # fmt: skip
+    assert (found.end, found.values[-1]) == ("the range ends", 2e6)
+    sizes = {point.multipliers.size for point in found.points}
+    assert (len(sizes) == 1) == keeps_those_of_both_ends
 
 
 @pytest.mark.parametrize("step", [0.01, 0.001])
