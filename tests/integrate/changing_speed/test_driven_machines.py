@@ -9,7 +9,7 @@ from full_order_machine import Machine, driven_machine
 
 from rubhpc import Carrier, LumpedStator, Rig, Unbalance, run_up
 from rubhpc.integrate.changing_speed.passing import Passing
-from rubhpc.integrate.changing_speed.pieces import Pieces
+from rubhpc.integrate.changing_speed.speed_ranges import SpeedRanges
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.study.drive_law import DriveLaw
 
@@ -131,8 +131,8 @@ def test_a_whip_takes_all_that_the_spin_holds(monkeypatch):
     The speed swings as it falls; matrices are held over that, and contact modes not solved piece by piece.
     """
     held, taken = [], []
-    hold, take = Pieces._hold, Passing.take
-    monkeypatch.setattr(Pieces, "_hold", lambda *at: held.append(at) or hold(*at))
+    hold, take = SpeedRanges.hold, Passing.take
+    monkeypatch.setattr(SpeedRanges, "hold", lambda *at: held.append(at) or hold(*at))
     monkeypatch.setattr(Passing, "take", lambda *at, **keys: taken.append(at) or take(*at, **keys))
     rig, _ = machine(3)
     drive = {"torque": 0.0, "start": 200.0, "revolutions": 60, "inertia": DRIVE_INERTIA}

@@ -1,0 +1,236 @@
+"""Matrices of ranges of speed and acceleration, for all pieces of a run-up that they serve."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from rubhpc.fem.assemble import model_at
+from rubhpc.fem.free_spin import unit_rotation
+from rubhpc.fem.probes import probes_at
+from rubhpc.fem.statics import sag_under
+from rubhpc.integrate.changing_speed.followed_modes import NODES
+from rubhpc.integrate.changing_speed.followed_range import followed_reach, rotor_of
+from rubhpc.integrate.changing_speed.held_matrices import (
+    NARROWEST,
+    WIDEST,
+    WIDEST_TABULATED,
+    held_range,
+)
+from rubhpc.integrate.changing_speed.mode_parts import speeds_of
+from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, sagging
+from rubhpc.integrate.changing_speed.ripples import Linear
+from rubhpc.integrate.packing import whole_system
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+    from rubhpc.integrate.changing_speed.acceleration_range import Judge
+    from rubhpc.integrate.changing_speed.followed_range import Reach
+    from rubhpc.integrate.changing_speed.retuned_modes import Desk
+    from rubhpc.integrate.modal_setup import ModalSetup
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
+
+    Floats = NDArray[np.float64]
+
+SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the speed is taken
+LONGEST_FALL = 1.0 / 3.0  # half of the range over the first speed of a coast-down, which stays above 0
+DRIVEN_SHARE = 0.25  # of the accuracy, of matrices of a driven rotor, whose twist errs most
+
+_DESKS: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], Desk]] = WeakKeyDictionary()
+
+
+class SpeedRanges:
+    """Matrices of a rotor whose speed changes, from its set-up at the highest speed.
+
+    Where the spin is free (`ModalSetup.free_spin`), the drive's torque twists the shaft, not its
+    acceleration, and `phi'' G u / 2` takes the place of `phi'' G u`, as Lagrange's equations have it.
+    """
+
+    def __init__(self, fastest: ModalSetup) -> None:
+        self._fastest = fastest
+        self._basis = fastest.reduced.basis
+        self.accelerations: tuple[float, float] | None = None  # rad/s^2, least and greatest of the run-up
+        model = fastest.model
+        rotor = model.rotor
+        self._inertia = rotor.mass @ unit_rotation(rotor)
+        n, n_all = rotor.n_dof, model.body_start[-1]
+        momentum = np.zeros((n_all, n_all))
+        momentum[:n, :n] = rotor.gyroscopic if fastest.free_spin is None else 0.5 * rotor.gyroscopic
+        self._momentum = self._basis.T @ momentum @ self._basis
+        self._turning = np.zeros(self._basis.shape[1])  # of the driven end about the mean
+        if fastest.free_spin is not None:
+            self._turning = fastest.free_spin.share @ self._basis[:n]
+        phasor = (model.unbalance_cosine - 1j * model.unbalance_sine) @ self._basis[:n]
+        self.phasor = phasor.astype(np.complex128)
+
+    def hold(self, speed: float, acceleration: float, slope: float) -> HeldMatrices:
+        """Matrices for a speed at the near end of the range over which they may be held.
+
+        That of a free spin, which may turn back, is in the middle of the range.
+        """
+        fastest, free = self._fastest, self._fastest.free_spin
+        is_followed = free is None and not fastest.is_updated
+        judge: Judge | None = None
+        if is_followed:
+            reach, swing, judge = self._followed_reach(speed, acceleration)
+        else:
+            reach, swing = self._held_reach(speed, acceleration, slope)
+        if free is None:
+            speed += np.sign(acceleration) * reach
+        model, reduced = self._reduced(speed, acceleration, slope, speed)
+        beside = [
+            self._reduced(speed + place * reach, acceleration, slope, speed)
+            for place in (NODES[1:] if is_followed else ())
+        ]
+        if all(np.array_equal(other.stiffness, reduced.stiffness) for _, other in beside) and all(
+            np.array_equal(other.damping, reduced.damping) for _, other in beside
+        ):
+            beside = []  # nothing goes with the speed
+        near_end = reach * (1.0 + 1e-9)  # rounding apart
+        slowest = replace(fastest, spin=abs(speed) - reach)
+        ranges = near_end, swing
+        desks = _DESKS.setdefault(fastest, {})
+        at = acceleration, slope, ranges
+        held = HeldMatrices(
+            model, reduced, self.phasor, self._momentum, *at, slowest.sample_level, desks, beside, judge
+        )
+        held.is_balanced = not is_followed
+        if beside and fastest.model.rotor.tabulated_speeds:
+            held.sags = [model.sag, *(other.sag for other, _ in beside)]
+        held.template = PieceSetup(
+            scheme=fastest.scheme,
+            model=model,
+            reduced=reduced,
+            spin=speed,
+            step=fastest.step,
+            contact_step=fastest.contact_step,
+            samples_per_revolution=fastest.samples_per_revolution,
+            is_updated=fastest.is_updated,
+            law=fastest.law,
+            accuracy=fastest.accuracy,
+            displacement_limit=fastest.displacement_limit,
+            held=held,
+            speeds=speeds_of([speed], [complex(speed**2)], [0.0], [1.0], speed, held.sample_level),
+            place=0,
+            most_energy=fastest.energy_limit,
+        )
+        for name in ("energy_limit", "sample_level", "clock"):  # for `with_values`, which takes them along
+            getattr(held.template, name)
+        tilted = model.rotor.gyroscopic @ model.sag
+        if free is not None:
+            held.twist = sag_under(model.rotor, -free.share)
+            held.lean = sag_under(model.rotor, -0.5 * tilted)
+        else:
+            held.lean = sag_under(model.rotor, -self._inertia - tilted)
+        return held
+
+    def linear(self, speed: float, *, is_whole: bool = False) -> Linear:
+        """The rotor without contact at a speed, rad/s, as the output node and probes see it.
+
+        `is_whole`: in all reduced degrees, not in those alone that unbalance moves.
+        """
+        model, damping, stiffness = self._matrices(speed, 0.0, 0.0)
+        output = self._fastest.reduced.output[:2]
+        of_output = np.stack([output, 0.0 * output, 0.0 * output])
+        seen = np.concatenate([of_output, model.probe_rows @ self._basis], axis=1)
+        if is_whole:
+            return Linear(stiffness, damping, self.phasor, seen)
+        return Linear.of_moved(stiffness, damping, self.phasor, seen, speed)
+
+    def _reduced(
+        self, speed: float, acceleration: float, slope: float, of_force: float
+    ) -> tuple[Model, ReducedModel]:
+        """The model at a speed about its sag, and reduced, with spin and unbalance force of another speed."""
+        fastest = self._fastest
+        model, damping, stiffness = self._matrices(speed, acceleration, slope)
+        model = sagging(model, sag_under(model.rotor, model.load))
+        phasor = self.phasor * of_force**2
+        reduced = replace(
+            fastest.reduced,
+            spin=of_force,
+            stiffness=stiffness,
+            damping=damping,
+            force=np.stack([phasor.real, -phasor.imag]),
+            probe=model.probe_rows @ self._basis,
+        )
+        for name in ("translations", "project"):  # which need not be computed again
+            reduced.__dict__[name] = getattr(fastest.reduced, name)
+        return model, reduced
+
+    def _followed_reach(self, speed: float, acceleration: float) -> Reach:
+        """The range in which modes follow the speed."""
+
+        def matrices(at: float) -> tuple[Floats, Floats]:
+            rotor = fastest.model.rotor.at(self._tabulated(at))  # whose sag is not asked for
+            damping, stiffness = self._system(replace(fastest.model, rotor=rotor), at, acceleration, 0.0)
+            return stiffness, damping
+
+        fastest = self._fastest
+        seen = self.linear(speed, is_whole=True).seen
+        rotor = rotor_of(self._fastest, matrices, self.phasor, seen)
+        widest = self._widest(speed, acceleration)
+        return followed_reach(
+            rotor,
+            speed,
+            acceleration,
+            self._momentum,
+            widest,
+            accuracy=self._fastest.accuracy,
+            others=self.accelerations or (acceleration, acceleration),
+        )
+
+    def _widest(self, speed: float, acceleration: float) -> float:
+        """Half of the widest range from a speed on, rad/s, no farther than the law goes."""
+        fastest = self._fastest
+        widest = (WIDEST_TABULATED if fastest.model.rotor.tabulated_speeds else WIDEST) * speed
+        if acceleration > 0.0:
+            return min(widest, max(0.5 * (fastest.spin - speed), NARROWEST * speed))
+        return min(widest, LONGEST_FALL * speed)
+
+    def _held_reach(self, speed: float, acceleration: float, slope: float) -> tuple[float, float]:
+        """The same over which matrices may be held."""
+        fastest, free = self._fastest, self._fastest.free_spin
+        _, damping, stiffness = self._matrices(speed, acceleration, slope)
+        _, next_damping, next_stiffness = self._matrices(speed * (1.0 + SPEED_STEP), acceleration, slope)
+        step = SPEED_STEP * speed
+        drift = (next_stiffness - stiffness) / step, (next_damping - damping) / step
+        reach, swing = held_range(
+            stiffness,
+            damping,
+            drift,
+            speed,
+            acceleration,
+            accuracy=fastest.accuracy if free is None else DRIVEN_SHARE * fastest.accuracy,
+            momentum=self._momentum,
+            widest=WIDEST_TABULATED if fastest.model.rotor.tabulated_speeds else WIDEST,
+        )
+        if free is None:
+            reach = min(reach, self._widest(speed, acceleration))
+        return reach, swing
+
+    def _matrices(self, speed: float, acceleration: float, slope: float) -> tuple[Model, Floats, Floats]:
+        """The model at a speed, within the tables of its bearings, its damping and its stiffness.
+
+        A torque that falls with the speed damps how the driven end turns about the mean.
+        """
+        model = self._fastest.model
+        if model.rotor.tabulated_speeds:
+            known = self._tabulated(speed)
+            model = probes_at(model_at(model, known), known, self._fastest.spin)
+        return model, *self._system(model, speed, acceleration, slope)
+
+    def _tabulated(self, speed: float) -> float:
+        """The speed, rad/s, or that of the tables of bearings which is nearest to it."""
+        speeds = self._fastest.model.rotor.tabulated_speeds
+        return float(np.clip(speed, speeds[0], speeds[-1])) if speeds else speed
+
+    def _system(self, model: Model, speed: float, acceleration: float, slope: float) -> tuple[Floats, Floats]:
+        """Damping and stiffness of a model, as of `_matrices`."""
+        _, damping, stiffness, _ = whole_system(model, speed)
+        damping = self._basis.T @ damping @ self._basis - slope * np.outer(self._turning, self._turning)
+        return damping, self._basis.T @ stiffness @ self._basis + acceleration * self._momentum
