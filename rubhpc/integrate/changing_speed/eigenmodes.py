@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rubhpc.integrate.changing_speed.followed_modes import taken
+from rubhpc.kernels.varying import take_course
+
+if TYPE_CHECKING:
+    from rubhpc.kernels.contact_modes import ModeTables
+    from rubhpc.kernels.retuning import HeldMode
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -21,6 +28,25 @@ class Eigenmodes(NamedTuple):
     constant: Complexes  # (c, m), for a unit of each coordinate that does not move
     drive: Complexes  # (m,), by the unbalance at unit speed
     mirrored_drive: Complexes  # (m,)
+
+    @classmethod
+    def of(cls, row: ModeTables, held: HeldMode, within: float, rise: float) -> Eigenmodes:
+        """Those of tables that follow the speed, at a place in the range and of the acceleration."""
+        varying, m = held.varying, held.is_pair.size
+        for course in (varying.kept_shape, varying.kept_entry):
+            take_course(course, within, rise, varying.kept)
+        constant = taken(varying.enter_constant, row.enter_constant[0], within, rise)[:, :, :m]
+        enter_re = taken(varying.enter_re, row.enter_re[0], within, rise)[:, :m]
+        enter_im = taken(varying.enter_im, row.enter_im[0], within, rise)[:, :m]
+        return cls(
+            exponent=held.exponent[:m].copy(),
+            is_pair=held.is_pair,
+            motion=held.motion.T.copy(),
+            enter=(enter_re + 1j * enter_im).T,
+            constant=constant[:, 0] + 1j * constant[:, 1],
+            drive=held.drive.copy(),
+            mirrored_drive=held.mirrored_drive.copy(),
+        )
 
     def entered(
         self, motion: Floats, constants: Floats, turning: complex, factor: complex, time: float

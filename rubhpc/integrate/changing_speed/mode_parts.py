@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.changing_speed.followed_modes import NOTHING
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 from rubhpc.kernels.retuning import HeldMode, Speeds
 from rubhpc.kernels.retuning_laws import NO_RIM, RimPart
+from rubhpc.kernels.sampling import LANES
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.changing_speed.near_modes import Linear
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.retuning_laws import Springs
 
 Floats = NDArray[np.float64]
@@ -57,6 +60,31 @@ def output_operators(reduced: ReducedModel) -> tuple[Floats, Floats, Floats]:
     rate.append(of_probes[1])
     acceleration.append(of_probes[2])
     return np.concatenate(position), np.concatenate(rate), np.concatenate(acceleration)
+
+
+def with_slip(row: ModeTables, slip: Complexes, exponent: Complexes) -> ModeTables:
+    """Tables of a mode, (1, ...), whose slip speeds (q, coordinates) and their rates are all of it."""
+    end, width = exponent.size, row.slip_re.shape[-1]
+    speed = np.zeros((1, len(slip), width), dtype=np.complex128)
+    speed[0, :, :end] = slip
+    rate = speed.copy()
+    rate[0, :, :end] *= exponent
+    return row._replace(
+        slip_re=speed.real.copy(),
+        slip_im=speed.imag.copy(),
+        slip_rate_re=rate.real.copy(),
+        slip_rate_im=rate.imag.copy(),
+    )
+
+
+def without_renewed(row: ModeTables, n_row: int) -> ModeTables:
+    """Tables of a mode, (1, ...), without what each speed renews; they have `n_row` outputs."""
+    width = row.motion_re.shape[-1]
+    n_output = -(-SAMPLES_AT_ONCE * n_row // LANES) * LANES
+    shapes = {"output": (1, 2 * width, n_output)} | {
+        name: getattr(row, name).shape for name in ("power_re", "power_im", "bound")
+    }
+    return row._replace(**{name: np.broadcast_to(0.0, shape) for name, shape in shapes.items()})
 
 
 def held_mode(

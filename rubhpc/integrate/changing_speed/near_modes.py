@@ -14,9 +14,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rubhpc.integrate.reduced_model.contact_mode import left_free
 from rubhpc.integrate.reduced_model.products import real_times
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
@@ -37,6 +40,29 @@ class Linear(NamedTuple):
     across: Floats  # (n, r), friction forces by switch functions
     damping: Floats  # (n, n)
     passed: Floats  # (n, n), what the constraints leave of a force
+
+    @classmethod
+    def of_closed(
+        cls,
+        pairs: Sequence[int],
+        reduced: ReducedModel,
+        directions: tuple[Floats, Floats],
+        phasor: Complexes,
+    ) -> Linear:
+        """Of closed pairs that slide; `directions` are gap Jacobian and forces, (q, n), of all pairs."""
+        gap_jacobian, force_direction = directions
+        (q, n), closed = gap_jacobian.shape, np.array(pairs, dtype=int)
+        rate, force = gap_jacobian[closed], force_direction[closed].T
+        tangent, project = left_free(rate, force)
+        switch, reaction = np.hstack([gap_jacobian, np.zeros((q, n))]), np.zeros(q, dtype=complex)
+        if closed.size:
+            solved = np.linalg.solve(rate @ force, rate)
+            switch[closed] = solved @ np.hstack([reduced.stiffness, reduced.damping])
+            reaction[closed] = solved @ phasor
+        across = np.zeros((n, q))
+        across[:, closed] = (force_direction - gap_jacobian)[closed].T
+        passed = tangent @ project
+        return cls(passed @ phasor, switch, reaction, across, reduced.damping, passed)
 
 
 def near_mode(

@@ -12,6 +12,7 @@ from rubhpc.integrate.reduced_model.contact_mode import left_free
 from rubhpc.integrate.reduced_model.friction_library import MOST_FRICTION_MODES
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode, states_of
 from rubhpc.integrate.reduced_model.mode_library import SPARE
+from rubhpc.integrate.reduced_model.penalty_library import PressedPairs
 from rubhpc.integrate.reduced_model.penalty_mode import overlap_rows
 from rubhpc.integrate.reduced_model.touching import friction_mode_among, penalty_mode_among
 from rubhpc.kernels.friction_coordinates import LANES
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
     from rubhpc.integrate.reduced_model.penalty_mode import Penalty
-    from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.retuning import HeldMode
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 
-class RetunedPenaltyLibrary(RetunedLibrary):
+class RetunedPenaltyLibrary(PressedPairs, RetunedLibrary):
     """Contact modes of pairs that press, by spring and damper, or are lifted."""
 
     def __init__(self, *args: Any, penalty: Penalty, **keys: Any) -> None:
@@ -45,16 +45,6 @@ class RetunedPenaltyLibrary(RetunedLibrary):
         if mask == 0:
             return super()._solve(0)
         return penalty_mode_among(self._among, self.reduced, self._penalty, self._opened, mask, self._known)
-
-    def _closed_pairs(self, mask: int) -> list[int]:
-        return self._penalty.pressed(mask)
-
-    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> ModeTables:
-        if not self._is_measured:
-            return super()._tables_of(mode, reduced)
-        tables = super()._tables_of(mode, self._penalty.damped(reduced, mode.mask))
-        tables.loss[0] += self._penalty.stored_energy(mode, self.width)
-        return tables
 
     def _linear(self, mode: ContactMode) -> Linear:
         penalty, (q, n) = self._penalty, self.slip.shape

@@ -18,20 +18,21 @@ from rubhpc.integrate.changing_speed.followed_modes import (
     entries,
     followed,
     matched,
-    taken,
 )
-from rubhpc.integrate.changing_speed.mode_parts import held_mode, output_operators, speeds_of
+from rubhpc.integrate.changing_speed.mode_parts import (
+    held_mode,
+    output_operators,
+    speeds_of,
+    with_slip,
+    without_renewed,
+)
 from rubhpc.integrate.changing_speed.near_modes import Linear, near_mode
-from rubhpc.integrate.reduced_model.contact_mode import left_free
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.table_stack import TableStack
 from rubhpc.integrate.reduced_model.touching import OpenBodies, contact_mode_among, open_bodies
-from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.retuning import retune
 from rubhpc.kernels.retuning_laws import Springs
-from rubhpc.kernels.sampling import LANES
-from rubhpc.kernels.varying import take_course
 
 NOT_TUNED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
 AT_ONCE = 8  # pieces to whose speeds a contact mode is tuned at once
@@ -225,24 +226,10 @@ class RetunedLibrary(ModeLibrary):
             self.forget()
         if not self._has(mask):
             return None
-        (row, held), m = self._held[mask], self._held[mask][1].is_pair.size
+        row, held = self._held[mask]
         if held.rim.one >= 0 or mask in self._strange:
             return None
-        varying = held.varying
-        for course in (varying.kept_shape, varying.kept_entry):
-            take_course(course, within, rise, varying.kept)
-        constant = taken(varying.enter_constant, row.enter_constant[0], within, rise)[:, :, :m]
-        enter_re = taken(varying.enter_re, row.enter_re[0], within, rise)[:, :m]
-        enter_im = taken(varying.enter_im, row.enter_im[0], within, rise)[:, :m]
-        return Eigenmodes(
-            exponent=held.exponent[:m].copy(),
-            is_pair=held.is_pair,
-            motion=held.motion.T.copy(),
-            enter=(enter_re + 1j * enter_im).T,
-            constant=constant[:, 0] + 1j * constant[:, 1],
-            drive=held.drive.copy(),
-            mirrored_drive=held.mirrored_drive.copy(),
-        )
+        return Eigenmodes.of(row, held, within, rise)
 
     def tuned(self, met: set[int]) -> Ints:
         """Sets of closed pairs of the tables that are tuned to this piece or to later ones, of those met."""
@@ -297,21 +284,8 @@ class RetunedLibrary(ModeLibrary):
         """A mode of these matrices with what is renewed of its tables left out."""
         row = row or self._tables_of(mode, self.reduced)
         if not self._is_measured:
-            slip = np.zeros((1, len(self._slip_rows()), self.width), dtype=np.complex128)
-            slip[0, :, : mode.exponent.size] = self._slip_rows() @ mode.motion[self.slip.shape[1] :]
-            rate = slip.copy()
-            rate[0, :, : mode.exponent.size] *= mode.exponent
-            row = row._replace(
-                slip_re=slip.real.copy(),
-                slip_im=slip.imag.copy(),
-                slip_rate_re=rate.real.copy(),
-                slip_rate_im=rate.imag.copy(),
-            )
-        n_output = -(-SAMPLES_AT_ONCE * len(self._output) // LANES) * LANES
-        shapes = {"output": (1, 2 * self.width, n_output)} | {
-            name: getattr(row, name).shape for name in ("power_re", "power_im", "bound")
-        }
-        row = row._replace(**{name: np.broadcast_to(0.0, shape) for name, shape in shapes.items()})
+            row = with_slip(row, self._slip_rows() @ mode.motion[self.slip.shape[1] :], mode.exponent)
+        row = without_renewed(row, len(self._output))
         return Tabulated(mode, row, self._hold(mode, row, linear))
 
     def _with(self, reduced: ReducedModel) -> RetunedLibrary:
@@ -367,19 +341,9 @@ class RetunedLibrary(ModeLibrary):
 
     def _linear(self, mode: ContactMode) -> Linear:
         """What a set of closed pairs makes of the motion."""
-        reduced, q, n = self.reduced, *self.slip.shape
-        closed = np.array([i for i in range(q) if mode.mask >> i & 1], dtype=int)
-        rate, force = self.gap_jacobian[closed], self.force_direction[closed].T
-        tangent, project = left_free(rate, force)
-        switch, reaction = np.hstack([self.gap_jacobian, np.zeros((q, n))]), np.zeros(q, dtype=complex)
-        if closed.size:
-            solved = np.linalg.solve(rate @ force, rate)
-            switch[closed] = solved @ np.hstack([reduced.stiffness, reduced.damping])
-            reaction[closed] = solved @ self._phasor
-        across = np.zeros((n, q))
-        across[:, closed] = (self.force_direction - self.gap_jacobian)[closed].T
-        passed = tangent @ project
-        return Linear(passed @ self._phasor, switch, reaction, across, reduced.damping, passed)
+        closed = [i for i in range(len(self.slip)) if mode.mask >> i & 1]
+        directions = self.gap_jacobian, self.force_direction
+        return Linear.of_closed(closed, self.reduced, directions, self._phasor)
 
     def _hold(self, mode: ContactMode, row: ModeTables, linear: Linear) -> HeldMode:
         """What the spin speed leaves alone of a mode and its tables, (1, ...) each."""

@@ -15,7 +15,23 @@ if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
 
 
-class PenaltyLibrary(ModeLibrary):
+class PressedPairs(ModeLibrary):
+    """What a penalty adds to tables of contact modes: what dampers take and springs hold."""
+
+    _penalty: Penalty
+
+    def _closed_pairs(self, mask: int) -> list[int]:
+        return self._penalty.pressed(mask)
+
+    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> ModeTables:
+        if not self._is_measured:
+            return super()._tables_of(mode, reduced)
+        tables = super()._tables_of(mode, self._penalty.damped(reduced, mode.mask))
+        tables.loss[0] += self._penalty.stored_energy(mode, self.width)
+        return tables
+
+
+class PenaltyLibrary(PressedPairs):
     """Contact modes of pairs that press, by spring and damper, or are lifted; masks hold q bits for each.
 
     What dampers take and springs hold is counted with the loss by damping.
@@ -36,13 +52,3 @@ class PenaltyLibrary(ModeLibrary):
 
     def _solved(self, mask: int) -> ContactMode:
         return penalty_mode_among(self._among, self.reduced, self._penalty, self._opened, mask, self._known)
-
-    def _closed_pairs(self, mask: int) -> list[int]:
-        return self._penalty.pressed(mask)
-
-    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> ModeTables:
-        if not self._is_measured:
-            return super()._tables_of(mode, reduced)
-        tables = super()._tables_of(mode, self._penalty.damped(reduced, mode.mask))
-        tables.loss[0] += self._penalty.stored_energy(mode, self.width)
-        return tables
