@@ -151,7 +151,7 @@ def retune_to(
         tables.slip_re[mode, i, m], tables.slip_im[mode, i, m] = slip.real, slip.imag
         slip = slip * turning
         tables.slip_rate_re[mode, i, m], tables.slip_rate_im[mode, i, m] = slip.real, slip.imag
-    _retune_powers(tables, mode, exponent, end, tick)
+    _retune_powers(tables, mode, exponent, end, tick, interval)
     for o in range(held.output.shape[0]):
         total = 0j
         for a in range(n):
@@ -171,7 +171,9 @@ def retune_to(
 
 
 @jit
-def _retune_powers(tables: ModeTables, mode: int, exponent: Complexes, end: int, tick: float) -> None:
+def _retune_powers(
+    tables: ModeTables, mode: int, exponent: Complexes, end: int, tick: float, interval: float
+) -> None:
     """Exponentials of the first `end` coordinates, and what bounds and paces have of them."""
     n_level = tables.power_re.shape[1]
     power_re, power_im = tables.power_re[mode], tables.power_im[mode]
@@ -195,7 +197,8 @@ def _retune_powers(tables: ModeTables, mode: int, exponent: Complexes, end: int,
             bound = np.sqrt(re_of * re_of + im_of * im_of) * size * size * growth
             tables.bound[mode, i, k] = bound
             if i < tables.turn.shape[1]:
-                tables.turn[mode, i, k] = bound * size
+                is_fast = exponent[k].imag == 0.0 and exponent[k].real * interval < -1.0
+                tables.turn[mode, i, k] = -bound * size if is_fast else bound * size
         is_gone = exponent[k].real * tick * 2.0**FORCED_LEVEL < GONE
         tables.pace[mode, k] = DYING if is_gone else size
 
