@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from rubhpc.case_arguments import CaseArguments, case_of
+from rubhpc.case_arguments import CaseArguments, case_of, check_count
 from rubhpc.errors import InputError, NoPeriodicMotion
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.integrate.branches.branch import branch_of
@@ -22,6 +22,7 @@ from rubhpc.integrate.record import State
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
 from rubhpc.study.axis_reading import unit_of
+from rubhpc.study.branch_keys import LONGEST_PERIOD, check_followed
 from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
 
@@ -114,12 +115,10 @@ def branch(
     >>> [name for name, _ in found[0].events()]
     ['grazing', 'grazing', 'period_doubling']
     """
-    if not 1 <= period <= 64:
-        raise InputError(f"branch: period: {period} is out of range; it must be from 1 to 64")
+    check_count("branch", "period", period, 1, LONGEST_PERIOD)
     counts = {"sweeps": (sweeps, 0), "doublings": (doublings, 0), "most_points": (most_points, 2)}
     for name, (number, least) in counts.items():
-        if number < least:
-            raise InputError(f"branch: {name}: {number} is out of range; it must be at least {least}")
+        check_count("branch", name, number, least)
     if not isinstance(rig, Rig):
         rig = read_rig(rig)
     first, last = _range(rig, along, start, stop)
@@ -183,6 +182,7 @@ def _range(rig: Rig, along: str, start: float | str, stop: float | str) -> tuple
 
 def _one(rig: Rig, along: str, value: float | str, name: str) -> float:
     """A value on the axis that is varied, SI."""
+    check_followed(along, "branch: along")
     try:
         unit = unit_of(along, rig)
     except InputError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from numbers import Integral
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from rubhpc.errors import InputError
@@ -55,6 +56,15 @@ class CaseArguments(ContactArguments, total=False):
     method: str
     step: float | str | None
     accuracy: float
+
+
+def check_count(caller: str, name: str, value: object, least: int, most: int | None = None) -> None:
+    """Refuse an argument that is not a whole number within its limits."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise InputError(f"{caller}: {name}: {brief(value)} is not a whole number; give one such as {least}")
+    if int(value) < least or (most is not None and int(value) > most):
+        limits = f"at least {least}" if most is None else f"from {least} to {most}"
+        raise InputError(f"{caller}: {name}: {value} is out of range; it must be {limits}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -139,6 +149,8 @@ def _assembled(
         ratio = parse_quantity(clearance_ratio, "", f"{caller}: clearance_ratio")
         if unstable:
             raise InputError(f"{caller}: clearance_ratio: {unstable}; give clearance instead")
+        if spin == 0.0:
+            raise InputError(f"{caller}: speed: 0 rad/s; sampling is locked to the shaft, so it has to turn")
         gap = ratio * amplitude
     else:
         gap = parse_quantity(clearance, "m", f"{caller}: clearance")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rubhpc.case_arguments import CaseArguments, case_of, read_probes
-from rubhpc.errors import InputError
+from rubhpc.case_arguments import CaseArguments, case_of, check_count, read_probes
 from rubhpc.integrate.periodic_motion import find_periodic_motion
 from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
@@ -86,10 +85,8 @@ def periodic(
     >>> motion.period, motion.is_stable
     (2, True)
     """
-    if not 1 <= period <= LONGEST:
-        raise InputError(f"periodic: period: {period} is out of range; it must be from 1 to {LONGEST}")
-    if repeat < 1:
-        raise InputError(f"periodic: repeat: {repeat} is out of range; it must be at least 1")
+    check_count("periodic", "period", period, 1, LONGEST)
+    check_count("periodic", "repeat", repeat, 1)
     if isinstance(keep, str):
         keep = (keep,)
     measured = read_probes("periodic", probes)

@@ -95,6 +95,14 @@ def branch_axis(name: str, values: object, rig: Rig, file: str) -> Axis:
     )
 
 
+def check_followed(along: str, where: str) -> None:
+    """Refuse an axis along which branches do not run."""
+    if is_of_table(along):
+        raise InputError(
+            f"{where}: {along} cannot be followed; use a speed, a clearance, friction or a key of the rig"
+        )
+
+
 def check_branch(
     keys: BranchKeys,
     axes: Sequence[Axis],
@@ -106,9 +114,7 @@ def check_branch(
     is_bent: bool,
 ) -> None:
     """Refuse what cannot be followed; `is_bent` where a stator is of the second order."""
-    if is_of_table(keys.along):
-        problem = f"{keys.along} cannot be followed; use a speed, a clearance, friction or a key of the rig"
-        raise InputError(f"[branch] along: {problem}")
+    check_followed(keys.along, "[branch] along")
     if all(axis.name != keys.along for axis in axes):
         raise InputError(
             f"[branch] along: {keys.along} is not an axis of the grid; add it as {{ start, stop }}"

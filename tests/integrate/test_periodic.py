@@ -94,6 +94,10 @@ def test_motion_without_contact_is_the_steady_response():
     ("arguments", "text"),
     [
         ({"period": 0}, "period: 0 is out of range; it must be from 1 to 64"),
+        ({"period": 1.5}, "periodic: period: 1.5 is not a whole number"),
+        ({"period": "2"}, "periodic: period: .2. is not a whole number"),
+        ({"repeat": 2.5}, "periodic: repeat: 2.5 is not a whole number"),
+        ({"speed_ratio": 0, "clearance": None, "clearance_ratio": 0.7}, "speed: 0 rad/s; .* it has to turn"),
         ({"repeat": 0}, "repeat: 0 is out of range"),
         (
             {"friction_law": "table", "slip_speed": [0, 1], "friction_ratio": [1, 1]},

@@ -184,6 +184,9 @@ def test_several_pairs_that_slide_under_coulombs_law_branch_as_pairs_that_slide(
     ("arguments", "text"),
     [
         ({"period": 65}, "period: 65 is out of range"),
+        ({"period": 1.5}, "branch: period: 1.5 is not a whole number"),
+        ({"sweeps": 1.5}, "branch: sweeps: 1.5 is not a whole number"),
+        ({"along": "contact.restitution"}, "branch: along: contact.restitution cannot be followed"),
         ({"sweeps": -1}, "sweeps: -1 is out of range; it must be at least 0"),
         ({"along": "speed", "start": -1.0, "stop": 1.0}, "contains 0, which is not a valid speed"),
         ({"along": "frction"}, "along: .*unknown axis; did you mean friction"),
