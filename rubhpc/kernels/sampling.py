@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import (
     HORIZONTAL,
     TWIST,
@@ -119,7 +119,7 @@ def take_samples(
     )
 
 
-@jit_lean_sum
+@jit_apart_sum
 def read_samples(
     output: Floats,
     mode: int,
