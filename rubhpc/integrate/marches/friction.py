@@ -15,7 +15,7 @@ from rubhpc.integrate.marches.workspace import empty_workspace
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.array_room import aligned
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, states_of
-from rubhpc.integrate.reduced_model.transitions import MetTransitions
+from rubhpc.integrate.reduced_model.transitions import MetTransitions, TransitionRoom
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     FINISHED,
@@ -115,8 +115,10 @@ class FrictionMarch(EventDrivenMarch):
         self.bodies = self.bodies._replace(clearance=self._entered_with)
         self._friction = self._friction_bodies()
         library = setup.friction_library(friction)
-        shared = library.transitions
-        self._met, self._transitions = None if shared is None else MetTransitions(shared), None
+        room = library.transitions
+        if room is not None and room.is_full:
+            room = library.transitions = TransitionRoom()
+        self._met, self._transitions = None if room is None else MetTransitions(room), None
         return library
 
     @cached_property

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 from rubhpc.integrate.reduced_model.mode_library import SPARE, ModeLibrary, Shared
 from rubhpc.integrate.reduced_model.touching import friction_mode_among
+from rubhpc.integrate.reduced_model.transitions import TransitionRoom
 from rubhpc.kernels.friction_coordinates import LANES
 from rubhpc.kernels.friction_states import FORWARD
 
@@ -48,7 +49,7 @@ class FrictionLibrary(ModeLibrary):
         # Where a mode may be given up, or is held in two tables, what is there depends on other cases.
         q = len(pairs.gap_jacobian)
         keeps_all = not self._is_large and 4**q <= self.n_most
-        self.transitions = {} if keeps_all and q > 1 and not pairs.stiffness else None
+        self.transitions = TransitionRoom() if keeps_all and q > 1 and not pairs.stiffness else None
 
     _closed = FORWARD
 

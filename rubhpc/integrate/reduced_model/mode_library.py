@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.energy_forms import Energies
     from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.integrate.reduced_model.touching import OpenBodies
-    from rubhpc.integrate.reduced_model.transitions import Part
+    from rubhpc.integrate.reduced_model.transitions import TransitionRoom
     from rubhpc.kernels import contact_modes as kernel
 
     Floats = NDArray[np.float64]
@@ -223,7 +223,7 @@ class ModeLibrary:
         """Of the coordinates of a mode, 1/s: (2, m), real and imaginary, and the drift (m,) of those of 0."""
         return self._exponents[mask]
 
-    transitions: dict[tuple[int, int, str], Part] | None = None  # that cases tabulate; None: they may not
+    transitions: TransitionRoom | None = None  # that cases tabulate; None: they may not
     is_tuned_ahead = False  # whether modes are tuned to several pieces of a changing speed at once
     _n_solved = 0
     _other: ModeLibrary | None = None  # of a large one's: that which is followed, or which is measured

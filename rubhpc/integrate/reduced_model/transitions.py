@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
 
 MOST_BYTES = 2**26  # of the transitions of a case
-MOST_SHARED = 2**27  # of those that the cases of a library share
+MOST_SHARED = 2**27  # of a room of transitions, beyond which cases begin another
 UNMOVED = 1e-9  # of unit coordinates: what a transition moves less stays where it is
 
 
@@ -35,21 +35,54 @@ class Part(NamedTuple):
     shifted: Ints  # where in `number` places in `value` are
 
 
+class TransitionRoom:
+    """What the cases of a library have tabulated, one after the other in two arrays that grow.
+
+    Each part is written once, and its place stays: a case that has taken it reads it in later arrays, too.
+    """
+
+    def __init__(self) -> None:
+        self.number, self.value = np.zeros(0, dtype=np.int64), np.zeros(0)
+        self._n_number = self._n_value = 0
+        self._places: dict[tuple[int, int, str], tuple[int, int, int]] = {}
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether further cases are to begin in a room of their own."""
+        return self._n_value * self.value.itemsize > MOST_SHARED
+
+    def take(self, key: tuple[int, int, str], make: Callable[[], Part]) -> tuple[int, int, int]:
+        """Places in `number` and `value` of what belongs to a key, and its bytes; it is made if need be."""
+        if key not in self._places:
+            part = make()
+            at_number, at_value = self._n_number, self._n_value
+            self.number = _with_room(self.number, at_number, part.number.size)
+            self.value = _with_room(self.value, at_value, part.value.size)
+            self._n_number, self._n_value = at_number + part.number.size, at_value + part.value.size
+            self.number[at_number : self._n_number] = part.number
+            self.value[at_value : self._n_value] = part.value
+            self.number[at_number + part.shifted] += at_value
+            self._places[key] = at_number, at_value, part.value.nbytes
+        return self._places[key]
+
+
 class MetTransitions:
     """Transitions that one case takes, tabulated where it takes them often.
 
     What the kernel does must not depend on what other cases have left: a case begins with no table, and takes
-    one out of `shared` where another has made it.
+    one out of the `room` that it shares with them where another has made it.
     """
 
-    def __init__(self, shared: dict[tuple[int, int, str], Part]) -> None:
+    def __init__(self, room: TransitionRoom) -> None:
         """Begin with none."""
-        self._shared = shared
+        self._room = room
         self._entry: dict[tuple[int, int], int] = {}  # by sets of states
         self._modes: dict[int, int] = {}
         self._energies: dict[int, int] = {}
-        self._number, self._value = np.zeros(0, dtype=np.int64), np.zeros(0)
-        self._n_number = self._n_value = 0
+        self._n_byte = 0
         self._masks: list[int] = []
         self._placed: Transitions | None = None
 
@@ -67,7 +100,7 @@ class MetTransitions:
             for mask in known.keys() & place.keys():
                 at[place[mask]] = known[mask]
         self._placed = Transitions(
-            entry, mode, energy, self._number, self._value, aligned((4 * m,)), aligned((4 * m,))
+            entry, mode, energy, self._room.number, self._room.value, aligned((4 * m,)), aligned((4 * m,))
         )
         return self._placed
 
@@ -80,7 +113,7 @@ class MetTransitions:
         passed = self._entry.get((before, after), UNKNOWN)
         if not is_counted and passed < 0:
             self._entry[before, after] = passed = passed - 1
-        return passed == UNKNOWN - WORTH_A_TABLE and self._n_value * self._value.itemsize <= MOST_BYTES
+        return passed == UNKNOWN - WORTH_A_TABLE and self._n_byte <= MOST_BYTES
 
     def tabulate(
         self, before: ModeTables, after: ModeTables, reduced: Reduced, bodies: FrictionBodies
@@ -105,20 +138,10 @@ class MetTransitions:
                 self._entry[self._masks[before], self._masks[after]] = int(entry[before, after])
 
     def _take(self, key: tuple[int, int, str], make: Callable[[], Part]) -> tuple[int, int]:
-        """Take in what belongs to a key; returns its places in `number` and `value`."""
-        part = self._shared.get(key)
-        if part is None:
-            part = make()
-            if sum(known.value.nbytes for known in self._shared.values()) > MOST_SHARED:
-                self._shared.clear()
-            self._shared[key] = part
-        at = self._n_number, self._n_value
-        self._number = _with_room(self._number, at[0], part.number.size)
-        self._value = _with_room(self._value, at[1], part.value.size)
-        self._n_number, self._n_value = at[0] + part.number.size, at[1] + part.value.size
-        self._number[at[0] : self._n_number], self._value[at[1] : self._n_value] = part.number, part.value
-        self._number[at[0] + part.shifted] += at[1]
-        return at
+        """Places in `number` and `value` of what belongs to a key."""
+        at_number, at_value, n_byte = self._room.take(key, make)
+        self._n_byte += n_byte
+        return at_number, at_value
 
 
 def _with_room(array: NDArray[Any], n_filled: int, n_more: int) -> NDArray[Any]:

@@ -9,7 +9,8 @@ from trial_rig import trial_rig
 from rubhpc import State
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
-from rubhpc.integrate.reduced_model.transitions import MetTransitions
+from rubhpc.integrate.reduced_model import transitions
+from rubhpc.integrate.reduced_model.transitions import MetTransitions, TransitionRoom
 from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.kernels.friction_coordinates import energies_gained, used_width
@@ -45,7 +46,7 @@ def settled():
 
 def tables_of(march, before, after):
     """All of a transition, whatever a case has passed."""
-    met = MetTransitions({})
+    met = MetTransitions(TransitionRoom())
     met._entry[before, after] = UNKNOWN - WORTH_A_TABLE
     assert met.is_due(before, after, is_counted=True)
     met.tabulate(march._tables_of(before), march._tables_of(after), march.bodies, march._friction)
@@ -164,6 +165,17 @@ def test_a_case_does_not_depend_on_tables_that_others_have_made(settled):
     assert not alone.library.transitions
     assert after_another.library.transitions
     assert advance(alone, 10).tobytes() == advance(after_another, 10).tobytes()
+
+
+def test_a_case_that_finds_the_room_full_begins_another(settled, monkeypatch):
+    """The one that is under way keeps its places."""
+    march, before = whip(), settled.library.transitions
+    monkeypatch.setattr(transitions, "MOST_SHARED", 0)
+    others = whip(settled.setup)
+    assert settled._met._room is before
+    assert others._met._room is settled.library.transitions is not before
+    assert advance(others, 10).tobytes() == advance(march, 10).tobytes()
+    settled.library.transitions = before
 
 
 def test_rings_whose_modes_may_be_given_up_have_no_tables():
