@@ -64,7 +64,7 @@ def test_a_run_up_over_constant_speed(seconds, capsys):
 @pytest.mark.parametrize("count", [8, 16])
 @on_one_thread
 def test_an_overhung_pump_in_a_ring(count, capsys):
-    """Gyroscopic terms matter: matrices are held over 26 ranges of speed, each with sets of contacts."""
+    """Gyroscopic terms matter: matrices are held over few ranges of speed, each with sets of contacts."""
     tips = [LumpedStator(node=6, angle=0.2 + i * 2.0 * math.pi / count, **SEGMENT) for i in range(count)]
     rig = replace(pump(), stator=tuple(tips))
     speed_law = SpeedLaw(time=(0.0, 8.0), speed=(300.0, 360.0))
