@@ -48,15 +48,27 @@ class Accumulator(NamedTuple):
     force_held: Ints  # (q, 2), which of them
     origin: Floats  # (1,), s, by which their clock is ahead of the march's
     peak_lateral: Floats  # (q,), m
-    energy: Floats  # (5,), J: see the indices below
+    energy: Floats  # (6,), J: see the indices below
     pivots: Ints  # (1,), most that one contact problem took
     residual: Floats  # (3, 2), largest distance from the laws, and what forces moved: see the indices below
 
 
-UNBALANCE_WORK, DRIVE_WORK, DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS = range(5)
+UNBALANCE_WORK, DRIVE_WORK, DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS, RUB_WORK = range(6)
 
 # Contact problems: gaps of a step, m; velocities of an impact, m/s; accelerations after it, m/s2.
 STEP, IMPACT, PRESSING = range(3)
+
+
+@jit_inline
+def observe_rub(drive: float, loss: float, accumulator: Accumulator) -> None:
+    """Add the work of the drive against friction and the loss by it, J, and what is left for the bodies.
+
+    `RUB_WORK` is a sum of differences: in the difference of two sums a rotor that stands and rubs would leave
+    the rounding of all that it has rubbed.
+    """
+    accumulator.energy[DRIVE_WORK] += drive
+    accumulator.energy[FRICTION_LOSS] += loss
+    accumulator.energy[RUB_WORK] += drive - loss
 
 
 @jit_inline
@@ -144,8 +156,8 @@ def observe_contact(
         accumulator.friction_work[i] += friction_force * slip * step
         accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
         observe_force(i, begin, step, force * step, force, force, accumulator)
-        accumulator.energy[DRIVE_WORK] += friction_force * pairs.radius[i] * abs(spin) * step
-        accumulator.energy[FRICTION_LOSS] += friction_force * slip * step
+        drive = friction_force * pairs.radius[i] * abs(spin) * step
+        observe_rub(drive, friction_force * slip * step, accumulator)
         accumulator.energy[IMPACT_LOSS] -= force * opening * step
 
 

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit, jit_inline
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
-    FRICTION_LOSS,
     IMPACT_LOSS,
     STEP,
     TWIST_ACCELERATION,
@@ -18,6 +17,7 @@ from rubhpc.kernels.accumulators import (
     centred,
     observe_contact,
     observe_motion,
+    observe_rub,
     observe_solution,
     take_sample,
 )
@@ -265,7 +265,7 @@ def observe_delays(row: Ints, work: Workspace, change: Floats, accumulator: Accu
                 opened += work.gap_jacobian[i, a] * moved
                 slipped -= (work.force_direction[i, a] - work.gap_jacobian[i, a]) * moved
         accumulator.friction_work[i] += slipped
-        accumulator.energy[FRICTION_LOSS] += slipped
+        observe_rub(0.0, slipped, accumulator)
         accumulator.energy[IMPACT_LOSS] -= opened
 
 

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
-    DRIVE_WORK,
-    FRICTION_LOSS,
     HORIZONTAL,
     TWIST,
     TWIST_ACCELERATION,
@@ -18,6 +16,7 @@ from rubhpc.kernels.accumulators import (
     Accumulator,
     Samples,
     observe_force,
+    observe_rub,
     observe_sense,
 )
 from rubhpc.kernels.case_progress import Clock, Progress, shaft_turn
@@ -244,8 +243,7 @@ def observe_curved_step(
             length = (NODES[node + 1] - NODES[node]) * step
             first, last = work.force[node, i], work.force[node + 1, i]
             observe_force(i, begin + NODES[node] * step, length, part * step, first, last, accumulator)
-        accumulator.energy[FRICTION_LOSS] += friction_work
-        accumulator.energy[DRIVE_WORK] += reduced.friction[i] * reduced.rim_speed[i] * impulse
+        observe_rub(reduced.friction[i] * reduced.rim_speed[i] * impulse, friction_work, accumulator)
 
 
 @jit_inline_sum

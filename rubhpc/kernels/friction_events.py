@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean
 from rubhpc.kernels.accumulators import (
-    DRIVE_WORK,
-    FRICTION_LOSS,
     IMPACT,
     IMPACT_LOSS,
     Accumulator,
+    observe_rub,
     observe_sense,
     observe_solution,
 )
@@ -339,8 +338,7 @@ def observe_impacts(bodies: FrictionBodies, work: FrictionWork, accumulator: Acc
             after = work.slip[i] + change
             after = after if abs(after) > AT_REST else 0.0
             accumulator.least_slip[i] = min(accumulator.least_slip[i], work.slip[i], after)
-            accumulator.energy[FRICTION_LOSS] += friction_work
-            accumulator.energy[DRIVE_WORK] += solver.traction[i] * bodies.rim_speed[i]
+            observe_rub(solver.traction[i] * bodies.rim_speed[i], friction_work, accumulator)
             accumulator.energy[IMPACT_LOSS] -= solver.force[i] * (work.rate[i] + 0.5 * gap_change(solver, i))
 
 

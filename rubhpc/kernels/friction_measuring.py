@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum
-from rubhpc.kernels.accumulators import DAMPING_LOSS, DRIVE_WORK, FRICTION_LOSS, observe_force
+from rubhpc.kernels.accumulators import DAMPING_LOSS, observe_force, observe_rub
 from rubhpc.kernels.contact_modes import DYING, RESOLVED, ModeTables
 from rubhpc.kernels.cubics import turning_value
 from rubhpc.kernels.force_average import AVERAGING_TIME
@@ -133,6 +133,7 @@ def observe_friction(
         accumulator.impulse[i] += impulse
         observe_force(i, begin, step, impulse, before, after, accumulator)
         across_bend = step * (across_rate_before - across_rate_after)
+        friction_work = 0.0
         if state == STUCK:
             rubbed = step * (0.5 * (across_before + across_after) + across_bend / 12.0)
             accumulator.stick_time[i] += step
@@ -144,8 +145,6 @@ def observe_friction(
             work = before * across_before + 4.0 * middle * across_middle + after * across_after
             friction_work = sense * bodies.sliding[i] * work * step / 6.0
             accumulator.friction_work[i] += friction_work
-            accumulator.energy[FRICTION_LOSS] += friction_work
-            accumulator.energy[DAMPING_LOSS] -= friction_work
             least = min(across_before, across_after)
             if across_rate_before < 0.0 and across_rate_after > 0.0:
                 least = turning_value(
@@ -154,5 +153,6 @@ def observe_friction(
             if state == FORWARD:
                 least = max(least, 0.0)
             accumulator.least_slip[i] = min(accumulator.least_slip[i], least)
-        accumulator.energy[DRIVE_WORK] += bodies.rim_speed[i] * rubbed
-        accumulator.energy[DAMPING_LOSS] += bodies.rim_speed[i] * rubbed
+        drive = bodies.rim_speed[i] * rubbed
+        observe_rub(drive, friction_work, accumulator)
+        accumulator.energy[DAMPING_LOSS] += drive - friction_work

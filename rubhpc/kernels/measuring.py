@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
-    DRIVE_WORK,
-    FRICTION_LOSS,
     UNBALANCE_WORK,
     Accumulator,
     Samples,
     observe_force,
+    observe_rub,
     observe_sense,
 )
 from rubhpc.kernels.case_progress import NONE, Clock, Progress
@@ -137,8 +136,7 @@ def observe_step(
             observe_sense(i, 1 if slip_after > 0.0 else -1, accumulator)
         observe_force(i, begin, step, impulse, before, after, accumulator)
         drive = reduced.friction[i] * reduced.radius[i] * abs(spin) * impulse
-        accumulator.energy[FRICTION_LOSS] += friction_work
-        accumulator.energy[DRIVE_WORK] += drive
+        observe_rub(drive, friction_work, accumulator)
         accumulator.energy[DAMPING_LOSS] += drive - friction_work
 
 

@@ -7,12 +7,11 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import (
-    DRIVE_WORK,
-    FRICTION_LOSS,
     IMPACT,
     IMPACT_LOSS,
     PRESSING,
     Accumulator,
+    observe_rub,
     observe_solution,
 )
 from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_active, solve_complementarity
@@ -143,7 +142,7 @@ def observe_impact(
         slip = reduced.radius[i] * abs(spin) - gain
         accumulator.least_slip[i] = min(accumulator.least_slip[i], slip, slip - change / reduced.friction[i])
     accumulator.impulse[i] += impulse
-    accumulator.friction_work[i] += drive - (total - closing) * impulse
-    accumulator.energy[DRIVE_WORK] += drive
-    accumulator.energy[FRICTION_LOSS] += drive - (total - closing) * impulse
+    friction_work = drive - (total - closing) * impulse
+    accumulator.friction_work[i] += friction_work
+    observe_rub(drive, friction_work, accumulator)
     accumulator.energy[IMPACT_LOSS] -= closing * impulse

@@ -21,7 +21,7 @@ from rubhpc.study.axes import (
 if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
-PHYSICS = 22  # version of the physics: raised whenever a study gives other results than before
+PHYSICS = 23  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
 MODAL = 4  # method = "modal": modes kept, and `modal_error`
 DIRECT = 6  # transient = "direct"

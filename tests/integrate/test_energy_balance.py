@@ -8,6 +8,7 @@ from trial_rig import trial_rig
 
 from rubhpc import LumpedStator, read_rig, simulate
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
+from rubhpc.rig.forces import Load
 from rubhpc.rig.reading import with_keys
 
 STIFF = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": 3e10})
@@ -53,6 +54,18 @@ def test_energy_balances_where_a_ring_bounces_thousands_of_times_a_revolution():
     record = simulate(rig, **case, **COULOMB, **FEW | {"transient": 1, "revolutions": 2})
     assert record.measures["left_closed_form"] == 0
     assert record.energy_residual < 1e-6
+
+
+@pytest.mark.parametrize("law", [{}, COULOMB], ids=str)
+def test_energy_balances_where_a_loaded_rotor_stands_and_rubs(law):
+    """On two walls below the shaft: friction dissipates 2.5 kJ, and nothing moves."""
+    walls = tuple(LumpedStator(node=8, rigid=True, radius=0.06, angle=math.pi + at) for at in (-0.7, 0.7))
+    rotor = replace(STIFF.rotor, gravity=9.81, load=(Load(node=8, vertical=-300.0),))
+    case = {"speed": 20.0, "clearance": "20 um", "friction": 0.8}
+    record = simulate(replace(STIFF, rotor=rotor, stator=walls), **case, **law, **FEW | {"revolutions": 32})
+    assert record.contact_fraction == pytest.approx([1.0, 1.0])
+    assert record.friction_work.sum() > 10.0
+    assert record.energy_residual < 1e-8
 
 
 def test_energy_residual_shows_friction_that_does_not_act(monkeypatch):

@@ -121,7 +121,7 @@ def test_limits_are_coulombs_law():
         ),
         ({"friction_law": "table", "slip_speed": [0, 1], "friction_ratio": [1, -1]}, "at least 0"),
         ({"friction_law": "coulomb", "stribeck_speed": 0.1}, "stribeck_speed: other laws have no such speed"),
-        ({"static_friction_ratio": 1.2}, 'this law has no such ratio; take friction_law = "coulomb"'),
+        ({"static_friction_ratio": 1.2}, 'this law has no such ratio; set friction_law = "coulomb"'),
     ],
 )
 def test_keys_that_do_not_agree_are_refused(given, message):

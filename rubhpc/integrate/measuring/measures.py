@@ -13,10 +13,9 @@ from rubhpc.integrate.measuring.regimes import regime
 from rubhpc.integrate.measuring.settling import settled
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
-    DRIVE_WORK,
-    FRICTION_LOSS,
     HORIZONTAL,
     IMPACT_LOSS,
+    RUB_WORK,
     TWIST,
     UNBALANCE_WORK,
     VERTICAL,
@@ -95,11 +94,11 @@ def measures_of(
     multiplier = verdict.multiplier
     rim = stators[0].radius * signals["torsion"]  # m, as the orbit
     force = signals["contact_force"].reshape(len(stators), n_revolution, samples_per_revolution)
-    # Drive and friction exchange a hundred times what the vibration feels of them: only their difference
-    # counts.
+    # Drive and friction exchange a hundred times what the vibration feels of them, and a rotor that stands
+    # exchanges nothing else: only their difference counts.
     flows = [
         accumulator.energy[UNBALANCE_WORK],
-        accumulator.energy[DRIVE_WORK] - accumulator.energy[FRICTION_LOSS],
+        accumulator.energy[RUB_WORK],
         -accumulator.energy[DAMPING_LOSS],
         -accumulator.energy[IMPACT_LOSS],
     ]

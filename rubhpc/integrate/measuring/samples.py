@@ -99,7 +99,7 @@ def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
         least_slip=least_slip,
         peak_force=peak_force,
         peak_lateral=np.zeros(n_place),
-        energy=np.zeros(5),
+        energy=np.zeros(6),
         pivots=np.zeros(1, dtype=np.int64),
         residual=np.zeros((3, 2)),
         **window,
