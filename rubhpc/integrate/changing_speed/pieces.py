@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
 
+SAGGING_AT_ONCE = 8  # pieces taken together where their sag, one for all, follows the speed
 LEAST_GROWTH = 1e-5  # of the unbalance force in a piece
 MOST_HELD = 4  # matrices at hand, of a spin that swings between them
 MOST_BYTES = 3 * 2**29  # of contact modes that are kept, with their matrices, for other cases
@@ -91,8 +92,9 @@ class Pieces:
         first = 0
         while first < speed.size:
             held, last = self._find(float(speed[first]), float(acceleration[first])), first + 1
+            at_once = SAGGING_AT_ONCE if held.sags else AT_ONCE
             while (
-                last < min(speed.size, first + AT_ONCE)
+                last < min(speed.size, first + at_once)
                 and n_sample[last] == n_sample[first]
                 and acceleration[last] == acceleration[first]
                 and held.serve(speed[last], acceleration[last])

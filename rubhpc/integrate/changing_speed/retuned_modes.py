@@ -35,8 +35,8 @@ from rubhpc.kernels.retuning import retune
 from rubhpc.kernels.retuning_laws import Springs
 
 NOT_TUNED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
-AT_ONCE = 8  # pieces to whose speeds a contact mode is tuned at once
-MOST_BYTES = 2**22  # of its tables for so many pieces; where they are more, pieces take turns in one
+AT_ONCE = 16  # pieces to whose speeds a contact mode is tuned at once
+MOST_BYTES = 2**23  # of its tables for so many pieces; where they are more, pieces take turns in one
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
