@@ -42,9 +42,7 @@ MOST_ITERATIONS, LEAST_STEP = 10, 1 / 4  # of Newton's method
 LOST = 3 / 4  # of what the linear theory takes from its distance, that it loses at least
 FAR = 1e-2  # of the square of its distance, until which the linear theory must keep its contacts
 AGAIN = 0.7  # of that square, at which they are looked at once more
-STRAYS = (
-    0.3  # of its distance a period before: a case that strays less from the linear theory may be led by it
-)
+STRAYS = 0.3  # of its distance a period before: a case that strays less may follow the linear theory
 MOST_EVENTS = 24, 8  # in a revolution: of one pair, and more for each further one
 
 
