@@ -1,7 +1,7 @@
-"""How numba compiles kernels: what they do not need is left out, in four fifths of the time.
+"""Numba compilers for kernels: steps that kernels do not need are left out, which saves a fifth of the time.
 
 Kernels take tuples of up to 30 arrays. Numba copies a whole tuple where one field of it is read, and clears a
-tuple that is deleted: a tenth of the code that LLVM is given is left in the end.
+tuple that is deleted. Without these copies LLVM receives a tenth of the code.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from numba.core.typed_passes import BaseNativeLowering, NativeLowering
 
 
 class Flags(NumbaFlags):
-    """The same flags, which compare only what is set and have their hash at hand.
+    """Numba's flags with a cached hash; two are compared by the options that are set.
 
     Numba looks up each call that it types by the flags, and reads all of some 35 options for each hash and
-    comparison: a tenth of the time of a compilation. The class bears numba's name, which is in the names of
-    what is compiled.
+    comparison: a tenth of the time of a compilation. The class has numba's name, because names of compiled
+    functions contain it.
     """
 
     __slots__ = ()
@@ -41,15 +41,15 @@ class Flags(NumbaFlags):
         )
 
 
-_HASH = hash(NumbaFlags())  # of the names of the options, as numba has it
+_HASH = hash(NumbaFlags())  # of the option names, as in numba
 _NAMED = (types.NamedTuple, types.NamedUniTuple)
 
 
 class _FieldLower(Lower):
-    """Write LLVM's code of a function, in which a tuple's field is read without the tuple.
+    """Lower a function to LLVM code that reads a field of a tuple without copying the tuple.
 
-    Where references are not counted, nothing is to be done to what a variable held before, or to one that is
-    deleted.
+    Without reference counting, neither the previous value of a variable nor a deleted variable needs any
+    code.
     """
 
     def lower_expr(self, resty: Any, expr: Any) -> Any:
@@ -82,7 +82,7 @@ class _FieldLower(Lower):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _FieldLowering(BaseNativeLowering):
-    """Numba's pass with the class above."""
+    """Numba's lowering pass with `_FieldLower`."""
 
     _name = "field_lowering"  # type: ignore[assignment]
 
@@ -92,7 +92,7 @@ class _FieldLowering(BaseNativeLowering):
 
 
 class _KernelCode(JITCodeLibrary):
-    """Code of a kernel; where references are not counted, none are looked for before it is optimised."""
+    """Code of a kernel; without reference counting, the search for reference operations is skipped."""
 
     counts_references = False
 
@@ -106,14 +106,14 @@ class _KernelCode(JITCodeLibrary):
 
 
 class _LinkedCode(_KernelCode):
-    """Code that is compiled into kernels and never run by itself: no machine code is made of it."""
+    """Code that is linked into kernels and never runs by itself: no machine code is generated for it."""
 
     @property
     def codegen(self) -> Any:
         return self
 
     def set_env(self, name: str, env: Any) -> None:
-        """Do nothing: what would be written to memory is that of the kernel."""
+        """Do nothing: the environment in memory is that of the kernel."""
 
     def get_pointer_to_function(self, name: str) -> int:
         self._ensure_finalized()
@@ -126,7 +126,7 @@ class _LinkedCode(_KernelCode):
 
 
 class _PartCode(_LinkedCode):
-    """Such code that is optimised with its callers alone."""
+    """Linked code that is optimised only together with its callers."""
 
     def _optimize_final_module(self) -> None:
         """Do nothing."""
@@ -154,19 +154,19 @@ class KernelCompiler(Compiler):
 
 
 class LinkedCompiler(KernelCompiler):
-    """Compile a function as far as its callers need it, which saves a sixteenth of the time of all."""
+    """Compile a function only as far as its callers need it, which saves a sixteenth of the total time."""
 
     _code = _LinkedCode
 
 
 class PartCompiler(LinkedCompiler):
-    """Compile a function that is optimised with its callers alone."""
+    """Compile a function that is optimised only together with its callers."""
 
     _code = _PartCode
 
 
 class ApartCompiler(PartCompiler):
-    """Compile such a function for arrays that do not overlap, which are then not compared at each loop."""
+    """Compile such a function for arrays that do not overlap, so that loops need no overlap checks."""
 
     def compile_extra(self, func: Any) -> Any:
         self.state.flags.noalias = True

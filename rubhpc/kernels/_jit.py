@@ -23,7 +23,7 @@ from rubhpc.kernels._compiler import ApartCompiler, Flags, KernelCompiler, Linke
 F = TypeVar("F", bound=Callable[..., object])
 
 # "contract" allows fused multiply-add, "nsz" ignores the sign of zero; "nnan" and "ninf" would make
-# isfinite(nan) true, and "reassoc" would let sums depend on how a loop was vectorised.
+# isfinite(nan) true, and "reassoc" would make sums depend on how a loop was vectorised.
 _FLAGS: dict[str, Any] = {
     "cache": True,
     "error_model": "numpy",
@@ -31,20 +31,20 @@ _FLAGS: dict[str, Any] = {
     "fastmath": {"contract", "nsz"},
     "no_cfunc_wrapper": True,  # no C function calls a kernel
 }
-# Sums over modes may be reordered, without which no such loop is vectorised; never what isfinite relies on.
+# Sums over modes may be reordered: otherwise no such loop is vectorised. Flags that break isfinite stay off.
 _SUM_FLAGS: dict[str, Any] = {**_FLAGS, "fastmath": {"contract", "nsz", "reassoc"}}
-# References are not counted: Python holds all arrays. Other products are fused with sums than where they are,
-# so that a kernel which changes over may change the last bits of what it computes.
+# No reference counting: Python holds all arrays. Different products are fused with sums, so switching a
+# kernel to these flags may change the last bits of its results.
 _LEAN_FLAGS: dict[str, Any] = {**_FLAGS, "_nrt": False}
 _LEAN_SUM_FLAGS: dict[str, Any] = {**_SUM_FLAGS, "_nrt": False}
 _PACKAGE = re.escape(__package__)
 _IMPORTS = re.compile(rf"\b{_PACKAGE}\.(\w+)|\bfrom {_PACKAGE} import ([\w ,]+|\([^)]*\))")
-_MOST_CACHES = 4  # of a module that are kept, of other sources each
+_MOST_CACHES = 4  # kept of a module, each of another state of the sources
 
 
 @cache
 def _imported_by(path: Path) -> frozenset[Path]:
-    """Files of this package that one of them names in its imports."""
+    """Files of this package that a file of it imports."""
     words = " ".join(chain.from_iterable(_IMPORTS.findall(path.read_text())))
     return frozenset(
         file for word in re.findall(r"\w+", words) if (file := path.with_name(f"{word}.py")).exists()
@@ -53,7 +53,7 @@ def _imported_by(path: Path) -> frozenset[Path]:
 
 @cache
 def _sources_of(path: Path) -> str:
-    """Digest of all sources that the kernels of a file are compiled from: its own, and what it imports."""
+    """Digest of all sources that the kernels of a file are compiled from: the file and its imports."""
     found: set[Path] = set()
     waiting = {path}
     while waiting:
@@ -64,12 +64,12 @@ def _sources_of(path: Path) -> str:
 
 
 class Compilation:
-    """What is known of compilations in this process.
+    """Time and progress of compilations in this process.
 
     Attributes
     ----------
     seconds : float
-        Spent on them so far, waiting for other processes included.
+        Spent on compilation so far, including waiting for other processes.
     began : callable
         Called with the name of a kernel that is in no cache, before it is compiled.
     """
@@ -81,7 +81,7 @@ class Compilation:
 
     @contextmanager
     def of(self, name: str, lock: Path) -> Iterator[None]:
-        """Around the compilation of a kernel, and of all that it calls; one process at a time."""
+        """Context of the compilation of a kernel and of all that it calls; one process at a time."""
         with global_compiler_lock, ExitStack() as held:
             if self._depth == 0:
                 self.began(name)
@@ -102,7 +102,7 @@ compilation = Compilation()
 
 @contextmanager
 def _alone_with(lock: Path) -> Iterator[None]:
-    """Wait until no other process compiles a kernel: it would repeat the work.
+    """Wait until no other process compiles a kernel: this process would repeat the work.
 
     A process waits for a kernel while it compiles what calls it, never the other way round.
     """
@@ -114,14 +114,14 @@ def _alone_with(lock: Path) -> Iterator[None]:
 
 
 def _wait_for(lock: Path) -> None:
-    """Wait for a process that compiles a kernel, if there is one."""
+    """Wait while another process compiles a kernel."""
     if lock.exists():
         with _alone_with(lock):
             pass
 
 
 def _drop_old(folder: Path) -> None:
-    """Remove all but the latest caches of other sources."""
+    """Remove all but the latest caches of other states of the sources."""
     name, _, _ = folder.name.rpartition("-")
     others = [path for path in folder.parent.glob(f"{name}-*") if path != folder and path.is_dir()]
     for path in sorted(others, key=lambda path: path.stat().st_mtime)[: -(_MOST_CACHES - 1)]:
@@ -129,11 +129,11 @@ def _drop_old(folder: Path) -> None:
 
 
 def _stamped(compiled: Any) -> Any:
-    """Cache a kernel by the content of its sources, and compile it in one process at a time.
+    """Cache a kernel by the content of its sources and compile it in one process at a time.
 
     Numba compares the date of a function's own file, though what it calls from other files is compiled into
-    it, and an installation renews all dates. Each state of the sources has a folder of its own, so that
-    versions that take turns in one environment keep theirs.
+    it, and an installation renews all dates. Each state of the sources has its own folder, so that versions
+    that alternate in one environment keep their caches.
     """
     cache = getattr(compiled, "_cache", None)
     file = getattr(cache, "_cache_file", None)
@@ -159,30 +159,30 @@ def _stamped(compiled: Any) -> Any:
 
 
 def _quick(compiled: Any) -> Any:
-    """Give a kernel flags that are compared quickly."""
+    """Give a kernel flags with a fast comparison."""
     if hasattr(compiled, "_compiler"):  # not under NUMBA_DISABLE_JIT
         compiled._compiler._customize_flags = Flags
     return compiled
 
 
 def cache_of(kernel: Callable[..., object]) -> Path:
-    """Path of the file that lists what of a kernel is in the cache, if anything is."""
+    """Path of the index file of a kernel's cache; the file may not exist."""
     cache: Any = getattr(kernel, "_cache", None)
     return Path(cache._cache_file._index_path) if cache is not None else Path(os.devnull)
 
 
 def _is_cached(compiled: Any, signature: Any) -> bool:
-    """Whether a kernel lies in the cache on the disk."""
+    """Whether a kernel is in the cache on the disk."""
     compiled.targetctx.refresh()
     key = compiled._cache._index_key(signature, compiled.targetctx.codegen())
     return key in compiled._cache._cache_file._load_index()
 
 
 def _of_kernels(compiled: Any, flags: dict[str, Any], compiler: type[LinkedCompiler]) -> Any:
-    """Compile a kernel that other kernels call without the wrapper that takes Python's arguments apart.
+    """Compile a kernel that other kernels call without the wrapper that unpacks Python arguments.
 
-    The wrapper of tables of arrays takes as long to compile as the kernel. What a kernel calls is compiled
-    into it, so it needs no cache either. One that was called from Python is taken as it is.
+    A wrapper for tables of arrays takes as long to compile as the kernel. Called kernels are compiled into
+    their callers, so they need no cache either. A kernel that Python has called before is used unchanged.
     """
     if not hasattr(compiled, "overloads"):  # under NUMBA_DISABLE_JIT
         return compiled
@@ -216,9 +216,9 @@ def _inlined(function: F, flags: dict[str, Any]) -> F:
 
 
 def plain(kernel: F) -> F:
-    """Return the Python function of a kernel that Python asks now and then, to compile nothing for that.
+    """Return the Python function of a kernel, for rare calls that are not worth a compilation.
 
-    For what compares and looks up; the last bits of products and sums are those of compiled code.
+    Only for comparisons and look-ups: compiled code may give other last bits of products and sums.
     """
     function: F = getattr(kernel, "py_func", kernel)
     return function
@@ -232,7 +232,7 @@ def jit(function: F) -> F:
 def jit_inline(function: F) -> F:
     """Compile a kernel into its callers, once for each call.
 
-    For what is small, or called once with a tuple of arrays: handing it over costs 0.1 us and more.
+    For small kernels, and for those called once with a tuple of arrays: passing it costs 0.1 us and more.
     """
     return _inlined(function, _FLAGS)
 
@@ -253,7 +253,7 @@ def jit_lean_sum(function: F) -> F:
 
 
 def jit_part_sum(function: F) -> F:
-    """Compile such a kernel that only kernels call: LLVM optimises it with its callers, not before them."""
+    """Compile such a kernel that only kernels call: LLVM optimises it with its callers, not separately."""
     return _compiled(function, _LEAN_SUM_FLAGS, PartCompiler)
 
 

@@ -1,4 +1,4 @@
-"""What is gathered while a case runs: extrema, contact statistics and the energy balance, step by step."""
+"""Accumulators of a running case: extrema, contact statistics and the energy balance, step by step."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Samples(NamedTuple):
     lateral: Floats  # (q, n_sample), m
     force: Floats  # (q, n_sample), N
     probe: Floats  # (n_probe, n_sample), each in its own unit
-    whole: Floats  # (4 + 3 q + n_probe, n_sample), of which the others are rows, in this order
+    whole: Floats  # (4 + 3 q + n_probe, n_sample), the arrays above as rows, in this order
 
 
 class Accumulator(NamedTuple):
@@ -44,13 +44,13 @@ class Accumulator(NamedTuple):
     friction_work: Floats  # (q,), J
     least_slip: Floats  # (q,), m/s
     peak_force: Floats  # (q,), N, largest mean over the averaging time: see `force_average`
-    force_piece: Floats  # (q, 7, n), pieces of the force within that time
-    force_held: Ints  # (q, 2), which of them
-    origin: Floats  # (1,), s, by which their clock is ahead of the march's
+    force_piece: Floats  # (q, 7, n), pieces of the force within the averaging time
+    force_held: Ints  # (q, 2), oldest piece and number of pieces
+    origin: Floats  # (1,), s, by which their clock is ahead of the integrator's
     peak_lateral: Floats  # (q,), m
     energy: Floats  # (6,), J: see the indices below
-    pivots: Ints  # (1,), most that one contact problem took
-    residual: Floats  # (3, 2), largest distance from the laws, and what forces moved: see the indices below
+    pivots: Ints  # (1,), most pivots of one contact problem
+    residual: Floats  # (3, 2), largest deviation from the laws, displacement by the forces: indices below
 
 
 UNBALANCE_WORK, DRIVE_WORK, DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS, RUB_WORK = range(6)
@@ -61,10 +61,10 @@ STEP, IMPACT, PRESSING = range(3)
 
 @jit_inline
 def observe_rub(drive: float, loss: float, accumulator: Accumulator) -> None:
-    """Add the work of the drive against friction and the loss by it, J, and what is left for the bodies.
+    """Add the work of the drive against friction, the frictional loss, and the difference, J.
 
-    `RUB_WORK` is a sum of differences: in the difference of two sums a rotor that stands and rubs would leave
-    the rounding of all that it has rubbed.
+    `RUB_WORK` is a sum of differences. The difference of the two sums would carry their rounding errors,
+    which grow with all the friction work of a rotor that stands and rubs.
     """
     accumulator.energy[DRIVE_WORK] += drive
     accumulator.energy[FRICTION_LOSS] += loss
@@ -75,7 +75,7 @@ def observe_rub(drive: float, loss: float, accumulator: Accumulator) -> None:
 def take_sample(
     displacement: Floats, output_row: Ints, pair_row: Ints, i_sample: int, samples: Samples
 ) -> None:
-    """Record the displacements of output node and stator tips; held degrees stay zero."""
+    """Record the displacements of output node and stator tips; constrained degrees stay zero."""
     for k in range(3):
         if output_row[k] >= 0:
             samples.rotor[k, i_sample] = displacement[output_row[k]]
@@ -95,7 +95,7 @@ def observe_motion(
     lowest: Floats,
     peak_lateral: Floats,
 ) -> None:
-    """Widen the extrema of the output node's degrees (3,) and of the stator tips (q,); row -1 is held."""
+    """Update the extrema of the output node's degrees (3,) and the tips (q,); row -1 is constrained."""
     for k in range(3):
         value = displacement[output_row[k]] if output_row[k] >= 0 else 0.0
         highest[k] = max(highest[k], value)
@@ -119,9 +119,9 @@ def observe_contact(
 ) -> None:
     """Add one step's contact; velocities are half a step before and after the step's forces.
 
-    The step begins at the time `begin` (s), and its force is taken for constant. The slip speed is
-    `r_d (spin + thx') + t . (vA - vB)`, signed so that steady sliding is positive. What the normal force does
-    not give back, `-N` times the rate of the gap, is the loss of the impacts.
+    The step begins at the time `begin` (s); its force is taken as constant. The slip speed is
+    `r_d (spin + thx') + t . (vA - vB)`, signed so that steady sliding is positive. The work that the normal
+    force does not return, `-N` times the rate of the gap, is the loss of the impacts.
     """
     sense = rim_sense(spin)
     for i in range(pairs.radius.size):
@@ -182,7 +182,7 @@ def observe_force(
 
 @jit_inline
 def observe_sense(i: int, sense: int, accumulator: Accumulator) -> None:
-    """Note in which sense (1 or -1) pair i slides, and whether that is another than before."""
+    """Record the sense (1 or -1) in which pair i slides, and count a reversal if it has changed."""
     if accumulator.sense[i] == -sense:
         accumulator.reversals[i] += 1
     accumulator.sense[i] = sense
@@ -192,7 +192,7 @@ def observe_sense(i: int, sense: int, accumulator: Accumulator) -> None:
 def observe_solution(
     problem: int, pivots: int, residual: float, moved: float, accumulator: Accumulator
 ) -> None:
-    """Note what a contact problem has taken, and how far its solution is from the laws."""
+    """Record the pivots of a contact problem and the deviation of its solution from the laws."""
     accumulator.pivots[0] = max(accumulator.pivots[0], pivots)
     accumulator.residual[problem, 0] = max(accumulator.residual[problem, 0], residual)
     accumulator.residual[problem, 1] = max(accumulator.residual[problem, 1], moved)
@@ -200,5 +200,5 @@ def observe_solution(
 
 @jit_inline
 def centred(row: int, velocity: Floats, velocity_next: Floats) -> float:
-    """Velocity of a degree at the time of the step's forces; zero where it is held."""
+    """Velocity of a degree at the time of the step's forces; zero where it is constrained."""
     return 0.5 * (velocity[row] + velocity_next[row]) if row >= 0 else 0.0

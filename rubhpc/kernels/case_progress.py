@@ -1,4 +1,4 @@
-"""How time is counted, and how far a case has come: what one kernel call leaves for the next."""
+"""Clock and progress of a case: the state that one kernel call leaves for the next."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ NONE = -1  # no contact mode wanted, no energies to add, no halving
 
 
 class Clock(NamedTuple):
-    """How time is counted."""
+    """Resolution and counting of time."""
 
     spin: float  # rad/s
     tick: float  # s
-    sample_level: int  # 2^level ticks are the interval of samples
+    sample_level: int  # samples are 2^level ticks apart
     samples_per_revolution: int
     search_level: int  # event-search steps, up to 2^level ticks, need no bound; they are checked at their end
     contact_level: int  # longest step with a pair closed while recording
-    n_sample: int  # samples of the record; it ends where the next one would stand
+    n_sample: int  # samples of the record, which ends where the next sample would be
     growth: float  # 1/s, of the unbalance force from tick 0 on; 0 at a constant speed
 
 
 class Progress(Protocol):
-    """How far a case has come; a record of integers, which kernels change in place.
+    """Progress of a case: a record of integers, which kernels change in place.
 
-    The kernels own it. Their callers read it, and change it by the functions below alone.
+    The kernels own it. Callers read it, and change it only through the functions below.
     """
 
     tick: int  # reached
@@ -45,10 +45,10 @@ class Progress(Protocol):
     next_sample: int  # to be taken
     entered: int  # tick at which the contact mode was entered
     energy_from: int  # tick from which energies are still to be added, or NONE
-    contact_age: int  # level of the contact's duration when its pace was last read, or NONE
+    contact_age: int  # level of the contact's duration when its rate of change was last read, or NONE
     resolved_level: int  # of the longest step that resolved the contact then
-    resolved: int  # ticks of that step, under set-valued friction
-    halving_level: int  # while halving towards an event: level of the longest step worth a try; else NONE
+    resolved: int  # ticks of that step (set-valued friction)
+    halving_level: int  # while halving towards an event: level of the longest step to try; else NONE
     is_after_event: int  # whether the next step is the first one after an event
 
 
@@ -65,12 +65,12 @@ def new_progress(n_case: int) -> Any:
 
 
 def bare(progress: Any) -> Any:
-    """The same records as NumPy's own type, whose items are read, and given to kernels, 20 times as fast."""
+    """The same records as a plain NumPy structured array: access and kernel calls are 20 times as fast."""
     return progress.view(np.ndarray).view(_RECORD)
 
 
 def restart_clock(record: Any, tick: int, sample: int, *, is_recorded: bool) -> None:
-    """Count time anew: the case of a bare record stands at `tick`, where `sample` is due."""
+    """Restart the clock of a bare record: the case is at `tick`, and `sample` is the next sample."""
     if passed := tick - int(record["tick"]):
         record["entered"] += passed
         record["counted_from"] += passed
@@ -81,23 +81,23 @@ def restart_clock(record: Any, tick: int, sample: int, *, is_recorded: bool) -> 
 
 
 def begin_in(record: Any, mode: int) -> None:
-    """Put the case of a bare record into a contact mode, of which it has the modal coordinates."""
+    """Set the contact mode of a bare record, whose modal coordinates are those of that mode."""
     record["mode"] = mode
 
 
 def ask_for(progress: Progress, mask: int) -> None:
-    """Have the case enter the contact mode with the pairs of `mask` closed, from its reduced motion."""
+    """Request the contact mode with the pairs of `mask` closed, to be entered from the reduced motion."""
     progress.wanted = mask
 
 
 def follow(progress: Progress, other: Progress) -> None:
-    """Stand where another march of the same case stands; no energies are to be added."""
+    """Take the progress of another integration of the same case; no energies are to be added."""
     progress.tick, progress.next_sample, progress.n_step = other.tick, other.next_sample, other.n_step
     progress.counted_from, progress.n_event, progress.energy_from = other.tick, 0, NONE
 
 
 def closed_pairs(progress: Progress, tables: ModeTables) -> int:
-    """Set of the pairs closed, bit i for pair i."""
+    """Set of the closed pairs, bit i for pair i."""
     return int(tables.mask[progress.mode])
 
 
@@ -110,7 +110,7 @@ def shaft_angle(clock: Clock, tick: int) -> float:
 
 @jit_inline_sum
 def shaft_turn(clock: Clock, tick: int, after: float = 0.0) -> tuple[float, float]:
-    """Cosine and sine of the shaft's angle a time `after` (s) a tick, as large as the unbalance has grown."""
+    """Cosine and sine of the shaft's angle a time `after` (s) a tick, times the growth of the unbalance."""
     angle = shaft_angle(clock, tick) + clock.spin * after
     size = np.exp(clock.growth * (tick * clock.tick + after))
     return size * np.cos(angle), size * np.sin(angle)

@@ -55,9 +55,9 @@ def apply_contact(
     share: Floats,
     motion: Floats,
 ) -> None:
-    """Add the contact forces' change of velocity over a step, the correction of Eqs. 23 and 24.
+    """Add the change of velocity by the contact forces of a step, the correction of Eqs. 23 and 24.
 
-    `share` (q,) of it is added to `motion`: one for velocities.
+    `share` (q,) is the fraction added to `motion`; 1 for velocities.
     """
     for i in range(force.size):
         if force[i] > 0.0 and share[i] != 0.0:
@@ -95,8 +95,9 @@ def advance(
 ) -> int:
     """Advance a case over samples `first_sample` to `last_sample` (excluded).
 
-    The shaft's angle is `2 pi i / samples_per_revolution` at sample i and turns on from there, so that no
-    phase error builds up. One step solves Eq. 20 for every block, finds the contact forces, and corrects.
+    The shaft's angle is `2 pi i / samples_per_revolution` at sample i and is integrated from there, so that
+    no phase error accumulates. One step solves Eq. 20 for every block, finds the contact forces, and
+    corrects.
 
     Parameters
     ----------
@@ -107,22 +108,22 @@ def advance(
     displacement_limit : float, m
         Displacement of the output node or of a rim beyond which the case has diverged.
     output_row : (3,)
-        Rows of vertical, horizontal and torsional displacement of the output node; -1 where held.
+        Rows of vertical, horizontal and torsional displacement of the output node; -1 where constrained.
     probe : (3, n_probe, n_dof)
-        What each probe sees of displacements, velocities and accelerations.
+        Weights of displacements, velocities and accelerations in the reading of each probe.
     state : (2, n_dof), m and m/s (rad and rad/s)
         Displacement, and velocity half a step earlier; advanced in place.
     scratch : (3, n_dof)
         Work space.
     reached : (1,)
-        The sample from which a case went that could not go on.
+        The last sample reached by a case that had to stop.
 
     Returns
     -------
     int
         FINISHED, DIVERGED or CONTACT_UNSOLVED.
     """
-    # Tuples are opened here: a field read inside the loop would count a reference at every step.
+    # Tuples are unpacked here: reading a field inside the loop would count a reference at every step.
     displacement, velocity = state[0], state[1]
     velocity_next, damping_force, residual = scratch[0], scratch[1], scratch[2]
     row, axis_y, axis_z, radius, clearance, aside = (
@@ -220,14 +221,14 @@ def advance(
                     ) / step
                 if i_step == 0:
                     read_probes(probe, step, displacement, velocity, velocity_next, i_sample, samples.probe)
-            if is_touching and bounces:  # what a force has moved before its impact was due
+            if is_touching and bounces:  # displacement by a force before the time of its impact
                 late[:] = -delay
                 for k in range(n_dof):
                     residual[k] = -displacement[k]
                 apply_contact(
                     start, inverse, row, block, force_direction, contact_force, step, late, displacement
                 )
-                if is_recorded:  # the loads have moved by it too
+                if is_recorded:  # the loads have done work on it too
                     for k in range(n_dof):
                         residual[k] += displacement[k]
                         energy[DAMPING_LOSS] += residual[k] * damping_force[k]
@@ -253,9 +254,9 @@ def advance(
 
 @jit_inline
 def observe_delays(row: Ints, work: Workspace, change: Floats, accumulator: Accumulator) -> None:
-    """Have the impulses of a step work at the velocities of their own instants, a delay after its beginning.
+    """Correct the work of a step's impulses for the velocities at their instants, each after its delay.
 
-    `change` (n_dof,) is that of the velocities over a step without its forces, by which they go on meanwhile.
+    `change` (n_dof,) is the change of the velocities over a step without contact forces.
     """
     for i in range(row.shape[0]):
         opened, slipped = 0.0, 0.0
@@ -279,7 +280,7 @@ def read_probes(
     i_sample: int,
     seen: Floats,
 ) -> None:
-    """Record what probes see, (n_probe, n_sample), between the velocities half a step before and after."""
+    """Record probe readings, (n_probe, n_sample), from the velocities half a step before and after."""
     for i in range(seen.shape[0]):
         value = 0.0
         for k in range(displacement.size):
@@ -293,7 +294,7 @@ def read_probes(
 
 @jit_inline
 def flush_decayed(state: Floats) -> None:
-    """Set motion that has died away to zero: subnormal numbers slow a step tenfold."""
+    """Set decayed motion to zero: subnormal numbers make a step ten times slower."""
     for i in range(state.shape[0]):
         for k in range(state.shape[1]):
             if abs(state[i, k]) < DECAYED:

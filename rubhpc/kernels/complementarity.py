@@ -1,6 +1,6 @@
-"""Linear complementarity: which of several contact pairs touch, and with what force.
+"""Linear complementarity: the closed pairs among several, and their forces.
 
-Find `force >= 0` with `gap + compliance @ force >= 0` and one of the two zero in every pair (paper,
+Find `force >= 0` with `gap + compliance @ force >= 0` such that one of the two is zero in every pair (paper,
 Eqs. 7 and 10).
 """
 
@@ -67,16 +67,16 @@ def solve_active(
 
 @jit_inline
 def natural_residual(give: float, force: float, gap: float) -> float:
-    """How far a pair is from complementarity, as its gap is measured: |min(give force, gap)|.
+    """Distance of a pair from complementarity, in the unit of its gap: |min(give force, gap)|.
 
-    `give` is what a unit force of the pair does to its own gap. Zero for force >= 0, gap >= 0, one of them 0.
+    `give` is the change of the pair's own gap by a unit force. Zero for force >= 0, gap >= 0, one of them 0.
     """
     return float(abs(min(give * force, gap)))
 
 
 @jit_lean
 def residual_of(compliance: Floats, gap: Floats, force: Floats) -> tuple[float, float]:
-    """Largest residual of a problem at `force`, and the most that a force moves its own gap."""
+    """Largest residual of a problem at `force`, and the largest change of a gap by its own force."""
     largest, moved = 0.0, 0.0
     for i in range(gap.size):
         end = gap[i]
@@ -98,7 +98,7 @@ def solve_complementarity(
 ) -> int:
     """Forces of all pairs, N, by block principal pivoting; returns the pivots taken, or UNSOLVED.
 
-    Every violated pair is exchanged at once as long as that lowers their number; else the last one alone
+    All violated pairs are exchanged at once as long as that reduces their number; else only the last one
     (Murty's rule, finite for P-matrices; Judice and Pires, Comput. Oper. Res. 21 (1994) 587-596).
 
     Parameters

@@ -1,4 +1,4 @@
-"""The contact forces of a step: what closes the gaps, or what the laws of impact and friction ask for."""
+"""The contact forces of a step: those that close the gaps, or that laws of impact and friction require."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from rubhpc.kernels.coulomb_friction import fill_slip, friction_residual, solve_
 from rubhpc.kernels.laws import gap_target, is_bouncing, is_penalty, is_set_valued, softness
 
 GAP_TOLERANCE = 1e-14  # m, to which a closed gap is zero
-N_NEWTON = 25  # passes for the curved gap; two or three are taken
-MOST_RESIDUAL = 1e-6  # over what the forces moved: rounding leaves 1e-9, and more is no solution
+N_NEWTON = 25  # iterations for the curved gap; two or three are usual
+MOST_RESIDUAL = 1e-6  # over the displacement by the forces; rounding leaves 1e-9, more is no solution
 
 
 @jit_lean
 def fill_compliances(pairs: Pairs, work: Workspace, step: float) -> None:
-    """What unit forces do to gaps and slips over a step; the directions are filled already."""
+    """Fill the changes of gaps and slips by unit forces over a step; the directions are already filled."""
     if is_set_valued(pairs.law):
         fill_matrix(pairs, work.gap_jacobian, work.gap_jacobian, work.matrix)
         fill_matrix(pairs, work.gap_jacobian, work.friction_direction, work.coupling)
@@ -42,7 +42,7 @@ def fill_compliances(pairs: Pairs, work: Workspace, step: float) -> None:
 
 @jit_lean
 def fill_targets(pairs: Pairs, work: Workspace, step: float) -> None:
-    """Gap that each pair asks for at the end of the step, and the delay of its impact (`laws.gap_target`)."""
+    """Fill the gap required of each pair at the end of the step, and the delay of its impact."""
     for i in range(pairs.radius.size):
         _, _, gap = pair_normal_and_gap(pairs, i, work.now[i])
         opening = 0.0
@@ -53,7 +53,7 @@ def fill_targets(pairs: Pairs, work: Workspace, step: float) -> None:
 
 @jit_inline
 def fill_residual(pairs: Pairs, work: Workspace) -> None:
-    """How far gaps and slips are from the laws at the end of the step, and how far the forces moved them."""
+    """Fill the deviation of gaps and slips from the laws at the end, and their change by the forces."""
     distance, moved = 0.0, 0.0
     for i in range(pairs.radius.size):
         end = work.gap[i] - work.target[i]
@@ -73,10 +73,10 @@ def fill_residual(pairs: Pairs, work: Workspace) -> None:
 def solve_contact(pairs: Pairs, work: Workspace, step: float, spin: float) -> int:
     """Contact forces of a step (s) at a spin (rad/s); returns the pairs in contact, or UNSOLVED.
 
-    Called once `is_any_closed` has filled the workspace, and `now` and `rate` too where the law is not plain.
-    With the fixed normal the gap is linear and one complementarity problem solves it; the updated normal is
-    taken at the free update, and the gap's curvature by Newton's method on |AB| - r_d, so that the gap
-    closes to rounding. The pivots taken and the residual are left in the workspace.
+    Called after `is_any_closed` has filled the workspace, and after `now` and `rate` are filled where the law
+    is not plain. With the fixed normal the gap is linear: one complementarity problem solves it. The updated
+    normal is that of the free update; the curvature of the gap is resolved by Newton's method on |AB| - r_d,
+    so that the gap closes to rounding. Pivots and residual are left in the workspace.
     """
     q = pairs.radius.size
     law = pairs.law

@@ -20,9 +20,9 @@ LATERAL_ROW, LATERAL_RATE = 1, 2
 
 SAMPLES_AT_ONCE = 8  # read from one set of modal coordinates
 BOUND_LEVEL = 3  # `ModeTables.bound` holds over 2^level samples, or the longest step where that is longer
-FORCED_LEVEL = 6  # steps of up to 2^level ticks follow an event unquestioned, so that time goes on
+FORCED_LEVEL = 6  # steps of up to 2^level ticks after an event need no bound, so that time advances
 RESOLVED = 0.02  # of a signal's size: its fourth derivative times the step to the fourth
-DYING = -1.0  # pace of a mode that is gone before anything is asked after an event
+DYING = -1.0  # pace of a mode that has decayed before the first step after an event ends
 
 
 class ModeTables(NamedTuple):
@@ -34,7 +34,7 @@ class ModeTables(NamedTuple):
     """
 
     mask: Ints  # (p,), bit i set: pair i is closed; other states of a pair have bits of their own
-    n_eigenmode: Ints  # (p,), how many eigenmodes
+    n_eigenmode: Ints  # (p,), number of eigenmodes
     switch_re: Floats  # (p, q, m), gap of an open pair, m; force of a closed one, N
     switch_im: Floats
     rate_re: Floats  # (p, q, m), its time derivative
@@ -47,7 +47,7 @@ class ModeTables(NamedTuple):
     power_re: Floats  # (p, n_level, m), exponential of each mode over 2^level ticks
     power_im: Floats
     output: Floats  # (p, 2 m, SAMPLES_AT_ONCE o), of the real, then the imaginary parts, sample by sample
-    slip_re: Floats  # (p, q, m), slip speed, m/s, but for that of the steady spin
+    slip_re: Floats  # (p, q, m), slip speed without the rim speed of the steady spin, m/s
     slip_im: Floats
     slip_rate_re: Floats  # (p, q, m), its time derivative
     slip_rate_im: Floats
@@ -55,13 +55,13 @@ class ModeTables(NamedTuple):
     motion_im: Floats
     enter_re: Floats  # (p, 2 n, m), modal coordinates of a unit displacement or velocity
     enter_im: Floats
-    enter_cosine: Floats  # (p, 2, m), part of the unbalance response to take off, times cos(angle)
+    enter_cosine: Floats  # (p, 2, m), subtracted part of the unbalance response, times cos(angle)
     enter_sine: Floats  # (p, 2, m), times sin(angle)
     enter_constant: Floats  # (p, q, 2, m), for a unit clearance of each pair
-    loss: Floats  # (p, 2 m, 2 m), form of the coordinates whose growth is the loss by damping, J
+    loss: Floats  # (p, 2 m, 2 m), quadratic form of the coordinates whose growth is the loss by damping, J
     work_re: Floats  # (p, 2, m), the same for the work of the unbalance: times exp(i angle), its conjugate
     work_im: Floats
-    steady_power: Floats  # (p, 2), W, of damping and of the unbalance, that no form of coordinates holds
+    steady_power: Floats  # (p, 2), W, of damping and of the unbalance, not contained in the forms
 
 
 class Reduced(NamedTuple):
@@ -73,7 +73,7 @@ class Reduced(NamedTuple):
     force_sine: Floats  # (n,)
     gap_jacobian: Floats  # (q, n), rate of a gap with the motion
     force_direction: Floats  # (q, n), force on the motion of a unit contact force, friction included
-    slip: Floats  # (q, n), slip speed with the motion, but for that of the steady spin
+    slip: Floats  # (q, n), slip speed by the motion, without that of the steady spin
     delassus: Floats  # (q, q), gap_jacobian @ force_direction.T, 1/kg
     friction: Floats  # (q,), coefficient, not negative
     radius: Floats  # (q,), m
@@ -82,9 +82,9 @@ class Reduced(NamedTuple):
     spring: float  # of a penalty, N/m; 0: gaps are closed by multipliers
     damper: float  # N s/m
     clearance: Floats  # (q,), m
-    translations: Floats  # (r, n), displacements that none may pass the limit with
+    translations: Floats  # (r, n), displacements that are compared with the limit
     displacement_limit: float  # m
-    overlap: float  # m, of an open pair that parts, up to which it goes on without an event
+    overlap: float  # m, of an open pair that parts, up to which it continues without an event
 
 
 @jit_lean_sum
@@ -98,7 +98,7 @@ def dot(re: Floats, im: Floats, z_re: Floats, z_im: Floats) -> float:
 
 @jit_inline_sum
 def bounded(weight: Floats, z_re: Floats, z_im: Floats) -> float:
-    """Bound on a second derivative: the modes' sizes, weighted, however their tables fall."""
+    """Bound on a second derivative: weighted sum of the modes' magnitudes."""
     total = 0.0
     for k in range(z_re.size):
         total += weight[k] * (abs(z_re[k]) + abs(z_im[k]))
@@ -116,7 +116,7 @@ def propagate(re: Floats, im: Floats, z_re: Floats, z_im: Floats, next_re: Float
 
 @jit_lean
 def add_rows(rows: Floats, value: Floats, target: Floats) -> None:
-    """Add the rows (n, m), times the values (n,), to the target (m,): four at a time, in their order."""
+    """Add the rows (n, m), times the values (n,), to the target (m,), four at a time, in order."""
     n_whole = value.size - value.size % 4
     for row in range(0, n_whole, 4):
         first, second, third, fourth = rows[row], rows[row + 1], rows[row + 2], rows[row + 3]
@@ -150,7 +150,7 @@ def enter_with(
 ) -> None:
     """Modal coordinates `z` (2, m) of a motion (2 n,) at the shaft's angle, with a mode's rows of the tables.
 
-    Python calls it with these alone: to take all tables apart takes as long to compile as the rest.
+    Python calls it with these rows alone: unpacking all tables would double the compilation time.
     """
     for part in range(2):
         rows = enter_re if part == 0 else enter_im
@@ -227,7 +227,7 @@ def event_free_interval(
     z_re: Floats,
     z_im: Floats,
 ) -> float:
-    """Time, s, in which no switch function of a mode can reach zero; tables come one by one for speed."""
+    """Time, s, in which no switch function of a mode can reach zero; single tables are faster to pass."""
     proved = np.inf
     for i in range(switch_re.shape[1]):
         s = dot(switch_re[mode, i], switch_im[mode, i], z_re, z_im)
@@ -240,7 +240,7 @@ def event_free_interval(
 def resolved_time(re: Floats, im: Floats, pace: Floats, least: float, z_re: Floats, z_im: Floats) -> float:
     """Time, s, over which Hermite's cubic follows a signal with these rows (m,) to 1e-4 of its size.
 
-    Coordinates whose pace is not above `least` are left out.
+    Coordinates with a pace up to `least` are left out.
     """
     size, bend = 0.0, 0.0
     for k in range(z_re.size):
@@ -262,9 +262,9 @@ def is_within(
     limit: float,
     energy_limit: float,
 ) -> bool:
-    """Whether a motion (2 n,), and the extrema of the output node so far, are those of no diverged case.
+    """Whether a motion (2 n,) and the extrema of the output node so far are within the limits of divergence.
 
-    Displacements are to be within `limit` (m), the energy within `energy_limit` (J).
+    Limits are `limit` (m) for displacements and `energy_limit` (J) for the energy.
     """
     n = stiffness.shape[0]
     for row in range(translations.shape[0]):
@@ -289,7 +289,7 @@ def is_within(
 
 @jit_inline_sum
 def is_beyond(reduced: Reduced, displacement: Floats) -> bool:
-    """Whether reduced displacements, the first n of a motion, pass the limit, or are no numbers."""
+    """Whether reduced displacements, the first n of a motion, pass the limit or are NaN."""
     for row in range(reduced.translations.shape[0]):
         seen = 0.0
         for k in range(reduced.translations.shape[1]):

@@ -1,4 +1,4 @@
-"""Contact pairs: where disc and stator tip face each other, and the forces between (paper, Eqs. 3-10, 19)."""
+"""Contact pairs of disc and stator tip: geometry and forces (paper, Eqs. 3-10, 19)."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ N_DEGREE = 5
 class Pairs(NamedTuple):
     """The q contact pairs of a case."""
 
-    row: Ints  # (q, 5), row of each degree in the state; -1 where it is held or absent
+    row: Ints  # (q, 5), row of each degree in the state; -1 where it is constrained or absent
     block: Ints  # (q, 5), block of each degree; -1 likewise
     axis_y: Floats  # (q,), stator's axis from the disc outwards
     axis_z: Floats  # (q,)
     radius: Floats  # (q,), of contact, m
     clearance: Floats  # (q,), at rest, m
-    aside: Floats  # (q,), how far a tip at rest stands aside of its axis through the disc, as `lateral`, m
+    aside: Floats  # (q,), lateral offset of a tip at rest from its axis through the disc, m
     friction: Floats  # (q,), coefficient, with the sign of the spin
     compliance: Floats  # (q, 5, q, 5), displacement of a degree for a unit force on another over a step, m/N
     is_updated: bool  # the normal follows the line of centres
@@ -38,7 +38,7 @@ class Workspace(NamedTuple):
     """Arrays of one contact solution."""
 
     at: Floats  # (q, 5), displacement of each degree at the end of the step without forces, m or rad
-    now: Floats  # (q, 5), at its beginning (for the laws that look at velocities or at the step before)
+    now: Floats  # (q, 5), at its beginning (for laws that use velocities or the step before)
     rate: Floats  # (q, 5), velocity before the forces of the step, m/s or rad/s (likewise)
     force_direction: (
         Floats  # (q, 5), generalised force on each degree for a unit normal force, friction included
@@ -50,12 +50,12 @@ class Workspace(NamedTuple):
     matrix: Floats  # (q, q), m/N
     gap: Floats  # (q,), m
     force: Floats  # (q,), normal, N
-    traction: Floats  # (q,), of the friction, positive against a rim that outruns the tip, N
+    traction: Floats  # (q,), friction, positive where the rim is faster than the tip, N
     active: NDArray[np.bool_]  # (q,)
     is_sticking: NDArray[np.bool_]  # (q,), at the end of the step
     elimination: Floats  # (q, q + 1)
     moved: Floats  # (5,), degrees of one pair after contact
-    target: Floats  # (q,), gap that the law asks for at the end of the step, m
+    target: Floats  # (q,), gap required by the law at the end of the step, m
     delay: Floats  # (q,), time from the beginning of the step to an impact with restitution, s; else 0
     slip: Floats  # (q,), slip over the step without forces, m
     cone: Floats  # (q,), largest friction for a unit normal force
@@ -64,12 +64,12 @@ class Workspace(NamedTuple):
     tableau: Floats  # (3 q, 6 q + 2)
     basis: Ints  # (3 q,)
     members: Ints  # (q,)
-    solution: Floats  # (3,), of the last one: pivots, distance from the laws and what its forces moved, m
+    solution: Floats  # (3,), of the last one: pivots, deviation from the laws, displacement by forces, m
 
 
 @jit_inline
 def rim_sense(spin: float) -> float:
-    """1, or -1: the way the rim slides over a tip, from which friction and slip have their signs."""
+    """1 or -1: direction in which the rim slides over a tip, the sign of friction and slip."""
     return 1.0 if spin >= 0.0 else -1.0
 
 
@@ -79,8 +79,8 @@ def force_on_disc(
 ) -> tuple[float, float, float]:
     """Generalised force (Fy, Fz, Mx) of the stator on the disc, N, N, N m.
 
-    -N n - mu N t and -mu N r_d (paper, Eqs. 8-10, 19), with n = (ny, nz) from disc to stator and
-    t = x_hat x n = (-nz, ny), the way the rim moves under positive spin.
+    -N n - mu N t and -mu N r_d (paper, Eqs. 8-10, 19), with n = (ny, nz) from disc to stator and t = x_hat x
+    n = (-nz, ny), the direction of the rim under positive spin.
     """
     slide = friction * force
     return -force * ny + slide * nz, -force * nz - slide * ny, -slide * radius
@@ -129,7 +129,7 @@ def fill_friction_direction(pairs: Pairs, i: int, ny: float, nz: float, friction
 
 @jit
 def fill_matrix(pairs: Pairs, rows: Floats, columns: Floats, matrix: Floats) -> None:
-    """Motion along `rows` (q, 5) for unit forces along `columns` over a step, `rows Mt^-1 columns^T`, m/N."""
+    """Displacement along `rows` (q, 5) by unit forces along `columns`, `rows Mt^-1 columns^T`, m/N."""
     q = pairs.radius.size
     for i in range(q):
         for j in range(q):
@@ -177,8 +177,8 @@ def is_any_closed(
 ) -> bool:
     """Whether a pair penetrates at `displacement` (n_dof,), the free update of Eq. 20.
 
-    Fills the degrees `at` (q, 5) and the `gap` (q,) of every pair. It takes the fields of `Pairs` one by one
-    because it runs at every step, and each look into a tuple of arrays counts a reference there.
+    Fills the degrees `at` (q, 5) and the `gap` (q,) of every pair. Fields of `Pairs` are passed one by one:
+    it runs at every step, and each access to a tuple of arrays counts a reference.
     """
     is_closed = False
     for i in range(gap.size):

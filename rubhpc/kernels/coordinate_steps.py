@@ -1,4 +1,4 @@
-"""Modal coordinates some ticks later: their exponentials over powers of two of ticks, multiplied."""
+"""Modal coordinates some ticks later: products of exponentials over powers of two of ticks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def go_on(
 ) -> None:
     """Fill `re` and `im` (m,) with modal coordinates `count` ticks later, at least one.
 
-    `power` (n_level, m) are those of a contact mode. The shortest steps are taken first, two at once.
+    `power` (n_level, m) are the exponentials of a contact mode. The shortest steps come first, two at a time.
     """
     level = lowest_level(count)
     rest = count >> (level + 1)
@@ -50,7 +50,7 @@ def go_on(
 
 @jit_apart_sum
 def turn_on(count: int, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats) -> None:
-    """Take modal coordinates (m,) on by `count` ticks, in place, as `go_on` does."""
+    """Advance modal coordinates (m,) by `count` ticks in place, as `go_on`."""
     level, rest = 0, count
     while rest != 0:
         shift = lowest_level(rest)

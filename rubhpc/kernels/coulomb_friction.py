@@ -1,13 +1,13 @@
-"""Set-valued Coulomb friction in a step: which pairs part, stick or slip, and with what forces.
+"""Set-valued Coulomb friction in a step: which pairs part, stick or slip, and their forces.
 
-With the normal force N of a pair, its friction T (positive against a rim that outruns the tip), and the slip
-d of the rim over the tip in the step,
+With the normal force N of a pair, its friction T (positive where the rim is faster than the tip), and the
+slip d of the rim over the tip in the step,
 
     |T| <= mu N,    d > 0: T = mu N,    d < 0: T = -mu N,    else the pair sticks.
 
-With T+ = mu N + T, T- = mu N - T and d = d+ - d-, each pair adds the complementary couples (N, gap), (T-, d+)
-and (d-, T+), and gap and slip are linear in the forces: one linear complementarity problem for all pairs,
-solved exactly (Glocker and Pfeiffer, Multibody Dynamics with Unilateral Contacts, Wiley 1996).
+With T+ = mu N + T, T- = mu N - T and d = d+ - d-, each pair contributes the complementary pairs of unknowns
+(N, gap), (T-, d+) and (d-, T+). Gap and slip are linear in the forces: one linear complementarity problem for
+all pairs, solved exactly (Glocker and Pfeiffer, Multibody Dynamics with Unilateral Contacts, Wiley 1996).
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from rubhpc.kernels.lemke import solve_lemke
 
 Floats = NDArray[np.float64]
 
-ROUNDING = 1e-12  # share of a force that counts as zero
-UNNOTICED = 1e-6  # share of what friction can change in a step that counts as no slip
+ROUNDING = 1e-12  # of a force: smaller ones count as zero
+UNNOTICED = 1e-6  # of the slip that friction can change in a step: less counts as no slip
 
 
 @jit_lean
@@ -41,10 +41,10 @@ def fill_slip(pairs: Pairs, work: Workspace, step: float, spin: float) -> None:
 def solve_friction(pairs: Pairs, work: Workspace, step: float, spin: float) -> int:
     """Forces N and T of all pairs, into `work.force` and `work.traction`; pivots taken, or UNSOLVED.
 
-    A pair that stuck in the step before holds up to the coefficient of rest; once that is passed it slides.
-    The law looks at the slip of the step, while the friction works on the mean of the velocities before and
-    after: where a slip turns round within the step, friction in the new sense would feed energy in, and that
-    pair has none in this step.
+    A pair that stuck in the step before sticks up to the static coefficient, beyond which it slides. The law
+    uses the slip of the step, but friction works on the mean of the velocities before and after. Where a slip
+    reverses within the step, friction in the new sense would add energy: that pair has no friction in this
+    step.
     """
     q = pairs.radius.size
     for i in range(q):
@@ -87,14 +87,14 @@ def slip_speed_before(pairs: Pairs, work: Workspace, i: int, spin: float) -> flo
 
 @jit_lean
 def feeds_energy(pairs: Pairs, work: Workspace, i: int, step: float, spin: float) -> bool:
-    """Whether the friction of pair i works with, not against, the mean of the slips before and after it."""
+    """Whether the friction of pair i has the direction of the mean slip, so that it adds energy."""
     before = step * pairs.radius[i] * spin
     after = work.slip[i]
     for a in range(N_DEGREE):
         before -= step * work.friction_direction[i, a] * work.rate[i, a]
     for j in range(work.force.size):
         after += work.tangential[0, i, j] * work.force[j] + work.tangential[1, i, j] * work.traction[j]
-    # Against what friction can do to the slip in a step: a pair that sticks slips by the rounding of
+    # Relative to the slip that friction can change in a step: a sticking pair slips by the rounding of
     # positions.
     least = UNNOTICED * abs(work.tangential[1, i, i]) * work.cone[i] * work.force[i]
     return bool(work.traction[i] * (before + after) < -abs(work.traction[i]) * least)
@@ -102,12 +102,12 @@ def feeds_energy(pairs: Pairs, work: Workspace, i: int, step: float, spin: float
 
 @jit_inline
 def friction_residual(work: Workspace, i: int) -> tuple[float, float]:
-    """How far pair i is from Coulomb's law, and how far its friction moved its slip, m."""
+    """Deviation of pair i from Coulomb's law, and the change of its slip by its friction, m."""
     slip = work.slip[i]
     for j in range(work.force.size):
         slip += work.tangential[0, i, j] * work.force[j] + work.tangential[1, i, j] * work.traction[j]
     give, bound = abs(work.tangential[1, i, i]), work.cone[i] * work.force[i]
-    # The friction that would stop the slip, as far as the cone lets it, is the friction there is.
+    # Coulomb's law: friction stops the slip, limited by the friction cone.
     wanted = min(max(work.traction[i] + slip / give, -bound), bound) if give > 0.0 else work.traction[i]
     return give * abs(work.traction[i] - wanted), give * abs(work.traction[i])
 
@@ -116,8 +116,7 @@ def friction_residual(work: Workspace, i: int) -> tuple[float, float]:
 def solve_cones(work: Workspace) -> int:
     """Forces for the given `work.cone`; pivots taken, or UNSOLVED.
 
-    Pairs whose gap stays open of itself are left out; should the forces of the others close it, they are
-    taken in.
+    Pairs whose gap stays open without forces are left out, and added where the forces of the others close it.
     """
     q = work.force.size
     pivots = 0
@@ -153,9 +152,9 @@ def solve_cones(work: Workspace) -> int:
 def solve_members(work: Workspace, q: int) -> int:
     """Forces of the first q `work.members`; pivots taken, or UNSOLVED.
 
-    Each pair's friction and slip are counted in the sense of its slip without forces, so that steady sliding,
-    the ordinary case, is where the method starts. Rows: gap, d+, T+; unknowns of their columns: N, T-, d-.
-    Forces are counted in the displacement that they cause: all entries of the tableau are then of order one.
+    Friction and slip of a pair are positive in the sense of its slip without forces, so that the method
+    starts from steady sliding, the usual case. Rows: gap, d+, T+; unknowns of their columns: N, T-, d-.
+    Forces are scaled to the displacement that they cause: all entries of the tableau are then of order one.
     """
     tableau, basis, members = work.tableau, work.basis, work.members
     n = 3 * q
@@ -185,7 +184,7 @@ def solve_members(work: Workspace, q: int) -> int:
             tableau[ahead, n + b] = -forward * (work.tangential[0, i, j] / scale + work.cone[j] * turn)
             if work.cone[j] > 0.0:
                 tableau[a, n + q + b], tableau[ahead, n + q + b] = couple, forward * turn
-        if not work.cone[i] > 0.0:  # no friction, whatever the slip: rows that are met as they stand
+        if not work.cone[i] > 0.0:  # no friction at any slip: these rows are satisfied
             for column in range(n, 2 * n + 2):
                 tableau[ahead, column] = tableau[room, column] = 0.0
     pivots = solve_lemke(tableau, basis, n)
@@ -202,7 +201,7 @@ def solve_members(work: Workspace, q: int) -> int:
             work.traction[members[k - q]] -= found
     for a in range(q):
         i = members[a]
-        bound = work.cone[i] * work.force[i]  # which rounding passes by a little, most of all at zero
+        bound = work.cone[i] * work.force[i]  # may be exceeded by rounding, above all at zero
         work.traction[i] = min(max(work.traction[i], -bound), bound)
         work.traction[i] *= 1.0 if work.slip[i] >= 0.0 else -1.0
     return pivots

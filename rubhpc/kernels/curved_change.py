@@ -1,4 +1,4 @@
-"""Events of contacts with curved gaps: impacts along the momentary normals, and which contacts go on."""
+"""Events of contacts with curved gaps: impacts along the current normals, and the pairs closed afterwards."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 @jit_lean_sum
 def look_at(pairs: CurvedPairs, i: int, motion: Floats, work: CurvedWork) -> float:
-    """Fill geometry, Jacobian and force direction of pair i from a reduced motion (2 n,); see the result.
+    """Fill geometry, Jacobian and force direction of pair i from a reduced motion (2 n,).
 
     Returns the acceleration of its gap at constant rates, m/s2.
     """
@@ -55,9 +55,9 @@ def change_curved(
     elimination: Floats,
     accumulator: Accumulator,
 ) -> int:
-    """Impact, then the set of closed pairs that goes on, as `mode_change.change_contacts`; -1: there is none.
+    """Impact, then the set of pairs closed afterwards, as `mode_change.change_contacts`; -1: there is none.
 
-    Gap rates and forces are those of the momentary normals, which an impact does not turn.
+    Gap rates and forces are those of the current normals, which an impact does not turn.
     """
     q, n = reduced.gap_jacobian.shape
     candidates = (closed & ~crossing) | (crossing & ~closed)
@@ -120,7 +120,7 @@ def change_curved(
                     - product(reduced.stiffness[k], motion[:n])
                     - product(reduced.damping[k], velocity)
                 )
-            # A pair that parts so slowly that it is pressed together again at once has not parted.
+            # A pair that parts so slowly that it is pressed together again at once counts as closed.
             if product(rate_row[i], velocity) <= OPENING + max(-acceleration, 0.0) * moment:
                 speed[i] = acceleration
         active[i] = speed[i] < 0.0
@@ -139,8 +139,8 @@ def change_curved(
             speed[i] = product(rate_row[i], velocity)
             parts = max(parts, speed[i])
         elif is_recorded and reduced.restitution > 0.0 and is_closed(crossing & ~closed, i):
-            accumulator.n_contact[i] += 1  # it has bounced off
-    if parts > AT_REST:  # what parts for a moment lacks as much of its impulse as presses it together again
+            accumulator.n_contact[i] += 1  # it bounces
+    if parts > AT_REST:  # where it parts for a moment, the impulse that closes it again is missing
         if not solve_active(delassus, speed, active, force, elimination):
             return -1
         for i in range(q):

@@ -1,4 +1,4 @@
-"""An event of curved gaps in the course of a case: what it makes of the motion, and of the record."""
+"""An event of curved gaps: its effect on the motion and on the record."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def take_curved_event(
     closed = int(tables.mask[mode])
     place(tables, curved, mode, z[0], z[1], work.h[0], work.rate[0], motion)
     if closed != 0:
-        progress.energy_from = NONE  # they are added up step by step
+        progress.energy_from = NONE  # energies are added step by step
     if not end_mode(
         tables, reduced, clock, is_recorded, progress, z, motion, events.impulse, recorder, accumulator
     ):

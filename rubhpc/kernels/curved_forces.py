@@ -1,4 +1,4 @@
-"""What closed contacts with curved gaps do at given coordinates: heights, normals, slips and forces."""
+"""Closed contacts with curved gaps at given coordinates: heights, normals, slips and forces."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from rubhpc.kernels.curved_contact import (
 
 Floats = NDArray[np.float64]
 
-MOST_PASSES = 8  # for h at given coordinates; two or three are taken
+MOST_PASSES = 8  # iterations for h at given coordinates; two or three are usual
 EXACT = 1e-17  # m, change of h at which they end
-CLOSE = 1e-11  # m, the same of a method that squares the error
+CLOSE = 1e-11  # m, the same for a method that squares the error
 
 
 @jit_inline_sum
 def curvature(radius: float, across: float, is_round: bool) -> float:
-    """What a round rim adds to the gap of a closed pair, m: r - sqrt(r^2 - d^2), without cancellation."""
+    """Height of a round rim above its chord at a closed pair, m: r - sqrt(r^2 - d^2) without cancellation."""
     if not is_round:
         return 0.0
     square = across * across
@@ -42,9 +42,9 @@ def curvature(radius: float, across: float, is_round: bool) -> float:
 def read_motion(
     tables: CurvedTables, mode: int, mask: int, which: int, z_re: Floats, z_im: Floats, motion: Floats
 ) -> None:
-    """Motions (3, q, 3 + b) of the pairs `which` and their rates, with the h of all taken for 0.
+    """Motions (3, q, 3 + b) of the pairs `which` and their rates, at h = 0.
 
-    And free accelerations of the closed ones.
+    Free accelerations of the closed pairs too.
     """
     q, d = tables.bound.shape[1], tables.bound.shape[2]
     for i in range(q):
@@ -84,7 +84,7 @@ def find_heights(
         if change <= EXACT:
             break
     take_off(tables, mode, mask, mask, 0, h[node], motion)
-    for i in range(q):  # how fast h follows the motions
+    for i in range(q):  # derivatives of h by the motions
         if is_closed(mask, i):
             across = motion[0, i, ACROSS] + pairs.aside[i]
             steep = 0.0
@@ -123,7 +123,7 @@ def find_heights(
 def take_off(
     tables: CurvedTables, mode: int, mask: int, which: int, derivative: int, h: Floats, motion: Floats
 ) -> None:
-    """Take off the motions, or their rates, of the pairs `which` what the h (q,), or its rate, moves."""
+    """Subtract the part by h (q,), or by its rate, from the motions or rates of the pairs `which`."""
     q, n_row = h.size, tables.bound.shape[2] + derivative
     for i in range(q):
         for k in range(q):
@@ -134,7 +134,7 @@ def take_off(
 
 @jit_lean_sum
 def fill_geometry(pairs: CurvedPairs, i: int, d: int, work: CurvedWork) -> tuple[float, float]:
-    """Normal, gap Jacobian and force direction of pair i at `work.motion`; gap (m) and what bends it (m/s2).
+    """Normal, gap Jacobian and force direction of pair i at `work.motion`; gap (m) and its curvature (m/s2).
 
     The latter is the acceleration of the gap at constant rates of the motions.
     """
@@ -168,7 +168,7 @@ def fill_geometry(pairs: CurvedPairs, i: int, d: int, work: CurvedWork) -> tuple
 
 @jit_lean_sum
 def slip_of(pairs: CurvedPairs, i: int, d: int, rim_speed: float, work: CurvedWork) -> float:
-    """Slip speed, m/s, of pair i, of which the geometry is filled; positive in steady sliding."""
+    """Slip speed, m/s, of pair i with its geometry filled; positive in steady sliding."""
     motion = work.motion
     turning = 0.0
     for j in range(BENDING, d):
@@ -189,10 +189,10 @@ def evaluate(
     z_im: Floats,
     work: CurvedWork,
 ) -> bool:
-    """Forces, slips and loads of the closed pairs at a node; False without forces.
+    """Forces, slips and loads of the closed pairs at a node; False where no forces are found.
 
-    The forces are those under which the gaps stay closed: with J the gap Jacobian and F the directions of the
-    forces, `J F N = -(J a + b)`, a the free accelerations and b those at constant rates.
+    The forces keep the gaps closed: `J F N = -(J a + b)`, with J the gap Jacobian, F the directions of the
+    forces, a the free accelerations and b the accelerations at constant rates.
     """
     read_motion(tables, mode, mask, mask, z_re, z_im, work.motion)
     q, d = tables.bound.shape[1], tables.bound.shape[2]
@@ -236,7 +236,7 @@ def find_gaps(
     z_im: Floats,
     work: CurvedWork,
 ) -> None:
-    """Gaps of the open pairs at a node and their rates, with the h of the closed ones found."""
+    """Gaps of the open pairs at a node and their rates; h of the closed pairs is known."""
     q, d = tables.bound.shape[1], tables.bound.shape[2]
     read_motion(tables, mode, mask, ~mask, z_re, z_im, work.motion)
     take_off(tables, mode, mask, ~mask, 0, work.h[node], work.motion)
@@ -252,7 +252,7 @@ def find_gaps(
 
 @jit_lean_sum
 def fill_loads(pairs: CurvedPairs, i: int, d: int, node: int, work: CurvedWork) -> None:
-    """Fill the loads of pair i at a node, of which the geometry is filled and the force is known."""
+    """Fill the loads of pair i at a node from its geometry and force."""
     force, load, direction = work.force[node, i], work.load[node, i], work.direction[i]
     load[HEIGHT], load[HEIGHT_RATE] = work.h[node, i], work.rate[node, i]
     load[LOAD_ALONG] = force * (direction[ALONG] - 1.0)
@@ -265,7 +265,7 @@ def fill_loads(pairs: CurvedPairs, i: int, d: int, node: int, work: CurvedWork) 
 def find_lone_forces(
     pairs: CurvedPairs, tables: CurvedTables, rim_speed: Floats, mode: int, node: int, work: CurvedWork
 ) -> bool:
-    """`evaluate` of the only pair, which is closed: its h by Newton's method, the rest without systems."""
+    """`evaluate` for a single closed pair: h by Newton's method, the rest without linear systems."""
     d = tables.bound.shape[2]
     motion, rates, free = work.motion[0, 0], work.motion[1, 0], work.motion[2, 0]
     jacobian, direction, radius = work.jacobian[0], work.direction[0], pairs.radius[0]

@@ -1,10 +1,11 @@
-"""The loads of several pairs over a step, found by a Newton method in h, its rate and the force of all.
+"""The loads of several pairs over a step, by a Newton method in h, its rate and the force of each.
 
-As `curved_newton` for a lone pair: the loads x at the nodes after the first answer to themselves through h,
-its rate and the force N of each closed pair, three states a pair and node; what a change of x does to the
-directions of the forces is left to the next sweep. With Q, how the states answer to loads, and P, the loads
-of a unit of each, `x + r + P (I - Q P)^-1 Q r` is tried, r the residual g(x) - x. Q itself is not held: its
-rows are those of the states in the coordinates, which loads reach by the weights of the step.
+As `curved_newton` for a single pair. The loads x at the nodes after the first depend on themselves through h,
+its rate and the force N of each closed pair: three states per pair and node. The effect of a change of x on
+the directions of the forces is left to the next sweep. With Q the derivatives of the states by the loads, P
+the loads by a unit of each state, and r = g(x) - x the residual, the next trial is
+`x + r + P (I - Q P)^-1 Q r`. Q is not stored: it is the product of the derivatives by the coordinates and of
+the weights of the step.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ Floats = NDArray[np.float64]
 
 @jit_lean_sum
 def find_joint_system(tables: CurvedTables, mode: int, level: int, mask: int, work: CurvedWork) -> bool:
-    """Fill `work.systems` with the factors of I - Q P in a step of 2^level ticks; False where it has none."""
+    """Fill `work.systems` with the factors of I - Q P of a step of 2^level ticks; False if it is singular."""
     q, middle, system, n = work.h.shape[1], work.middle, work.systems[level], 0
     for i in range(q):
         n += N_STATE if is_closed(mask, i) else 0
@@ -73,7 +74,7 @@ def find_joint_system(tables: CurvedTables, mode: int, level: int, mask: int, wo
 
 @jit_inline_sum
 def move_jointly(tables: CurvedTables, mode: int, level: int, mask: int, work: CurvedWork) -> None:
-    """Move the loads by what they are missed by, and by what that brings about."""
+    """Correct the loads by their residual and by its effect through the states."""
     q, n_load, point, state = work.h.shape[1], work.load.shape[2], work.point, work.unknown
     response, middle = work.response, work.middle
     p = 0
@@ -120,7 +121,7 @@ def move_jointly(tables: CurvedTables, mode: int, level: int, mask: int, work: C
 
 @jit_inline_sum
 def take_joint_states(mask: int, work: CurvedWork) -> None:
-    """Take h, its rate and the forces of the closed pairs at the nodes as the last move has them."""
+    """Copy h, its rate and the forces of the closed pairs at the nodes from the last correction."""
     q, p, c = work.h.shape[1], 0, 0
     for i in range(q):
         p += 1 if is_closed(mask, i) else 0

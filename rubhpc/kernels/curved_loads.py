@@ -1,4 +1,4 @@
-"""The loads of the closed pairs at the nodes of a step after the first, in one row."""
+"""The loads of the closed pairs at the nodes of a step after the first, as one vector."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from rubhpc.kernels.curved_contact import (
 
 Floats = NDArray[np.float64]
 
-# Rows of `CurvedWork.point`: loads, their image, what they were predicted to be, by how much they are missed,
-# by how much they are moved; forces (N) that units of them stand for.
+# Rows of `CurvedWork.point`: loads, their image g(x), predicted loads, residual, correction, and the force
+# (N) equivalent to a unit of each.
 LOADS, IMAGE, GUESS, MISSED, MOVE, FORCES = range(6)
 
 
@@ -66,7 +66,7 @@ def weigh_loads(pairs: CurvedPairs, mask: int, step: float, work: CurvedWork) ->
 
 @jit_lean_sum
 def size_of(change: Floats, n: int, n_load: int, forces: Floats) -> float:
-    """Largest change of n loads at a node, as a force, N; that of the rates of h is not counted."""
+    """Largest change of n loads at a node as a force, N, without the rates of h."""
     largest = 0.0
     for first in range(0, n, n_load):
         force = 0.0

@@ -1,8 +1,8 @@
 """The modal integrator for curved gaps: closed-form flights, and steps of order 8 while contacts are closed.
 
-As `event_loop`, but for what is closed: there the motion has no closed form, and `curved_step` takes steps
-with control of their error. In flight the gap is a convex function of the motion, so that it is never smaller
-than its linear continuation: what bounds the linear gap of a fixed normal bounds a curved one as well.
+As `event_loop`, except while a pair is closed: the motion then has no closed form, and `curved_step` takes
+steps with error control. In flight the gap is a convex function of the motion. It is never smaller than its
+linearisation, so that bounds on the linear gap of a fixed normal hold for a curved gap too.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-GROWTH = 2  # steps are no longer than 2^this times what the contact has lasted
+GROWTH = 2  # steps are at most 2^this times the age of the contact
 OBSERVED = 3e-3  # of the tolerance of loads, while recording, so that energies balance
 
 
@@ -114,8 +114,8 @@ def advance_curved(
     last_step = progress.n_step + MOST_STEPS
     tolerance *= OBSERVED if is_recorded else 1.0
     progress.halving_level, progress.is_after_event = NONE, 0
-    due = int(np.int64(NONE))  # ticks to where a closed contact is expected to end, or another pair to touch
-    groping = int(np.int64(0))  # level of the next step once they have passed
+    due = int(np.int64(NONE))  # ticks until a closed contact is expected to end, or another pair to touch
+    groping = int(np.int64(0))  # level of the next step after that
     while True:
         if progress.wanted >= 0:
             found = find_mode(mask, progress.wanted)
@@ -178,7 +178,7 @@ def advance_curved(
             if not is_event_free:
                 crossing = open_crossing(tables, curved, pairs, mode, next_re, next_im, work)
         else:
-            # What an event sets off is fast at first: steps grow with the age of the contact.
+            # Vibration after an event is fast at first: steps grow with the age of the contact.
             age = contact_age(progress) + GROWTH
             level = min(longest, age if is_recorded else max(age, FORCED_LEVEL), progress.resolved_level)
             level = min(level, curved.weight_re.shape[1] - 1)
@@ -189,7 +189,7 @@ def advance_curved(
                     work.span[RESOLVED] = resolved_transient(tables, mode, work)
                 while level > FORCED_LEVEL and (1 << level) * clock.tick > work.span[RESOLVED]:
                     level -= 1
-            is_event_free = progress.tick - progress.entered < 1 << FORCED_LEVEL  # so that time goes on
+            is_event_free = progress.tick - progress.entered < 1 << FORCED_LEVEL  # so that time advances
             if due >= 0:
                 level = min(level, floor_log2(due) if due > 0 else groping)
             step = (1 << level) * clock.tick
@@ -272,7 +272,7 @@ def advance_curved(
                 ahead = next_crossing(closed, work) * (1 << level)
                 if groping == 0 and ahead <= 2.0 * (1 << level):
                     due = int(ahead)
-                elif groping > FORCED_LEVEL:  # none came
+                elif groping > FORCED_LEVEL:  # no event occurred
                     due = NONE
             go_on(closed, step, work)
         for k in range(z_re.size):
@@ -294,7 +294,7 @@ def enter_curved(
     motion: Floats,
     work: CurvedWork,
 ) -> bool:
-    """Enter contact mode `found` with the reduced motion (2 n,); False where its forces are not found."""
+    """Enter contact mode `found` with the reduced motion (2 n,); False where no forces are found."""
     q, n = reduced.gap_jacobian.shape
     closed = int(tables.mask[found])
     for i in range(q):

@@ -1,4 +1,4 @@
-"""What is measured while contacts with curved gaps are closed: samples, forces, slip and energies."""
+"""Measurements while contacts with curved gaps are closed: samples, forces, slip and energies."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ from rubhpc.kernels.mode_change import product
 from rubhpc.kernels.sampling import Recorder, widen_extrema
 
 Floats = NDArray[np.float64]
-# 1e-4 of 5! over 0.0029, by which the polynomial through the nodes misses a fifth derivative within a step.
+# 1e-4 of 5! / 0.0029: the error of the polynomial through the nodes by a fifth derivative within a step.
 RESOLVED_FIFTH = 4.1
 
 
@@ -82,10 +82,10 @@ def begin_curved_span(
     progress: Progress,
     work: CurvedWork,
 ) -> None:
-    """Begin to add up energies amid closed contacts, at the tick reached.
+    """Begin to add energies at the current tick, with contacts closed.
 
-    What goes on by itself from here is set apart, the coordinates but for where the loads hold them: steps
-    must resolve that alone.
+    The transient is separated: the coordinates without their quasi-static response to the loads. Steps must
+    resolve this part alone.
     """
     mode, transient = progress.mode, work.transient
     respond(curved, mode, int(tables.mask[mode]), 0, 1, work)
@@ -100,9 +100,9 @@ def begin_curved_span(
 
 @jit_lean_sum
 def resolved_transient(tables: ModeTables, mode: int, work: CurvedWork) -> float:
-    """Time, s, over which polynomials follow what force and slip of the closed pairs do by themselves.
+    """Time, s, over which polynomials follow the transient of force and slip of the closed pairs.
 
-    To 1e-4, as `contact_modes.resolved_time`, but of the whole force and slip.
+    To 1e-4 of the whole force and slip (compare `contact_modes.resolved_time`).
     """
     time = np.inf
     for i in range(work.h.shape[1]):
@@ -126,7 +126,7 @@ def resolved_transient(tables: ModeTables, mode: int, work: CurvedWork) -> float
 
 @jit_lean_sum
 def resolved_part(re: Floats, im: Floats, least: float, pace: Floats, work: CurvedWork) -> float:
-    """The same of one signal, of size `least` at least."""
+    """The same for one signal, with a size of at least `least`."""
     size, bend, transient = 0.0, 0.0, work.transient
     for k in range(pace.size):
         if pace[k] > DYING:
@@ -149,7 +149,7 @@ def observe_power(
     z: Floats,
     work: CurvedWork,
 ) -> None:
-    """Power (W) that damping takes and the unbalance gives at a node; the turn is that of `shaft_turn`."""
+    """Power (W) of damping and of the unbalance at a node; the turn is that of `shaft_turn`."""
     seen, n_loss = work.seen, curved.sign.shape[1]
     for r in range(n_loss + 2):
         seen[r] = 0.0
@@ -184,7 +184,7 @@ def observe_energies(
     work: CurvedWork,
     accumulator: Accumulator,
 ) -> None:
-    """Add what damping takes and the unbalance gives in a step of 2^level ticks from `z`."""
+    """Add the work of damping and of the unbalance in a step of 2^level ticks from `z`."""
     mode = progress.mode
     step = (1 << level) * clock.tick
     loss, gain = LOBATTO[0] * work.power[0, 0], LOBATTO[0] * work.power[0, 1]
@@ -219,7 +219,7 @@ def observe_curved_step(
     samples: Samples,
     accumulator: Accumulator,
 ) -> None:
-    """Add a step (s) of the closed pairs by Lobatto's rule; the rest as in `measuring.observe_step`."""
+    """Add a step (s) of the closed pairs by Lobatto's rule; otherwise as `measuring.observe_step`."""
     for i in range(reduced.radius.size):
         if not is_closed(mask, i):
             continue

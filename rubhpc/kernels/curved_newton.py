@@ -1,10 +1,10 @@
-"""The loads of a lone pair over a step, found by a Newton method in h, its rate and the force at the nodes.
+"""The loads of a single pair over a step, by a Newton method in h, its rate and the force at the nodes.
 
-The loads x at the nodes after the first answer to themselves: the motion under them has the loads g(x). All
-but h and its rate are the force N times a direction u. A change of x comes back through h, its rate and N:
-what it does to the directions comes back a hundredfold smaller, and is left to the next sweep. With Q, how
-these three answer to loads, and P, the loads of a unit of each, `x + r + P (I - Q P)^-1 Q r` is tried, r the
-residual g(x) - x: a system of three unknowns a node.
+The loads x at the nodes after the first are a fixed point: the motion under them has the loads g(x). All but
+h and its rate are the force N times a direction u. A change of x acts through h, its rate and N. Its effect
+through the directions is a hundred times smaller and is left to the next sweep. With Q the derivatives of
+these three states by the loads, P the loads by a unit of each, and r = g(x) - x the residual, the next trial
+is `x + r + P (I - Q P)^-1 Q r`: a system of three unknowns per node.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from rubhpc.kernels.curved_loads import LOADS, MISSED, MOVE
 
 Floats = NDArray[np.float64]
 
-# Rows of `CurvedWork.part`, derivatives in the motions: of the force in the displacements, at given h and
-# rate, and in the rates; of the cosine and the sine of the normal; last products with `gram`.
+# Rows of `CurvedWork.part`, derivatives by the motions: of the force by displacements, at given h and rate,
+# and by rates; of the cosine and the sine of the normal; then products with `gram`.
 FORCE, FORCE_RATE, COSINE, SINE, GIVEN, TAKEN = range(6)
-N_STATE = 3  # what loads answer through, a node: h, its rate and the force
+N_STATE = 3  # states per node, through which loads act: h, its rate and the force
 STATE_H, STATE_RATE, STATE_FORCE = range(N_STATE)
 
 
 @jit_inline_sum
 def fill_slopes(pairs: CurvedPairs, tables: CurvedTables, mode: int, node: int, work: CurvedWork) -> None:
-    """Derivatives of h, its rate and the force at a node, just found, in what is read of the lone pair.
+    """Derivatives of h, its rate and the force of the single pair at a node by its readings.
 
-    Into `work.slope`; what a unit of force has of loads goes into `work.lever`.
+    They go into `work.slope`, the loads by a unit of force into `work.lever`.
     """
     d, moved = tables.bound.shape[2], tables.moved[mode, 0]
     motion, rates, free = work.motion[0, 0], work.motion[1, 0], work.motion[2, 0]
@@ -63,7 +63,7 @@ def fill_slopes(pairs: CurvedPairs, tables: CurvedTables, mode: int, node: int, 
         steep, steeper = across / root, radius * radius / (root * root * root)
         curve = 1.0 / np.sqrt(reach * reach + across * across)
     slide = along * rates[ACROSS] - aslant * (rates[ALONG] + turning)
-    # h = f(m) and its rate, at the motion m = u - moved h that is read as u.
+    # h = f(m) and its rate, at the motion m = u - moved h, where u is the reading.
     answers = 1.0 + steep * moved[ACROSS, 0]
     turned = steeper * rates[ACROSS] * moved[ACROSS, 0]
     for j in range(BENDING, d):
@@ -142,9 +142,9 @@ def fill_slopes(pairs: CurvedPairs, tables: CurvedTables, mode: int, node: int, 
 
 @jit_inline_sum
 def find_system(tables: CurvedTables, mode: int, level: int, work: CurvedWork) -> bool:
-    """Fill `work.answer` with Q in a step of 2^level ticks, and `work.system` with the factors of I - Q P.
+    """Fill `work.answer` with Q of a step of 2^level ticks, and `work.system` with the factors of I - Q P.
 
-    Returns False where that has no inverse.
+    Returns False where that is singular.
     """
     n_load, n_read, answer, system = work.load.shape[2], work.slope.shape[2], work.answer, work.system
     for node in range(N_NODE - 1):
@@ -169,7 +169,7 @@ def find_system(tables: CurvedTables, mode: int, level: int, work: CurvedWork) -
 
 @jit_lean_sum
 def factorise(system: Floats, order: NDArray[np.int64]) -> bool:
-    """Turn a matrix (n, n) into its factors, rows exchanged as `order` says; False if it is singular."""
+    """Replace a matrix (n, n) by its factors, with row exchanges in `order`; False if it is singular."""
     n = order.size
     for k in range(n):
         pivot = k
@@ -194,7 +194,7 @@ def factorise(system: Floats, order: NDArray[np.int64]) -> bool:
 
 @jit_lean_sum
 def solve(system: Floats, order: NDArray[np.int64], value: Floats) -> None:
-    """Turn `value` (n,) into the solution with a matrix that was factorised."""
+    """Replace `value` (n,) by the solution with a factorised matrix."""
     n = order.size
     for k in range(n):
         if order[k] != k:
@@ -213,7 +213,7 @@ def solve(system: Floats, order: NDArray[np.int64], value: Floats) -> None:
 
 @jit_inline_sum
 def move_by_newton(work: CurvedWork) -> None:
-    """Move the loads by what they are missed by, and by what that brings about."""
+    """Correct the loads by their residual and by its effect through the states."""
     n_load, point, state, n = work.load.shape[2], work.point, work.unknown, work.point.shape[1]
     for i in range(state.size):
         row, total = work.answer[i], 0.0
@@ -235,7 +235,7 @@ def move_by_newton(work: CurvedWork) -> None:
 
 @jit_inline_sum
 def take_states(work: CurvedWork) -> None:
-    """Take h, its rate and the force of the lone pair at the nodes as the last move has them."""
+    """Copy h, its rate and the force of the single pair at the nodes from the last correction."""
     for node in range(1, N_NODE):
         work.h[node, 0], work.rate[node, 0] = work.load[node, 0, HEIGHT], work.load[node, 0, HEIGHT_RATE]
         work.force[node, 0] += work.unknown[N_STATE * (node - 1) + STATE_FORCE]

@@ -1,4 +1,4 @@
-"""Loads of closed contacts with curved gaps over a step, and what the coordinates make of them."""
+"""Loads of closed contacts with curved gaps over a step, and the response of the coordinates."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 @jit_inline_sum
 def lone_pair(mask: int, q: int) -> int:
-    """The closed pair, where it is the only pair; else -1."""
+    """The closed pair where there is a single pair; else -1."""
     return 0 if q == 1 and mask == 1 else -1
 
 
@@ -33,7 +33,7 @@ def lone_pair(mask: int, q: int) -> int:
 def read_free(
     tables: CurvedTables, mode: int, level: int, z_re: Floats, z_im: Floats, work: CurvedWork
 ) -> None:
-    """Read the only pair at the nodes of a step of 2^level ticks, under the loads at its beginning alone."""
+    """Read the single pair at the nodes of a step of 2^level ticks, under the first node's loads alone."""
     n_load, free = work.load.shape[2], work.free
     for r in range(free.size):
         free[r] = 0.0
@@ -45,7 +45,7 @@ def read_free(
 
 @jit_inline_sum
 def read_loaded(tables: CurvedTables, mode: int, level: int, work: CurvedWork) -> None:
-    """Read the only pair at the nodes of a step of 2^level ticks under the loads at its nodes."""
+    """Read the single pair at the nodes of a step of 2^level ticks under the loads at its nodes."""
     n_load, whole = work.load.shape[2], work.whole
     for r in range(whole.size):
         whole[r] = work.free[r]
@@ -54,7 +54,7 @@ def read_loaded(tables: CurvedTables, mode: int, level: int, work: CurvedWork) -
 
 @jit_inline_sum
 def take_motion(d: int, node: int, work: CurvedWork) -> None:
-    """Fill the motion of the only pair at a node from what was read."""
+    """Fill the motion of the single pair at a node from its readings."""
     whole, motion, first = work.whole, work.motion, (node - 1) * (3 * d + 1)
     for j in range(d):
         motion[0, 0, j], motion[2, 0, j] = whole[first + j], whole[first + 2 * d + 1 + j]
@@ -122,7 +122,7 @@ def arrive(tables: CurvedTables, mode: int, level: int, node: int, work: CurvedW
 
 @jit_inline_sum
 def predict_loads(mask: int, step: float, work: CurvedWork) -> None:
-    """Loads at the nodes of a step (s) after the first: those of a step before, gone on as they went."""
+    """Loads at the nodes of a step (s) after the first, extrapolated from the step before."""
     q, n_load, ahead = work.load.shape[1], work.load.shape[2], work.ahead
     ratio, past = 0.0, 0.0
     if work.span[BEFORE] > 0.0:

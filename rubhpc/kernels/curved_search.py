@@ -1,4 +1,4 @@
-"""Where gaps that are curved close, and where closed ones open."""
+"""Search for the closing and opening of curved gaps."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from rubhpc.kernels.event_steps import GAP_TOLERANCE
 
 Floats = NDArray[np.float64]
 
-N_LOOK = 32  # parts of a step in which a first root is looked for
-N_BISECTION = 24  # passes that narrow one down to less than a tick of the longest step
-N_NEWTON = 4  # passes to a root beyond the step's end
+N_LOOK = 32  # intervals of a step that are searched for the first root
+N_BISECTION = 24  # bisections that locate it to less than a tick of the longest step
+N_NEWTON = 4  # iterations for a root beyond the step's end
 
 
 @jit_inline_sum
@@ -38,10 +38,10 @@ def curved_free_interval(
     z_im: Floats,
     work: CurvedWork,
 ) -> float:
-    """Time, s, in which no gap closes, all being open; it need not be longer than `enough`.
+    """Time, s, in which no gap closes while all are open; it need not be longer than `enough`.
 
-    A gap along the stator's axis is the smaller one. Where it does not do, the gap is continued along its
-    momentary normal, below which a convex function of the motion does not go.
+    The gap along the stator's axis is a lower bound. Where it is too small, the linearisation along the
+    current normal is used: a convex function of the motion stays above it.
     """
     free = event_free_interval(
         tables.switch_re, tables.switch_im, tables.rate_re, tables.rate_im, tables.bound, mode, z_re, z_im
@@ -76,7 +76,7 @@ def open_crossing(
     z_im: Floats,
     work: CurvedWork,
 ) -> int:
-    """Set of the pairs, all open, whose gap is negative."""
+    """Set of the pairs whose gap is negative, while all are open."""
     crossing = int(np.int64(0))
     is_near = False
     for i in range(pairs.radius.size):
@@ -94,7 +94,7 @@ def open_crossing(
 
 @jit_inline_sum
 def closed_crossing(closed: int, work: CurvedWork) -> int:
-    """Set of the pairs whose force or, of those open, gap is negative at or between the nodes of a step."""
+    """Set of the pairs whose force (closed) or gap (open) is negative at or between the nodes of a step."""
     crossing = int(np.int64(0))
     for i in range(work.h.shape[1]):
         least = np.inf
@@ -113,7 +113,7 @@ def closed_crossing(closed: int, work: CurvedWork) -> int:
 
 @jit_inline_sum
 def first_crossing(closed: int, crossing: int, work: CurvedWork) -> float:
-    """Share of a step at which the first of the pairs `crossing` does so, by the polynomials of the step."""
+    """Fraction of a step at which the first of the pairs `crossing` reaches zero, by polynomials."""
     first = 1.0
     for i in range(work.h.shape[1]):
         if is_closed(crossing, i):
@@ -124,7 +124,7 @@ def first_crossing(closed: int, crossing: int, work: CurvedWork) -> float:
 
 @jit_inline_sum
 def next_crossing(closed: int, work: CurvedWork) -> float:
-    """How far beyond the end of a step, over its length, the first force vanishes; infinite if none falls."""
+    """Distance of the first zero of a force beyond the end of a step, over its length; infinite if none."""
     nearest = np.inf
     for i in range(work.h.shape[1]):
         if is_closed(closed, i):
@@ -135,7 +135,7 @@ def next_crossing(closed: int, work: CurvedWork) -> float:
 
 @jit_lean_sum
 def fill_course(closed: int, i: int, work: CurvedWork) -> None:
-    """Fill `work.course` with the force of pair i, or its gap if open, by powers of the share of the step."""
+    """Fill `work.course` with the force of pair i, or its gap if open, by powers of the step's fraction."""
     course = work.course
     for power in range(N_NODE):
         course[power] = 0.0
@@ -156,7 +156,7 @@ def value_at(course: Floats, share: float) -> float:
 
 @jit_lean_sum
 def first_root(course: Floats) -> float:
-    """First root between 0 and 1 of a polynomial that begins above zero; without one, where it is least."""
+    """First root between 0 and 1 of a polynomial that begins above zero; without a root, its minimum."""
     share, least, where = 0.0, np.inf, 0.0
     for part in range(1, N_LOOK + 1):
         share = part / N_LOOK
@@ -179,7 +179,7 @@ def first_root(course: Floats) -> float:
 
 @jit_lean_sum
 def next_root(course: Floats) -> float:
-    """Root of a polynomial from 1 on, by Newton's method; infinite where it does not fall towards one."""
+    """Root of a polynomial beyond 1, by Newton's method; infinite where it does not fall."""
     share = 1.0
     for _ in range(N_NEWTON):
         slope = 0.0

@@ -1,4 +1,4 @@
-"""How h, its rate and the force of several closed pairs follow the coordinates: slopes for `curved_joint`."""
+"""Derivatives of h, its rate and the force of several closed pairs by the coordinates, for `curved_joint`."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from rubhpc.kernels.curved_newton import (
 
 Floats = NDArray[np.float64]
 
-# Rows of `CurvedWork.balance`: accelerations under the forces; what rates and free accelerations do to the
-# balance of forces; what a unit force on each motion does to the gap.
+# Rows of `CurvedWork.balance`: accelerations under the forces; derivatives of the force balance by rates and
+# by free accelerations; response of the gap to a unit force on each motion.
 PULL, MOVING, PRESSING, GIVEN = range(4)
 
 
@@ -37,13 +37,13 @@ PULL, MOVING, PRESSING, GIVEN = range(4)
 def fill_answers(
     pairs: CurvedPairs, tables: CurvedTables, mode: int, mask: int, node: int, work: CurvedWork
 ) -> bool:
-    """Derivatives of the states at a node, just found, in the coordinates, and what a unit of force does.
+    """Derivatives of the states at a node by the coordinates, and effects of a unit of force.
 
-    Into `work.follow` and `work.push`. The motions are `m = u - E h`, u what is read of the coordinates. With
-    s the slopes of h in them and t those of its rate, `(1 + s E) dh = s du` and
+    Into `work.follow` and `work.push`. The motions are `m = u - E h`, where u is read from the coordinates.
+    With s the derivatives of h by them and t those of its rate, `(1 + s E) dh = s du` and
     `(1 + s E) dh' = s du' + t (du - E dh)`; the forces obey
-    `J gram F dN = -(dJ (a + gram F N) + J da + db + J gram dF N)`.
-    Returns False where one of the two systems has no inverse.
+    `J gram F dN = -(dJ (a + gram F N) + J da + db + J gram dF N)`. Returns False where one of the two systems
+    is singular.
     """
     q, d = tables.bound.shape[1], tables.bound.shape[2]
     moved, accel, accel_rate = tables.moved[mode], tables.accel[mode], tables.accel_rate[mode]
@@ -147,7 +147,7 @@ def add_multiple(factor: float, row: Floats, target: Floats) -> None:
 
 @jit_lean_sum
 def invert(mask: int, matrix: Floats, work: CurvedWork) -> bool:
-    """Fill `work.inverse` with that of the rows and columns (q, q) of the closed pairs; False without."""
+    """Fill `work.inverse` with the inverse for the closed pairs (q, q); False where it is singular."""
     q, n = matrix.shape[0], 0
     for i in range(q):
         if is_closed(mask, i):
@@ -186,7 +186,7 @@ def combine(mask: int, state: int, follow: Floats, work: CurvedWork) -> None:
 
 @jit_lean_sum
 def fill_gradients(pairs: CurvedPairs, i: int, d: int, work: CurvedWork) -> None:
-    """Slopes of h of pair i, and of its rate, in the motions at given rates, and the turn of its normal."""
+    """Derivatives of h of pair i, of its rate (at given rates) and of its normal's angle by the motions."""
     motion, rates, radius = work.motion[0, i], work.motion[1, i], pairs.radius[i]
     across, back = pairs.aside[i] + motion[ACROSS], 0.0
     steep, steeper = work.steep[i], work.steeper[i]
@@ -210,9 +210,9 @@ def fill_gradients(pairs: CurvedPairs, i: int, d: int, work: CurvedWork) -> None
 
 @jit_lean_sum
 def fill_force_gradient(pairs: CurvedPairs, i: int, mask: int, d: int, node: int, work: CurvedWork) -> None:
-    """What is left of the force balance of pair i by motions, `work.bending`, rates and free accelerations.
+    """Derivatives of the force balance of pair i by motions, `work.bending`, rates and free accelerations.
 
-    The latter into rows of `work.balance`; with the sign of the right-hand side.
+    Those by rates and accelerations are rows of `work.balance`; signs are those of the right-hand side.
     """
     q, motion, rates = work.h.shape[1], work.motion[0, i], work.motion[1, i]
     along, aslant = work.normal[0, i], work.normal[1, i]

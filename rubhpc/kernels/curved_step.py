@@ -56,19 +56,19 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 MOST_SWEEPS = 12  # over the nodes
-# A polynomial through the loads errs by less than this share of what the one before has missed them by, as it
-# went on: |t (t - 1/2) (t - 1) (t^2 - t + 1/7)| is at most 0.0029 within a step, 6.4 a step further.
+# The error of a polynomial through the loads is below this fraction of the error of the extrapolated previous
+# one: |t (t - 1/2) (t - 1) (t^2 - t + 1/7)| is at most 0.0029 within a step, 6.4 a step further.
 INTERPOLATED = 5e-4
-SETTLED = 0.1  # share of the loads' tolerance to which the iteration goes
+SETTLED = 0.1  # of the loads' tolerance, at which the iteration ends
 OBSERVED_SETTLED = 0.1  # of that while recording, so that energies balance
-EASY, VERY_EASY = 0.02, 5e-4  # shares of the tolerance below which steps may be twice, four times as long
-STALE = 2  # sweeps after which slopes are taken anew
-ANSWERED = 0.5  # share of the tolerance below which one more move errs by less than `SETTLED`
-HOPELESS = 6  # sweeps after which loads are to be missed by less than `FALLEN` of what they first were
+EASY, VERY_EASY = 0.02, 5e-4  # of the tolerance, below which steps may be twice, four times as long
+STALE = 2  # sweeps after which derivatives are computed again
+ANSWERED = 0.5  # of the tolerance, below which one more correction has an error below `SETTLED`
+HOPELESS = 6  # sweeps after which the residual must be below `FALLEN` of the first one
 FALLEN = 0.1
-PATIENT = 16  # steps, after one whose loads were not found, before a longer one is tried
-QUICK = 5  # sweeps that a step took which may do for one twice as long
-LEAST_TRAVEL = 0.01  # of the clearance: errors are relative to a force that moves the tip so far, or more
+PATIENT = 16  # steps after a failed one before a longer one is tried
+QUICK = 5  # most sweeps of a step after which one twice as long may follow
+LEAST_TRAVEL = 0.01  # of the clearance: errors are relative to a force that moves the tip at least so far
 
 
 @jit_inline_sum
@@ -86,23 +86,23 @@ def take_step(
     z_next: Floats,
     work: CurvedWork,
 ) -> tuple[bool, int]:
-    """Take a step of 2^level ticks (s) from coordinates `z` to `z_next`, by collocation.
+    """Take a step of 2^level ticks (s) from coordinates `z` to `z_next` by collocation.
 
-    `work` holds forces and loads at the beginning, and is left with those at the other nodes.
+    On entry `work` holds forces and loads at the beginning, on return those at the other nodes too.
 
     Parameters
     ----------
     tolerance : float
-        Of the loads, relative to the largest force of the contact.
+        Tolerance of the loads, relative to the largest force of the contact.
     is_recorded : bool
-        Whether slips at the nodes must be those under the last loads.
+        Whether slips at the nodes must be those of the final loads.
 
     Returns
     -------
     bool
-        Whether the loads are found, and a polynomial follows them; a step of one tick has no error.
+        Whether the loads are found and a polynomial follows them; a step of one tick is always accepted.
     int
-        Binary logarithm of how many times as long the next step may be.
+        Binary logarithm of the allowed growth of the next step.
     """
     mask = int(tables.mask[mode])
     scale = work.span[LARGEST]
@@ -140,7 +140,7 @@ def take_step(
         moved = size_of(point[MISSED], n, n_load, point[FORCES])
         if moved <= settled or sweep == MOST_SWEEPS:
             if takes_slopes and not is_lone:
-                work.is_solved[level], work.span[SLOPED] = False, 1.0  # its factors are of other slopes
+                work.is_solved[level], work.span[SLOPED] = False, 1.0  # its factors are outdated
             break
         first = moved if sweep == 0 else first
         if sweep >= HOPELESS and not moved <= FALLEN * first:
@@ -208,9 +208,9 @@ def sweep_alone(
     takes_slopes: bool,
     work: CurvedWork,
 ) -> bool:
-    """Loads of the only pair at the nodes under those found so far, and slopes if asked for.
+    """Loads of the single pair at the nodes under the current loads, and derivatives if requested.
 
-    False without forces.
+    Returns False where no forces are found.
     """
     read_loaded(curved, mode, level, work)
     is_found = True
@@ -246,7 +246,7 @@ def sweep_all(
 
 @jit_inline_sum
 def go_on(mask: int, step: float, work: CurvedWork) -> None:
-    """Make the end of a step (s) the beginning of the next."""
+    """Make the end of a step (s) the beginning of the next one."""
     follow_loads(mask, step, step, work)
     end = N_NODE - 1
     for i in range(work.load.shape[1]):
@@ -262,7 +262,7 @@ def go_on(mask: int, step: float, work: CurvedWork) -> None:
 
 @jit_inline_sum
 def follow_loads(mask: int, step: float, past: float, work: CurvedWork) -> None:
-    """Continue the next loads from those of a step (s) that began a time `past` (s) before them."""
+    """Extrapolate the next loads from those of a step (s) that began a time `past` (s) before."""
     for i in range(work.load.shape[1]):
         if is_closed(mask, i):
             for node in range(N_NODE):

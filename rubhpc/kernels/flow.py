@@ -1,4 +1,4 @@
-"""One linear piece of a motion: closed-form to its first event, whose time is found to rounding."""
+"""One linear piece of a motion: closed form up to its first event, whose time is found to rounding."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from rubhpc.kernels.cubics import turning_value
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-MOST_REFINEMENTS = 30  # Newton steps to a root; two or three are taken
+MOST_REFINEMENTS = 30  # Newton steps to a root; two or three are usual
 SAME_TIME = 1e-14  # s, within which switch functions vanish together
 
 
 class PieceTables(NamedTuple):
-    """A contact mode as a piece is followed in it: m coordinates, n reduced degrees, s switch functions."""
+    """Tables of a contact mode to follow a piece: m coordinates, n reduced degrees, s switch functions."""
 
     switch_re: Floats  # (s, m), switch functions of the coordinates, real part of the product
     switch_im: Floats
@@ -30,20 +30,20 @@ class PieceTables(NamedTuple):
     power_re: Floats  # (levels, m), exponentials over 2^level ticks
     power_im: Floats
     exponent: Floats  # (2, m), 1/s, real and imaginary
-    drift: Floats  # (m,), growth of coordinates that grow linearly, their unit per second
-    floor: Floats  # (s,), below which a switch function is negative; -inf for one that is not looked at
-    kind: Ints  # (s,), row of the least values that it counts for, or NONE
+    drift: Floats  # (m,), rate of coordinates that grow linearly, their unit per second
+    floor: Floats  # (s,), below which a switch function counts as negative; -inf: not monitored
+    kind: Ints  # (s,), row of `least` to which its minima belong, or NONE
     enter_re: Floats  # (2 n, m), coordinates of a unit motion
     enter_im: Floats
-    offset: Floats  # (2, 3, m), coordinates besides: times cosine and sine of the shaft's angle, and constant
+    offset: Floats  # (2, 3, m), further terms: times cosine and sine of the shaft's angle, and constant
     shape_re: Floats  # (2 n, m), motion of unit coordinates
     shape_im: Floats
-    translations: Floats  # (r, n), displacements that none may pass the limit with
+    translations: Floats  # (r, n), displacements that are compared with the limit
     displacement_limit: float  # m
 
 
 class PieceRoom(NamedTuple):
-    """Where a piece is worked out."""
+    """Work space of a piece."""
 
     switch: Floats  # (4, s), switch functions and their rates before and after a step
     roots: Floats  # (s,)
@@ -51,7 +51,7 @@ class PieceRoom(NamedTuple):
 
 
 def piece_room(n_switch: int, width: int) -> PieceRoom:
-    """Room for pieces of as many switch functions and coordinates."""
+    """Work space for pieces with so many switch functions and coordinates."""
     return PieceRoom(np.zeros((4, n_switch)), np.zeros(n_switch), np.zeros((2, width)))
 
 
@@ -76,8 +76,8 @@ def follow_piece(
 ) -> tuple[float, int]:
     """Follow a motion in a contact mode until a switch function falls below its floor, or for `duration`.
 
-    Steps are chosen as by `event_loop.advance`; within the last tick the root is found by Newton's method
-    with the exponentials themselves.
+    Steps are chosen as in `event_loop.advance`. Within the last tick Newton's method finds the root, with
+    exact exponentials.
 
     Parameters
     ----------
@@ -91,11 +91,11 @@ def follow_piece(
         Filled in: coordinates at the beginning, and at the end.
     motions : (4, 2 n)
         Filled in: motion at the end before the event, its rate at the beginning and at the end, and the
-        gradient of the first switch function that vanishes by the motion (as it is where none does).
+        gradient of the first switch function that vanishes, by the motion (unchanged where none vanishes).
     rates : (s,)
-        Filled in: of the switch functions at the end.
+        Filled in: rates of the switch functions at the end.
     least : (2, q)
-        Smallest value of the switch functions of each kind and pair where they turn; lowered in place.
+        Smallest minimum of the switch functions of each kind and pair; lowered in place.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def next_event(
     z: Floats,
     least: Floats,
 ) -> tuple[float, int]:
-    """Find the first event after coordinates (2, m) were `z_entered`: `follow_piece`; `z` is filled in."""
+    """Find the first event after the coordinates (2, m) `z_entered`, as `follow_piece`; `z` is filled in."""
     switch_re, switch_im, rate_re, rate_im = (
         tables.switch_re,
         tables.switch_im,
@@ -225,7 +225,7 @@ def next_event(
         for j in range(n_switch):
             if floor[j] > -np.inf and now_rate[j] < 0.0 and then_rate[j] > 0.0:
                 value = turning_value(now[j], now_rate[j], then[j], then_rate[j], step)
-                if tables.kind[j] >= 0 and value > -floor[j]:  # a gap just opened is zero but for rounding
+                if tables.kind[j] >= 0 and value > -floor[j]:  # a gap that just opened is zero up to rounding
                     least[tables.kind[j], j // stride] = min(least[tables.kind[j], j // stride], value)
             now[j], now_rate[j] = then[j], then_rate[j]
         for k in range(m):
@@ -239,7 +239,7 @@ def next_event(
 
 @jit_inline_sum
 def positive_time(value: float, rate: float, bend: float) -> float:
-    """Time, s, for which a function stays positive whose second derivative is within `bend`."""
+    """Time, s, for which a function with a second derivative within `bend` stays positive."""
     if not value > 0.0:
         return 0.0
     if bend > 0.0:
@@ -258,7 +258,7 @@ def read_switches(
     value: Floats,
     rate: Floats,
 ) -> None:
-    """Switch functions (n_switch,) that are looked at, and their rates."""
+    """Monitored switch functions (n_switch,) and their rates."""
     for j in range(value.size):
         if floor[j] > -np.inf:
             value[j] = dot(switch_re[j], switch_im[j], z[0], z[1])
@@ -277,7 +277,7 @@ def below(value: Floats, floor: Floats) -> int:
 
 @jit_lean_sum
 def move(exponent: Floats, drift: Floats, time: float, z_entered: Floats, z: Floats) -> None:
-    """Coordinates (2, m) a time (s) after they were `z_entered`."""
+    """Coordinates (2, m) a time (s) after `z_entered`."""
     for k in range(z.shape[1]):
         size = np.exp(exponent[0, k] * time)
         turn = exponent[1, k] * time
@@ -299,7 +299,7 @@ def refine(
 ) -> tuple[float, int]:
     """First root of the switch functions `crossing` near the time (s) from `first` to `last`.
 
-    A function that falls slowly may have passed zero some ticks before it is below its floor.
+    A function that falls slowly may pass zero some ticks before it falls below its floor.
     """
     exponent, drift = tables.exponent, tables.drift
     switch_re, switch_im = tables.switch_re, tables.switch_im

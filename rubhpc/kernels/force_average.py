@@ -1,9 +1,9 @@
-"""The largest mean of a contact force over a short time: what a peak of it is measured by.
+"""The largest mean of a contact force over a short time: the measure of its peak.
 
-Of a force itself no peak converges. What a touch sets off in the damper of a stator's tip grows with the
-mesh, as one over the root of the time since, and the tip's own mass takes the rim's speed by an impulse. The
-mean over a given time has neither fault: an impulse is shared out over it, and what the mesh does not resolve
-lasts shorter than that.
+The peak of the force itself does not converge. After a touch the force of the damper at a stator's tip goes
+as one over the root of the time since, so that its peak grows with mesh refinement, and the tip's own mass
+takes the rim's speed by an impulse. The mean over a given time converges: an impulse is spread over this
+time, and what the mesh does not resolve is shorter.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 AVERAGING_TIME = 20e-6  # s
-SHORTEST = AVERAGING_TIME / 64  # s, of two pieces that follow one another; shorter ones become one
-MOST_PIECES = 160  # of a force within the averaging time; what does not fit is added to the last one
+SHORTEST = AVERAGING_TIME / 64  # s, of two consecutive pieces; shorter ones are merged
+MOST_PIECES = 160  # of a force within the averaging time; further ones are merged into the last one
 
 BEGIN, END, BEFORE, IMPULSE, FIRST, LAST = range(6)  # rows of `piece`: s, s, N s, N s, N, N
-LOUD = 6  # row whose first number is the end of the last piece whose force may have passed the peak, s
+LOUD = 6  # row whose first number is the end of the last piece that may exceed the peak, s
 OLDEST, COUNT = range(2)  # columns of `held`
 
 
@@ -30,7 +30,7 @@ OLDEST, COUNT = range(2)  # columns of `held`
 def part_of(piece: Floats, k: int, time: float) -> tuple[float, float]:
     """Impulse (N s) of a pair's piece k (6, n) up to a time in it, and the force (N) then.
 
-    The impulse goes as Hermite's cubic; that of an impact, which takes no time, is whole.
+    The impulse follows Hermite's cubic. An impact takes no time and counts whole.
     """
     impulse, length = piece[IMPULSE, k], piece[END, k] - piece[BEGIN, k]
     if not length > 0.0:
@@ -43,7 +43,7 @@ def part_of(piece: Floats, k: int, time: float) -> tuple[float, float]:
 
 @jit_inline
 def greatest_force(step: float, impulse: float, first: float, last: float, merged: float) -> float:
-    """Bound on the force (N) of a piece, and of those that it is one with: Bernstein's of its parabola."""
+    """Bound on the force (N) of a piece and of those merged with it: Bernstein's bound of its parabola."""
     if not step > 0.0:
         return np.inf
     return max(first, last, 3.0 * impulse / step - first - last, merged)
@@ -62,21 +62,21 @@ def add_force(
     held: Ints,
     peak: Floats,
 ) -> None:
-    """Add a piece of the force of pair i, and take the largest mean that ends within it.
+    """Add a piece of the force of pair i, and update the peak by the largest mean that ends within it.
 
-    Between the moments at which the window begins or ends at the end of a piece, the mean is smooth: its
-    largest value is at one of them, or where it turns in between.
+    Between the times at which an end of the window meets an end of a piece, the mean is smooth: its largest
+    value is at one of these times, or at a maximum in between.
 
     Parameters
     ----------
     begin, step : float, s
-        When the piece begins, counted from `origin` (1,), and how long it lasts; 0 for an impact.
+        Beginning of the piece, counted from `origin` (1,), and its length; 0 for an impact.
     impulse, first, last : float, N s, N, N
         Its impulse, and the force at its ends.
     pieces : (q, 7, MOST_PIECES)
-        The pieces within the averaging time, in a ring.
+        The pieces within the averaging time, in a ring buffer.
     held : (q, 2)
-        Which is the oldest of them, and how many there are.
+        Place of the oldest piece, and number of pieces.
     peak : (q,), N
         The largest mean so far.
     """
@@ -102,19 +102,19 @@ def add_force(
         piece[IMPULSE, now], piece[FIRST, now], piece[LAST, now] = impulse, first, last
     if greatest_force(step, impulse, first, last, piece[FIRST, now]) > peak[i]:
         piece[LOUD, 0] = end
-    elif begin - AVERAGING_TIME >= piece[LOUD, 0]:  # no mean of less than the peak is above it
+    elif begin - AVERAGING_TIME >= piece[LOUD, 0]:  # no force above the peak is left in the window
         held[i, OLDEST], held[i, COUNT] = k, count
         return
     before = piece[BEFORE, now]
     time, start = begin, begin - AVERAGING_TIME  # the ends of the window
-    is_inside = piece[BEGIN, k] <= start  # whether it begins in piece k, or in a flight before that
+    is_inside = piece[BEGIN, k] <= start  # whether it begins in piece k, or in a flight before it
     gained, force = part_of(piece, now, time)
     left, leaving = piece[BEFORE, k], 0.0  # the impulse before the window, and the force where it begins
     if is_inside:
         part, leaving = part_of(piece, k, start)
         left += part
     mean, rate = before + gained - left, force - leaving  # times the averaging time
-    largest = mean if piece[BEGIN, now] == begin else 0.0  # of pieces that are one, that at the end is exact
+    largest = mean if piece[BEGIN, now] == begin else 0.0  # of merged pieces, the mean at the end is exact
     while time < end:
         bound = piece[END, k] if is_inside else piece[BEGIN, k]
         later = max(time, min(end, bound + AVERAGING_TIME))

@@ -1,6 +1,6 @@
-"""Laws of contact and friction: what ties the forces of a pair to its gap and its slip.
+"""Laws of contact and friction: relations of the forces of a pair with its gap and slip.
 
-To add one, give it a place here and a name in `study.contact_keys`; CONTRIBUTING.md has the steps.
+CONTRIBUTING.md describes how to add one.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _NO_TABLE = np.zeros(0)
 
 
 class Law(NamedTuple):
-    """Laws of a case; but for the first, the fields are named as the keys of `[contact]`."""
+    """Laws of a case; all fields but the first have the names of the keys of `[contact]`."""
 
     friction_law: int = SLIDING  # one of the numbers above
     stiffness: float = 0.0  # of the penalty, N/m; 0: the gap is closed exactly, by a multiplier
@@ -41,7 +41,7 @@ MULTIPLIER = Law()
 
 @jit_inline
 def is_set_valued(law: Law) -> bool:
-    """Whether friction may stick and reverse, in place of the steady sliding that the spin makes."""
+    """Whether friction may stick and reverse, instead of steady sliding by the spin."""
     return law.friction_law != SLIDING
 
 
@@ -68,7 +68,7 @@ def friction_coefficient(law: Law, friction: float, slip_speed: float, is_sticki
 
 @jit_inline
 def interpolated(at: NDArray[np.float64], values: NDArray[np.float64], x: float) -> float:
-    """Value at x between rising places, linear; beyond the last one, its own."""
+    """Linear interpolation at x between ascending places; constant beyond the last one."""
     for i in range(1, at.size):
         if x < at[i]:
             share = (x - at[i - 1]) / (at[i] - at[i - 1])
@@ -84,7 +84,7 @@ def is_penalty(law: Law) -> bool:
 
 @jit_inline
 def is_bouncing(law: Law) -> bool:
-    """Whether an impact sends a pair back."""
+    """Whether impacts have restitution."""
     return law.restitution > 0.0
 
 
@@ -102,11 +102,11 @@ def softness(law: Law, step: float) -> float:
 
 @jit_inline
 def gap_target(law: Law, step: float, gap: float, opening: float, end: float) -> tuple[float, float]:
-    """Gap asked for at the end of a step, less what its own force yields (m), and delay of an impact (s).
+    """Gap required at the end of a step, less its compression by the force (m), and delay of an impact (s).
 
-    Multiplier: zero. Restitution: see `bounce`. Penalty: the force is the mean, 1:2:1, of the springs' at the
-    ends of this step and the one before, and the damper's over both. This mean neither adds nor takes energy,
-    and it is stable for any stiffness.
+    Multiplier: zero. Restitution: see `bounce`. Penalty: the spring force is the mean, weighted 1:2:1, over
+    the ends of this step and the one before, the damper force that over both steps. This mean conserves
+    energy and is stable for any stiffness.
 
     Parameters
     ----------
@@ -128,20 +128,20 @@ def gap_target(law: Law, step: float, gap: float, opening: float, end: float) ->
 
 @jit_inline
 def bounce(restitution: float, step: float, gap: float, opening: float, end: float) -> tuple[float, float]:
-    """Gap to ask for at the end of a step (m) in which an impact falls, and when it falls (s).
+    """Gap required at the end of a step with an impact (m), and delay of the impact in the step (s).
 
-    The gap, `gap` at the beginning, would be `end` < 0 at the end, and opened at the rate `opening` half a
-    step before the beginning. With the acceleration that this makes, it closes after the delay, at the rate
-    v-; v+ = -e v- then gives the rate half a step after the beginning. The step is taken at that rate, and
-    what the force has moved before it was due is taken back. Where the flight that follows would end within
-    the step, the gap is closed instead, as without restitution: (0, 0).
+    The gap is `gap` at the beginning, would be `end` < 0 at the end, and had the rate `opening` half a step
+    before the beginning. The acceleration follows from these: the gap closes after the delay at the rate v-,
+    and v+ = -e v- gives the rate half a step after the beginning. The step is taken at that rate, and the
+    displacement by the force before the delay is subtracted. Where the following flight would end within the
+    step, the gap is closed as without restitution: (0, 0).
     """
     acceleration = (end - gap - step * opening) / step**2
     rate = opening + 0.5 * step * acceleration
     closing = np.sqrt(max(rate * rate - 2.0 * acceleration * gap, 0.0))
     if not closing > 0.0 or 2.0 * restitution * closing <= -acceleration * step:
         return 0.0, 0.0
-    # The root of gap + rate t + acceleration t^2 / 2 that does not cancel.
+    # The root of gap + rate t + acceleration t^2 / 2, without cancellation.
     delay = min(2.0 * gap / (closing - rate), step) if closing > rate else step
     after = restitution * closing + acceleration * (0.5 * step - delay)
     return gap + step * after, delay

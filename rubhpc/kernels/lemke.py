@@ -1,6 +1,6 @@
-"""Linear complementarity without a P-matrix, by Lemke's method: what set-valued friction needs.
+"""Linear complementarity without a P-matrix, by Lemke's method, for set-valued friction.
 
-Find `z >= 0` with `w = A z + b >= 0` and one of the two zero in every row. Pivots run through a tableau
+Find `z >= 0` with `w = A z + b >= 0` such that one of the two is zero in every row. Pivots act on a tableau
 `w - A z - z0 = b` whose artificial column z0 makes every row feasible at first; the method ends when z0
 leaves the basis (Cottle, Pang, Stone, The Linear Complementarity Problem, SIAM 2009, Algorithm 4.4.5).
 """
@@ -16,14 +16,14 @@ from rubhpc.kernels.complementarity import UNSOLVED
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-PIVOT = 1e-13  # relative to the entries of the tableau, which are of order one: less counts as zero
+PIVOT = 1e-13  # entries of the tableau are of order one; smaller ones count as zero
 TIE = 1e-12
 PIVOTS_A_ROW = 20
 
 
 @jit_lean
 def exchange(tableau: Floats, basis: Ints, n: int, row: int, column: int) -> int:
-    """Take the variable of `column` into the basis at `row`, of n rows; returns the one that leaves."""
+    """Exchange the variable of `column` into the basis at `row`, of n rows; returns the one that leaves."""
     width = 2 * n + 2
     pivot = tableau[row, column]
     for k in range(width):
@@ -40,7 +40,7 @@ def exchange(tableau: Floats, basis: Ints, n: int, row: int, column: int) -> int
 
 @jit_lean
 def solve_lemke(tableau: Floats, basis: Ints, n: int) -> int:
-    """Pivots taken until the problem of n rows is solved, or UNSOLVED.
+    """Solve a problem of n rows; returns the number of pivots, or UNSOLVED.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def solve_lemke(tableau: Floats, basis: Ints, n: int) -> int:
                     finish = i
         if row < 0:
             return UNSOLVED
-        # Of rows that are equal but for rounding that of z0 leaves: then all is done.
+        # Among rows that are equal up to rounding z0 leaves: the problem is then solved.
         if finish >= 0 and tableau[finish, last] <= least * (1.0 + TIE) * tableau[finish, entering]:
             row = finish
         leaving = exchange(tableau, basis, n, row, entering)

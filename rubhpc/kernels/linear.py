@@ -4,9 +4,9 @@ With `v` the velocity half a step before displacement `u`, Eq. 20 is, without it
 
     (M + h/2 C) (v_next - v) = h (f - K u - C v),    u_next = u + h v_next.
 
-Degrees of freedom that no matrix couples fall into blocks (rotor bending, torsion, each stator's axial and
-lateral motion), so that no dense product runs over both bodies: the inverse of `M + h/2 C` is dense within a
-block. K and C are banded throughout and stored by diagonals, as in `scipy.sparse.dia_array`.
+Uncoupled degrees of freedom form separate blocks (rotor bending, torsion, each stator's axial and lateral
+motion), so that no dense product includes both bodies: the inverse of `M + h/2 C` is dense within a block. K
+and C are banded throughout and stored by diagonals, as in `scipy.sparse.dia_array`.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def free_velocity(
     damping_force: Floats,
     residual: Floats,
 ) -> None:
-    """Velocity half a step ahead if nothing touched, into `velocity_next`; C v is left in `damping_force`.
+    """Velocity half a step ahead without contact, into `velocity_next`; C v goes into `damping_force`.
 
     All state arrays are (n_dof,) in m, rad, m/s, rad/s; `residual` is work space.
     """

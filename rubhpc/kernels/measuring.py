@@ -1,4 +1,4 @@
-"""What the exact integrator measures as it goes, besides its samples: contacts and energies."""
+"""Measurements of the exact integrator other than samples: contacts and energies."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def resolved_contact(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) 
 
 @jit_inline_sum
 def leave_out_dying(pace: Floats, z: Floats, calm: Floats) -> None:
-    """Fill `calm` (2, m) with the coordinates that outlive the first step: no cubic follows the others."""
+    """Fill `calm` (2, m) with the coordinates that outlast the first step: no cubic follows the others."""
     for k in range(z.shape[1]):
         dies = pace[k] == DYING
         calm[0, k], calm[1, k] = (0.0, 0.0) if dies else (z[0, k], z[1, k])
@@ -71,7 +71,7 @@ def leave_out_dying(pace: Floats, z: Floats, calm: Floats) -> None:
 def force_in_step(
     before: float, rate_before: float, after: float, rate_after: float, step: float
 ) -> tuple[float, float]:
-    """Impulse (N s) and value in the middle (N) of a force over a step (s), as Hermite's cubic."""
+    """Impulse (N s) and middle value (N) of a force over a step (s), by Hermite's cubic."""
     bend = step * (rate_before - rate_after)
     impulse = step * (0.5 * (before + after) + bend / 12.0)
     return impulse, 0.5 * (before + after) + 0.125 * bend
@@ -112,8 +112,8 @@ def observe_step(
     """Add a step (s) of the closed pairs: force and slip as cubics, Simpson's rule for friction.
 
     It begins at the time `begin` (s), and `z` are the coordinates at its end; `share` (1/s) takes an impulse
-    to the mean force of sample `i_sample`. Of drive and friction together `end_span` knows the work exactly,
-    in closed form, and counts it with the damping: what is added to them here is taken off there.
+    to the mean force of sample `i_sample`. `end_span` has the exact work of drive and friction together in
+    closed form, as part of that of damping: it subtracts what is added here.
     """
     for i in range(reduced.radius.size):
         if not (tables.mask[mode] >> i) & 1:
@@ -144,9 +144,9 @@ def observe_step(
 def energy_forms(
     loss_form: Floats, work_re: Floats, work_im: Floats, first: int, mode: int, z: Floats, entry: Floats
 ) -> None:
-    """Fill `entry` (2,), J, with what grows by damping loss and unbalance work in a contact mode.
+    """Fill `entry` (2,), J, with the forms whose growth is damping loss and unbalance work in a contact mode.
 
-    The arrays are `loss`, `work_re` and `work_im` of the tables, `first` is the mode's number of eigenmodes.
+    The arrays are `loss`, `work_re` and `work_im` of the tables; `first` is the mode's number of eigenmodes.
     """
     m = z.shape[1]
     if loss_form.shape[1] == 0:  # tables without energies
@@ -182,9 +182,9 @@ def end_span(
     recorder: Recorder,
     accumulator: Accumulator,
 ) -> None:
-    """Add what damping took and the unbalance gave since the span began, in one contact mode all along.
+    """Add damping loss and unbalance work since the span began, in one contact mode throughout.
 
-    The tables count what friction took with the damping, less what the drive gave for it.
+    In the tables the damping loss includes that of friction, less the work of the drive against it.
     """
     if progress.energy_from < 0:
         return
@@ -200,7 +200,7 @@ def end_span(
 
 @jit_inline_sum
 def begin_span(tables: ModeTables, z: Floats, progress: Progress, recorder: Recorder) -> None:
-    """Begin to add up energies at the tick reached, in the contact mode entered."""
+    """Begin to add energies at the current tick, in the current contact mode."""
     mode = progress.mode
     first = tables.n_eigenmode[mode]
     energy_forms(tables.loss, tables.work_re, tables.work_im, first, mode, z, recorder.entry)

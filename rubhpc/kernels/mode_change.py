@@ -1,4 +1,4 @@
-"""Events of the exact integrator: impacts, and which contacts go on."""
+"""Events of the exact integrator: impacts, and the pairs closed afterwards."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ AT_REST = 1e-12  # m/s, of gaps that stay closed
 
 @jit_inline_sum
 def product(a: Floats, b: Floats) -> float:
-    """Inner product; `np.dot` would cost a call of the library for a dozen numbers."""
+    """Inner product; `np.dot` would call a library for a dozen numbers."""
     total = 0.0
     for k in range(a.size):
         total += a[k] * b[k]
@@ -50,11 +50,11 @@ def change_contacts(
     elimination: Floats,
     accumulator: Accumulator,
 ) -> int:
-    """Impact, then the set of closed pairs that goes on; -1 where there is none.
+    """Impact, then the set of pairs closed afterwards; -1 where there is none.
 
-    `closed` are the pairs closed before, `crossing` those whose gap closes or whose force vanishes now. The
-    impact sends every candidate that closes back at its restitution (0: inelastic); among those that do not
-    part for longer than `moment` (s), the accelerations decide. Fills the impulses `given` (q,), N s.
+    `closed` are the pairs closed before, `crossing` those whose gap closes or whose force vanishes now. Every
+    candidate that closes rebounds with its restitution (0: inelastic). Among those that do not part for
+    longer than `moment` (s), the accelerations decide. Fills the impulses `given` (q,), N s.
     """
     q, n = reduced.gap_jacobian.shape
     candidates = (closed & ~crossing) | (crossing & ~closed)
@@ -89,7 +89,7 @@ def change_contacts(
                     - product(reduced.stiffness[k], motion[:n])
                     - product(reduced.damping[k], velocity)
                 )
-            # A pair that parts so slowly that it is pressed together again at once has not parted.
+            # A pair that parts so slowly that it is pressed together again at once counts as closed.
             if product(reduced.gap_jacobian[i], velocity) <= OPENING + max(-acceleration, 0.0) * moment:
                 speed[i] = acceleration
         active[i] = speed[i] < 0.0
@@ -108,8 +108,8 @@ def change_contacts(
             speed[i] = product(reduced.gap_jacobian[i], velocity)
             parts = max(parts, speed[i])
         elif is_recorded and reduced.restitution > 0.0 and (crossing & ~closed) >> i & 1:
-            accumulator.n_contact[i] += 1  # it has bounced off
-    if parts > AT_REST:  # what parts for a moment lacks as much of its impulse as presses it together again
+            accumulator.n_contact[i] += 1  # it bounces
+    if parts > AT_REST:  # where it parts for a moment, the impulse that closes it again is missing
         if not solve_active(reduced.delassus, speed, active, force, elimination):
             return -1
         for i in range(q):
@@ -126,9 +126,10 @@ def change_contacts(
 def observe_impact(
     reduced: Reduced, i: int, spin: float, impulse: float, velocity: Floats, accumulator: Accumulator
 ) -> None:
-    """Add an impact's impulse (N s) and work to the accumulator; `velocity` (n,) is the one before it."""
+    """Add an impact's impulse (N s) and work to the accumulator; `velocity` (n,) is that before it."""
     friction = reduced.friction[i] * impulse
-    # An impulse works with the mean of the velocities before and after; the force direction has friction.
+    # An impulse does work at the mean of the velocities before and after; the force direction includes
+    # friction.
     closing = product(reduced.gap_jacobian[i], velocity) + 0.5 * impulse * reduced.delassus[i, i]
     total = product(reduced.force_direction[i], velocity) + 0.5 * impulse * product(
         reduced.force_direction[i], reduced.force_direction[i]
@@ -138,7 +139,7 @@ def observe_impact(
         change = impulse * (
             product(reduced.force_direction[i], reduced.force_direction[i]) - reduced.delassus[i, i]
         )
-        gain = (total - closing - 0.5 * change) / reduced.friction[i]  # of the slip on the rim's own speed
+        gain = (total - closing - 0.5 * change) / reduced.friction[i]  # of the slip over the rim's own speed
         slip = reduced.radius[i] * abs(spin) - gain
         accumulator.least_slip[i] = min(accumulator.least_slip[i], slip, slip - change / reduced.friction[i])
     accumulator.impulse[i] += impulse

@@ -1,9 +1,9 @@
-"""Events under a penalty: which pairs press, are lifted or open. Motion and forces are continuous.
+"""Events under a penalty: pairs are pressed, lifted or open. Motion and forces are continuous.
 
-A pair presses from where its gap closes until its force `-k g - c g'` vanishes. With a damper the gap is
-overlapped then: the pair is lifted, until the gap opens or the force would be compressive again. A set of
-states has bit i for pair i that presses and bit q + i for one that is lifted. The switch function of a lifted
-pair is `k g + c g'`, which vanishes before the next touch too: the pair goes over to open then.
+A pair is pressed from the closing of its gap until its force `-k g - c g'` vanishes. With a damper the gap
+still overlaps then: the pair is lifted until the gap opens or the force would be compressive again. A set of
+states has bit i for a pressed pair i and bit q + i for a lifted one. The switch function of a lifted pair is
+`k g + c g'`. It also vanishes before the next touch, where the pair becomes open.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rubhpc.kernels.mode_change import product
 
 Floats = NDArray[np.float64]
 
-MOST_PAIRS = 31  # whose states an integer holds
+MOST_PAIRS = 31  # whose states fit into an integer
 
 
 @jit_lean_sum
@@ -36,7 +36,7 @@ def force_of(reduced: Reduced, i: int, motion: Floats) -> float:
 
 @jit_lean_sum
 def pressed_pairs(reduced: Reduced, motion: Floats) -> int:
-    """States of the pairs in a motion (2 n,) of which nothing is known."""
+    """States of the pairs in a motion (2 n,) without a history."""
     q = reduced.gap_jacobian.shape[0]
     found = int(np.int64(0))
     for i in range(q):
@@ -47,7 +47,7 @@ def pressed_pairs(reduced: Reduced, motion: Floats) -> int:
 
 @jit_lean_sum
 def change_pressed(reduced: Reduced, states: int, crossing: int, motion: Floats) -> int:
-    """States that go on after the switch functions `crossing` (bits) vanish, in a motion (2 n,)."""
+    """States after the switch functions `crossing` (bits) vanish, in a motion (2 n,)."""
     q = reduced.gap_jacobian.shape[0]
     found = int(np.int64(0))
     for i in range(q):

@@ -18,18 +18,19 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-# Outcomes: all are followed, a contact mode is not known, the rows are full, an event is left to the caller,
-# a displacement passes its limit, no contact forces obey the laws, and too many events in a revolution.
+# Outcomes: all revolutions are followed; a contact mode is missing; the rows are full; an event is left to
+# the caller; a displacement passes its limit; no contact forces satisfy the laws; too many events in a
+# revolution.
 FOLLOWED, MODE_UNKNOWN, FULL, AT_EVENT, BEYOND, UNSOLVED, TOO_MANY = range(7)
 PIECE, STATES, REVOLUTION, BEGUN = range(4)  # items of `reached`
 AFTER = 4  # row of the motions of a piece, after those of `flow.follow_piece`
 
 
 class PieceModes(NamedTuple):
-    """The contact modes of a case as `flow.PieceTables` has each of them, p of them."""
+    """The p contact modes of a case, with the fields of `flow.PieceTables`."""
 
     mask: Ints  # (p,)
-    is_known: Flags  # (p,), whether its row is filled in
+    is_known: Flags  # (p,), whether the mode's row is filled in
     gaps: Ints  # (p,), bits of the switch functions that are gaps
     switch_re: Floats  # (p, s, m)
     switch_im: Floats
@@ -50,17 +51,17 @@ class PieceModes(NamedTuple):
 
 
 class PieceRows(NamedTuple):
-    """Pieces of a motion, one a row."""
+    """Pieces of a motion, one per row."""
 
-    states: Ints  # (k, 4), those of the piece, `crossing`, the gaps among it, and the states after it
-    times: Floats  # (k, 2), s, when it begins after the shaft's angle 0, and for how long
-    motions: Floats  # (k, 5, 2 n), as `flow.follow_piece` has them, and the motion after the event
+    states: Ints  # (k, 4), states in the piece, `crossing`, the gaps among these, states after the event
+    times: Floats  # (k, 2), s, beginning after the shaft's angle 0, and duration
+    motions: Floats  # (k, 5, 2 n), those of `flow.follow_piece`, then the motion after the event
     rates: Floats  # (k, s), of the switch functions at the end
-    given: Floats  # (k, 2, q), normal impulses of the event and tractions, N s
+    given: Floats  # (k, 2, q), normal and tangential impulses of the event, N s
 
 
 def piece_rows(k: int, width: int, n_switch: int, q: int) -> PieceRows:
-    """Room for k pieces of motions of this width (2 n) with q pairs."""
+    """Arrays for k pieces of motions of this width (2 n) with q pairs."""
     return PieceRows(
         states=np.empty((k, 4), dtype=np.int64),
         times=np.empty((k, 2)),
@@ -101,23 +102,23 @@ def follow_revolutions(
     Parameters
     ----------
     coordinates : (2, 2, m)
-        Work space, as are `room`, `force`, `speed`, `active` and `elimination`; `accumulator` stays as it is.
+        Work space, as `room`, `force`, `speed`, `active` and `elimination`; `accumulator` is not changed.
     begin, end : float, s
         Times after the shaft's angle 0 at which each revolution begins and ends.
     moment : float, s
-        As `mode_change.change_contacts` has it.
+        As in `mode_change.change_contacts`.
     takes_events : bool
-        Whether events are taken here; else each is left to the caller, who changes motion and states.
+        Whether events are computed here; else each is left to the caller, who changes motion and states.
     most_events : int
-        In a revolution.
+        Most events in a revolution.
     reached : (4,)
-        Pieces filled in, states of the pairs, revolution, and pieces before it began; in place.
+        Pieces filled in, states of the pairs, revolution, and pieces before that revolution; in place.
     passed : (1,), s
         Time reached in the revolution; in place.
     motion : (2 n,)
         In place.
     least : (r, 2, q)
-        As `flow.follow_piece` lowers it, in each of the r revolutions.
+        As in `flow.follow_piece`, for each of the r revolutions.
     """
     while reached[REVOLUTION] < least.shape[0]:
         k, states = reached[PIECE], reached[STATES]

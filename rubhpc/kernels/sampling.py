@@ -1,4 +1,4 @@
-"""Samples of a record in the exact modal schemes, read from modal coordinates, and their extrema."""
+"""Samples of a record and their extrema, read from modal coordinates."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ LANES = 8  # outputs are read in whole vectors
 
 
 class Recorder(NamedTuple):
-    """Work space of a case's measures, o output rows and q pairs; make one with `recorder`."""
+    """Work space of a case's measures, for o output rows and q pairs; made by `recorder`."""
 
     value: Floats  # (SAMPLES_AT_ONCE o,), outputs sample by sample
-    last: Floats  # (2, 3 + q), watched signals and their rates at the last sample; NaN before the first
+    last: Floats  # (2, 3 + q), signals with extrema and their rates at the last sample; NaN before the first
     node: Floats  # (4, q), force, slip speed (N, m/s) and their rates of closed pairs at the last step
     entry: Floats  # (2,), J, forms of damping loss and unbalance work where the span began
-    begun: Floats  # (2, m), under set-valued friction: coordinates where the span began
+    begun: Floats  # (2, m), coordinates where the span began (set-valued friction)
 
 
 def recorder(q: int, n_probe: int = 0) -> Recorder:
@@ -55,9 +55,9 @@ def recorder(q: int, n_probe: int = 0) -> Recorder:
 
 @jit_inline_sum
 def read_outputs(output: Floats, mode: int, z_re: Floats, z_im: Floats, n_value: int, value: Floats) -> None:
-    """Fill the first `n_value` outputs from the modal coordinates, whose number is a multiple of four.
+    """Fill the first `n_value` outputs from the modal coordinates; their number is a multiple of four.
 
-    Those that rest add nothing: of a ring that nothing has touched, the coordinates of all stators.
+    Coordinates at zero are skipped, such as those of all stators of a ring before any contact.
     """
     m = z_re.size
     for r in range(n_value):
@@ -91,9 +91,9 @@ def take_samples(
     samples: Samples,
     accumulator: Accumulator,
 ) -> None:
-    """Record `count` samples from `first` on in one mode; the one past the record counts for extrema.
+    """Record `count` samples from `first` on in one mode; one past the record counts for extrema only.
 
-    `interval` (s) is that between samples, `z` the coordinates at the first of them.
+    `interval` (s) is the time between samples, `z` the coordinates at the first one.
     """
     read_samples(
         tables.output,
@@ -133,7 +133,7 @@ def read_samples(
     lateral: Floats,
     probe: Floats,
 ) -> None:
-    """Fill `value` with the outputs of `count` samples, and those of the record with the samples."""
+    """Fill `value` with the outputs of `count` samples, and the record with those that belong to it."""
     q = axial.shape[0]
     n_row, n_sample = value.size // SAMPLES_AT_ONCE, rotor.shape[1]
     first_probe = N_ROTOR_ROW + 3 * q
@@ -162,7 +162,7 @@ def widen_extrema(
     highest: Floats,
     peak_lateral: Floats,
 ) -> None:
-    """Widen the extrema of the watched signals by `count` samples, an `interval` (s) apart."""
+    """Update the extrema of signals by `count` samples, an `interval` (s) apart."""
     q = peak_lateral.size
     n_row = value.size // SAMPLES_AT_ONCE
     for k in range(3 + q):

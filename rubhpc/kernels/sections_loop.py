@@ -1,4 +1,4 @@
-"""Several revolutions without a record, and the motions at their ends."""
+"""Several revolutions without a record, with the motions at their ends."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ def advance_sections(
     accumulator: Accumulator,
     sections: Floats,
 ) -> int:
-    """Advance from the tick reached to tick 0 (`event_loop.advance`), and note the motion in between.
+    """Advance from the current tick to tick 0 (`event_loop.advance`), and store motions on the way.
 
     Parameters
     ----------
     limit, energy_limit : float, m and J
-        Beyond which a case has diverged (`contact_modes.is_within`).
+        Limits of divergence (`contact_modes.is_within`).
     sections : (n_revolution, 2 n)
         Filled in: the reduced motion at the end of each of the last revolutions before tick 0.
 
     Returns
     -------
     int
-        As of `event_loop.advance`; FINISHED before tick 0 where the motion is beyond a limit there.
+        As in `event_loop.advance`; FINISHED before tick 0 where the motion is beyond a limit.
     """
     per_revolution = clock.samples_per_revolution << clock.sample_level
     motion_re, motion_im, n_revolution = tables.motion_re, tables.motion_im, sections.shape[0]

@@ -1,7 +1,8 @@
-"""Events under set-valued friction and a penalty: which pairs press, and which are lifted.
+"""Events under set-valued friction and a penalty: pairs are pressed or lifted.
 
-A spring and a damper give the normal force, so that nothing impacts: motion is continuous, and so are normal
-forces but for the damper's where a gap closes. What a pair sticks with follows from Coulomb's law alone.
+A spring and a damper give the normal force, so that there are no impacts. The motion is continuous, and so
+are normal forces, except the damper's where a gap closes. The friction of a sticking pair follows from
+Coulomb's law.
 """
 
 from __future__ import annotations
@@ -34,9 +35,9 @@ def press_pairs(
     motion: Floats,
     work: FrictionWork,
 ) -> int:
-    """Bits of the pairs that are lifted after an event; the forces of those that press go to `work.solver`.
+    """Bits of the pairs lifted after an event; the forces of the pressed pairs go to `work.solver`.
 
-    The gap of any other is infinite.
+    All other pairs get an infinite gap.
     """
     q, solver = work.rate.size, work.solver
     lifted = int(np.int64(0))

@@ -1,10 +1,10 @@
 """The modal integrator in steps: closed-form motion between short contact steps, for every law and normal.
 
-With the updated normal the gap is no linear function of the motion, and with a penalty forces act in open
-gaps: closed contacts have no modes. The contact force of a step
-acts as a kick at its beginning, as in the central difference, and the motion drifts freely (exactly, in the
-modes of the open system) to its end, where the laws of contact hold. Far from contact, bounded long steps are
-taken: the gap along the stator's axis is never the larger one.
+It covers laws under which closed contacts have no modes. With the updated normal, for instance, the gap is
+not a linear function of the motion. The contact force of a step acts as an impulse at its beginning, as in
+the central difference. The motion is then free (exact, in the modes of the open system) up to the end of the
+step, where the laws of contact hold. Far from contact, long steps are taken within bounds: the gap along the
+stator's axis is a lower bound.
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ Ints = NDArray[np.int64]
 
 
 class ContactImpulses(NamedTuple):
-    """How contact forces act on the modes of the open system; q pairs of 5 degrees each, m modes."""
+    """Action of contact forces on the modes of the open system; q pairs of 5 degrees each, m modes."""
 
     level: int  # steps in contact last 2^level ticks
     degree_re: Floats  # (5 q, m), displacement of each degree
     degree_im: Floats
     rate_re: Floats  # (5 q, m), velocity of each degree
     rate_im: Floats
-    drifted_re: Floats  # (5 q, m), modal coordinates a contact step after a unit impulse on each degree
+    drifted_re: Floats  # (5 q, m), modal coordinates one contact step after a unit impulse on each degree
     drifted_im: Floats
-    shifted_re: Floats  # (5 q, m), those of the displacement that a unit impulse makes in a second
+    shifted_re: Floats  # (5 q, m), those of the displacement by a unit impulse in one second
     shifted_im: Floats
     twist_response: Floats  # (5 q,), torsional acceleration of the output node for a unit force
     skew: Floats  # (n, n), skew part of the reduced stiffness; (0, n) where there is none
-    probe_response: Floats  # (n_probe, 5 q), what a probe of acceleration sees of a unit force, at once
+    probe_response: Floats  # (n_probe, 5 q), immediate reading of an acceleration probe for a unit force
 
 
 @jit_lean_sum
@@ -66,12 +66,12 @@ def book_step(
     x_after: Floats,
     energy: Floats,
 ) -> None:
-    """Add what damping took and the unbalance gave in a step of contact (s), at its mean velocity.
+    """Add the work of damping and of the unbalance in a contact step (s), at its mean velocity.
 
     `x` and `x_after` (n,) are the reduced displacements at its ends, `cosine` and `sine` are those of the
-    shaft amid it (`shaft_turn`); `skew` is the skew part of the stiffness, without rows where there is none.
-    A kick sets off a burst of the fastest modes, which force spread over the step would not: the mean leaves
-    it out.
+    shaft in its middle (`shaft_turn`); `skew` is the skew part of the stiffness, without rows where it is
+    zero. An impulse excites the fastest modes, which a force spread over the step would not: the mean
+    velocity excludes this.
     """
     n = x.size
     loss, gain = 0.0, 0.0
@@ -103,9 +103,9 @@ def take_back(
     before: Floats,
     now: Floats,
 ) -> None:
-    """Take back what a step's forces have moved before their impacts were due; velocities stay.
+    """Subtract the displacement by a step's forces before the times of their impacts; velocities are kept.
 
-    `z` are the coordinates at the end of the step (s); the ends `before` and `now` (5 q,) are moved alike.
+    `z` are the coordinates at the end of the step (s); `before` and `now` (5 q,) are corrected likewise.
     """
     for i in range(work.force.size):
         for d in range(N_DEGREE):
@@ -141,9 +141,9 @@ def advance_by_steps(
 ) -> int:
     """Advance a case from the tick reached to `last_tick`, as `event_loop.advance` does.
 
-    `tables` holds the open mode alone; `pairs.row` numbers the 5 q degrees of `impulses`. `ends` (4, 5 q)
-    keeps the degrees at the beginning and the end of the step before, where that was as short, else NaN; two
-    rows of it, and `placed` (2, n), are work space.
+    `tables` holds only the open mode; `pairs.row` numbers the 5 q degrees of `impulses`. `ends` (4, 5 q)
+    keeps the degrees at the beginning and the end of the step before if that was equally short, else NaN. Its
+    other two rows and `placed` (2, n) are work space.
     """
     q = pairs.radius.size
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
@@ -162,7 +162,7 @@ def advance_by_steps(
     x, x_after = placed[0], placed[1]
     for a in range(n_degree):
         after[a] = 0.0
-    is_placed = False  # whether x is where the step begins
+    is_placed = False  # whether x is the position at the beginning of the step
     step = clock.tick * (1 << impulses.level)
     interval = clock.tick * (1 << clock.sample_level)
     end_tick = clock.n_sample << clock.sample_level
@@ -170,7 +170,7 @@ def advance_by_steps(
     per_revolution = clock.samples_per_revolution << clock.sample_level
     is_direct, may_press_open = is_plain(pairs.law), is_penalty(pairs.law)
     bounces = is_bouncing(pairs.law)
-    is_followed = is_recorded or not is_direct  # the steps before and after a force are looked at
+    is_followed = is_recorded or not is_direct  # laws use the steps before and after a force
     last_step = progress.n_step + MOST_STEPS
     was_touching = False
     for i in range(q):
@@ -183,7 +183,7 @@ def advance_by_steps(
         is_end = t >= last_tick
         if is_sample and (not is_end or t == end_tick):
             i_sample = t >> clock.sample_level
-            n_taken = i_sample + 1 - progress.next_sample  # 1; the callee would be compiled for a literal
+            n_taken = i_sample + 1 - progress.next_sample  # 1; a literal would be another type
             take_samples(
                 tables, progress.mode, z_re, z_im, i_sample, n_taken, interval, recorder, samples, accumulator
             )
@@ -202,7 +202,7 @@ def advance_by_steps(
         progress.n_step += 1
         propagate(power_re[0, level], power_im[0, level], z_re, z_im, next_re, next_im)
         is_near, is_touching = level <= impulses.level, False
-        # The force that holds a gap closed is half of what it is in the step that a case begins with.
+        # In the first step of a case the force that holds a gap closed is half of its later value.
         share = 2.0 if progress.n_step == 1 and was_touching and not may_press_open else 1.0
         if is_near:
             for a in range(n_degree):

@@ -1,11 +1,11 @@
-"""The exact tangent of a motion carried along its trail: exponentials, and saltation at events.
+"""The exact tangent of a motion along its trail: exponentials between events, saltation at events.
 
 A small displacement d of a motion x moves an event, at which a switch function h vanishes, by
-`t = -(grad h . d) / (dh/dt)`. Before it d + t f-, with f the rate of the motion, is where the displaced
-motion meets the event; the derivative DR of the impact takes it over, and `- t f+` brings it back to the time
-of the event: `S d = DR (d + t f-) - t f+`, the saltation matrix (Leine and Nijmeijer 2004) without being
-formed. In modal coordinates the rates are products with the exponents, so that an event costs what entering a
-contact mode costs.
+`t = -(grad h . d) / (dh/dt)`. With f the rate of the motion, the displaced motion meets the event at d + t
+f-. The derivative DR of the impact maps this displacement, and `- t f+` returns to the time of the event:
+`S d = DR (d + t f-) - t f+`. This applies the saltation matrix S (Leine and Nijmeijer 2004) without forming
+it. In modal coordinates the rates are products with the exponents, so that an event costs as much as entering
+a contact mode.
 """
 
 from __future__ import annotations
@@ -27,28 +27,28 @@ Ints = NDArray[np.int64]
 
 ALL_CARRIED = -1
 NO_IMPULSE = 1e-12  # of the largest impulse of an event
-STOPPED = 1e-9  # of the rim's speed: what slips less after an impact sticks
-LOST = 1e-280  # a displacement smaller than that is gone
+STOPPED = 1e-9  # of the rim's speed: a pair that slips less after an impact sticks
+LOST = 1e-280  # a smaller displacement counts as zero
 PIECE, REVOLUTION, PASSED, IS_ENTERED = range(4)  # items of `Tangent.reached`
 
 
 class TrailModes(NamedTuple):
-    """The k different contact modes of a trail."""
+    """The k distinct contact modes of a trail."""
 
-    of_piece: Ints  # (room + 1,), which of them each piece is in
+    of_piece: Ints  # (room + 1,), contact mode of each piece
     place: Ints  # (k,), in the tables, or -1
     exponent: Floats  # (k, 2, m), 1/s
     drift: Floats  # (k, m), of the coordinates with exponent 0
     opened: Ints  # (k,), bits of the switch functions that are gaps
-    has_states: bool  # whether pairs slide in either sense and stick
+    has_states: bool  # whether pairs may slide in either sense and stick
 
 
 class Tangent(NamedTuple):
-    """A displacement that is carried, and work space; m coordinates, n reduced degrees, q pairs."""
+    """A displacement of a motion and work space; m coordinates, n reduced degrees, q pairs."""
 
-    reached: Ints  # (4,), piece, revolution, ticks passed, and whether the first mode is entered
-    motion: Floats  # (2 n,), the displacement where none is entered: at the beginning and at the end
-    generic: Floats  # (2 n,), what goes on in place of one that is lost
+    reached: Ints  # (4,), piece, revolution, ticks passed, whether the first mode is entered
+    motion: Floats  # (2 n,), the displacement outside contact modes: at the beginning and at the end
+    generic: Floats  # (2 n,), replaces a displacement that has become zero
     d: Floats  # (2, m)
     z: Floats  # (2, m), the motion itself
     grown: Floats  # (n_revolution,), filled in: logarithm of the growth in each revolution
@@ -56,8 +56,8 @@ class Tangent(NamedTuple):
     compliance: Floats  # (2 q, 2 q)
     speed: Floats  # (2 q,)
     found: Floats  # (2 q,)
-    rate: Floats  # (2, q), of gaps, then slips, with the displacement
-    given: Floats  # (2, q), impulses, then tractions, that its derivative has
+    rate: Floats  # (2, q), changes of gap rates, then of slips, by the displacement
+    given: Floats  # (2, q), derivatives of the normal, then the tangential impulses
     active: NDArray[np.bool_]  # (2 q,)
     elimination: Floats  # (2 q, 2 q + 1)
 
@@ -95,17 +95,17 @@ def carry_along(
     transitions: Transitions,
     tangent: Tangent,
 ) -> int:
-    """Carry a displacement along a trail: `tangent.grown.size` revolutions of `per_revolution` ticks.
+    """Propagate a displacement along a trail: `tangent.grown.size` revolutions of `per_revolution` ticks.
 
-    The trail begins at tick `first`.
+    The trail begins at the tick `first`.
 
-    Its size is the root of v'v + spin^2 u'u in reduced coordinates, in which the mass matrix is the identity;
-    it is brought back to 1 after every revolution.
+    The size of a displacement is the root of v'v + spin^2 u'u in reduced coordinates, in which the mass
+    matrix is the identity; it is normalised to 1 after every revolution.
 
     Returns
     -------
     int
-        ALL_CARRIED, or the piece whose contact mode is not tabulated: call again once it is.
+        ALL_CARRIED, or the piece whose contact mode is missing from the tables: add it and call again.
     """
     reached, d, z = tangent.reached, tangent.d, tangent.z
     n_event, n_revolution = trail.n_event[0], tangent.grown.size
@@ -149,7 +149,7 @@ def carry_along(
         crossing = trail.crossing[k]
         is_touching = crossing & modes.opened[which] != 0
         shift, cosine_rate, sine_rate = 0.0, 0.0, 0.0
-        if modes.has_states or is_touching:  # else a release, at which the forces are continuous
+        if modes.has_states or is_touching:  # else a release with continuous forces
             read_begun(trail, k, z)
             move(tables, place, end - begun, z)
             for i in range(z.shape[1]):
@@ -189,7 +189,7 @@ def carry_along(
 
 @jit_lean_sum
 def move(tables: ModeTables, place: int, n_tick: int, z: Floats) -> None:
-    """Coordinates (2, m) that many ticks later."""
+    """Advance coordinates (2, m) by `n_tick` ticks."""
     power_re, power_im = tables.power_re[place], tables.power_im[place]
     highest = power_re.shape[0] - 1
     z_re, z_im = z[0], z[1]
@@ -213,7 +213,7 @@ def read_begun(trail: Trail, piece: int, z: Floats) -> None:
 
 @jit_inline_sum
 def add_rate(time: float, exponent: Floats, drift: Floats, z: Floats, d: Floats) -> None:
-    """Add to a displacement d what a motion z does in a time, s, both (2, m)."""
+    """Add the change of a motion z in a time, s, to a displacement d, both (2, m)."""
     for i in range(z.shape[1]):
         growth, turning = time * exponent[0, i], time * exponent[1, i]
         d[0, i] += growth * z[0, i] - turning * z[1, i] + time * drift[i]
@@ -231,7 +231,7 @@ def read_displacement(tables: ModeTables, place: int, tangent: Tangent) -> None:
 
 @jit_lean_sum
 def enter_displacement(tables: ModeTables, place: int, cosine: float, sine: float, tangent: Tangent) -> None:
-    """Fill the coordinates from `tangent.motion`, and from a change of the shaft's cosine and sine."""
+    """Fill the coordinates from `tangent.motion` and from a change of the shaft's cosine and sine."""
     for part in range(2):
         target = tangent.d[part]
         from_cosine, from_sine = tables.enter_cosine[place, part], tables.enter_sine[place, part]
@@ -255,7 +255,7 @@ def size_of(motion: Floats, spin: float) -> float:
 def strike_motion(
     reduced: Reduced, has_states: bool, impulse: Floats, velocity: Floats, tangent: Tangent
 ) -> None:
-    """Apply the derivative of an impact to `tangent.motion`, as `strike` finds it."""
+    """Apply the derivative of an impact, from `strike`, to `tangent.motion`."""
     q, n = reduced.gap_jacobian.shape
     moved = tangent.motion[n:]
     for i in range(q):
@@ -276,9 +276,9 @@ def strike(reduced: Reduced, has_states: bool, impulse: Floats, velocity: Floats
     """Fill `tangent.given` with the impulses of the derivative of an impact: `dv+ = dv- - F (R F)^-1 R dv-`.
 
     The rows R are those of the gap velocities that impulses change, each times 1 + restitution where the pair
-    parts, and of the slips that they stop; F are the directions of these impulses, friction in proportion
-    included. `impulse` are its impulses and tractions (2, q), `velocity` (n,) what it leaves, `tangent.rate`
-    what the displacement does to the rates of gaps and to slips.
+    parts, and of the slips that they stop. F are the directions of these impulses, including proportional
+    friction. `impulse` (2, q) are the normal and tangential impulses, `velocity` (n,) is the velocity after
+    the impact, and `tangent.rate` the change of gap rates and slips by the displacement.
     """
     q, active, share = reduced.radius.size, tangent.active, tangent.share
     tangent.given[:] = 0.0

@@ -1,4 +1,4 @@
-"""The trail of a motion from event to event: what its tangent is carried along by afterwards."""
+"""The trail of a motion from event to event, along which its tangent is propagated afterwards."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ Ints = NDArray[np.int64]
 
 MOST_BYTES = 2**25  # of a trail
 MOST_EVENTS = 2**14
-BROKEN = -1  # in place of the number of events: there were more, or short steps between them
+BROKEN = -1  # instead of the number of events: there was no room for all, or short steps between them
 
 
 class Trail(NamedTuple):
-    """Pieces of a motion, m modal coordinates, n reduced degrees, q pairs; without room none are noted.
+    """Pieces of a motion; m modal coordinates, n reduced degrees, q pairs. Without room none are stored.
 
     Piece k + 1 begins where event k ends piece k.
     """
 
-    n_event: Ints  # (1,), events noted, or BROKEN
+    n_event: Ints  # (1,), number of events, or BROKEN
     states: Ints  # (room + 1,), set of closed pairs, or of the states of all pairs
     tick: Ints  # (room,), of each event
     crossing: Ints  # (room,), bits of the switch functions that vanish there
     begun: Floats  # (room + 1, 2, m), modal coordinates with which each piece begins
     velocity: Floats  # (room, n), reduced velocity after each event
-    given: Floats  # (room, 2, q), normal impulses of each event and tractions, N s
+    given: Floats  # (room, 2, q), normal and tangential impulses of each event, N s
 
 
 def new_trail(m: int, n: int, q: int) -> Trail:
@@ -39,7 +39,7 @@ def new_trail(m: int, n: int, q: int) -> Trail:
 
 
 def no_trail() -> Trail:
-    """Nothing is noted in this one."""
+    """A trail without room."""
     return _with_room(0, 1, 1, 1)
 
 
@@ -56,13 +56,13 @@ def _with_room(room: int, m: int, n: int, q: int) -> Trail:
 
 
 def begin_trail(trail: Trail, states: int, z: Floats) -> None:
-    """Note where a motion stands: its states and modal coordinates (2, m)."""
+    """Begin at a motion, given by its states and modal coordinates (2, m)."""
     trail.n_event[0], trail.states[0], trail.begun[0] = 0, states, z
 
 
 @jit_inline
 def note_event(trail: Trail, tick: int, crossing: int) -> None:
-    """Note an event."""
+    """Store an event."""
     room, k = trail.tick.size, trail.n_event[0]
     if room > 0 and k >= 0:
         if k == room:
@@ -73,7 +73,7 @@ def note_event(trail: Trail, tick: int, crossing: int) -> None:
 
 @jit_inline
 def note_after(trail: Trail, motion: Floats, given: Floats) -> None:
-    """Note the motion (2 n,) after the event, and its impulses and tractions (2, q)."""
+    """Store the motion (2 n,) after the event, and its normal and tangential impulses (2, q)."""
     k = trail.n_event[0]
     if trail.tick.size > 0 and k >= 0:
         n = trail.velocity.shape[1]
@@ -85,7 +85,7 @@ def note_after(trail: Trail, motion: Floats, given: Floats) -> None:
 
 @jit_inline
 def note_piece(trail: Trail, states: int, z: Floats) -> None:
-    """Note the states and coordinates (2, m) that go on after the event."""
+    """Store the states and coordinates (2, m) after the event."""
     k = trail.n_event[0]
     if trail.tick.size > 0 and k >= 0:
         trail.states[k + 1] = states
