@@ -1,8 +1,7 @@
-"""A second process that compiles what a case needs last, while the first one compiles what it needs first.
+"""A second process that compiles the kernels a case needs last, while the first compiles those needed first.
 
-They meet in the cache on the disk: what one has compiled, or is compiling, the other loads. The kernels that
-follow a motion for the proof of its period do not need those that march through transient and record, but
-share the events with them.
+They share the cache on the disk: each loads what the other has compiled. The kernels that follow a motion for
+the proof of its period share only the events with those that march through transient and record.
 """
 
 from __future__ import annotations
@@ -44,10 +43,10 @@ _SOFT = {"law": "penalty", "stiffness": 1e8, "damping": 0.0}
 
 
 def compile_ahead(setup: Setup) -> None:
-    """Have the kernels of periodic motions compiled beside this process, if any cache lacks them.
+    """Compile the kernels of periodic motions in a second process, if a cache lacks them.
 
-    One process a cache does so at a time, and none where there is one processor or no interpreter to start.
-    What it does not do is compiled here when it is needed.
+    There is at most one such process per cache, and none with one processor or without an interpreter to
+    start. Kernels that it has not compiled are compiled here when they are needed.
     """
     if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
         return
@@ -58,12 +57,12 @@ def compile_ahead(setup: Setup) -> None:
     kernels = (follow_revolutions, march.take_change)[: 1 + issubclass(march, FrictionMarch)]
     is_known = all(cache_of(kernel).exists() for kernel in kernels)
     if not is_known and len(os.sched_getaffinity(0)) > 1 and Path(sys.executable).stem.startswith("python"):
-        with suppress(OSError):  # the lock of another, or no room for a process
+        with suppress(OSError):  # another process has the lock, or no process can be started
             _start(FRICTION_LAWS[setup.law.friction_law], is_soft=plain(is_penalty)(setup.law))
 
 
 def _start(friction_law: str, *, is_soft: bool) -> None:
-    """Start the process; it holds the lock, and ends with this one, which holds its input."""
+    """Start the process. It holds the lock, and ends with this process, which holds its input."""
     path = cache_of(follow_revolutions).parent / "ahead.lock"
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as lock:
@@ -88,16 +87,16 @@ def _start(friction_law: str, *, is_soft: bool) -> None:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Leave no process behind; half a kernel is in no cache."""
+    """End the process; the cache never contains a partial kernel."""
     process.kill()
     process.communicate()
 
 
 def _compile(friction_law: str, *, is_soft: bool) -> None:
-    """Compile what follows a motion from event to event, on a rotor that touches nothing.
+    """Compile the kernels that follow a motion from event to event, on a rotor without contact.
 
-    Under set-valued friction what takes an event is a kernel of its own. Before these what the march needs
-    towards its end: both processes then end at about the same time.
+    Under set-valued friction an event has its own kernel. The kernels that the march needs last are compiled
+    first: both processes then end at about the same time.
     """
     seen = new_accumulator(1)
     add_force(0, 0.0, 0.0, 0.0, 0.0, 0.0, seen.origin, seen.force_piece, seen.force_held, seen.peak_force)
@@ -118,6 +117,6 @@ def _end_with_parent() -> None:
 
 
 if __name__ == "__main__":
-    gc.disable()  # it ends before it would need the room
+    gc.disable()  # the process ends before it needs the memory
     threading.Thread(target=_end_with_parent, daemon=True).start()
     _compile(sys.argv[1], is_soft="soft" in sys.argv[2:])

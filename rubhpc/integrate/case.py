@@ -76,7 +76,7 @@ MARCHES: dict[Scheme, Callable[..., March]] = {
 
 
 def march_of(scheme: Scheme, setup: Setup) -> Callable[..., March]:
-    """Return what integrates a case by a scheme."""
+    """Return the constructor of the march of a scheme."""
     march = MARCHES[scheme]
     return closed_form_march(setup) if isinstance(setup, ModalSetup) and march is EventDrivenMarch else march
 
@@ -140,10 +140,10 @@ def compile_kernels(
     recording: Recording,
     check: Callable[[], None] | None = None,
 ) -> None:
-    """Compile what every case of this set-up calls, on two revolutions.
+    """Compile the kernels that every case of this set-up calls, on two revolutions.
 
-    What some cases call as well, contact in short steps and neighbouring motions, is compiled when the first
-    of them does.
+    Kernels that only some cases call, for short steps and neighbouring motions, are compiled when a case
+    first calls them.
     """
     short = replace(recording, transient=1, transient_limit=None, transient_tolerance=None, revolutions=1)
     record = run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)
@@ -179,7 +179,7 @@ def _integrate(
         begun_on = passed.found
     else:
         reason, n_transient = pass_transient(march, recording)
-    if reason is not None:  # what led to it is the record
+    if reason is not None:  # the record shows the way to divergence
         n_step, n_left = n_step + march.n_step, march.n_left
         ended = n_transient + march.sample // per_revolution + 1
         march, n_transient = start(initial), max(0, ended - recording.revolutions)
@@ -258,7 +258,7 @@ def _pass_directly(
     friction: float,
     recording: Recording,
 ) -> tuple[Passed, Record | None]:
-    """Pass the transient in the direct way; with the record of the known motion that it leads to, if any."""
+    """Pass the transient by the direct method; returns the record of a known motion if it reaches one."""
     known = None
     if recording.is_transient_shared:
         assert isinstance(setup, ModalSetup)
@@ -285,7 +285,7 @@ def _pass_directly(
 def _solve_from(
     setup: Setup, clearance: float, friction: float, state: State, march: EventDrivenMarch | None = None
 ) -> PiecewiseMotion:
-    """Piecewise motion of a case in closed form; a march of it that is given is started again."""
+    """Piecewise motion of a case in closed form; a given march of it is restarted."""
     assert isinstance(setup, ModalSetup)
     return PiecewiseMotion(setup, clearance, friction, state, march)
 

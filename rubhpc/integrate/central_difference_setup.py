@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CentralDifferenceSetup:
-    """All that the cases of one rig and speed share."""
+    """Set-up that the cases of one rig and speed share."""
 
     scheme: ClassVar[Scheme] = Scheme.CENTRAL_DIFFERENCE
     model: Model

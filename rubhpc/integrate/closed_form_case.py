@@ -1,4 +1,4 @@
-"""What more is known of a case in closed form: its tangent, Lyapunov exponents, periodic motions near it."""
+"""Further results of a case in closed form: tangent, Lyapunov exponents, periodic motions nearby."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rubhpc.kernels.trail import Trail
     from rubhpc.study.study import Recording
 
-_spare: list[Trail] = []  # that of the last case, if no other has taken it
+_spare: list[Trail] = []  # arrays of the last case, unless another one uses them
 
 
 def exponents_of(
@@ -49,14 +49,14 @@ def solver_of(
     final: State,
     begun_on: tuple[PiecewiseMotion, Orbit] | None,
 ) -> Solver | None:
-    """What finds periodic motions next to where a march has ended; None where it has no closed form."""
+    """Solver for periodic motions near the end of a march; None where it has no closed form."""
     if isinstance(march, EventDrivenMarch) and march.has_closed_form and isinstance(setup, ModalSetup):
         return Solver(setup, clearance, friction, final, begun_on, march)
     return None
 
 
 def trail_of(march: March, recording: Recording) -> Trail | None:
-    """Have the events of a record noted, where its tangent may be carried along them."""
+    """Record the events of a record where its tangent may be propagated along them."""
     if (
         isinstance(march, EventDrivenMarch)
         and march.has_closed_form
@@ -69,9 +69,9 @@ def trail_of(march: March, recording: Recording) -> Trail | None:
 
 
 def give_back(march: March, trail: Trail | None) -> None:
-    """Keep the room of a trail for the next case, once nothing reads or writes it any more.
+    """Keep the arrays of a trail for the next case, when nothing reads or writes them any more.
 
-    The system clears new memory page by page, which takes longer than to follow the tangent.
+    The system clears new memory page by page, which takes longer than following the tangent.
     """
     if trail is not None:
         cast("EventDrivenMarch", march).keep(None)
@@ -79,7 +79,7 @@ def give_back(march: March, trail: Trail | None) -> None:
 
 
 def _kept(march: EventDrivenMarch) -> Trail | None:
-    """Room that was given back, where it is as wide as that of a march."""
+    """Kept arrays, if they fit a march."""
     try:
         trail = _spare.pop()
     except IndexError:
@@ -96,7 +96,7 @@ def neighbours_of(
     setup: Setup,
     recording: Recording,
 ) -> Neighbours:
-    """A motion beside that from where a march has ended."""
+    """A motion next to the one from the end of a march."""
     if isinstance(march, EventDrivenMarch) and march.has_closed_form:
         return TangentMotion(
             cast("Callable[[State], EventDrivenMarch]", start), final, setup, recording, trail, march

@@ -1,4 +1,4 @@
-"""Announces the compilation of kernels, and counts its time, which is not part of a case's computing time."""
+"""Announces the compilation of kernels and counts its time, which is not part of a case's computing time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rubhpc.kernels._jit import compilation
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-# Kernels that are announced by themselves -> what for; they are compiled when a case first needs them.
+# Kernels with their own announcement -> purpose; they are compiled when a case first needs them.
 _PARTS = {
     "advance_by_steps": "for contact in short steps",
     "advance_curved": "for curved gaps",
@@ -37,7 +37,7 @@ def to_stderr(text: str) -> None:
 
 
 def announce_by(announce: Callable[[str], None]) -> None:
-    """Have `announce` called, once a part of the program, before kernels in no cache are compiled."""
+    """Call `announce` before kernels that are in no cache are compiled, once for each part of the program."""
 
     def begin(name: str) -> None:
         part = _PARTS.get(name, "")
@@ -60,10 +60,9 @@ def announced_by(announce: Callable[[str], None]) -> Iterator[None]:
 
 
 class _Uncollected(event.Listener):
-    """Leaves garbage alone while kernels are compiled, 90 MB: to look for it takes a twelfth of the time.
+    """Disables garbage collection while kernels are compiled (90 MB): it takes a twelfth of the time.
 
-    So does a look at all that has been made meanwhile, so that it is never looked at again: that process is
-    80 MB larger for it.
+    A later scan of these objects takes as long, so that they are excluded: the process is 80 MB larger.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Counts the revolutions that are followed behind records, for their exponents and for motions to come."""
+"""Counts the revolutions that are followed after records, for exponents and periodic motions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ _followed = [0]
 
 
 def n_followed() -> int:
-    """Revolutions that this process has followed behind records so far; of two motions, those of both."""
+    """Revolutions that this process has followed after records so far; of two motions, those of both."""
     return _followed[0]
 
 

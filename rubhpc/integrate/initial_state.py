@@ -1,8 +1,8 @@
 """Initial states: rest in the sag, or a motion of another case adapted to the gaps of this one.
 
-What a wall that has moved in overlaps is pushed apart as by moving the wall slowly: by the static shapes of
-rotor and stators under the contact forces that it takes, with the least strain energy that does it. To let
-the first step close the gap instead would throw the bodies apart at micrometres a microsecond.
+Overlaps are removed quasi-statically: rotor and stators move by their static shapes under the contact forces
+that close the gaps, with the least strain energy. If the first step closed the gaps instead, it would throw
+the bodies apart at micrometres per microsecond.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-TOLERANCE = 1e-12  # m, ten times what the integrators take for closed: a run that goes on is left as it is
+TOLERANCE = 1e-12  # m, ten times the tolerance of the integrators: a continued run is not changed
 PARTED = 1e-9  # m, beyond which a closed contact has opened
-LEAST_FORCE = np.finfo(float).tiny  # N, of a contact that is closed, whatever presses it
-MOST_PASSES = 20  # for the curved gap of the updated normal; three or four are taken
+LEAST_FORCE = np.finfo(float).tiny  # N, least force that marks a contact as closed
+MOST_PASSES = 20  # for the curved gap of the updated normal; three or four are usual
 
 
 def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
-    """Return a state as the start of a case: no gap overlapped further than it was, and none pulled shut.
+    """Return a state as the start of a case: no gap overlaps more than before, and none is pulled shut.
 
     Parameters
     ----------
     state : State
-        Where another case has ended; its `overlap` is what a penalty allows.
+        Final state of another case; its `overlap` is that allowed by a penalty.
     clearance : float, m
         Radial clearance at rest; a stator's `clearance_offset` is added.
 
@@ -76,7 +76,7 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
 def at_rest(setup: Setup, clearance: float) -> State:
     """Return the shaft at rest under its constant loads, on stators that the sag reaches, without friction.
 
-    Clearance in m; what the stators hold up presses them.
+    Clearance in m; stators carry the weight that rests on them.
     """
     state = State.at_rest(setup.model)
     if not setup.model.sag.any():
@@ -86,7 +86,7 @@ def at_rest(setup: Setup, clearance: float) -> State:
 
 
 def with_overlap(state: State, setup: Setup, clearance: float) -> State:
-    """Return the state at the end of a case with what its gaps overlap."""
+    """Return the final state of a case with the overlap of its gaps."""
     gap, _ = gaps(state.displacement, setup, clearance)
     return replace(state, overlap=np.maximum(-gap, 0.0))
 
@@ -113,7 +113,7 @@ def gaps(displacement: Floats, setup: Setup, clearance: float) -> tuple[Floats, 
 
 
 def _as_seen(displacement: Floats, setup: Setup) -> Floats:
-    """Displacement of all bodies as the integrator will have it: reduced coordinates hold no more."""
+    """Displacement of all bodies that the integrator can represent in its reduced coordinates."""
     if not isinstance(setup, ModalSetup):
         return displacement
     n, sag = setup.model.rotor.n_dof, setup.model.sag
@@ -125,7 +125,7 @@ def _as_seen(displacement: Floats, setup: Setup) -> Floats:
 
 
 def static_shapes(force: Floats, setup: Setup) -> Floats:
-    """Static displacements (n_dof, k) under forces (n_dof, k); what nothing holds follows by its inertia."""
+    """Static displacements (n_dof, k) under forces (n_dof, k); free bodies follow by their inertia."""
     if isinstance(setup, ModalSetup):
         basis, stiffness = setup.reduced.basis, setup.reduced.stiffness
         shapes: Floats = basis @ np.linalg.solve(0.5 * (stiffness + stiffness.T), basis.T @ force)
@@ -143,7 +143,7 @@ def static_shapes(force: Floats, setup: Setup) -> Floats:
 
 
 def _least_forces(compliance: Floats, gap: Floats) -> Floats:
-    """Forces (q,), N, none of them pulling, that leave no gap below zero."""
+    """Compressive forces (q,), N, that leave no gap below zero."""
     q = gap.size
     force, active, work = np.zeros(q), gap < 0.0, np.zeros((q, q + 1))
     solve_complementarity(np.ascontiguousarray(compliance), gap, TOLERANCE, force, active, work)

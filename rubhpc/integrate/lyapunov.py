@@ -1,4 +1,4 @@
-"""How fast two neighbouring motions of a case part: the growth behind its largest Lyapunov exponent."""
+"""Growth of the distance of two neighbouring motions of a case, for its largest Lyapunov exponent."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-SPAN = 4  # revolutions: few enough that neighbours stay neighbours
-N_ALIGNING = 4  # spans in which the displacement turns into the direction that grows most
-DISPLACED = 1e-5  # of the motion: far above the resolution of events, far below the motion's features
-LOST = 1e-6  # of the displacement: what is left is rounding
+SPAN = 4  # revolutions: few enough that neighbours stay close
+N_ALIGNING = 4  # spans in which the displacement turns into the direction of largest growth
+DISPLACED = 1e-5  # of the motion: far above the resolution of events, far below details of the motion
+LOST = 1e-6  # of the displacement: less is rounding
 
 
 class Neighbours(Protocol):
@@ -37,10 +37,10 @@ class Neighbours(Protocol):
     Attributes
     ----------
     n_aligning, most_spans : int
-        Spans in which their displacement turns into the direction that grows most, and for how many they are
-        worth following, these included.
+        Spans in which their displacement turns into the direction of largest growth, and most spans to
+        follow, including these.
     within : list of float
-        Growth per revolution in the spans of the record, as far as it is known.
+        Growth per revolution in the spans of the record, where known.
     """
 
     n_aligning: int
@@ -48,27 +48,27 @@ class Neighbours(Protocol):
     within: list[float]
 
     def part(self, n_revolution: int) -> float | None:
-        """Go on with both; return by how much the logarithm of their distance grows, or None at an end.
+        """Continue both; return the growth of the logarithm of their distance, or None at an end.
 
-        The second is then as near as in the beginning again, in the direction in which it went.
+        The second motion is then moved back to the initial distance, in the same direction.
         """
 
 
 class Growth:
     """Logarithm of how much a small displacement grows per revolution, in spans of 4.
 
-    Iterated, it yields spans from the end of a record on. After each the displacement is brought back to its
-    first size (Benettin, Galgani, Giorgilli and Strelcyn 1980). The mean tends to the largest Lyapunov
-    exponent per revolution; it ends where a motion cannot go on, or is not worth following.
+    Iteration yields spans from the end of a record on. After each the displacement is rescaled to its first
+    size (Benettin, Galgani, Giorgilli and Strelcyn 1980). The mean tends to the largest Lyapunov exponent per
+    revolution. Iteration ends where a motion cannot continue, or after the most spans.
 
     Parameters
     ----------
     begin : callable
-        Makes the motion and its displacement, once the first span is wanted.
+        Makes the motion and its displacement when the first span is read.
     """
 
     def __init__(self, begin: Callable[[], Neighbours]) -> None:
-        """Begin when it is asked for."""
+        """Begin when the first span is read."""
         self._begin = begin
 
     @cached_property
@@ -76,7 +76,7 @@ class Growth:
         return self._begin()
 
     def within(self) -> list[float]:
-        """Return the spans of the record, as far as they are known there."""
+        """Return the spans of the record, where known."""
         return self._neighbours.within
 
     def __iter__(self) -> Iterator[float]:
@@ -104,7 +104,7 @@ class Marches:
     def __init__(
         self, start: Callable[[State], March], state: State, setup: Setup, recording: Recording
     ) -> None:
-        """Start at `state`, and beside it."""
+        """Start at `state` and next to it."""
         self.n_aligning = N_ALIGNING
         self.within: list[float] = []
         self.most_spans = N_ALIGNING + N_ALL  # of short steps; more may take minutes
@@ -115,7 +115,7 @@ class Marches:
         self._other, self._size = self._displaced()
 
     def part(self, n_revolution: int) -> float | None:
-        """Start both marches again, one after the other, and compare where they end."""
+        """Restart both marches, one after the other, and compare their ends."""
         ends = []
         for k, state in enumerate((self._state, self._other)):  # the first may empty the tables of the second
             march = self._started(k, state)
@@ -132,7 +132,7 @@ class Marches:
         return math.log(max(ratio, LOST))
 
     def _started(self, k: int, state: State) -> March:
-        """The march of the last span, the first or the second, started at a new state, or a new one."""
+        """March of the first or second motion, restarted at a new state, or a new one."""
         if k == len(self._kept):
             self._kept.append(self._start(state))
         elif not self._kept[k].start_again(state):
@@ -140,7 +140,7 @@ class Marches:
         return self._kept[k]
 
     def _displaced(self) -> tuple[State, float]:
-        """State a little faster than the first, so that closed gaps stay closed, and its distance."""
+        """State with slightly larger velocities, so that closed gaps stay closed, and its distance."""
         state = self._state
         still = replace(
             state,
@@ -163,7 +163,7 @@ class Marches:
 
 
 def _between(one: State, other: State, share: float) -> State:
-    """State at a share of the way from one to the other; below 0 or above 1, beyond them."""
+    """State at a share of the way between two states; beyond them below 0 or above 1."""
 
     def at(a: Floats, b: Floats) -> Floats:
         return a + share * (b - a)

@@ -56,28 +56,28 @@ if TYPE_CHECKING:
 
 L = TypeVar("L", bound=ModeLibrary)
 FINEST_TICK = 1.5e-9  # s
-CONTACT_STEPS = 1024  # a revolution, at least, while recording a contact
-LONGEST_TURN = FINEST_TICK * 2**46  # s, a day: 64 bits count the ticks of a hundred thousand
-FEWEST_STEPS = 16  # a revolution: none is longer than the power of two below it
+CONTACT_STEPS = 1024  # per revolution, at least, while recording a contact
+LONGEST_TURN = FINEST_TICK * 2**46  # s, a day: 64 bits count the ticks of a hundred thousand revolutions
+FEWEST_STEPS = 16  # per revolution, at least
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ModalSetup:
-    """All that the cases of one rig and speed share; contact modes are solved when they are first met."""
+    """Set-up that the cases of one rig and speed share; contact modes are solved when first met."""
 
-    scheme: Scheme = Scheme.EVENT_DRIVEN  # with which a case begins
+    scheme: Scheme = Scheme.EVENT_DRIVEN  # initial scheme of a case
     model: Model
     reduced: ReducedModel
     spin: float  # rad/s
-    step: float  # s, up to which steps are taken without a bound
-    contact_step: float  # s, of contact where it has no closed form
+    step: float  # s, up to which steps need no bound
+    contact_step: float  # s, in contact without a closed form
     samples_per_revolution: int
     is_updated: bool  # normal
     displacement_limit: float  # m
     law: Law = MULTIPLIER
     accuracy: float = 1e-3  # relative, of the modes kept, and of loads where gaps are curved
-    free_spin: FreeSpin | None = None  # where a drive turns it
-    is_measured: bool = True  # or followed alone: tables then hold no outputs and energies
+    free_spin: FreeSpin | None = None  # of a driven rotor
+    is_measured: bool = True  # False: tables have no outputs and energies
     _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
     _curved_libraries: dict[float, CurvedLibrary] = field(default_factory=dict)
     _friction_libraries: dict[float, FrictionLibrary] = field(default_factory=dict)
@@ -91,14 +91,14 @@ class ModalSetup:
 
     @cached_property
     def modal_error(self) -> float:
-        """Estimated error by the modes left out, as a share of each signal and force."""
+        """Estimated error by the omitted modes, relative to each signal and force."""
         touch = touch_of(self.model, self.law, is_updated=self.is_updated)
         are_kept = kept_modes(self.model, self.spin, self.accuracy, touch)
         return modal_error(self.model, self.spin, are_kept, touch)
 
     @cached_property
     def modes_missing(self) -> str:
-        """What to do where that error is above the accuracy asked for; "" where it is not."""
+        """Advice where that error exceeds the requested accuracy; else ""."""
         if self.modal_error <= self.accuracy:
             return ""
         fix = sufficient_accuracy(self.model, self.spin)
@@ -108,7 +108,7 @@ class ModalSetup:
         )
 
     def bodies(self, friction: float, clearance: Floats) -> Reduced:
-        """The reduced bodies of a case as kernels take them; clearance (q,), m."""
+        """The reduced bodies of a case for kernels; clearance (q,), m."""
         return kernel_bodies(self.reduced, self.model, friction, clearance, self.law, self.displacement_limit)
 
     @cached_property
@@ -118,12 +118,12 @@ class ModalSetup:
 
     @cached_property
     def sample_level(self) -> int:
-        """2^sample_level ticks are the interval of samples; no step of contact is shorter than a tick."""
+        """Samples are 2^sample_level ticks apart; no step of contact is shorter than a tick."""
         return max(2, self._contact_levels, math.ceil(math.log2(self.interval / FINEST_TICK)))
 
     @property
     def _contact_levels(self) -> int:
-        """By how many levels the longest step of a recorded contact is below the interval of samples."""
+        """Levels between the interval of samples and the longest step of a recorded contact."""
         return max(0, math.ceil(math.log2(CONTACT_STEPS / self.samples_per_revolution)))
 
     @cached_property
@@ -133,7 +133,7 @@ class ModalSetup:
 
     @cached_property
     def clock(self) -> Clock:
-        """How time is counted, from the shaft's angle 0 on, before a record is asked for."""
+        """Clock from the shaft's angle 0 on, without a record."""
         return Clock(
             spin=self.spin,
             tick=self.tick,
@@ -151,7 +151,7 @@ class ModalSetup:
 
     @cached_property
     def _opened(self) -> ContactMode:
-        """Motion with every pair open, whatever the friction."""
+        """Contact mode with every pair open, which does not depend on friction."""
         gap_jacobian, force_direction, _ = directions(self.reduced, self.model, 0.0)
         return solve_contact_mode(self.reduced, gap_jacobian, force_direction, 0, self._known_of_ring)
 
@@ -168,7 +168,7 @@ class ModalSetup:
         return self._libraries[friction]
 
     def curved_library(self, friction: float) -> CurvedLibrary:
-        """Contact modes of a friction with what curved gaps need, shared by its cases."""
+        """Contact modes of a friction with tables for curved gaps, shared by its cases."""
         if friction not in self._curved_libraries:
             self._curved_libraries[friction] = self._make_library(CurvedLibrary, friction)
         return self._curved_libraries[friction]
@@ -178,7 +178,7 @@ class ModalSetup:
 
     @property
     def _shared(self) -> Shared:
-        """What all libraries take; that of Coulomb's law has parts of its own."""
+        """Arguments of all libraries; that of Coulomb's law has further ones."""
         return {
             "opened": self._opened,
             "known": self._known_of_ring,
@@ -203,7 +203,7 @@ class ModalSetup:
 
     @property
     def _known_of_ring(self) -> Solved:
-        """The same of several stators; of one there is little to look up."""
+        """The same for several stators; for one stator nothing is looked up."""
         return self._known if len(self.model.stators) > 1 else {}
 
     def friction_pairs(self, friction: float) -> FrictionPairs:
@@ -221,7 +221,7 @@ class ModalSetup:
         )
 
     def friction_library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction whose slip may turn, shared by its cases."""
+        """Contact modes of a friction whose slip may reverse, shared by its cases."""
         if friction not in self._friction_libraries:
             pairs = self.friction_pairs(friction)
             opened = solve_friction_mode(self.reduced, pairs, 0, self._known)
@@ -236,7 +236,7 @@ class ModalSetup:
 
     @property
     def n_byte(self) -> dict[float, int]:
-        """Memory that tables of contact modes hold, by friction."""
+        """Memory of the tables of contact modes, bytes, by friction."""
         found: Counter[float] = Counter()
         for held in self._all_libraries:
             found.update({friction: library.n_byte for friction, library in held.items()})
@@ -244,12 +244,12 @@ class ModalSetup:
 
     @property
     def n_byte_of_parts(self) -> int:
-        """Memory that parts of contact modes hold, which those of a ring have in common."""
+        """Memory of the parts that contact modes of a ring share, bytes."""
         known = vars(self).get("_known")
         return known.n_byte if isinstance(known, KeptParts) else 0
 
     def n_solved(self, friction: float) -> int:
-        """Contact modes of a friction that were solved, those that were given up and met again included."""
+        """Number of contact modes of a friction that were solved, including repeated ones."""
         return sum(held[friction].n_solved for held in self._all_libraries if friction in held)
 
     def forget(self, friction: float) -> None:
@@ -257,7 +257,7 @@ class ModalSetup:
         self._open_tables.pop(friction, None)
         for held in self._all_libraries:
             held.pop(friction, None)
-        if not any(self._all_libraries):  # nor the parts that they share, but those with every pair open
+        if not any(self._all_libraries):  # and the shared parts, except those with every pair open
             vars(self).pop("_known", None)
 
     def penalty_library(self, friction: float) -> ModeLibrary:
@@ -271,7 +271,7 @@ class ModalSetup:
         return self._penalty_libraries[friction]
 
     def open_tables(self, friction: float) -> ModeTables:
-        """Tables of the mode with every pair open alone, as wide as those of the friction's library."""
+        """Tables of the open mode alone, with the width of the friction's library."""
         if friction not in self._open_tables:
             library = self._libraries.get(friction)
             width = (

@@ -34,7 +34,7 @@ class Packed:
     Attributes
     ----------
     row : (n_all,)
-        Kernel row of each degree of rotor, then stators; -1 where nothing seen depends on it.
+        Kernel row of each degree of rotor, then stators; -1 where no output depends on it.
     mass, damping, stiffness : (n_dof, n_dof)
         M, C = D + spin G and K in kernel order.
     """
@@ -50,11 +50,11 @@ class Packed:
     degree_block: Ints  # (q, 5)
     compliance: Floats  # (q, 5, q, 5), m/N
     output_row: Ints  # (3,), vertical, horizontal, torsion
-    probe: Floats  # (3, n_probe, n_dof), what each sees of displacements, velocities and accelerations
+    probe: Floats  # (3, n_probe, n_dof), weights of displacements, velocities and accelerations
 
 
 def pack(model: Model, spin: float, step: float) -> Packed:
-    """Everything of a model that depends on speed and step alone.
+    """Pack everything of a model that depends on speed and step alone.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def pack(model: Model, spin: float, step: float) -> Packed:
     coupled = csr_array((mass != 0) | (stiffness != 0) | (damping != 0))
     n_component, component = connected_components(coupled, directed=False)
     seen = np.unique(component[np.concatenate([degree[degree >= 0], output[output >= 0], looked_at])])
-    # Within a block, degrees coupled by K and M stand together (the planes of bending): fewer diagonals.
+    # Within a block, degrees coupled by K and M are adjacent (the planes of bending): fewer diagonals.
     _, plane = connected_components(csr_array((mass != 0) | (stiffness != 0)), directed=False)
     order = np.concatenate([np.flatnonzero(component == c) for c in seen])
     order = order[np.lexsort((plane[order], component[order]))]
@@ -105,7 +105,7 @@ def pack(model: Model, spin: float, step: float) -> Packed:
 def whole_system(model: Model, spin: float) -> tuple[Floats, Floats, Floats, Floats]:
     """M, C = D + spin G and K of rotor, then stators (n_all, n_all), and the unbalance force (2, n_all), N.
 
-    The force's rows go with the cosine and the sine of the shaft's angle; spin in rad/s.
+    The rows of the force belong to the cosine and the sine of the shaft's angle; spin in rad/s.
     """
     bodies = model.bodies
     n_all = sum(body.n_dof for body in bodies)
@@ -147,7 +147,7 @@ def _find_degrees(model: Model) -> Ints:
 def carrier_degrees(model: Model) -> Ints:
     """Rows of each carrier's vertical and horizontal displacement, (n, 2); -1 where held.
 
-    Those that turn follow once more, with none and their rotation.
+    Those that turn have a further row, with -1 and their rotation.
     """
     start = model.stator_start
     wanted = [(carrier, ("v", "w")) for carrier in model.carriers]
@@ -166,7 +166,7 @@ def output_degrees(model: Model) -> Ints:
 
 
 def law_of(contact: Contact) -> Law:
-    """Laws of a study as the kernels take them: what it leaves out keeps its default."""
+    """Laws of a study for kernels; what it omits keeps its default."""
     given = {key: getattr(contact, key) for key in Law._fields if key != "friction_law"}
     values: dict[str, Any] = {
         key: np.array(value) if isinstance(value, tuple) else float(value)
@@ -198,7 +198,7 @@ def pairs_of(
         Displacement of a degree for a unit force on another over a step.
     clearance : float, m
     friction : float
-        Coefficient, not negative; the spin (rad/s) gives it the sense of the rim.
+        Coefficient, not negative; the spin (rad/s) determines its sign.
     """
     angle = np.array([stator.angle for stator in model.stators])
     nearer, aside = sag_at_stators(model)
@@ -244,7 +244,7 @@ def _linear(inverse: Floats, stiffness: Floats, damping: Floats, force: Floats, 
     damping_values, damping_span = _diagonals(damping)
     skew = 0.5 * (stiffness - stiffness.T)
     skew[abs(skew) <= 1e-12 * abs(stiffness).max()] = 0.0  # rounding of the assembly
-    # Contiguous, or the kernels are compiled once more for such rigs.
+    # Contiguous: otherwise kernels are compiled again for such rigs.
     skew_row, skew_column = (np.ascontiguousarray(index) for index in np.nonzero(skew))
     force_row = np.flatnonzero(np.any(force != 0, axis=0))
     return Linear(

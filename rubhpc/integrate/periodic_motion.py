@@ -121,16 +121,16 @@ def find_periodic_motion(
 ) -> PeriodicMotion:
     """Solve for a periodic motion and record it.
 
-    From a state the search begins there. Else it begins where a simulation has come to after the transient,
-    and takes the first stable motion. Where it fails, the simulation goes on for up to 450 revolutions, from
-    which the search begins again.
+    With a state, the search begins there. Otherwise it begins at the end of a simulated transient, and takes
+    the first stable motion. Where it fails, the simulation continues for up to 450 revolutions, and the
+    search is repeated.
 
     Parameters
     ----------
     clearance : float, m
         Radial clearance at rest; a stator's `clearance_offset` is added.
     period : int
-        Revolutions after which the motion is to close.
+        Revolutions after which the motion is to repeat.
     repeat : int
         Periods recorded, whatever `recording.revolutions`.
 
@@ -139,7 +139,7 @@ def find_periodic_motion(
     InputError
         The laws of the case have no closed form.
     NoPeriodicMotion
-        None was found; its text says why.
+        None was found; the message gives the reason.
     """
     if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
         raise InputError(
@@ -178,7 +178,7 @@ def _search(
     recording: Recording,
     initial: State | Initial,
 ) -> tuple[PiecewiseMotion, Orbit]:
-    """Shoot from the state, then from where a simulation leads to."""
+    """Shoot from the state, then from the end of a simulation."""
     if isinstance(initial, State):
         state, first = fit_to_gaps(initial, setup, clearance), 0
     else:
@@ -218,7 +218,7 @@ def record_of_period(
     repeat: int,
     recording: Recording,
 ) -> Record:
-    """Record a period, and repeat it: what is unstable would not stay where it is."""
+    """Record one period and repeat it: an unstable motion would drift away."""
     once = replace(
         recording,
         transient=0,

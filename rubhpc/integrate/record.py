@@ -1,4 +1,4 @@
-"""What one case yields: its state before and after, its signals, spectra and measures."""
+"""Result of a case: state before and after, signals, spectra and measures."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class State:
 
     @classmethod
     def unpacked(cls, values: Floats, model: Model) -> State:
-        """The state of a model that `packed` has put into one vector."""
+        """The state of a model from the vector of `packed`."""
         n_dof, n_stator = model.body_start[-1], len(model.stators)
         parts = np.split(values, np.cumsum([n_dof, n_dof, n_stator]))
         return cls.of_bodies(model, *parts)
@@ -86,7 +86,7 @@ class State:
 
     @classmethod
     def at_rest(cls, model: Model) -> State:
-        """Return the state of rest: only the steady spin, the shaft bent by constant loads, no contact."""
+        """Return the state of rest: steady spin, shaft bent by constant loads, no contact."""
         n_dof = model.body_start[-1]
         displacement = np.zeros(n_dof)
         displacement[: model.rotor.n_dof] = model.sag
@@ -94,7 +94,7 @@ class State:
 
 
 MOST_RESIDUAL = 0.01  # of the energy balance: a larger one is reported
-MOST_LEFT_RESIDUAL = 1e-4  # the same of a case in closed form that was left to short steps
+MOST_LEFT_RESIDUAL = 1e-4  # the same for a case that left closed form for short steps
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,7 +149,7 @@ class Record(RecordVariables):
         return self.signals, self.spectra, self.sections, self.measures, self.settings
 
     def copied(self) -> Record:
-        """Return the record with arrays of its own, but for the final state."""
+        """Return the record with copies of its arrays, except the final state."""
         own = [
             {name: value.copy() if isinstance(value, np.ndarray) else value for name, value in group.items()}
             for group in (self.signals, self.spectra, self.sections, self.measures)

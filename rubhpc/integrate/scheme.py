@@ -1,4 +1,4 @@
-"""How a case is integrated: the scheme that its contact and integrator ask for."""
+"""Integration schemes, and the scheme that contact and integrator of a case require."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Scheme(Enum):
-    """How a case is integrated."""
+    """Integration scheme of a case."""
 
     EVENT_DRIVEN = "event-driven"  # closed-form motion from event to event
     CURVED = "curved"  # closed-form flights from event to event, steps of order 8 where gaps are closed
@@ -27,7 +27,7 @@ class Scheme(Enum):
 
 
 def scheme_of(contact: Contact, integrator: Integrator, *, is_bent: bool = False) -> Scheme:
-    """Return the scheme with which a case of a study begins; `is_bent`: a stator's gap knows its bending.
+    """Return the initial scheme of a case; `is_bent`: a stator has second-order geometry.
 
     Raises
     ------

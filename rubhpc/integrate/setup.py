@@ -45,15 +45,15 @@ def prepare(
 ) -> Setup:
     """Assemble, check the step and factorise: once per rig and speed.
 
-    `model` is that of the rig, where it has been assembled already, `probes` what is measured of it, `drive`
-    what turns it where its speed is free, `reduced` what it is in modal coordinates, where that is known.
-    What is followed and never recorded need not be measured.
+    `model` is the assembled rig, if known, `probes` are its measuring points, `drive` turns a rotor of free
+    speed, and `reduced` is the model in modal coordinates, if known. A motion that is followed but never
+    recorded need not be measured.
 
     Raises
     ------
     InputError
-        If the step asked for is above the stability limit of the assembled matrices, the rig has no stator,
-        the speed is zero or, for the modal scheme, all but zero, or a probe has nothing to measure.
+        If the requested step is above the stability limit of the assembled matrices, the rig has no stator,
+        the speed is zero or, for the modal scheme, nearly zero, or a probe has nothing to measure.
     """
     if not rig.stator:
         raise InputError(f"rig {rig.name}: [[stator]]: none; a rub case needs at least one")

@@ -1,4 +1,4 @@
-"""Where a case of a study starts: at rest, contact-free or where another has ended; displaced or knocked."""
+"""Start of a case: at rest, contact-free or at the final state of another; displaced or knocked."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def start_of(initial: Initial, setup: Setup, clearance: float, spin: float | Non
     initial : Initial
         Displacement and velocity of the output node, and an impulse, on top of a motion.
     clearance : float, m
-        Radial clearance at rest; a stator's `clearance_offset` is added. What overlaps it is pushed apart
+        Radial clearance at rest; a stator's `clearance_offset` is added. Overlaps are removed
         (`initial_state.fit_to_gaps`).
     spin : float, rad/s, optional
-        Of the contact-free motion, by default the set-up's; where the speed changes, the first one.
+        Of the contact-free motion, by default that of the set-up; with changing speed, the first one.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def start_of(initial: Initial, setup: Setup, clearance: float, spin: float | Non
 
 @dataclass(eq=False)
 class _Shared:
-    """What the starts of a set-up share, found when it is first needed."""
+    """Results that the starts of a set-up share, computed when first needed."""
 
     shapes: dict[tuple[int, ...], Floats] = field(default_factory=dict)
     contact_free: dict[float, State] = field(default_factory=dict)  # by speed, rad/s
@@ -71,7 +71,7 @@ _SHARED: WeakKeyDictionary[Setup, _Shared] = WeakKeyDictionary()
 
 
 def _shared(setup: Setup) -> _Shared:
-    """What the starts of a set-up share, as long as that is kept."""
+    """Shared results of a set-up, as long as it is kept."""
     if setup not in _SHARED:
         _SHARED[setup] = _Shared()
     return _SHARED[setup]
@@ -93,7 +93,7 @@ def _contact_free(setup: Setup, spin: float) -> State:
 
 
 def _disturbed(state: State, initial: Initial, setup: Setup) -> State:
-    """A state with displacement, velocity and impulse added; what touched is free to part."""
+    """A state with displacement, velocity and impulse added; closed contacts may part."""
     model = setup.model
     displacement, velocity = state.displacement, state.velocity
     moved = np.array([initial.vertical, initial.horizontal])

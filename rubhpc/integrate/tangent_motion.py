@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-MOST_AT_ONCE = 16 * SPAN  # revolutions passed together beyond the record
-GOALS = N_FIRST, N_ALL, N_MOST  # spans that are asked for together (`regimes.by_growth`)
+MOST_AT_ONCE = 16 * SPAN  # revolutions passed together after the record
+GOALS = N_FIRST, N_ALL, N_MOST  # spans that are read together (`regimes.by_growth`)
 
 
 class TangentMotion:
-    """A small displacement of a motion, carried by its exact derivative (`kernels.tangent`).
+    """A small displacement of a motion, propagated by its exact derivative (`kernels.tangent`).
 
-    Where pairs leave the closed form for short steps, it goes on with two motions (`lyapunov.Marches`).
+    Where pairs leave the closed form for short steps, it continues with two motions (`lyapunov.Marches`).
     """
 
     def __init__(
@@ -46,9 +46,9 @@ class TangentMotion:
         trail: Trail | None = None,
         march: EventDrivenMarch | None = None,
     ) -> None:
-        """Take where a record has ended, and the trail of its revolutions, if it was kept.
+        """Begin at the end of a record, with the trail of its revolutions if it was kept.
 
-        A march of the case that is needed no more may be given, to be started anew; and so is the trail.
+        A march of the case that is no longer needed may be given and is restarted, as the trail.
         """
         self.n_aligning, self.most_spans = N_ALIGNING, N_ALIGNING + N_MOST
         self.within: list[float] = []
@@ -57,7 +57,7 @@ class TangentMotion:
         self._march = march = start(state) if march is None else march
         self._n_passed, self._most_at_once = 0, MOST_AT_ONCE
         n = march.bodies.stiffness.shape[0]
-        self._motion = np.cos(np.arange(2.0 * n))  # in no direction of its own
+        self._motion = np.cos(np.arange(2.0 * n))  # without a special direction
         self._beside: Marches | None = None
         self._grown: list[float] = []  # logarithms, revolution by revolution, not yet read
         if trail is not None and self._carry(trail, 0, recording.revolutions):
@@ -70,12 +70,12 @@ class TangentMotion:
         self._spare = march.new_trail() if trail is None else trail
 
     def part(self, n_revolution: int) -> float | None:
-        """Go on; see `lyapunov.Neighbours`.
+        """Continue; see `lyapunov.Neighbours`.
 
         Raises
         ------
         NoClosedForm
-            Only short steps can follow the motion.
+            The motion needs short steps.
         """
         while self._beside is None and len(self._grown) < n_revolution:
             if not self._pass_on():
@@ -86,7 +86,7 @@ class TangentMotion:
         return float(sum(grown))
 
     def _pass_on(self) -> bool:
-        """Pass some more revolutions, or find them too many; returns whether the motion can go on."""
+        """Pass some more revolutions, or reduce their number; returns whether the motion can continue."""
         n_revolution = self._next_revolutions()
         march, trail = self._march, self._spare
         march.start_again(self._state)
@@ -113,18 +113,18 @@ class TangentMotion:
         return True
 
     def _next_revolutions(self) -> int:
-        """Revolutions until as many spans are there as are asked for together next, or a part of them."""
+        """Revolutions up to the next number of spans that is read together, or a part of them."""
         ends = (SPAN * (self.n_aligning + goal - len(self.within)) for goal in GOALS)
         left = next((end - self._n_passed for end in ends if end > self._n_passed), SPAN)
         return min(left, self._most_at_once)
 
     def _leave_room(self, trail: Trail, n_revolution: int) -> None:
-        """Pass no more revolutions at once than a trail has room for, if they have twice as many events."""
+        """Limit the revolutions passed at once such that a trail has room for twice their events."""
         n_event = max(1, 2 * int(trail.n_event[0]))
         self._most_at_once = min(self._most_at_once, max(1, trail.tick.size * n_revolution // n_event))
 
     def _carry(self, trail: Trail, first: int, n_revolution: int) -> bool:
-        """Carry the displacement along a trail that begins at tick `first`; False where that is broken."""
+        """Propagate the displacement along a trail that begins at tick `first`; False where it is broken."""
         if trail.n_event[0] == BROKEN:
             return False
         march = self._march
@@ -156,9 +156,9 @@ class TangentMotion:
 
 
 class _ModesOfTrail:
-    """The contact modes that a trail goes through, each read when the tables first hold it.
+    """The contact modes of a trail, each read when it is first in the tables.
 
-    Large rings meet more of them than the tables have room for, so that places change while a trail is read.
+    Large rings meet more modes than fit in the tables, so that places change while a trail is read.
     """
 
     def __init__(self, trail: Trail, march: EventDrivenMarch) -> None:
@@ -177,7 +177,7 @@ class _ModesOfTrail:
         )
 
     def placed(self) -> TrailModes:
-        """They, with their places in the tables as those are now."""
+        """The modes with their present places in the tables."""
         march, modes = self._march, self._modes
         place_of = {states: place for place, states in enumerate(march.tables.mask.tolist())}
         for i, states in enumerate(self._states):

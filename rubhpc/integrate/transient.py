@@ -1,4 +1,4 @@
-"""The transient: a fixed number of revolutions, or until the motion repeats itself."""
+"""The transient: a fixed number of revolutions, or until the motion has settled."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-# Revolutions between the cycles looked at: one is compared with those 8 and 12 later, which finds motions of
-# period 1, 2, 3, 4, 6, 8 and 12; the last is the first of the next three.
+# Revolutions between compared cycles: one is compared with those 8 and 12 later, which finds motions of
+# period 1, 2, 3, 4, 6, 8 and 12. The last cycle is the first of the next three.
 PAUSES = (7, 3)
-DECAYED = 0.01  # of the largest value that a signal has had: smaller ones are compared with that
+DECAYED = 0.01  # of the largest past value of a signal: reference for smaller ones
 
 
 def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]:
     """March through the transient, until the motion has settled where `recording` says "auto".
 
-    It has settled when no displacement of output node, tips or carriers differs from one cycle of 8 or 12
-    revolutions before by more than `settled_within` of the signal's largest value, or of a hundredth of the
-    largest that it has had: one that dies out has settled too. At the latest it ends with `longest_transient`
-    revolutions.
+    It has settled when no displacement of output node, tips or carriers differs from that 8 or 12 revolutions
+    before by more than `settled_within` of the signal's largest value in the cycle, or of a hundredth of its
+    largest past value, so that a decaying signal settles too. The transient ends after `longest_transient`
+    revolutions at the latest.
 
     Returns
     -------
     str or None
-        Why the case cannot go on.
+        Reason why the case cannot continue.
     int
         Revolutions marched.
     """
@@ -44,7 +44,7 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
         return pass_revolutions(march, recording, recording.longest_transient), recording.longest_transient
 
     n_place, done, limit = march.n_place, 0, recording.longest_transient
-    tips = 4 + np.arange(march.n_body)  # rotations of carriers show in the tips that they move
+    tips = 4 + np.arange(march.n_body)  # rotations of carriers are visible in the tips that they move
     samples, accumulator = (
         empty_samples(n_place, recording.samples_per_revolution),
         new_accumulator(march.touching().size, n_place),
@@ -77,9 +77,9 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
 
 
 def has_settled(cycle: Floats, earlier: Floats, tolerance: float, least: Floats | float = 0.0) -> bool:
-    """Whether two cycles (signals, samples) are one, to a share of each signal's largest value.
+    """Whether two cycles (signals, samples) agree within a share of each signal's largest value.
 
-    What is smaller than `least`, (signals,), is compared with that.
+    For smaller signals the reference is `least`, (signals,).
     """
     change, size = np.abs(cycle - earlier).max(axis=1), np.abs(cycle).max(axis=1)
     return bool(np.all(change <= tolerance * np.maximum(size, least)))
@@ -88,9 +88,9 @@ def has_settled(cycle: Floats, earlier: Floats, tolerance: float, least: Floats 
 def pass_revolutions(
     march: March, recording: Recording, n_revolution: int, idle: tuple[Samples, Accumulator] | None = None
 ) -> str | None:
-    """March some revolutions without a record; returns why the case cannot go on.
+    """March some revolutions without a record; returns why the case cannot continue.
 
-    What a march asks for to record into, and leaves as it is, may be given as `idle`.
+    `idle` is the unused record that a march requires (`idle_of`).
     """
     samples, accumulator = idle or idle_of(march)
     first = -n_revolution * recording.samples_per_revolution
@@ -98,5 +98,5 @@ def pass_revolutions(
 
 
 def idle_of(march: March) -> tuple[Samples, Accumulator]:
-    """Room for no samples, and sums: what `pass_revolutions` leaves as it is."""
+    """Empty samples and an accumulator, which `pass_revolutions` does not change."""
     return empty_samples(march.n_place, 0), new_accumulator(march.touching().size)

@@ -25,22 +25,22 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 FIRST, LEAST, LONGEST = 0.1, 1e-4, 1.0  # lengths of a step
-GOOD, POOR = 0.03, 0.15  # distance from a prediction over the step's length: go on with more, with less
+GOOD, POOR = 0.03, 0.15  # distance from a prediction over the step's length: lengthen below, shorten above
 STRAIGHT = 0.75  # cosine of the angle between two steps, at least
-MOST_OFF = 3  # motions off a prediction by the last steps, after which the tangent is asked
-SHORT = 0.02  # length of the step in which a branch may pass a motion of half its period
-FEWEST = 6  # points of a branch that is closed
-ANYWHERE = 1e-3  # of a step, within which it does not matter where it ends
-SHORTEST = 1e-3  # length of a step in which several contacts may come and go at once
+MOST_OFF = 3  # motions off a prediction by the last steps, after which the tangent is used
+SHORT = 0.02  # length of a step that may pass a motion of half the period
+FEWEST = 6  # points of a closed branch
+ANYWHERE = 1e-3  # of a step, accuracy of where it ends
+SHORTEST = 1e-3  # length of a step in which several contacts may appear and vanish at once
 BEYOND = (0.02, 0.1, 0.5)  # steps past a grazing at which the branch is sought again
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Track:
-    """Points of a branch in order, with what happens at each, and why it ends.
+    """Points of a branch in order, with the event at each, and the reason of its end.
 
-    `is_halved` says that it ends at a motion of half its period, `is_closed` that it ends where it began,
-    `doublings` how many have led to it.
+    `is_halved`: it ends at a motion of half its period; `is_closed`: it ends where it began; `doublings`:
+    number of period doublings that lead to it.
     """
 
     points: list[Point]
@@ -67,7 +67,7 @@ def follow(
     start : list of Point
         One point, or two from the first of which the branch goes through the second.
     sense : float
-        1 or -1: whether the parameter rises at first, from a single point.
+        From a single point: 1 where the parameter rises at first, else -1.
     most : int
         Points, at most.
     """
@@ -76,7 +76,7 @@ def follow(
     length = FIRST if len(start) == 1 else float(np.linalg.norm(branching.difference(*start)))
     length = min(FIRST, length)
     is_halved = is_closed = False
-    heading, has_turned = None, False  # where it goes from a single point; whether its contacts are new
+    heading, has_turned = None, False  # direction from a single point; whether its contacts are new
 
     def add(event: Event, point: Point) -> None:
         points.append(point.note_state())
@@ -128,7 +128,7 @@ def follow(
                 if point is not None:
                     follower = _beyond(branching, history[-2:], base, point)
                 elif len(history) > 1 and (other := _beyond(branching, history[-2:], base, base)):
-                    corner_there = grazing_beside(branching, base, other)  # behind a corner that is too sharp
+                    corner_there = grazing_beside(branching, base, other)  # behind a sharp corner
                     if corner_there and _is_close(branching, base, corner_there.point):
                         point, follower = corner_there.point, other
                 if point is None:
@@ -145,7 +145,7 @@ def follow(
             has_halved = _is_half(found) or (is_same and _is_back(found, base))
             for event, point in happened:
                 if not has_halved or event not in (Event.FOLD, Event.BRANCH_POINT):
-                    add(event, point)  # where the period halves a multiplier of 1 is no other event
+                    add(event, point)  # where the period halves, a multiplier of 1 is no further event
             if has_halved:
                 if half := halving(branching, base, found):
                     add(Event.PERIOD_DOUBLING, half)
@@ -166,7 +166,7 @@ def follow(
             history, heading, has_turned = [*(corner or history[-2:]), found], None, not is_same
             length = min(LONGEST, 1.5 * length) if miss < GOOD else (0.6 * length if miss > POOR else length)
             if corner:
-                length = max(length, FIRST)  # it was short for the sake of the grazing
+                length = max(length, FIRST)  # it was short because of the grazing
     except (Unfollowed, InputError, NotConverged, np.linalg.LinAlgError) as problem:
         end = str(problem)
     if events[-1] is Event.NONE and len(points) < most:
@@ -175,7 +175,7 @@ def follow(
 
 
 def predict(branching: Branching, history: list[Point], length: float) -> tuple[Floats, Floats]:
-    """Motion some length ahead of two or three points, in steps from the last, and the direction there."""
+    """Predicted motion at a length ahead of two or three points, in steps from the last; direction there."""
     ahead = branching.difference(*history[-2:])
     first = float(np.linalg.norm(ahead))
     slope, bend = ahead / first, np.zeros_like(ahead)
@@ -195,7 +195,7 @@ def _miss(branching: Branching, base: Point, guess: Floats, found: Point) -> flo
 
 
 def _is_near(branching: Branching, history: list[Point], guess: Floats, found: Point) -> bool:
-    """Whether a motion lies where the branch was going, not on another."""
+    """Whether a motion lies on the branch as predicted, not on another one."""
     change = branching.difference(history[-1], found)
     length = float(np.linalg.norm(guess))
     if change.size != guess.size:
@@ -205,7 +205,7 @@ def _is_near(branching: Branching, history: list[Point], guess: Floats, found: P
 
 
 def _beyond(branching: Branching, history: list[Point], base: Point, grazing_point: Point) -> Point | None:
-    """A motion of other contacts next to a grazing: with a weak impact, or along the parameter or back."""
+    """A motion with other contacts next to a grazing: by a weak impact, or along the parameter."""
 
     def follows(found: Point) -> bool:
         is_near = np.linalg.norm(branching.difference(grazing_point, found)) < 1.0
@@ -227,12 +227,12 @@ def _beyond(branching: Branching, history: list[Point], base: Point, grazing_poi
 
 
 def _is_close(branching: Branching, base: Point, point: Point) -> bool:
-    """Whether a motion of other contacts is as near as a last short step."""
+    """Whether a motion with other contacts is as near as a last short step."""
     return bool(np.linalg.norm(branching.difference(base, point)) < SHORTEST)
 
 
 def _is_back(found: Point, base: Point) -> bool:
-    """Whether a motion has passed one of half its period, and goes on as it came, half a period later."""
+    """Whether the branch has passed a motion of half its period, and returns half a period later."""
     if found.period % 2:
         return False
     now, before = half_change(found), half_change(base)
@@ -240,14 +240,14 @@ def _is_back(found: Point, base: Point) -> bool:
 
 
 def _is_half(point: Point) -> bool:
-    """Whether a motion has half the period it is followed with."""
+    """Whether a motion has half the period with which it is followed."""
     if point.period % 2:
         return False
     return bool(point.case.size(half_change(point)) < SAME * point.case.size(point.motion))
 
 
 def _closing(branching: Branching, points: list[Point], base: Point, found: Point) -> Point | None:
-    """The motion with which a branch began, where it comes by once more between two points, in one sense."""
+    """The first motion of a branch, where the branch passes it again between two points in the same sense."""
     first, step = points[0], found.value - base.value
     if len(points) < FEWEST or step * (points[1].value - first.value) <= 0.0:
         return None

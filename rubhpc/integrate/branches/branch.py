@@ -1,4 +1,4 @@
-"""Branches of periodic motions as users have them: points with stability, events and states."""
+"""Branches of periodic motions for users: points with stability, events and states."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Branch:
     points : tuple of BranchPoint
         In order along the branch; the parameter turns at folds.
     end : str
-        Why the branch ends, on each side.
+        Reason of the end, on each side.
     """
 
     along: str
@@ -142,7 +142,7 @@ class Branch:
 
 
 def branch_of(branching: Branching, track: Track, recording: Recording) -> Branch:
-    """Return a track as users have it."""
+    """Convert a track to a branch for users."""
     return Branch(
         along=branching.family.along,
         period=track.points[0].period,

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MOST_ITERATIONS = 7
-SOON = 1e-4  # residual from which an iteration that is late may go on
-FAST = 0.02  # ratio of two residuals below which a derivative serves once more
-LESS = 0.7  # ratio of a residual to the least before it that is progress
-MORE, PATIENCE = (2.0, 10.0), (2, 3)  # ratio to the one before, and iterations without progress, borne
-ROUNDING = 1e-8  # residual below which want of progress may be rounding
-IN_PLANE = 1e-7  # steps, by which a motion may lie off its plane
+SOON = 1e-4  # residual below which a slow iteration may continue
+FAST = 0.02  # ratio of two residuals below which a derivative is used again
+LESS = 0.7  # ratio of a residual to the least before it that counts as progress
+MORE, PATIENCE = (2.0, 10.0), (2, 3)  # allowed ratio to the one before, and iterations without progress
+ROUNDING = 1e-8  # residual below which lack of progress may be rounding
+IN_PLANE = 1e-7  # steps, distance of a motion from its plane
 STEEP = 0.4  # share of the parameter in a step below which it is an unknown
 
 
@@ -44,7 +44,7 @@ class Branching:
     check : callable, optional
         Called before every search for a motion; what it raises ends the search for branches.
     say : callable, optional
-        Called then with how many motions have been found, and the parameter beside which the next is sought.
+        Called then with the number of motions found, and the parameter near which the next is sought.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Branching:
         self._n_found = 0
 
     def begin(self, value: float, motion: Floats, states: int, period: int) -> Point:
-        """Shoot at a value of the parameter from a motion at the angle 0; the section is then moved.
+        """Solve at a value of the parameter from a motion at the angle 0; the section is then moved.
 
         Raises
         ------
@@ -115,7 +115,7 @@ class Branching:
         return np.append(b.scale * (b.motion - motion), (b.value - a.value) / self.step)
 
     def is_same(self, a: Point, b: Point) -> bool:
-        """Whether two motions of a case are one, but for a shift by revolutions."""
+        """Whether two motions of a case are the same up to a shift by revolutions."""
         if a.motion.size != b.motion.size or a.period != b.period:
             return False
         limit = SAME_MOTION * a.case.size(a.motion)
@@ -126,7 +126,7 @@ class Branching:
         return False
 
     def tangent(self, point: Point, toward: Floats) -> Floats:
-        """Direction of the branch at a point, in steps, of length 1 (2 n + 1,), along another."""
+        """Direction of the branch at a point, in steps, of length 1 (2 n + 1,), in the sense of `toward`."""
         rate = self.family.derivative(
             point.value, point.motion, point.states, point.revolutions, point.phase
         )  # fmt: skip
@@ -151,24 +151,24 @@ class Branching:
         Parameters
         ----------
         base : Point
-            In whose scale and section guess and direction are.
+            Its scale and section are those of guess and direction.
         guess, along : (2 n + 1,)
-            From the base, in steps; the direction of length 1. Where it runs along the parameter mainly,
-            that is held, which costs less; not near a fold, where a motion may not be found so, or badly.
+            From the base, in steps; the direction has length 1. Where it is mainly along the parameter, the
+            parameter is held, which costs less, except near a fold.
         period : int
             Revolutions; by default that of the base.
         most : int
             Iterations; up to twice as many where the end is near.
         is_free : bool
-            The parameter is never held: between two points around a fold several motions have one parameter.
+            The parameter is never held: around a fold several motions have the same parameter.
         in_plane : float
-            Steps by which the motion may lie off the plane: the last iterations hold the parameter where it
-            moves by less, since every new value needs contact modes of its own.
+            Allowed distance from the plane, in steps: the last iterations hold the parameter where it moves
+            by less, since every new value needs its own contact modes.
 
         Raises
         ------
         NotConverged
-            Newton's method finds none.
+            Newton's method does not converge.
         """
         period = period or base.period
         is_asked = not np.any(along[:-1])
@@ -234,7 +234,7 @@ class Branching:
                 if scale.size != motion.size:
                     break
                 here = np.linalg.solve(derivative, -defect)
-                if np.linalg.norm(scale * here) <= in_plane:  # other cases round otherwise
+                if np.linalg.norm(scale * here) <= in_plane:  # other cases have other rounding errors
                     motion = motion + here
                     continue
                 if rate is None or rate.size != motion.size:
@@ -246,7 +246,7 @@ class Branching:
                 row = np.append(along[:-1] * scale, along[-1])
                 matrix = np.block([[derivative, rate[:, None]], [row[None, :]]])
                 change = np.linalg.solve(matrix, np.append(-defect, along @ (guess - ahead)))
-                if n_worse and residual <= ROUNDING:  # at a fold: what is left is this case's rounding
+                if n_worse and residual <= ROUNDING:  # at a fold the rest is rounding
                     motion = motion + change[:-1]
                     continue
                 value += float(change[-1]) * self.step

@@ -71,7 +71,7 @@ def record_branches(
     check : callable, optional
         Called several times a second; what it raises ends the case.
     say : callable, optional
-        Called with how far it has come, in words.
+        Called with the progress, as text.
     note : callable, optional
         Called then with the value of the parameter there.
     """
@@ -105,7 +105,7 @@ def _arrays(
     check: Callable[[], None] | None,
     say: Callable[[str], None] | None,
 ) -> tuple[dict[str, Floats], int]:
-    """All points, branch after branch, and how many there are."""
+    """All points, branch after branch, and their number."""
     rows: dict[str, list[Any]] = {name: [] for name in branch_variables()}
     for number, branch in enumerate(branches, 1):
         for i_point, point in enumerate(branch.points):

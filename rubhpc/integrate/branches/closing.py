@@ -1,4 +1,4 @@
-"""What keeps a pair closed after a touch: how slowly it parts, and how firmly it is pressed."""
+"""Distances of a pair from parting after a touch: in speed and in contact force."""
 
 from __future__ import annotations
 
@@ -20,18 +20,19 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
 
-AT_ONCE = 1e-6  # of the time for which a pair must part to have parted
+AT_ONCE = 1e-6  # of the time for which a pair must part to count as open
 
 
 def staying_closed(case: PiecewiseMotion, revolutions: Iterable[Revolution]) -> Floats:
-    """Least distances (2, q), over the touches of a motion, from where a pair that stays closed would part.
+    """Least distances (2, q), over the touches of a motion, of pairs that stay closed from parting.
 
-    A pair that is closed when another touches, or touches itself, parts where the impact sends it away, or
-    where nothing presses it behind the impact. It may be back within a ten-thousandth of a revolution: a
-    contact more, without a gap or a force that turns at zero. The first row has how much faster a pair
-    would have to part to stay apart (`kernels.mode_change`), over the speed of a whirl in the gap, the
-    impulses that hold it counted as the speeds that they take; the second its force behind the touch, N.
-    Infinite for a pair that stays closed at no touch, and all of it under a penalty, where nothing impacts.
+    A pair that touches, or is closed when another one touches, parts where the impact sends it away, or where
+    nothing presses it after the impact. It may touch again within a ten-thousandth of a revolution: one
+    contact more, without a gap or a force with a minimum of zero. The first row is the additional speed with
+    which a pair would part for good (`kernels.mode_change`), over the speed of a whirl in the gap; impulses
+    that hold it count as the speeds that they change. The second row is its force after the touch, N.
+    Infinite for a pair that stays closed at no touch, and for all pairs under a penalty, which has no
+    impacts.
     """
     least = np.full((2, case.q), np.inf)
     if case.bodies.spring > 0.0:
@@ -48,7 +49,7 @@ def staying_closed(case: PiecewiseMotion, revolutions: Iterable[Revolution]) -> 
             lacking, opening = _opening(case, piece, following.begin)
             if case.has_states:
                 force = case.march.forces(mode.place, case.enter(mode, following.begin, piece.after))[stays]
-            else:  # what decides: the impulses that hold what would part for a moment come after it
+            else:  # decisive: impulses that hold a pair which would part for a moment come later
                 force = -np.linalg.pinv(case.bodies.delassus[np.ix_(stays, stays)]) @ opening[stays]
             for row, value in enumerate((lacking[stays] / whirl, force)):
                 least[row, stays] = np.minimum(least[row, stays], value)
@@ -56,9 +57,9 @@ def staying_closed(case: PiecewiseMotion, revolutions: Iterable[Revolution]) -> 
 
 
 def _opening(case: PiecewiseMotion, piece: Piece, time: float) -> tuple[Floats, Floats]:
-    """Speeds (q,), m/s, that pairs lack to part at the touch that ends a piece; accelerations of their gaps.
+    """Missing speeds (q,), m/s, for pairs to part at the touch that ends a piece; gap accelerations.
 
-    These, m/s2, are without the forces of contacts. Infinite and 0 where no impulses are found.
+    The accelerations, m/s2, are those without contact forces. Infinite and 0 where no impulses are found.
     """
     bodies, march, n, angle = case.bodies, case.march, case.n, case.setup.spin * time
     motion = piece.before.copy()

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-LOCATED = 1e-9  # of the range: how near to an event its point is
-LEFT = 1e-6  # distance of a multiplier from the unit circle beyond which it has left
+LOCATED = 1e-9  # of the range: distance of a point from its event
+LEFT = 1e-6  # distance of a multiplier outside the unit circle that counts as outside
 ALONG = 0.9  # share of the parameter in a step above which it may be held
-JUMP = 1e-3  # of the distance of a multiplier from the unit circle at both ends, that is left at its crossing
+JUMP = 1e-3  # of the distance from the unit circle at both ends that is left at a crossing
 SAME_PLACE = 1e-6  # share of a step within which two multipliers leave together
 MOST_SECANTS = 8
 
@@ -49,7 +49,7 @@ def crossings(branching: Branching, a: Point, b: Point) -> Iterator[tuple[Event,
         return
     change = -branching.difference(b, a)  # in the coordinates of the first
     length = float(np.linalg.norm(change))
-    n_both = min(a.multipliers.size, b.multipliers.size)  # one may have more coordinates, well damped
+    n_both = min(a.multipliers.size, b.multipliers.size)  # one may have further, well damped coordinates
     was, now = (np.abs(point.multipliers[:n_both]) - 1.0 for point in (a, b))
     has_left = (was * now < 0.0) & (np.minimum(np.abs(was), np.abs(now)) > LEFT)
     ranks: list[int] = np.flatnonzero(has_left).tolist()
@@ -63,7 +63,7 @@ def crossings(branching: Branching, a: Point, b: Point) -> Iterator[tuple[Event,
             return b
         return branching.correct(a, share * change, change / length, is_free=is_free)
 
-    from scipy.optimize import brentq  # 0.2 s to load, and a run without branches needs it nowhere
+    from scipy.optimize import brentq  # takes 0.2 s to load; only branches need it
 
     found: list[tuple[float, Event, Point]] = []
     for rank in ranks:
@@ -85,7 +85,7 @@ def crossings(branching: Branching, a: Point, b: Point) -> Iterator[tuple[Event,
 
 
 def tolerance_of(branching: Branching, a: Point, b: Point) -> float:
-    """How much of the way between two points an event may be off; at a fold the value hardly changes."""
+    """Tolerance of an event, as a share of the way between two points; at a fold the value hardly changes."""
     change = max(abs(b.value - a.value), 1e-3 * branching.step)
     return float(min(LOCATED * branching.family.span / change, 1e-6))
 
@@ -96,7 +96,7 @@ def _is_real(multiplier: complex) -> bool:
 
 
 def kind_of(point: Point, rank: int, a: Point, b: Point) -> Event:
-    """What happens at a point between two others, where its multiplier of a rank crosses the unit circle."""
+    """Kind of event at a point between two others, where the multiplier of a rank crosses the unit circle."""
     multiplier = point.multipliers[rank]
     if abs(multiplier.imag) > REAL:
         return Event.NEIMARK_SACKER
@@ -107,9 +107,9 @@ def kind_of(point: Point, rank: int, a: Point, b: Point) -> Event:
 
 
 def halving(branching: Branching, a: Point, b: Point) -> Point | None:
-    """Locate the motion of half the period that a branch passes between two points; None where it is lost.
+    """Locate the motion of half the period that a branch passes between two points; None if it is not found.
 
-    It is followed on the branch of that motion to where a multiplier is -1: there it is regular.
+    It is sought on the branch of half the period, where a multiplier is -1: the problem is regular there.
     """
     change, was, now = branching.difference(a, b), half_change(a), half_change(b)
     share = float(was @ was / (was @ was - now @ was))
@@ -136,7 +136,7 @@ def _above_minus_one(point: Point) -> float:
 
 
 def half_change(point: Point) -> Floats:
-    """What half its period changes in a motion (2 n,)."""
+    """Change of a motion (2 n,) over half its period."""
     return np.asarray(point.revolutions[point.period // 2 - 1].end - point.motion)
 
 

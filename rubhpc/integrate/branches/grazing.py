@@ -1,4 +1,4 @@
-"""Grazing on a branch: where a contact more or less begins, between two points or ahead of them."""
+"""Grazing on a branch: where a contact appears or vanishes, between two points or ahead of them."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Predictor = Callable[[Branching, list[Point], float], tuple[Floats, Floats]]
 
-APPROACH = 0.1  # of its distance to grazing that a trial leaves
-LOOK = 0.05  # of the way to a motion beyond a grazing, at which the first trial shows how the gap falls
-NEXT_TO = 0.01  # of the way, within which a motion found beyond a grazing is next to it
+APPROACH = 0.1  # of the distance to grazing that a trial leaves
+LOOK = 0.05  # of the way to a motion beyond a grazing: first trial, for the slope of the gap
+NEXT_TO = 0.01  # of the way, within which a motion beyond a grazing is next to it
 HOPELESS, STILL = 0.01, 0.3  # of the way that is left, and of the gap: it falls smoothly
-CERTAIN = 3.0  # times the error of a secant, that a trial stays short of where it leads
-MISPLACED = 1e-4  # of its length, by which a trial may lie elsewhere
+CERTAIN = 3.0  # times the error of a secant, by which a trial stays short of its root
+MISPLACED = 1e-4  # of its length, allowed deviation of a trial
 MOST_TRIALS = 40
 CLOSE = 1e-4  # steps before a grazing at which its point may lie
 BESIDE = (
@@ -37,7 +37,7 @@ BESIDE = (
     1e-2,
     0.1,
 )  # shares of a step from a grazing, at which the motion with more contacts is sought
-MISSED = 1e-4  # of a step, or of a gap, short of which it must have been followed to where it vanishes
+MISSED = 1e-4  # of a step, or of a gap, that may be left where it is taken to vanish
 MEETING, NEIGHBOURS = 0.5, 2.0  # of a step, within which the motions on both sides of a grazing lie
 WITHIN_REACH = 3.0  # steps, in which a distance to grazing would vanish
 
@@ -45,10 +45,10 @@ WITHIN_REACH = 3.0  # steps, in which a distance to grazing would vanish
 def passed(
     branching: Branching, a: Point, b: Point, *, is_last: bool = False
 ) -> list[tuple[Event, Point]] | None:
-    """What happens between two points of a branch, in order; None where b does not follow from a.
+    """Events between two points of a branch, in order; None where b does not follow from a.
 
-    A contact more or less begins with grazing, and there both motions are one. Where several contacts come
-    and go the points are to be nearer, unless it `is_last`: by symmetry several may graze at once.
+    A contact appears or vanishes at a grazing, where both motions coincide. Where several contacts change the
+    points must be nearer, unless it `is_last`: by symmetry several may graze at once.
     """
     if a.sequence == b.sequence:
         return list(crossings(branching, a, b))
@@ -77,7 +77,7 @@ def passed(
 
 
 def touches(point: Point) -> Counter[int]:
-    """How often each pair touches in a period."""
+    """Touches of each pair in a period."""
     return Counter(pair for _, touching in point.sequence for pair in touching)
 
 
@@ -92,7 +92,7 @@ def distances(point: Point) -> Floats:
 
 
 def reach(branching: Branching, before: Point, point: Point) -> float:
-    """Length, in steps, after which a distance to grazing vanishes if all go on as between two points."""
+    """Length, in steps, after which a distance to grazing vanishes, extrapolated from two points."""
     was, now = distances(before), distances(point)
     length = float(np.linalg.norm(branching.difference(before, point)))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -103,8 +103,8 @@ def reach(branching: Branching, before: Point, point: Point) -> float:
 def grazing(branching: Branching, history: list[Point], predict: Predictor) -> Point | None:
     """Approach the grazing ahead of some points; returns the last motion before it, None where there is none.
 
-    Every trial leaves a tenth of the distance that is left, as the points before have it. The contacts must
-    stay as they are: the derivative is unbounded on the other side.
+    Every trial leaves a tenth of the remaining distance, extrapolated from the points before. The contacts
+    must stay the same: the derivative is unbounded on the other side.
     """
     if len(history) < 2 or history[-2].sequence != history[-1].sequence:
         return None
@@ -139,14 +139,14 @@ class Grazing(NamedTuple):
     """Motions on both sides of a grazing."""
 
     point: Point  # with fewer contacts
-    beyond: Point  # with more, as near as it was found
+    beyond: Point  # with more contacts, as near as one was found
 
 
 def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
-    """Locate the grazing between two points with one contact more or less.
+    """Locate the grazing between two points that differ by one contact.
 
-    On the side with fewer contacts the least gap falls smoothly to zero, where secants lead; else the
-    place is halved. None where that side is lost before the gap has vanished, as by a fold close by.
+    On the side with fewer contacts the least gap falls smoothly to zero, and secants are used; else
+    bisection. None where that side ends before the gap vanishes, for example at a near fold.
     """
     change = branching.difference(a, b)
     n_touch = [touches(point).total() for point in (a, b)]
@@ -155,9 +155,9 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
     direction, is_first_free = change / np.linalg.norm(change), n_touch[0] < n_touch[1]
     tolerance, measure = tolerance_of(branching, a, b), change
     if abs(direction[-1]) > STEEP and not a.may_fold and not b.may_fold:
-        measure = np.append(np.zeros(change.size - 1), change[-1])  # the way is measured by the parameter
+        measure = np.append(np.zeros(change.size - 1), change[-1])  # lengths are measured by the parameter
     first, other = (a, b) if is_first_free else (b, a)
-    far = 1.0 if is_first_free else 0.0  # where a motion is that has more contacts, or none was found
+    far = 1.0 if is_first_free else 0.0  # place of a motion with more contacts, or where none was found
     free: list[tuple[float, Point]] = [(1.0 - far, first)]
     impacts: list[tuple[float, Point]] = []
     root, error, missing = None, np.inf, np.inf
@@ -169,7 +169,7 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
         end, depth = 1.0 if is_first_free else 0.0, DEPTH
         most = MEETING * float(np.linalg.norm(branching.difference(free[-1][1], other)))
         shares = _shares(first, free[-1][1], more)
-        is_gap = shares[0].min() <= shares.min()  # what vanishes: else both sides are alike
+        is_gap = shares[0].min() <= shares.min()  # a gap vanishes: else both sides are alike
         with suppress(NotConverged):
             for _ in range(2 if is_gap else 0):
                 found = weakly_impacting(branching, [point for _, point in free], depth)
@@ -193,7 +193,7 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
         shares = [_shares(first, point, more) for _, point in free[-2:]]
         kept = [float(share.min()) for share in shares]
         if root is not None and abs(root - near) < tolerance and kept[-1] >= kept[0]:
-            return Grazing(free[-1][1], impacting(near))  # a gap of rounding is not seen any more
+            return Grazing(free[-1][1], impacting(near))  # a gap within rounding is not detected
         ahead_of = _root(free[-2:], more)
         if _between(near, ahead_of, far) or (ahead_of is not None and not _between(near, root, far)):
             if root is not None and ahead_of is not None and len(free) > 2 and free[-3][0] != ahead_of:
@@ -209,7 +209,7 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
             left = max(0.5 * tolerance, CERTAIN * error)
             share = root + np.sign(near - root) * min(left, APPROACH * abs(near - root))
         if abs(near - far) < HOPELESS and STILL < shares[-1][:2].min() < np.inf:
-            return None  # it would have to fall all at once
+            return None  # it would have to fall suddenly
         if abs(near - far) < tolerance:
             is_missed = missing > MISSED and _is_apart(free[-1][1], other)
             return None if is_missed else Grazing(free[-1][1], impacting(near))
@@ -232,10 +232,10 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
 
 
 def grazing_beside(branching: Branching, a: Point, b: Point) -> Grazing | None:
-    """Locate the grazing next to two points with one contact more or less, where the branch has a corner.
+    """Locate the grazing next to two points that differ by one contact, where the branch has a corner.
 
-    It need not lie between them: where an impact makes a motion unstable, both may rise from it.
-    From the side with fewer contacts the least gap is followed to zero along the parameter.
+    It need not lie between them: where an impact makes a motion unstable, the parameter may rise on both
+    sides. From the side with fewer contacts the least gap is followed to zero along the parameter.
     """
     n_touch = [touches(point).total() for point in (a, b)]
     if n_touch[0] == n_touch[1]:
@@ -279,16 +279,16 @@ def _between(one: float, place: float | None, other: float) -> bool:
 
 
 def _is_apart(free: Point, other: Point) -> bool:
-    """Whether a motion is seen to be apart from the contacts that another one has more."""
+    """Whether a motion clearly lacks the additional contacts of another one."""
     more = list((touches(other) - touches(free)).keys())
     gap, force = distances(free)[: 2 * free.case.q].reshape(2, -1)[:, more]
     return bool(np.isfinite(np.concatenate([gap, force])).any() and not np.any(gap <= MISSED))
 
 
 def _ahead(branching: Branching, free: list[tuple[float, Point]], change: Floats, measure: Floats) -> Floats:
-    """Where the side without the contact goes in a whole step, by its last two points; else `change`.
+    """Direction of the side without the contact over a whole step, by its last two points; else `change`.
 
-    A step is whole that is as long as `measure` (2 n + 1,) in its direction.
+    A whole step is as long as `measure` (2 n + 1,) in its direction.
     """
     if len(free) < 2:
         return change
@@ -298,7 +298,7 @@ def _ahead(branching: Branching, free: list[tuple[float, Point]], change: Floats
 
 
 def _root(free: list[tuple[float, Point]], pairs: list[int] | None = None) -> float | None:
-    """Where the first least gap or force, of some pairs, vanishes that falls from one point to the next."""
+    """Extrapolated place where the first falling least gap or force of some pairs vanishes."""
     if len(free) < 2:
         return None
     (x, before), (y, point) = free
@@ -309,7 +309,7 @@ def _root(free: list[tuple[float, Point]], pairs: list[int] | None = None) -> fl
 
 
 def _shares(first: Point, point: Point, pairs: list[int]) -> Floats:
-    """What is left of the distances (4, k) of some pairs that a first point had; 0 where one is new."""
+    """Distances (4, k) of some pairs over those of a first point; 0 where one is new."""
     was, now = (_turning(one, pairs).reshape(4, -1) for one in (first, point))
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(np.isfinite(was) & (was > 0.0), now / was, 0.0)

@@ -1,4 +1,4 @@
-"""The least gap of a pair within a period: when it is, and what it changes with."""
+"""The least gap of a pair within a period: its time and its derivatives."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-LOOKS = 256  # in a revolution, among which the least gap is looked for
-MOST_ITERATIONS, TURNED = 30, 1e-14  # of Newton's method for its time, which is known to a share of the turn
+LOOKS = 256  # samples of a revolution, among which the least gap is sought
+MOST_ITERATIONS, TURNED = 30, 1e-14  # of Newton's method for its time; accuracy as a share of a revolution
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,7 +33,7 @@ class LeastGap:
     ----------
     gap : float, m
     bend : float, m/s^2
-        Its second derivative by the time.
+        Its second derivative with respect to time.
     """
 
     point: Point
@@ -45,7 +45,7 @@ class LeastGap:
 
     @property
     def gradient(self) -> Floats:
-        """Derivative (2 n,) of the gap by the motion at the section: its row, times the tangent there."""
+        """Derivative (2 n,) of the gap with respect to the motion at the section."""
         case = self.point.case
         mode = case.mode(_pieces(self.point)[self._place].states)
         row = (mode.tables.switch_re + 1j * mode.tables.switch_im)[_switch(case, self.pair), mode.moving]
@@ -54,10 +54,10 @@ class LeastGap:
         return gradient @ self.point.tangents()[self._place - 1] if self._place else gradient
 
     def impact(self, depth: float) -> Floats:
-        """What an impact here adds to the motion (2 n,) after the period, to the leading order.
+        """Change of the motion (2 n,) after the period by an impact here, to leading order.
 
-        A wall that is passed by a depth p is hit with the speed `v = sqrt(2 p d)`, d being the second
-        derivative of the gap, and the pair parts at once. The pairs that are closed stay closed.
+        A wall at a depth p is hit with the speed `v = sqrt(2 p d)`, where d is the second derivative of the
+        gap, and the pair parts at once. Closed pairs stay closed.
         """
         case, pieces = self.point.case, _pieces(self.point)
         piece, bodies = pieces[self._place], self.point.case.bodies
@@ -78,7 +78,7 @@ class LeastGap:
 
 
 def least_gap(point: Point, pair: int) -> LeastGap | None:
-    """Find where the gap of a pair is least; None where it turns in no piece of the period."""
+    """Find the least gap of a pair; None where the gap has no minimum in a piece of the period."""
     case, best = point.case, (np.inf, 0, 0.0)
     pieces = _pieces(point)
     begins = [point.motion, *(piece.after for piece in pieces)]

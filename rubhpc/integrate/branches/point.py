@@ -28,14 +28,14 @@ TURN = 0.2  # change of the motion, over its size, that counts as one step
 SAME_MOTION = 1e-6  # of its size
 NEAR_FOLD = 0.03  # distance of a multiplier from 1 within which the parameter is not held
 MAY_FOLD = 0.7  # a real multiplier beyond which a fold may be a step ahead
-REAL = 1e-6  # imaginary part of a multiplier that is taken for a real one
-CENTRAL = 0.2  # share of an event-free piece at either end in which no section is placed
+REAL = 1e-6  # imaginary part below which a multiplier counts as real
+CENTRAL = 0.2  # share of an event-free piece at either end without a section
 
 
 class HeldCase:
-    """The case of a point, as long as the family has room: its tables are many times larger than a point.
+    """The case of a point, as long as the family has room: its tables are much larger than a point.
 
-    Later it is set up anew.
+    Later it is set up again.
     """
 
     def __init__(self, family: Family, value: float, case: PiecewiseMotion) -> None:
@@ -65,7 +65,7 @@ class Point:
     revolutions : list of Revolution
         As many as its period.
     held : HeldCase
-        Whose coordinates these are.
+        The case whose coordinates these are.
     """
 
     value: float
@@ -86,12 +86,12 @@ class Point:
         return len(self.revolutions)
 
     def tangents(self) -> list[Floats]:
-        """Derivatives (2 n, 2 n) by the motion, of what it is after each piece and the event that ends it."""
+        """Derivatives (2 n, 2 n), by the motion, of the motion after each piece and its event."""
         return tangents(self.case, self.revolutions)
 
     @cached_property
     def monodromy(self) -> Floats:
-        """Derivative (2 n, 2 n) of the motion after a period by that before it."""
+        """Derivative (2 n, 2 n) of the motion after a period with respect to that before it."""
         return self.tangents()[-1]
 
     @cached_property
@@ -106,7 +106,7 @@ class Point:
         return self.case.march.state_of(motion, self.case.contact_force(states, motion))
 
     def note_state(self) -> Point:
-        """Find what is asked of every point of a branch as long as its case is ready; returns the point."""
+        """Compute what every point of a branch needs while its case is set up; returns the point."""
         _ = self.state, self.multipliers
         return self
 
@@ -118,7 +118,7 @@ class Point:
 
     @property
     def is_near_fold(self) -> bool:
-        """Whether the motion hardly closes less well next to it, with the parameter held."""
+        """Whether the problem with the parameter held is nearly singular."""
         return bool(np.abs(self.multipliers - 1.0).min() < NEAR_FOLD)
 
     @property
@@ -134,7 +134,7 @@ class Point:
 
     @cached_property
     def staying_closed(self) -> Floats:
-        """How far pairs are from parting at a touch, (2, q): `closing.staying_closed`."""
+        """Distances of pairs from parting at a touch, (2, q): `closing.staying_closed`."""
         return staying_closed(self.case, self.revolutions)
 
     def after(self, ahead: float) -> tuple[Floats, int, float]:
@@ -148,7 +148,7 @@ class Point:
 
     @cached_property
     def sequence(self) -> tuple[tuple[int, tuple[int, ...]], ...]:
-        """Contacts in the order of a period: what is closed until each event, and what touches there.
+        """Contacts in the order of a period: pairs closed until each event, and pairs that touch there.
 
         It begins with the smallest, so that it does not depend on the section.
         """
@@ -164,7 +164,7 @@ class Point:
 
 
 def away_from_events(point: Point) -> float:
-    """Revolutions from a point's section to the middle of the longest piece without an event; 0 where near.
+    """Revolutions from a point's section to the middle of the longest event-free piece; 0 if it is near.
 
     An impact at the section would make the motion there jump.
     """

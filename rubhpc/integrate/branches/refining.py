@@ -1,4 +1,4 @@
-"""Search within the steps of a branch for pairs of folds, doublings or grazings that the ends do not show."""
+"""Search within the steps of a branch for pairs of events that the ends of a step do not show."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MOST_HALVINGS = 6  # of a step
-MOST_KNOWN = 20  # where its ends leave no doubt that an event lies between them
-FAR = 1e-3  # of a step: a neighbour that is nearer shows no trend
+MOST_KNOWN = 20  # where an event certainly lies between its ends
+FAR = 1e-3  # of a step: a nearer neighbour shows no trend
 TURNED = 0.3  # between the direction of a step and the mean of those around it, of length 1
-ASTRAY = 0.5  # of a step, by which its middle may lie off
+ASTRAY = 0.5  # of a step, allowed deviation of its middle
 
 
 def refined(branching: Branching, track: Track, most: int) -> Track:
-    """Add points in the middle of steps that may hide a pair of events, and the events that they show.
+    """Add points in the middle of steps that may hide a pair of events, and the events between them.
 
-    Two events of one kind leave no trace at the ends of a step: a multiplier is outside the unit circle and
-    inside again, a gap closes once more and opens. The neighbours show it. Where the distance of a
-    multiplier from the unit circle, or that of a motion to grazing, falls towards a step from both sides so
-    that the two tangents meet below zero, or where the branch turns aside within the step and back, its
-    middle is computed.
+    Two events of one kind are not visible at the ends of a step: a multiplier leaves the unit circle and
+    enters it again, or a gap closes once more and opens. Neighbouring points show this. The middle of a step
+    is computed where the distance of a multiplier from the unit circle, or of a motion from grazing, falls
+    towards the step from both sides such that the two tangents meet below zero. It is also computed where the
+    branch turns aside within the step and back.
     """
     points, events = list(track.points), list(track.events)
     for i in range(1, len(points) - 1):
@@ -74,7 +74,7 @@ def refined(branching: Branching, track: Track, most: int) -> Track:
 def _event_at(before: Point, point: Point, behind: Point) -> Event:
     """What happens at a point, where a multiplier on the unit circle leaves it there."""
     if has_halved(before) or has_halved(behind):
-        return Event.NONE  # all but there, and the multiplier is that of the doubling
+        return Event.NONE  # nearly there; the multiplier is that of the doubling
     (on,) = np.nonzero(np.abs(np.abs(point.multipliers) - 1.0) <= LEFT)
     if on.size and before.n_unstable != behind.n_unstable:
         return kind_of(point, int(on[0]), before, behind)
@@ -93,7 +93,7 @@ def _may_hide(branching: Branching, points: list[Point], k: int) -> bool:
     """Whether a pair of events may lie between two points."""
     a, b = points[k], points[k + 1]
     if a.sequence != b.sequence or a.value == b.value or has_halved(a) or has_halved(b):
-        return False  # next to a motion of half the period, points are less certain than the step is long
+        return False  # next to a motion of half the period the error of points exceeds the step
     common = _outside(a) & _outside(b)
     if not common:
         return True  # one event is known, and there is another
@@ -116,7 +116,7 @@ def _may_hide(branching: Branching, points: list[Point], k: int) -> bool:
 
 
 def _outside(point: Point) -> set[int]:
-    """How many multipliers may be taken to be outside the unit circle: at an event one or a pair is on it."""
+    """Possible numbers of multipliers outside the unit circle: at an event one or a pair is on it."""
     modulus = np.abs(point.multipliers)
     n_outside, is_on = int((modulus > 1.0 + LEFT).sum()), np.abs(modulus - 1.0) <= LEFT
     n_real = int((is_on & (np.abs(point.multipliers.imag) <= REAL)).sum())
@@ -139,9 +139,9 @@ def _neighbour(points: list[Point], k: int, sense: int, least: float, n_outside:
 
 
 def _tests(point: Point, n_unstable: int) -> Floats:
-    """What vanishes at an event: distances to grazing, and of two multipliers from the unit circle."""
+    """Test functions of events: distances to grazing, and of two multipliers from the unit circle."""
     modulus, apart = np.abs(point.multipliers), distances(point)
-    n = 2 * point.case.q  # the speeds of approach behind are in the order of the section
+    n = 2 * point.case.q  # the speeds of approach after them are in the order of the section
     inside = 1.0 - modulus[n_unstable] if n_unstable < modulus.size else np.inf
     outside = modulus[n_unstable - 1] - 1.0 if n_unstable else np.inf
     return np.append(apart[:n], [apart[n:].min(initial=np.inf), inside, outside])

@@ -1,4 +1,4 @@
-"""All branches that lead on from some motions: both ways, at doublings of the period and from halved ones."""
+"""All branches reached from some motions: in both senses, at period doublings and from halved periods."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-# Steps from a doubling at which the motion of twice the period is sought: the range in which it exists, or
-# has the same contacts, may be narrow.
+# Steps from a doubling at which the motion of twice the period is sought: it may exist, or have the same
+# contacts, only in a narrow range.
 ASIDE = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)
-SAME_VALUE = 1e-6  # of the range, between two doublings that are one
-ASTRAY = 0.5  # of that length, by which a motion may lie off the direction of the multiplier -1
+SAME_VALUE = 1e-6  # of the range, between two doublings that are the same
+ASTRAY = 0.5  # of that length, allowed deviation from the direction of the multiplier -1
 
 
 def search(
     branching: Branching, starts: Iterable[Point], *, low: float, high: float, most: int, doublings: int
 ) -> list[Track]:
-    """Follow the branches of some motions, and what bifurcates from them.
+    """Follow the branches of some motions, and those that bifurcate from them.
 
     Parameters
     ----------
     starts : iterable of Point
-        Motions; those on a branch that has been followed are passed over.
+        Motions; those on a known branch are skipped.
     low, high : float
         Range of the parameter.
     most : int
@@ -111,14 +111,14 @@ def _both_ways(branching: Branching, start: Point, low: float, high: float, most
 
 
 def _doublings(track: Track) -> Iterator[Point]:
-    """Where the period doubles, but for the ends at which it halves."""
+    """Period doublings, except ends at which the period halves."""
     for point, event in zip(track.points, track.events, strict=True):
         if event is Event.PERIOD_DOUBLING and not has_halved(point):
             yield point
 
 
 def _halved(branching: Branching, track: Track) -> Iterator[Point]:
-    """The motions of half the period at which a track ends, but for that from which it was switched."""
+    """The motions of half the period at which a track ends, except the one from which it branched off."""
     for k in (-1,) if track.doublings else (0, -1):
         point = track.points[k]
         if track.events[k] in (Event.PERIOD_DOUBLING, Event.GRAZING) and has_halved(point):
@@ -132,7 +132,7 @@ def _halved(branching: Branching, track: Track) -> Iterator[Point]:
 
 
 def _is_known(branching: Branching, tracks: list[Track], point: Point) -> bool:
-    """Whether the branch that leaves at a doubling has been followed to it from its other side."""
+    """Whether the branch that leaves at a doubling has been followed from its other end."""
     within = SAME_VALUE * branching.family.span
     return any(
         event is Event.PERIOD_DOUBLING
@@ -147,7 +147,7 @@ def _is_known(branching: Branching, tracks: list[Track], point: Point) -> bool:
 def _aside(branching: Branching, point: Point) -> list[Point] | None:
     """A motion of twice the period at its doubling, and one next to it on the branch that leaves.
 
-    It has to have the same contacts, so that no event is skipped; where there is none, the farthest is taken.
+    It must have the same contacts, so that no event is skipped; where none has, the farthest is taken.
     """
     base = branching.repeated(point, 2)
     values, vectors = np.linalg.eig(point.monodromy)

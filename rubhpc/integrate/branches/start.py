@@ -1,4 +1,4 @@
-"""Motions from which branches are followed: what sweeps up and down and random disturbances settle on."""
+"""Motions from which branches are followed: those reached by sweeps up and down and random disturbances."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ SEED = 1  # of the disturbances: the same in every run
 def starts(
     branching: Branching, values: Sequence[float], periods: Sequence[int], recording: Recording
 ) -> Iterator[Point]:
-    """Yield motions at some values of the parameter, of each period asked for that is found.
+    """Yield motions at some values of the parameter, for each requested period.
 
-    The case is simulated with the parameter rising, each from where the one before has ended, then falling,
-    then from rest with a sideways velocity as random as its direction, up to that of a whirl in the gap.
+    The case is simulated with rising parameter, each time from the final state of the one before, then with
+    falling parameter, then from rest with a random lateral velocity of up to that of a whirl in the gap.
     """
     rising = sorted(values)
     for order in (rising, rising[::-1]):
@@ -63,7 +63,7 @@ def starts(
 def _of_each_period(
     branching: Branching, value: float, piecewise: PiecewiseMotion, periods: Sequence[int]
 ) -> Iterator[Point]:
-    """Motions of these periods, and of no divisor, that Newton's method finds from where a case begins."""
+    """Motions with exactly these periods that Newton's method finds from a start."""
     for period in periods:
         point = shot(branching, value, piecewise, (period,))
         if point is not None and point.period == period:
@@ -73,7 +73,7 @@ def _of_each_period(
 def simulated(
     branching: Branching, value: float, initial: State | Initial, recording: Recording
 ) -> tuple[State, PiecewiseMotion] | None:
-    """Where a case has come to after the transient; None where it has no closed form."""
+    """State of a case after the transient; None where it has no closed form."""
     setup, clearance, friction = branching.family.settings(value)
     try:
         state = (
@@ -93,7 +93,7 @@ def simulated(
 def shot(
     branching: Branching, value: float, piecewise: PiecewiseMotion, periods: Sequence[int]
 ) -> Point | None:
-    """The motion of the first of some periods that is found from where a case begins."""
+    """The first motion found from a start, among some periods."""
     for period in periods:
         try:
             return branching.begin(value, piecewise.start, piecewise.states, period)

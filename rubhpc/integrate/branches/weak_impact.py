@@ -1,4 +1,4 @@
-"""The motion with one weak impact more, next to a grazing."""
+"""The motion with one additional weak impact, next to a grazing."""
 
 from __future__ import annotations
 
@@ -24,28 +24,29 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 NEAR = 1e-8, 1e-2  # of the clearance: gaps from which a gap of zero is extrapolated
-BACK = 1e-3  # of the way to the first motion, where the others nearly touch or do not
+BACK = 1e-3  # of the way to the first motion, where the others are unsuitable
 DEPTH = 1e-5  # of the clearance, by which a motion without the impact would pass the wall
 SMALL = 1e-6  # steps, by which derivatives are taken at most
-ALIKE = 0.1  # of a least gap, between what was interpolated as it was followed and what it is
-PART = 0.1  # of the gap over the clearance, which they are at most: no gap closes meanwhile
+ALIKE = 0.1  # of a least gap, between the interpolated and the actual value
+PART = 0.1  # of the gap over the clearance, their upper limit: no gap closes meanwhile
 MOST_ITERATIONS = 20
 
 
 def weakly_impacting(branching: Branching, free: Sequence[Point], share: float = DEPTH) -> Point:
-    """Find the periodic motion that a wall holds up from passing it by a small share of the clearance.
+    """Find the periodic motion with a weak impact, which replaces a small overlap with the wall.
 
-    The speed of an impact goes with the root of that depth p, the change of the motion with the root of the
-    change of the parameter: at a given parameter Newton's method meets a derivative without bound. In terms
-    of the depth both are smooth. So `h(x, lambda) = -p` is added, h being the least gap linearised beside
-    the grazing, and the parameter is an unknown: it lies ahead where the branch goes on, or behind where it
-    turns (Nordmark 1991; di Bernardo and others 2008, 7.2).
+    The speed of the impact is proportional to the root of the depth p of this overlap, and the change of the
+    motion to the root of the change of the parameter. At a given parameter the derivative in Newton's method
+    is therefore unbounded. Both are smooth in terms of the depth. The equation `h(x, lambda) = -p` is
+    therefore added, with h the least gap linearised next to the grazing, and the parameter is an unknown. It
+    lies ahead where the branch continues, or behind where it turns (Nordmark 1991; di Bernardo and others
+    2008, 7.2).
 
     Parameters
     ----------
     free : sequence of Point
-        Motions without the impact, towards the grazing; of those whose least gap is between 1e-8 and 1e-2 of
-        its clearance the one is taken where it is nearest to 1e-5, or one a thousandth of the way back.
+        Motions without the impact, towards the grazing. Of those with a least gap between 1e-8 and 1e-2 of
+        its clearance the one nearest to 1e-5 is used, or one a thousandth of the way back.
     share : float
         Of the clearance.
 
@@ -77,7 +78,7 @@ def weakly_impacting(branching: Branching, free: Sequence[Point], share: float =
 
 
 def _beside(branching: Branching, free: Sequence[Point]) -> tuple[Point, int, float, float]:
-    """A motion that nearly grazes, the pair that does, its least gap and its clearance, m."""
+    """A motion that nearly grazes, the pair concerned, its least gap and its clearance, m."""
 
     def nearly(points: Iterable[Point]) -> tuple[Point, int, float, float] | None:
         found = []
@@ -105,7 +106,7 @@ def _least_gaps(point: Point) -> Floats:
 
 
 def _rates(branching: Branching, point: Point, pair: int, small: float) -> tuple[float, Floats]:
-    """Derivatives by the parameter, a step, the beginning held: of a least gap, m, and of the end (2 n,)."""
+    """Derivatives by the parameter, per step, at a fixed beginning: of a least gap, m, and the end (2 n,)."""
     family = branching.family
     try:
         there = family.at(point.value + small * branching.step)

@@ -1,4 +1,4 @@
-"""Record of a case that ran away."""
+"""Record of a diverged case."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def diverged_record(
     final: State,
     reached: dict[str, Floats] | None = None,
 ) -> Record:
-    """Record of a case that ran away: its signals as far as it got, and not-a-number elsewhere.
+    """Record of a diverged case: its signals up to the divergence, and NaN elsewhere.
 
     `reached` holds the samples (..., n) until then; sections are read from them. Spectra and measures are
     those of whole records: a diverged case has none.
@@ -68,5 +68,5 @@ def diverged_record(
 
 
 def _variables_of(recording: Recording) -> dict[str, Variable]:
-    """Variables of a case that is recorded so."""
+    """Variables of such a record."""
     return VARIABLES | probe_variables(recording.probed) | lyapunov_variables(recording.lyapunov)

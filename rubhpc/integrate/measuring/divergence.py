@@ -1,4 +1,4 @@
-"""When a motion counts as diverged: by the rotor's displacement and by the energy of all bodies."""
+"""Divergence of a motion: limits of the rotor's displacement and of the energy of all bodies."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def energy_limit(model: Model, spin: float, displacement_limit: float) -> float:
-    """Mechanical energy, J, beyond which a motion has diverged; inf where nothing holds the rotor.
+    """Mechanical energy, J, beyond which a motion has diverged; inf for an unconstrained rotor.
 
     It is that of the rotor whose output node whirls with the spin (rad/s) at the displacement limit (m), in
     the shape of its static response to a force there. A stator whose tip bends far stays below it; a body
@@ -42,12 +42,12 @@ def judged_nodes(model: Model) -> tuple[int, ...]:
 
 
 def displacement_reason(model: Model, displacement: Floats, limit: float) -> str:
-    """Which node of the rotor has passed the limit (m) by displacements (2 n_node,), v and w of each."""
+    """Reason with the node whose displacement, of (2 n_node,), v and w of each, has passed the limit (m)."""
     size = np.abs(displacement).reshape(-1, 2).max(axis=1)
     worst = int(np.argmax(np.where(np.isnan(size), np.inf, size)))
     return f"the displacement of the rotor at node {judged_nodes(model)[worst]} passed {limit:.3g} m"
 
 
 def energy_reason(limit: float) -> str:
-    """Say that the energy has passed its limit, J."""
+    """Reason of a case whose energy has passed its limit, J."""
     return f"the mechanical energy passed {limit:.3g} J, that of the rotor at its displacement limit"

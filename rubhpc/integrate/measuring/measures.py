@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-LEAST_EXCHANGE = 1e-6  # of the mechanical energy: a motion that exchanges less is balanced against that
+LEAST_EXCHANGE = 1e-6  # of the mechanical energy: least reference of the energy residual
 
 
 def measures_of(
@@ -62,15 +62,15 @@ def measures_of(
         Mechanical energy at the beginning and at the end of the record.
     spin : float, rad/s
     is_round : bool
-        Whether the gap knows that the rim is round (updated normal).
+        Whether the gap includes the roundness of the rim (updated normal).
     growth : iterable of float
-        How a small displacement grows after the record (`lyapunov.Growth`); read where it decides the regime.
+        Growth of a small displacement after the record (`lyapunov.Growth`); read where it decides the regime.
     within : callable, optional
-        How it grows within the record (`lyapunov.Growth.within`).
+        Growth within the record (`lyapunov.Growth.within`).
     solve : callable, optional
         Finds periodic motions (`proof.Solver`).
     later : callable, optional
-        Finds them in later revolutions, where that does not (`proof.Solver.later`).
+        Finds them in later revolutions, where `solve` does not (`proof.Solver.later`).
     n_event : float
         Events in a revolution, where they are known; else 0.
     """
@@ -79,7 +79,7 @@ def measures_of(
     duration = 2.0 * np.pi * n_revolution / abs(spin)
     has_touched = accumulator.impulse > 0
     is_contact = bool(has_touched.any())
-    n_contact = np.maximum(accumulator.n_contact, 1)  # one that lasts throughout never begins in the record
+    n_contact = np.maximum(accumulator.n_contact, 1)  # a permanent contact does not begin in the record
     orbit = signals["vertical"], signals["horizontal"], samples_per_revolution
     verdict = regime(
         *orbit,
@@ -94,8 +94,8 @@ def measures_of(
     multiplier = verdict.multiplier
     rim = stators[0].radius * signals["torsion"]  # m, as the orbit
     force = signals["contact_force"].reshape(len(stators), n_revolution, samples_per_revolution)
-    # Drive and friction exchange a hundred times what the vibration feels of them, and a rotor that stands
-    # exchanges nothing else: only their difference counts.
+    # Drive and friction exchange a hundred times the energy that reaches the vibration, and for a rotor that
+    # stands nothing else: only their difference counts.
     flows = [
         accumulator.energy[UNBALANCE_WORK],
         accumulator.energy[RUB_WORK],
@@ -108,7 +108,7 @@ def measures_of(
         "period": verdict.period,
         "regime": verdict.flag,
         "lyapunov_exponent": verdict.exponent,
-        # Python's abs() of a complex NaN may raise an error left over from arithmetic before it.
+        # Python's abs() of a complex NaN may raise a pending floating-point error.
         "largest_multiplier": math.nan if cmath.isnan(multiplier) else abs(multiplier),
         "multiplier_angle": cmath.phase(multiplier),
         "whirl_ratio": whirl_ratio(*orbit, spin),
@@ -152,10 +152,10 @@ def measures_of(
 def foreshortening_ratio(
     stators: tuple[StatorModel, ...], deflection: Floats, force: Floats, *, is_round: bool
 ) -> Floats:
-    """Return by how much a bent tip changes its gap without the model's knowing, over its compression, (q,).
+    """Return the change of the gap by bending that the model omits, over the tip's compression, (q,).
 
     A tip at a lateral `deflection` l (q,), m, draws back by 0.6 l^2 / L, and the rim, r away from its centre,
-    by l^2 / (2 r); a body without a length or a rim has neither. The compression is the static one under the
+    by l^2 / (2 r). A body without a length or a rim has neither. The compression is the static one under the
     `force` (q,), N; without it the ratio is 0.
     """
     ratio = np.zeros(len(stators))

@@ -20,7 +20,7 @@ def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) ->
     """Period of the orbit in revolutions; 0 where it has none up to 16 (or the record is too short).
 
     Whole cycles are compared: the rms distance between revolutions k and k + n over the orbit's size stays
-    under 1e-2. A stroboscopic point alone would take a period-2 orbit for period 1.
+    under 1e-2. Section points alone could show a period-2 orbit as period 1.
 
     Parameters
     ----------
@@ -31,21 +31,21 @@ def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) ->
     most = PERIOD_TOLERANCE**2 * sum(float(signal @ signal) for signal in signals) / vertical.size
 
     def distance(shift: int, end: int) -> float:
-        """Sum of the square distances between the first samples, up to `end`, and those a shift later."""
+        """Sum of squared distances between the first samples, up to `end`, and those a shift later."""
         changes = [signal[shift : shift + end] - signal[:end] for signal in signals]
         return sum(float(change @ change) for change in changes)
 
     for n in range(1, min(LONGEST_PERIOD, n_revolution - 1) + 1):
         shift = n * samples_per_revolution
         n_pair = vertical.size - shift
-        # The first revolution alone mostly shows that there is no such period.
+        # The first revolution alone usually excludes a period.
         if all(distance(shift, end) <= most * n_pair for end in (samples_per_revolution, n_pair)):
             return n
     return 0
 
 
 def ends_change(cycles: Floats, period: int) -> float:
-    """Root mean square distance of the first cycles from those as many whole periods later as there are.
+    """Root mean square distance of the first cycles from the last ones a whole number of periods later.
 
     Parameters
     ----------

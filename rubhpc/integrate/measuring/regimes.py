@@ -23,20 +23,20 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 MOST_DOUBLED = 2 * LONGEST_PERIOD  # revolutions, to which period doublings are followed
-STEEPEST = -2.0  # multiplier of a motion beside a stable one of twice the period; -1.60 where doublings end
-MOST_EVENTS = 160  # in a period that is solved for; the time that a proof takes goes with them
-MOST_DISTANT = 0.1  # of the orbit's size: a record that is farther from a motion does not settle on it
-LEAST_REVOLUTIONS = LONGEST_PERIOD  # of a record without a period that is worth following further
+STEEPEST = -2.0  # multiplier of a motion next to a stable one of twice the period; see `_proved`
+MOST_EVENTS = 160  # in a period that is solved for; the time of a proof is proportional to them
+MOST_DISTANT = 0.1  # of the orbit's size: a record farther from a motion does not settle on it
+LEAST_REVOLUTIONS = LONGEST_PERIOD  # of a record without a period that is followed further
 TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may show a torus, or a longer period, by itself
-N_FIRST, N_ALL, N_MOST = 16, 64, 256  # spans whose growth is measured, each where the last left it open
-CLEAR = 0.05  # per revolution: an exponent beyond that over 16 spans keeps its sign
-ZERO = 0.01  # per revolution: an exponent within that is none
-EQUAL = 1e-5  # of the orbit's size: cycles as near as that are the same where no motion can be solved for
-NOISE, ALIKE = 1e-9, 2.0  # of the orbit's size, and times the nearest return: a return as near as any
-REAL = 1e-6  # imaginary part of a multiplier that is taken for a real one
-SURE = 2.0  # standard errors: an exponent within that is none, too
-# A torus: the nearest return is that near, of the distance between cycles; that of twice as many revolutions
-# is twice as far, by 8 %; and neither half of the record has the farther ones.
+N_FIRST, N_ALL, N_MOST = 16, 64, 256  # spans of measured growth, each if the one before was not conclusive
+CLEAR = 0.05  # per revolution: sign of a larger exponent over 16 spans is certain
+ZERO = 0.01  # per revolution: a smaller exponent counts as zero
+EQUAL = 1e-5  # of the orbit's size: nearer cycles are the same, where no motion can be solved for
+NOISE, ALIKE = 1e-9, 2.0  # of the orbit's size, times the nearest return: counts as nearest
+REAL = 1e-6  # imaginary part below which a multiplier counts as real
+SURE = 2.0  # standard errors: an exponent within them counts as zero
+# A torus: limits of the nearest return, relative to the distance between cycles; of the return after twice as
+# many revolutions, twice as far within 8 %; and of the difference between the halves of the record.
 NEAR, TWICE, EVEN = 0.21, (1.85, 2.16), 1.5
 
 
@@ -48,17 +48,17 @@ class Solution(NamedTuple):
     section: (
         Floats  # (period, 2), m, vertical and horizontal at the shaft's angle 0, the end of a record first
     )
-    is_led_to: bool = False  # what follows the record has come to it
+    is_led_to: bool = False  # revolutions after the record reach it
 
 
 class Verdict(NamedTuple):
-    """What a motion is."""
+    """Regime of a motion."""
 
     flag: int  # of `schema.REGIME`
     period: int  # revolutions; 0: none found
-    exponent: float = math.nan  # largest Lyapunov exponent per revolution, where it had to be measured
+    exponent: float = math.nan  # largest Lyapunov exponent per revolution, where it was measured
     multiplier: complex = complex(math.nan, math.nan)  # largest, where the periodic motion was solved for
-    is_reached: bool = True  # false where the record still settles on it
+    is_reached: bool = True  # false where the record has not settled on it
 
 
 def regime(
@@ -76,22 +76,22 @@ def regime(
 ) -> Verdict:
     """Judge a record.
 
-    A record that looks periodic is so if a stable periodic motion is found next to its end, which the record
-    agrees with or draws near to: of the period that it looks like, of that at which it returns nearest, or in
-    later revolutions. If none is found, its cycles must be the same within 1e-5. Where motions cannot be
-    solved for at all, it is taken for what it looks like, if its first cycles are its last ones within 1 %.
-    A record shorter than 16 revolutions without a period leaves the motion undecided: it is too short for
-    some periods. From 16 to 31 the growth alone decides, for it is measured beyond the record; a longer
-    record may show a torus, or a period beyond 16, by itself. A motion that shows no period, but comes to a
-    periodic motion in later revolutions, is that and has not settled. Next to the end of a torus that the
-    record shows none is sought, and of one with so many events that no motion of a longer period than 1 could
-    be solved for, none later.
+    A record with an apparent period is periodic if a stable periodic motion is found near its end that the
+    record agrees with or approaches. It is sought with the apparent period, with that of the nearest return,
+    and in later revolutions. If none is found, the cycles must be the same within 1e-5. Where motions cannot
+    be solved for, the record is periodic if its first and last cycles agree within 1 %.
+
+    Without a period, a record shorter than 16 revolutions leaves the motion undecided: it is too short for
+    some periods. From 16 to 31 revolutions the growth alone decides, because it is measured beyond the
+    record. A longer record may show a torus, or a period beyond 16, by itself. A motion that reaches a
+    periodic motion in later revolutions is periodic and has not settled. None is sought near the end of a
+    torus, nor later where a period longer than 1 has too many events.
 
     Parameters
     ----------
     vertical, horizontal : (n_revolution * samples_per_revolution,), m
     period : int
-        Revolutions after which the record looks the same, or 0 where there are none up to 16.
+        Apparent period in revolutions, or 0 where there is none up to 16.
     growth : iterable of float
         Growth of a small displacement per revolution, span by span; read only where it is needed.
     solve : callable, optional
@@ -99,7 +99,7 @@ def regime(
     within : callable, optional
         Growth of a small displacement within the record, span by span (`lyapunov.Growth.within`).
     later : callable, optional
-        What to try in later revolutions, in turn, where the record looks periodic or does not
+        Searches in later revolutions, in order, where the record looks periodic or does not
         (`proof.Solver.later`).
     n_event : float
         Events in a revolution, where they are known.
@@ -121,10 +121,10 @@ def regime(
     repeats = is_open and orbit.repeats(orbit.closest_return)
     if orbit.n_revolution < LEAST_REVOLUTIONS:
         return Verdict(periodic, orbit.closest_return) if repeats else Verdict(REGIME.index("undecided"), 0)
-    is_closed = is_long and is_torus(orbit.distances)  # the curve on which the cycles lie
+    is_closed = is_long and is_torus(orbit.distances)  # the cycles lie on a closed curve
     flag, exponent = by_growth(growth, within, is_closed=is_closed, is_cheap=solve is not None)
     if search.turns_away and flag == periodic and exponent > -CLEAR:
-        flag = REGIME.index("quasi_periodic")  # a torus about it, too near yet to be seen as one
+        flag = REGIME.index("quasi_periodic")  # a torus around it, still too close to be distinguished
     if repeats and flag != REGIME.index("chaotic"):
         return Verdict(periodic, orbit.closest_return, exponent)
     is_regular = flag in (periodic, REGIME.index("quasi_periodic"))
@@ -165,7 +165,7 @@ class _Orbit:
 
     @property
     def nearest_return(self) -> int:
-        """Revolutions after which that is least."""
+        """Revolutions after which this distance is least."""
         return int(self.returns.argmin()) + 1
 
     def distances_from(self, solution: Solution) -> Floats:
@@ -175,12 +175,12 @@ class _Orbit:
         return np.asarray(apart / max(self.size, np.finfo(float).tiny))
 
     def has_equal_ends(self, period: int, tolerance: float = PERIOD_TOLERANCE) -> bool:
-        """Whether the first cycles are those as many whole periods later as there are."""
+        """Whether the first cycles equal the last ones a whole number of periods later."""
         change = ends_change(self.cycles.reshape(self.n_revolution, -1), period)
         return change <= tolerance * self.size * math.sqrt(self.cycles.shape[2])
 
     def repeats(self, period: int) -> bool:
-        """Whether its cycles are the same a period later, and at its ends."""
+        """Whether its cycles are the same a period later and at both ends."""
         square = self._square_returns[period - 1]
         return square <= EQUAL**2 * self.size**2 and self.has_equal_ends(period, EQUAL)
 
@@ -199,12 +199,12 @@ class _Orbit:
 
 
 def closest_return(square: Floats, size: float) -> int:
-    """Least n whose mean square distance `square[n - 1]` is as near as any, for a motion of a size."""
+    """Least n whose mean square distance `square[n - 1]` is nearest within tolerance, for an orbit's size."""
     return int(np.argmax(square <= ALIKE**2 * square.min() + (NOISE * size) ** 2)) + 1
 
 
 class _Search:
-    """The search for a stable motion that a record agrees with, or draws near to."""
+    """The search for a stable motion that a record agrees with or approaches."""
 
     def __init__(self, orbit: _Orbit) -> None:
         self._orbit = orbit
@@ -212,7 +212,7 @@ class _Search:
         self.turns_away = False  # from an unstable motion that the record agrees with, in two directions
 
     def proves(self, period: int, solve: Solve, later: Later | None = None) -> Verdict | None:
-        """Judge by the motion of a period, by that of the closest return, and by what is found later on."""
+        """Judge by the motion of a period, by that of the closest return, and by later searches."""
         asked: set[int] = set()
         verdict = self._proved(period, solve, asked)
         if verdict is not None or later is None:
@@ -223,15 +223,15 @@ class _Search:
         return self.proves_any(later(True))
 
     def proves_any(self, trials: Iterable[tuple[int, Solve]]) -> Verdict | None:
-        """Judge by the first of these searches that finds such a motion."""
+        """Judge by the first successful search."""
         verdicts = (self._proved(period, solve, set()) for period, solve in trials)
         return next((verdict for verdict in verdicts if verdict is not None), None)
 
     def _proved(self, period: int, solve: Solve, asked: set[int]) -> Verdict | None:
-        """Judge by the motion of a period; None where that is none, unstable or elsewhere.
+        """Judge by the motion of a period; None where there is none, or it is unstable or elsewhere.
 
-        An unstable motion whose disturbances change sides in every period is followed to twice its period, if
-        they do not grow by more than double: where doublings accumulate they grow by 1.60 (Feigenbaum 1978).
+        An unstable motion with alternating disturbances is followed to twice its period, unless they more
+        than double: where doublings accumulate they grow by 1.60 (Feigenbaum 1978).
         """
         found = solve(period)
         asked.add(period)
@@ -263,10 +263,10 @@ def by_growth(
     is_closed: bool = False,
     is_cheap: bool = False,
 ) -> tuple[int, float]:
-    """Judge by how neighbours part: flag of `schema.REGIME`, and the largest Lyapunov exponent or NaN.
+    """Judge by the growth of a displacement: flag of `schema.REGIME`, largest Lyapunov exponent or NaN.
 
-    `is_closed` states that the cycles lie on a closed curve (`is_torus`), `is_cheap` that spans may be asked
-    for until a displacement has found its direction: among many slow modes it falls a long way before.
+    `is_closed`: the cycles lie on a closed curve (`is_torus`). `is_cheap`: spans may be read until a
+    displacement has found its direction; with many slow modes it first decreases for long.
     """
     grown = [] if within is None else list(within())
     if is_closed and grown and abs(np.mean(grown)) < CLEAR:
@@ -274,12 +274,12 @@ def by_growth(
     spans = iter(growth)
 
     def reaches(n_span: int) -> bool:
-        """Whether so many spans are there, or can be read."""
+        """Whether so many spans are known or can be read."""
         grown.extend(islice(spans, max(0, n_span - len(grown))))
         return len(grown) >= n_span
 
     if not reaches(N_FIRST):
-        return REGIME.index("undecided"), math.nan  # the motion next to it cannot go on
+        return REGIME.index("undecided"), math.nan  # the neighbouring motion cannot continue
     if abs(np.mean(grown)) < CLEAR:
         if is_closed:
             return REGIME.index("quasi_periodic"), float(np.mean(grown))
@@ -301,7 +301,7 @@ def by_growth(
 
 
 def standard_error(grown: list[float]) -> float:
-    """Standard error of the mean of growths that follow one another by chance."""
+    """Standard error of the mean of independent growths."""
     return float(np.std(grown)) / math.sqrt(len(grown))
 
 
@@ -321,11 +321,11 @@ def returns(distances: Floats) -> Floats:
 
 
 def is_torus(distances: Floats) -> bool:
-    """Whether the cycles lie on a closed curve, along which each revolution takes them by the same share.
+    """Whether the cycles lie on a closed curve and advance along it by the same share each revolution.
 
-    After the revolutions that nearly fill whole rounds of that curve, the cycles are displaced along it by a
-    little, and by twice that little after twice as many; those of chaotic motion return to a neighbourhood,
-    however often, and those of a motion that still settles draw nearer and nearer.
+    After a number of revolutions that nearly completes rounds of the curve, the cycles are displaced along it
+    by a small amount, and by twice this amount after twice as many. The cycles of chaotic motion return to a
+    neighbourhood, and those of a motion that still settles approach each other.
     """
     square = returns(distances)
     n = int(square.argmin()) + 1

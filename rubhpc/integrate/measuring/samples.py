@@ -1,4 +1,4 @@
-"""Samples and sums of a record: room for them, where they are counted from, their names in the schema."""
+"""Samples and accumulators of a record: their arrays, origin, and names in the schema."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-_WIDEST = np.array([[-np.inf] * 3, [np.inf] * 3])  # extrema before anything is seen
+_WIDEST = np.array([[-np.inf] * 3, [np.inf] * 3])  # extrema before the first sample
 
 
 def empty_samples(n_place: int, n_sample: int, n_probe: int = 0) -> Samples:
-    """Room for the samples of a record: one array, so that their spectra are taken together.
+    """Array for the samples of a record: one array, so that their spectra are computed together.
 
-    Places (`Model.n_place`) are the stators, then the carriers, whose vertical motion stands for the axial
-    one, and whose horizontal motion for the lateral one, then their rotations, as lateral motion.
+    Places (`Model.n_place`) are the stators, then the carriers, with vertical motion as axial and horizontal
+    motion as lateral, then their rotations as lateral motion.
     """
     first_probe = 4 + 3 * n_place
     whole = np.zeros((first_probe + n_probe, n_sample))
@@ -47,7 +47,7 @@ def empty_samples(n_place: int, n_sample: int, n_probe: int = 0) -> Samples:
 
 
 def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
-    """Sums at zero, extrema at their neutral ends; places as in `empty_samples`, by default the stators."""
+    """Zero accumulator with neutral extrema; places as in `empty_samples`, by default the stators."""
     return _accumulator(
         n_stator,
         n_stator if n_place is None else n_place,
@@ -58,12 +58,12 @@ def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
 
 
 def following_accumulator(before: Accumulator, passed: float) -> Accumulator:
-    """Sums of what follows in a march that restarts its time, after `passed` (s) of the march before.
+    """Accumulator of a march that restarts its time, after `passed` (s) of the march before.
 
-    Means of the contact force reach back beyond it.
+    Means of the contact force include times before the restart.
     """
     pieces = before.force_piece.copy()
-    pieces[:, LOUD, 0] = np.inf  # to a peak that begins again
+    pieces[:, LOUD, 0] = np.inf  # relative to a peak that is reset
     return _accumulator(
         before.impulse.size,
         before.peak_lateral.size,
@@ -74,13 +74,13 @@ def following_accumulator(before: Accumulator, passed: float) -> Accumulator:
 
 
 def stacked_accumulators(n: int, before: Accumulator) -> Accumulator:
-    """Sums of n parts of a record, (n, ...) each, at zero, with as many pairs and places as `before`."""
+    """Zero accumulators of n parts of a record, (n, ...) each, with the pairs and places of `before`."""
     new = new_accumulator(before.impulse.size, before.peak_lateral.size)
     return Accumulator._make(np.repeat(field[np.newaxis], n, axis=0) for field in new)
 
 
 def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
-    """Sums at zero, but for the window of the mean force; a run-up takes one a revolution."""
+    """Zero accumulator except for the window of the mean force; a run-up makes one per revolution."""
     contact_time, impulse, stick_time, friction_work, peak_force, least_slip = np.zeros((6, n_stator))
     n_contact, sense, reversals = np.zeros((3, n_stator), dtype=np.int64)
     highest, lowest = _WIDEST.copy()
@@ -107,7 +107,7 @@ def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
 
 
 def add_sag(samples: Samples, accumulator: Accumulator, model: Model) -> None:
-    """Count what output node and probes see from the shaft without loads, not from where it sags to."""
+    """Refer output node and probes to the shaft without loads, not to the sagged shaft."""
     if not model.sag.any():
         return
     lift_samples(samples.whole, model)
@@ -117,7 +117,7 @@ def add_sag(samples: Samples, accumulator: Accumulator, model: Model) -> None:
 
 
 def lift_samples(whole: Floats, model: Model) -> None:
-    """Count samples (`Samples.whole`) from the shaft without loads."""
+    """Refer samples (`Samples.whole`) to the shaft without loads."""
     if not model.sag.any():
         return
     if model.probe is not None:
@@ -126,7 +126,7 @@ def lift_samples(whole: Floats, model: Model) -> None:
 
 
 def samples_within(samples: Samples, n_taken: int, limit: float) -> int:
-    """Count the samples up to the first whose lateral displacement passes a limit, m, of those taken."""
+    """Number of samples up to the first whose lateral displacement passes a limit, m."""
     lateral = samples.rotor[[VERTICAL, HORIZONTAL], : max(n_taken, 0)]
     beyond = np.flatnonzero(~np.all(np.abs(lateral) <= limit, axis=0))
     return int(beyond[0]) if beyond.size else lateral.shape[1]
@@ -149,7 +149,7 @@ def by_name(whole: Floats, model: Model) -> dict[str, Floats]:
 
 
 def probe_extents(signals: dict[str, Floats]) -> dict[str, float]:
-    """Peak to peak of what each probe has sampled."""
+    """Peak to peak of each probe's samples."""
     return {
         f"peak_to_peak_{name}": float(np.ptp(signal))
         for name, signal in signals.items()

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 UNKNOWN = -1  # the record is too short
-# Of the halves of a record: distance of their means over the standard deviation within them, and ratio of
-# the two standard deviations. Linear drift gives 3.5 and 1, an exponential decay 3.1 and 2, 2.6 and 4, or 2.0
-# and 10; 57 quasi-periodic and chaotic rubs 1000 revolutions after their beginning at most 0.5 and 1.3.
+# Of the halves of a record: distance of their means over the standard deviation within them, and ratio of the
+# two standard deviations. Linear drift gives 3.5 and 1, an exponential decay 3.1 and 2, 2.6 and 4, or 2.0 and
+# 10. For 57 quasi-periodic and chaotic rubs, 1000 revolutions after their start, they are at most 0.5 and
+# 1.3.
 MOST_SHIFT, MOST_RATIO = 2.0, 2.0
 MOST_CHANGE = PERIOD_TOLERANCE  # of the orbit's size, or of the impulse: less is no change
 
@@ -29,9 +30,9 @@ def settled(
     """Flag of `schema.SETTLED`, or -1 where the record is too short to show it.
 
     A motion with a period has settled if its first and last whole cycles are the same within 1e-2 of the
-    orbit's size. One without, or a periodic one whose cycles differ, has settled if the halves of the record
-    have the same statistics: mean cycle, and spread of the cycles about it. Either way the mean impulse of
-    the halves must be the same too. Without contact only a periodic motion has settled: the system is linear.
+    orbit's size. Without a period, or where cycles differ, it has settled if the halves of the record have
+    the same statistics: mean cycle, and spread of the cycles about it. In both cases the halves must have the
+    same mean impulse. Without contact only a periodic motion has settled: the system is linear.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def halves(values: Floats) -> tuple[float, tuple[float, float]]:
     Parameters
     ----------
     values : (n_revolution, n)
-        The middle one of an odd number belongs to neither half.
+        The middle row of an odd number belongs to neither half.
     """
     n = len(values) // 2
     first, second = values[:n], values[len(values) - n :]

@@ -1,4 +1,4 @@
-"""A model in the same reduced coordinates at every speed of a range."""
+"""A model in the same reduced coordinates at all speeds of a range."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 
 class AlongSpeeds:
-    """Reduces a model once for a range of speeds: its motions change with the speed alone, not with a basis.
+    """Reduces a model once for a range of speeds, so that all speeds share one basis.
 
-    Modes are kept that any of some speeds needs. Gyroscopic terms go with the speed, unbalance forces with
-    its square; nothing else of a model changes, unless its bearings do.
+    The basis has the modes that any of the given speeds needs. Gyroscopic terms are proportional to the
+    speed, unbalance forces to its square. Nothing else changes, unless bearings do.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class AlongSpeeds:
 
     def at(self, spin: float) -> ReducedModel:
         """The model at a speed, rad/s."""
-        found = copy(self._fastest)  # with what its basis has yielded
+        found = copy(self._fastest)  # including its cached projections
         damping, force = self._damping + spin * self._gyroscopic, spin**2 * self._force
         vars(found).update(spin=spin, damping=damping, force=force)
         return found

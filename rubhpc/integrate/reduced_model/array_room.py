@@ -1,4 +1,4 @@
-"""Room for arrays that kernels read in whole vectors."""
+"""Allocation of arrays that kernels read in whole vectors."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_PAGES = 2**16  # bytes from which an array has pages of its own
-_LINE = 64  # bytes of a line of the processor's cache
+_PAGES = 2**16  # bytes from which an array has its own pages
+_LINE = 64  # bytes of a cache line
 _FLOATS = np.dtype(np.float64)
 
 
 def room_for(shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """An array with pages of its own, which go back to the system with it.
+    """An array with its own pages, which return to the system when it is freed.
 
-    Those of the C library would not: once a few megabytes have been given back it takes arrays up to 32 MB
-    from its heap, which smaller ones behind them keep from shrinking (M_MMAP_THRESHOLD in mallopt(3)): 24
-    set-ups of a ring of eight, of which four are held at a time, took 840 MB so, and take 430.
+    Memory of the C library does not: after a few megabytes have been freed, it takes arrays of up to 32 MB
+    from its heap, which cannot shrink below later allocations (M_MMAP_THRESHOLD in mallopt(3)). 24 set-ups of
+    a ring of eight, four of them alive at a time, took 840 MB in this way, and take 430.
     """
     n_byte = math.prod(shape) * dtype.itemsize
     if n_byte < _PAGES:
@@ -31,9 +31,9 @@ def room_for(shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
 
 
 def aligned(shape: tuple[int, ...], dtype: np.dtype[Any] = _FLOATS) -> NDArray[Any]:
-    """An array of zeros that begins with a line of the processor's cache.
+    """An array of zeros that begins at a cache line.
 
-    A vector of eight numbers is such a line, and takes twice as long to read or write from two of them.
+    A vector of eight numbers fills a cache line; across two lines it takes twice as long to read or write.
     """
     n_byte = math.prod(shape) * dtype.itemsize
     room = np.zeros(n_byte + _LINE, dtype=np.uint8)

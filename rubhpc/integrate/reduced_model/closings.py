@@ -1,4 +1,4 @@
-"""Eigenmodes with contacts closed one after another: sets that begin alike share what they have in common."""
+"""Eigenmodes with contacts closed one after another; sets share the results of common first contacts."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ MOST = 64  # sets whose eigenmodes are kept
 
 
 class Closings:
-    """Eigenmodes of bodies with contacts, each set of them from the one without its last.
+    """Eigenmodes of bodies with contacts, each set computed from the set without its last contact.
 
     Parameters
     ----------
     opened : Eigenmodes
         Of all n coordinates without contacts.
     part : (n,)
-        Number of the body of each coordinate: nothing couples two of them without contacts.
+        Number of the body of each coordinate; bodies are uncoupled without contacts.
     """
 
     def __init__(self, opened: Eigenmodes, part: Ints) -> None:
@@ -35,16 +35,16 @@ class Closings:
         self._known: dict[tuple[bytes, ...], tuple[Ints, Eigenmodes] | None] = {}
 
     def within(self, rows: Ints) -> Within:
-        """The same for contacts of these coordinates, which are those of whole bodies."""
+        """The same restricted to these coordinates, which are those of whole bodies."""
         return Within(self, rows)
 
     def among(self, rows: Ints, contacts: tuple[Contact, ...]) -> Eigenmodes | None:
-        """Eigenmodes of these coordinates with these contacts of all n; None where they are not found so."""
+        """Eigenmodes of these coordinates with these contacts of all n; None where the method fails."""
         found = self._closed(contacts)
         return self._enlarged(*found, rows) if found else None
 
     def _closed(self, contacts: tuple[Contact, ...]) -> tuple[Ints, Eigenmodes] | None:
-        """Eigenmodes of what the contacts couple, after its coordinates."""
+        """Coordinates that the contacts couple, and their eigenmodes."""
         if not contacts:
             none = np.zeros(0, dtype=np.int64)
             return none, Eigenmodes(*np.zeros((1, 0), dtype=complex), *np.zeros((2, 0, 0), dtype=complex))
@@ -57,7 +57,7 @@ class Closings:
         return self._known[name]
 
     def _with_last(self, rows: Ints, modes: Eigenmodes, contact: Contact) -> tuple[Ints, Eigenmodes] | None:
-        """Eigenmodes with one more contact, and the bodies that it brings in."""
+        """The same with one more contact and the bodies that it couples."""
         seen = np.flatnonzero((contact.row != 0.0) | (contact.force != 0.0))
         every = np.flatnonzero(np.isin(self.part, self.part[np.concatenate([rows, seen])]))
         last = contact._replace(row=contact.row[every], force=contact.force[every])
@@ -65,7 +65,7 @@ class Closings:
         return (every, found) if found else None
 
     def _enlarged(self, rows: Ints, modes: Eigenmodes, every: Ints) -> Eigenmodes:
-        """Eigenmodes of the coordinates `every`, of which those of `rows` are known."""
+        """Eigenmodes of the coordinates `every`; those of `rows` are known."""
         if rows.size == every.size:
             return modes
         new = np.setdiff1d(every, rows, assume_unique=True)
@@ -89,24 +89,24 @@ class Closings:
 
 
 class Within(NamedTuple):
-    """Bodies whose contacts are closed together."""
+    """Bodies that closed contacts couple."""
 
     closings: Closings
     rows: Ints  # (k,), their coordinates
 
     def with_contacts(self, contacts: Sequence[Contact]) -> Eigenmodes | None:
-        """Their eigenmodes with these contacts, whose rows are (k,); None where they are not found so."""
+        """Their eigenmodes with these contacts, whose rows are (k,); None where the method fails."""
         return self.closings.among(self.rows, tuple(self._of_all(contact) for contact in contacts))
 
     def _of_all(self, contact: Contact) -> Contact:
-        """A contact by all coordinates."""
+        """A contact expressed in all coordinates."""
         wide = np.zeros((2, self.closings.part.size))
         wide[:, self.rows] = contact.row, contact.force
         return contact._replace(row=wide[0], force=wide[1])
 
 
 def _name_of(contact: Contact) -> bytes:
-    """What a contact is known by."""
+    """Key of a contact."""
     springs = np.array([contact.stiffness, contact.damping])
     return contact.row.tobytes() + contact.force.tobytes() + springs.tobytes()
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Places(NamedTuple):
-    """Where a contact mode of some pairs stands in that of all bodies."""
+    """Places of the arrays of a contact mode of some pairs in that of all bodies."""
 
     coordinate: Ints  # ascending
     take_off: Ints  # rows
@@ -50,12 +50,12 @@ class ContactMode:
 
     @property
     def n_eigenmode(self) -> int:
-        """How many of the coordinates are eigenmodes, m."""
+        """Number of eigenmodes among the coordinates, m."""
         return len(self.enter)
 
     @property
     def drift(self) -> Floats:
-        """How fast coordinates grow linearly, their unit per second: none does here."""
+        """Rates of linearly growing coordinates, their unit per second: zero here."""
         return np.zeros(self.exponent.size)
 
     @classmethod
@@ -66,7 +66,7 @@ class ContactMode:
         )
 
     def other_fields(self, columns: Ints, m: int, end: int) -> dict[str, Any]:
-        """What else changes where m eigenmodes are in a contact mode of `end` coordinates."""
+        """Further fields of a contact mode with m eigenmodes and `end` coordinates."""
         return {}
 
 
@@ -81,9 +81,9 @@ def solve_contact_mode(
     """Solve the linear system with the pairs of `mask` closed.
 
     With J the gap Jacobian and F the contact-force directions of the closed pairs, closed gaps confine the
-    motion to `x = x0 + T y` with `J T = 0`; the contact forces drop out of the equations projected on L with
-    `L^T F^T = 0`, and follow from the accelerations of the gaps being zero (the constraint of Eq. 18 of the
-    paper, differentiated twice). `opened` are the bodies with every pair open.
+    motion to `x = x0 + T y` with `J T = 0`. The equations are projected on L with `L^T F^T = 0`, which
+    removes the contact forces. These follow from zero accelerations of the gaps (the constraint of Eq. 18 of
+    the paper, differentiated twice). `opened` are the bodies with every pair open.
 
     Raises
     ------
@@ -137,8 +137,8 @@ def confined_modes(
 ) -> tuple[Complexes, Complexes, Complexes]:
     """Exponents (m,), motions (2 n, m) and inverse by the coordinates of `tangent` (m, 2 n_free).
 
-    `system` is that of these coordinates, `contacts` are what distinguishes it from that of the bodies
-    `opened`: a large one is solved by way of theirs.
+    `system` is that of these coordinates. `contacts` distinguish it from the system of the bodies `opened`,
+    from whose eigenmodes a large one is solved.
     """
     n, n_free = tangent.shape
     is_large = n_free**2 >= FEWEST**2 * len(contacts)
@@ -154,7 +154,7 @@ def confined_modes(
 def steady_response(system: Floats, spin: float, load: Complexes, q: int) -> Complexes:
     """Coordinates and rates (2 n_free,) under a load (2 n_free,) that turns with the shaft.
 
-    The load drives rates alone. Of several pairs (q) each part is solved by itself, for its coordinates.
+    The load drives rates alone. With several pairs (q) each uncoupled part is solved separately.
     """
     response, n = np.zeros(len(system), dtype=np.complex128), len(system) // 2
     if q <= 1:
@@ -172,7 +172,7 @@ def steady_response(system: Floats, spin: float, load: Complexes, q: int) -> Com
 
 
 def _at_rest(system: Floats, load: Floats, q: int) -> Floats:
-    """Coordinates and rates (2 n_free, k) at rest under loads (n_free, k), each part by itself."""
+    """Static coordinates and rates (2 n_free, k) under loads (n_free, k), each part separately."""
     found, n = np.zeros((len(system), load.shape[1])), len(load)
     if q <= 1:
         return -np.asarray(np.linalg.solve(system, np.vstack([np.zeros_like(load), load])))
@@ -191,7 +191,7 @@ def count_coordinates(reduced: ReducedModel, gap_jacobian: Floats, force_directi
 
 
 def confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats, Floats, Floats]:
-    """Motions that keep gaps closed T (n, n_free), projection that no contact force passes, and the system.
+    """Motions that keep gaps closed T (n, n_free), projection that removes contact forces, and the system.
 
     `rate` (r, n) is the gap Jacobian of the closed pairs and `force` (n, r) their contact-force directions;
     the system (2 n_free, 2 n_free) is that of the coordinates y and their rates.
@@ -212,7 +212,7 @@ def confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats,
 
 
 def left_free(rate: Floats, force: Floats) -> tuple[Floats, Floats]:
-    """Motions and projection of `confine`, which no speed changes."""
+    """Motions and projection of `confine`, which do not depend on the speed."""
     if not len(rate):
         return np.eye(len(force)), np.eye(len(force))
     return _left_free(rate.tobytes(), np.ascontiguousarray(force).tobytes(), len(force))
@@ -237,7 +237,7 @@ def _closing(rate: bytes, r: int, n: int) -> Floats:
 
 
 def _null_space(rows: Floats) -> Floats:
-    """Orthonormal columns that `rows` (r, n) take to zero; coordinates unseen by them stay as they are."""
+    """Orthonormal basis of the null space of `rows` (r, n); unaffected coordinates stay unchanged."""
     seen = np.flatnonzero(np.any(rows != 0.0, axis=0))
     unseen = np.flatnonzero(np.all(rows == 0.0, axis=0))
     inside = null_space(rows[:, seen]) if seen.size else np.zeros((0, 0))

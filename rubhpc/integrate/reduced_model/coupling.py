@@ -1,4 +1,4 @@
-"""Uncoupled parts of a matrix: groups of rows that no entries connect."""
+"""Uncoupled parts of a matrix: groups of rows without entries between them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def coupled_rows(linked: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """Rows of each part of a matrix (n, n) that nothing couples to the rest, by their first rows.
+    """Rows of each uncoupled part of a matrix (n, n), in the order of their first rows.
 
     `linked` states which entries couple; one of (i, j) and (j, i) is enough.
     """
@@ -34,7 +34,7 @@ def coupled_parts(linked: NDArray[np.bool_]) -> Ints:
 
 @lru_cache(maxsize=32)
 def _numbers(linked: bytes, n: int) -> Ints:
-    """The same; rigs that differ in their values alone couple the same entries."""
+    """The same, cached: rigs that differ only in values couple the same entries."""
     bits = np.unpackbits(np.frombuffer(linked, dtype=np.uint8), count=n * n)
     number: Ints = connected_components(csr_array(bits.reshape(n, n)), directed=False)[1].astype(np.int64)
     number.flags.writeable = False
@@ -42,14 +42,14 @@ def _numbers(linked: bytes, n: int) -> Ints:
 
 
 class Grouped:
-    """Columns of motion over degrees of which groups are not coupled, as bodies of a ring: (n_all, n).
+    """Columns of motion over uncoupled groups of degrees, such as the bodies of a ring: (n_all, n).
 
     Parameters
     ----------
     groups : list of (r,) int
-        Rows of each group; with one of all rows products are those of whole matrices.
+        Rows of each group; one group of all rows gives products of whole matrices.
     columns : (n_all, n)
-        None moves in two groups.
+        Each moves in one group only.
     """
 
     def __init__(self, groups: list[Ints], columns: Floats) -> None:

@@ -1,4 +1,4 @@
-"""What curved gaps have of the bodies: motions of a pair along the axis, along the rim and on its bending."""
+"""Bodies with curved gaps: motions of a pair along the axis, along the rim and by bending."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-UNBENT = 1e-8  # bending displacement over the largest of a stator, below which it is none
-SKEWED = 1e-14  # skew part of the stiffness over its largest entry, below which it is rounding
+UNBENT = 1e-8  # bending displacement over the largest of a stator; smaller ones count as zero
+SKEWED = 1e-14  # skew part of the stiffness over its largest entry; less is rounding
 
 
 def curved_pairs(

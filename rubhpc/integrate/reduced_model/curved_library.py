@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class CurvedLibrary(ModeLibrary):
-    """Contact modes of one speed and friction, with what curved gaps need of them."""
+    """Contact modes of one speed and friction, with further tables for curved gaps."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         self._row = motion_rows(args[0], args[1])
@@ -28,7 +28,7 @@ class CurvedLibrary(ModeLibrary):
         """Contact modes that there is room for."""
         return super().n_most if self._curved is None else min(super().n_most, self._curved.n_most)
 
-    _is_parted = False  # curved gaps are the same whether they are recorded or not
+    _is_parted = False  # tables of curved gaps do not depend on recording
 
     @property
     def n_byte(self) -> int:
@@ -42,17 +42,17 @@ class CurvedLibrary(ModeLibrary):
         super().forget()
 
     def make_room(self) -> None:
-        """Forget all: of curved gaps there is more than one table a mode."""
+        """Forget all modes: curved gaps have further tables of each mode."""
         self.forget()
 
     def curved_tables(self) -> CurvedTables:
-        """What curved gaps need of all contact modes."""
+        """Further tables of all contact modes for curved gaps."""
         assert self._curved is not None
         tables: CurvedTables = self._curved.view()
         return tables
 
     def _friction_of(self, mode: ContactMode) -> None:
-        """Not counted: its direction is that of the momentary normal."""
+        """None: the direction of friction is that of the current normal."""
 
     def _tabulate(self, mode: ContactMode, row: ModeTables | None = None) -> None:
         super()._tabulate(mode, row)

@@ -23,9 +23,9 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 LONGEST_STEP = 1e-3  # s, of closed contacts
-# |x| below which the phi functions are series, which cancel less there, and their terms.
+# |x| below which the phi functions are series, which cancel less there, and number of terms.
 SERIES = ((0.1, 10), (3.0, 26))
-UNDAMPED = 1e-14  # eigenvalue of the damping over the largest, below which it is none
+UNDAMPED = 1e-14  # eigenvalue of the damping over the largest; smaller ones count as zero
 
 
 def tabulate_curved(
@@ -45,8 +45,8 @@ def tabulate_curved(
     row : (q, 3 + b, n)
         `curved_bodies.motion_rows`.
     directions : (q, n), (q, n)
-        Gap Jacobian Q and contact-force directions P with the fixed normal. `E = P (Q P)^-1` moves the gaps
-        of the closed pairs and, projected as contact forces are, nothing else.
+        Gap Jacobian Q and contact-force directions P with the fixed normal. `E = P (Q P)^-1` changes the gaps
+        of the closed pairs; its projection is zero, as that of contact forces.
     n_level : int
         As in `mode_library.ModeLibrary`.
     """
@@ -62,16 +62,16 @@ def tabulate_curved(
 
 
 def steps_of(tick: float, n_level: int) -> Floats:
-    """Lengths of the steps that are tabulated, of those of a library, s."""
+    """Lengths of the tabulated steps, among those of a library, s."""
     return np.ldexp(tick, np.arange(min(n_level, max(1, int(np.log2(LONGEST_STEP / tick))))))
 
 
 class StillParts(NamedTuple):
-    """What the spin speed leaves alone of a mode's tables, but for terms of the unbalance."""
+    """Parts of a mode's tables that do not depend on the spin speed, without terms of the unbalance."""
 
     row: Floats  # (q, 3 + b, n), `curved_bodies.motion_rows`
     first: int  # coordinate of the response to the unbalance
-    is_lone: bool  # whether the only pair is closed
+    is_lone: bool  # whether there is a single pair, and it is closed
     shift: Floats  # (q, n), these as in `CurvedTables`
     moved: Floats
     accel: Floats
@@ -123,7 +123,7 @@ def tuned_tables(
     Parameters
     ----------
     exponent, motion : (m,), (2 n, m)
-        Of its coordinates, that of the response included.
+        Of its coordinates, including that of the response.
     steps : (n_level,), s
     """
     row, n = still.row, reduced.stiffness.shape[0]
@@ -132,7 +132,7 @@ def tuned_tables(
     free = -reduced.stiffness @ motion[:n] - reduced.damping @ motion[n:]
     free[:, still.first] += reduced.force[0] - 1j * reduced.force[1]
     read = np.concatenate([flat @ motion[:n], row @ motion[n:], flat @ free], axis=1)
-    is_loaded = bool(still.load.any())  # without a closed pair nothing is loaded
+    is_loaded = bool(still.load.any())  # without a closed pair there are no loads
     weight = np.zeros((steps.size, N_NODE - 1, N_NODE, exponent.size), dtype=complex)
     if is_loaded:
         weight = _weights(exponent, steps)
@@ -177,7 +177,7 @@ def tuned_tables(
 
 
 def _reach(weight: Complexes, read: Complexes, load: Complexes) -> Floats:
-    """What is read (r, m) at nodes under unit loads (j, m) at all of them, (step, 5, j, 4, r)."""
+    """Readings (r, m) at nodes under unit loads (j, m) at all of them, (step, 5, j, 4, r)."""
     n_step, n_at, n_node, width = weight.shape
     both = (read[:, np.newaxis] * load).reshape(-1, width)  # (r j, m)
     columns = np.concatenate([both.real, -both.imag], axis=1).T
@@ -188,7 +188,7 @@ def _reach(weight: Complexes, read: Complexes, load: Complexes) -> Floats:
 
 
 def _losses(reduced: ReducedModel) -> tuple[Floats, Floats]:
-    """Eigenvalues (r,) of the symmetric damping that are not 0, and their shapes (n, r)."""
+    """Nonzero eigenvalues (r,) of the symmetric damping, and their shapes (n, r)."""
     size, shape = np.linalg.eigh(0.5 * (reduced.damping + reduced.damping.T))
     keep = np.abs(size) > UNDAMPED * np.abs(size).max()
     return size[keep], shape[:, keep]
@@ -201,12 +201,12 @@ def _weights(exponent: Complexes, steps: Floats) -> Complexes:
     time c h.
     """
     reached = np.multiply.outer(steps, NODES[1:])
-    # All at once: of one step NumPy takes longer to begin than to compute.
+    # All steps together: for one step NumPy's overhead exceeds the computation.
     phi = phi_functions(np.multiply.outer(reached, exponent).ravel())
     phi = phi.reshape(N_NODE, *reached.shape, exponent.size)
     for power in range(N_NODE):
         phi[power] *= (reached * NODES[1:] ** power * math.factorial(power))[..., np.newaxis]
-    # Reals: a real matrix would be turned into a complex one.
+    # In real numbers: NumPy would convert a real matrix to a complex one.
     found = (LAGRANGE @ phi.reshape(N_NODE, -1).view(np.float64)).view(np.complex128)
     weights: Complexes = np.moveaxis(found.reshape(phi.shape), 0, 2)
     return weights

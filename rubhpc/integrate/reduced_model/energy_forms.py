@@ -1,4 +1,4 @@
-"""Forms of modal coordinates whose growth is what damping takes and the unbalance gives."""
+"""Forms of modal coordinates whose growth is the loss by damping and the work of the unbalance."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
+STEADY = 1e-13  # sum of two exponents over the greatest; less counts as zero
 
 
 class Growth(NamedTuple):
@@ -29,7 +29,7 @@ class Growth(NamedTuple):
     steady: int = -1  # the coordinate that is 1
 
     def among(self, columns: NDArray[np.int64]) -> Growth:
-        """The same counted among some of the coordinates, in ascending order."""
+        """The same with places counted among some of the coordinates, in ascending order."""
         which, steady = np.searchsorted(columns, self.which), int(np.searchsorted(columns, self.steady))
         return Growth(which, self.speed, steady)
 
@@ -39,17 +39,17 @@ class Energies(NamedTuple):
 
     loss: Floats  # (2 m, 2 m), form of their real and imaginary parts, J
     work: NDArray[np.complex128]  # (2, m), J
-    steady: Floats  # (2,), W, that no form holds
+    steady: Floats  # (2,), W, not contained in the forms
 
     def add(self, columns: NDArray[np.int64], part: Energies) -> None:
-        """Add those of a part of the bodies, which has some of the coordinates."""
+        """Add the energies of a part of the bodies, which has some of the coordinates."""
         both = np.concatenate([columns, self.work.shape[1] + columns])
         self.loss[both[:, None], both] += part.loss
         self.work[:, columns] += part.work
         self.steady[:] += part.steady
 
     def padded(self, width: int) -> Energies:
-        """The same among more coordinates, in whose motion there is no energy."""
+        """The same with further coordinates without energy."""
         found = Energies.none(width)
         found.add(np.arange(self.work.shape[1]), self)
         return found
@@ -61,12 +61,12 @@ class Energies(NamedTuple):
 
 
 def energies_of(mode: ContactMode, reduced: ReducedModel, friction: Complexes | None, width: int) -> Energies:
-    """Of a contact mode, its coordinates padded to `width`.
+    """Energies of a contact mode, its coordinates padded to `width`.
 
     Parameters
     ----------
     friction : (n, m), N, optional
-        Friction forces on the motion with each coordinate; what they take is counted with the damping.
+        Friction forces on the motion with each coordinate; their loss is added to that of damping.
     """
     spare = width - mode.exponent.size
     exponent, motion = np.pad(mode.exponent, (0, spare)), np.pad(mode.motion, ((0, 0), (0, spare)))
@@ -94,11 +94,10 @@ def energy_forms(
 ) -> Energies:
     """Primitives of the powers of damping and unbalance.
 
-    With the damping counts `friction` (n, m), whose power on the motion is what the drive gives for it less
-    what it turns into heat.
-    Products of two coordinates go as exp((l_k + l_j) t) or exp((l_k + conj l_j) t). What has no primitive
-    among them is steady: that of the unbalance response with itself. Undamped modes have none either,
-    and nothing to lose.
+    The loss includes that of `friction` (n, m), whose power on the motion is the work of the drive against it
+    less the heat. Products of two coordinates are proportional to exp((l_k + l_j) t) or exp((l_k + conj l_j)
+    t). Terms without a primitive are steady: the product of the unbalance response with itself, and those of
+    undamped modes, which have no loss.
     """
     n = reduced.stiffness.shape[0]
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
@@ -140,8 +139,8 @@ def _follow_growth(
 ) -> None:
     """Correct primitives for coordinates that grow: `int z phi = z phi / l - phi' z / l^2`.
 
-    Products of the coordinate that is 1 go as phi / phi' with a clearance, as phi^2 / (2 phi') with phi; that
-    with itself is left to the steady power.
+    Primitives of products with the coordinate that is 1: phi / phi' for a clearance, phi^2 / (2 phi') for
+    phi. Its product with itself is part of the steady power.
     """
     moving, one = slice(n_eigenmode + 1), growing.steady
     for phi, speed in zip(growing.which, growing.speed, strict=True):

@@ -28,9 +28,9 @@ MOST_FRICTION_MODES = 1024  # sets of states of one speed and friction: up to fo
 
 
 class FrictionLibrary(ModeLibrary):
-    """Contact modes of pairs that slide in either sense or stick; masks hold two bits a pair.
+    """Contact modes of pairs that slide in either sense or stick; masks have two bits per pair.
 
-    Under a penalty they hold a third, and its springs and dampers are counted as in `PenaltyLibrary`.
+    Under a penalty they have a third bit, and its springs and dampers count as in `PenaltyLibrary`.
     """
 
     _most_modes = MOST_FRICTION_MODES
@@ -45,8 +45,9 @@ class FrictionLibrary(ModeLibrary):
         """Start as `ModeLibrary` does, with one pair sliding forward."""
         self._pairs = pairs
         super().__init__(reduced, model, pairs.friction, **shared)
-        # Overlaps ask for the motion at each event; the few modes of one pair stay in the processor's cache.
-        # Where a mode may be given up, or is held in two tables, what is there depends on other cases.
+        # No transitions are tabulated for overlaps, which need the motion at each event, nor for one pair,
+        # whose few modes stay in the cache. Where modes may be discarded, or are in two tables, they would
+        # depend on other cases.
         q = len(pairs.gap_jacobian)
         keeps_all = not self._is_large and 4**q <= self.n_most
         self.transitions = TransitionRoom() if keeps_all and q > 1 and not pairs.stiffness else None

@@ -37,10 +37,10 @@ if TYPE_CHECKING:
 class FrictionMode(ContactMode):
     """Motion with a state for each pair, `x = Re(motion @ z)`.
 
-    To the coordinates of a contact mode come a 1, and for each pair that sticks the displacement phi along
-    its rim, m, which grows as the rim moves: m + 1 + q + 1 + q in all. `mask` holds two bits a pair
-    (`kernels.friction_states`), `switch` two rows a pair; `enter` (all, 2 n) and `take_off` (3 + q, all) fill
-    phi too, and take off the response to the rims' speed.
+    In addition to the coordinates of a contact mode there are a constant 1, and for each sticking pair the
+    displacement phi along its rim, m, which grows as the rim moves: m + 1 + q + 1 + q in all. `mask` has two
+    bits per pair (`kernels.friction_states`), `switch` two rows a pair; `enter` (all, 2 n) and `take_off` (3
+    + q, all) include phi, and subtract the response to the rims' speed.
     """
 
     n_mode: int
@@ -48,12 +48,12 @@ class FrictionMode(ContactMode):
 
     @property
     def n_eigenmode(self) -> int:
-        """How many of the coordinates are eigenmodes, m."""
+        """Number of eigenmodes among the coordinates, m."""
         return self.n_mode
 
     @property
     def drift(self) -> Floats:
-        """How fast coordinates grow linearly, m/s."""
+        """Rates of linearly growing coordinates, m/s."""
         return self.growth
 
     @classmethod
@@ -67,7 +67,7 @@ class FrictionMode(ContactMode):
         )
 
     def other_fields(self, columns: Ints, m: int, end: int) -> dict[str, Any]:
-        """What else changes where m eigenmodes are in a contact mode of `end` coordinates."""
+        """Further fields of a contact mode with m eigenmodes and `end` coordinates."""
         growth = np.zeros(end)
         growth[columns] = self.growth
         return {"n_mode": m, "growth": growth}
@@ -89,14 +89,14 @@ class FrictionMode(ContactMode):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrictionPairs:
-    """The q pairs of a friction, as reduced coordinates see them."""
+    """The q pairs of a friction, in reduced coordinates."""
 
     gap_jacobian: Floats  # (q, n)
     friction_direction: Floats  # (q, n), force of a unit friction; its negative is the slip with the motion
     friction: float
     static_ratio: float  # coefficient at rest over that in sliding
     rim_speed: Floats  # (q,), m/s, not negative
-    stiffness: float = 0.0  # N/m, of a penalty; 0: closed gaps are held
+    stiffness: float = 0.0  # N/m, of a penalty; 0: closed gaps are constraints
     damping: float = 0.0  # N s/m, of a penalty
 
     def closed(self, mask: int) -> list[int]:
@@ -131,12 +131,12 @@ def solve_friction_mode(
 ) -> FrictionMode:
     """Solve the linear system with the pairs in the states of `mask`.
 
-    A closed gap and a slip that sticks are constraints `R x = c(t)`, where c holds the clearances and the
-    displacements phi that grow as the rims move. With `x = T y + E c`, `R T = 0`, the forces drop out of the
-    equations projected on L, `L^T B = 0`, B being their directions: that of a sliding pair's normal force has
-    its friction, that of a pair that sticks has none. Under a penalty gaps are no constraints: `k P Q` and
-    `c P Q` join the matrices, and `-k P` is the load of the clearances, as in `penalty_mode`. `opened` are
-    the bodies with every pair open.
+    A closed gap and a sticking slip are constraints `R x = c(t)`, where c has the clearances and the
+    displacements phi, which grow as the rims move. With `x = T y + E c`, `R T = 0`, the projection of the
+    equations on L, `L^T B = 0`, removes the forces. B are their directions: the normal force of a sliding
+    pair includes its friction, that of a sticking pair does not. Under a penalty gaps are not constraints:
+    `k P Q` and `c P Q` are added to the matrices, and `-k P` is the load of the clearances, as in
+    `penalty_mode`. `opened` are the bodies with every pair open.
     """
     n, q = reduced.stiffness.shape[0], len(pairs.gap_jacobian)
     states = np.array(states_of(mask, q))
@@ -235,7 +235,7 @@ def solve_friction_mode(
 
 
 def watch_open_pairs(switch: Complexes, motion: Complexes, pairs: FrictionPairs, mask: int, m: int) -> None:
-    """Fill in the switch functions of open pairs: their gaps, of lifted ones the tension, and 1."""
+    """Fill in the switch functions of open pairs: their gaps, or the tension of lifted ones, and 1."""
     q, n = pairs.gap_jacobian.shape
     watched = np.flatnonzero(np.array(states_of(mask, q)) == OPEN)
     switch[2 * watched] = pairs.gap_jacobian[watched] @ motion[:n]

@@ -30,15 +30,15 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-# Coordinates that a set of several contacts may have beyond any single one. The width is settled before the
-# first case: that of the tables decides in which order sums are taken, and so the last bits of every case.
+# Coordinates that a set of several contacts may have beyond any single one. The width is fixed before the
+# first case: it determines the order of sums, and thus the last bits of every case.
 SPARE = 8
-FEW_PAIRS = 5  # whose outputs take little of the memory
-VACANT = -3  # in place of a set of closed contacts: one that has been given up
+FEW_PAIRS = 5  # with outputs that take little memory
+VACANT = -3  # instead of a set of closed contacts: a discarded mode
 
 
 class Shared(TypedDict, total=False):
-    """What a library takes besides the bodies and the law, as `ModeLibrary` describes it."""
+    """Arguments of a library other than bodies and law; see `ModeLibrary`."""
 
     opened: Any
     known: Solved
@@ -55,15 +55,15 @@ class ModeLibrary:
     Parameters
     ----------
     opened : ContactMode
-        That with every pair open, which friction does not change.
+        The mode with every pair open, which does not depend on friction.
     known : Solved
         The parts of the open set.
     tick : float, s
     sample_level, n_level : int
-        2^sample_level ticks are the interval of samples; exponentials are tabulated over 1, 2, ...,
-        2^(n_level - 1) ticks.
+        Samples are 2^sample_level ticks apart; exponentials are tabulated over 1, 2, ..., 2^(n_level - 1)
+        ticks.
     is_measured : bool
-        Whether the tables hold slip, outputs and energies, or what a motion is followed with alone.
+        Whether the tables contain slip, outputs and energies, or only what following a motion needs.
     among : OpenBodies, optional
         The bodies with every pair open, where they are known.
     """
@@ -106,7 +106,7 @@ class ModeLibrary:
         self._tables = TableStack(1 + q, self._most_modes, MOST_BYTES)
         self.masks = [mode.mask for mode in modes]
         self._exponents: dict[int, tuple[Floats, Floats]] = {}
-        self.derived: dict[int, Any] = {}  # what others make of the modes, by mask
+        self.derived: dict[int, Any] = {}  # derived data of the modes, by mask
         self._chance = np.random.default_rng(0)
         for mode, row in zip(modes, rows, strict=True):
             self._tabulate(mode, row)
@@ -115,15 +115,15 @@ class ModeLibrary:
     def followed(self) -> ModeLibrary:
         """Contact modes with which a motion is followed where nothing is recorded.
 
-        Of large ones memory holds few; without slip, outputs and energies it holds more, and twice as much
-        memory is theirs: an irregular motion that finds no room for all of them solves them again and again.
-        What one of the two libraries holds the other does not solve again.
+        Memory holds few large modes. Without slip, outputs and energies it holds more, and twice as much
+        memory is allowed: an irregular motion whose modes do not fit solves them repeatedly. A mode in one of
+        the two libraries is not solved again for the other.
         """
         if not self._is_large:
             return self
         if self._other is None:
             self._other = made = copy(self)
-            made._other = weakref.proxy(self)  # each holding the other, both would be freed late
+            made._other = weakref.proxy(self)  # a strong reference would be a cycle, which is freed late
             made._is_measured = made._is_large = False
             made._is_roomy = True
             made._n_solved = 0
@@ -136,12 +136,12 @@ class ModeLibrary:
 
     @property
     def n_most(self) -> int:
-        """Contact modes that there is room for."""
+        """Most contact modes that fit."""
         return self._tables.n_most
 
     @property
     def n_usual(self) -> int:
-        """Contact modes by which it is judged whether a case meets too many; `n_most`, or fewer."""
+        """Number of contact modes above which a case meets too many; `n_most` or fewer."""
         if not self._is_roomy:
             return self.n_most
         least, usual = 1 + len(self.gap_jacobian), (MOST_BYTES + MOST_BYTES // 2)
@@ -149,12 +149,12 @@ class ModeLibrary:
 
     @property
     def n_byte(self) -> int:
-        """Memory that its tables hold."""
+        """Memory of its tables, bytes."""
         return self._tables.n_byte + (self._other._tables.n_byte if self._other else 0)
 
     @property
     def n_solved(self) -> int:
-        """Contact modes that were solved for these tables and those of `followed`, again where given up."""
+        """Contact modes solved for these tables and those of `followed`, including repeated ones."""
         return self._n_solved + (self._other._n_solved if self._other else 0)
 
     @property
@@ -178,17 +178,17 @@ class ModeLibrary:
         return True
 
     def _recovered(self, mask: int) -> ContactMode | None:
-        """The contact mode with these pairs closed, from its tables; None where they are not here."""
+        """The contact mode with these pairs closed, from its tables; None where it is not in them."""
         if mask not in self.masks:
             return None
         row = self._tables.row(self.masks.index(mask))
         return mode_of(row, type(self._opened), self._exponents[mask])
 
     def make_room(self) -> None:
-        """Give up any contact mode but those to begin with.
+        """Discard a contact mode other than the initial ones.
 
-        By chance: a rotor that runs round in a ring comes back to that which has been kept longest. A library
-        that does not hold its modes one by one forgets them all.
+        It is chosen at random: a rotor that runs round in a ring returns to the oldest one. A library that
+        cannot discard single modes discards all.
         """
         if self._chance is None:
             self.forget()
@@ -203,7 +203,7 @@ class ModeLibrary:
         self._tables.vacate(place)
 
     def forget(self) -> None:
-        """Make room: keep no mode but that with every pair open."""
+        """Make room: keep only the mode with every pair open."""
         self._tables.clear()
         self._exponents.clear()
         self.derived.clear()
@@ -211,7 +211,7 @@ class ModeLibrary:
         self._tabulate(self._opened)
 
     def unmet(self, met: set[int]) -> list[int]:
-        """Places in the tables of contact modes that are not among those that a case has met."""
+        """Places in the tables of contact modes that a case has not met."""
         return [place for place, mask in enumerate(self.masks) if mask not in met]
 
     def tables(self) -> kernel.ModeTables:
@@ -220,16 +220,16 @@ class ModeLibrary:
         return tables
 
     def exponents(self, mask: int) -> tuple[Floats, Floats]:
-        """Of the coordinates of a mode, 1/s: (2, m), real and imaginary, and the drift (m,) of those of 0."""
+        """Exponents of a mode's coordinates, 1/s: (2, m), real and imaginary; drift (m,) of those at 0."""
         return self._exponents[mask]
 
-    transitions: TransitionRoom | None = None  # that cases tabulate; None: they may not
-    is_tuned_ahead = False  # whether modes are tuned to several pieces of a changing speed at once
+    transitions: TransitionRoom | None = None  # tabulated by cases; None: not allowed
+    is_tuned_ahead = False  # whether modes are tuned to several pieces of a changing speed together
     _n_solved = 0
-    _other: ModeLibrary | None = None  # of a large one's: that which is followed, or which is measured
-    _is_large = False  # so that memory does not hold as many as may be wanted
-    _is_roomy = False  # whether it holds more than those of a case that goes on in closed form
-    _is_parted = True  # whether large ones are followed with other tables than they are measured with
+    _other: ModeLibrary | None = None  # for large modes: the library for following, or for measuring
+    _is_large = False  # memory may not hold all modes
+    _is_roomy = False  # whether it holds more modes than a case in closed form needs
+    _is_parted = True  # whether large modes have separate tables for following and measuring
     _n_ahead = SAMPLES_AT_ONCE
     _chance: np.random.Generator | None = None
     _most_modes = MOST_MODES
@@ -247,7 +247,7 @@ class ModeLibrary:
         return contact_mode_among(self._among, self.reduced, directions, mask, self._known)
 
     def _closed_pairs(self, mask: int) -> list[int]:
-        """Pairs that act in a set."""
+        """Closed pairs of a set."""
         return [i for i in range(len(self.gap_jacobian)) if mask >> i & 1]
 
     def _energies_of(self, mode: ContactMode, reduced: ReducedModel) -> Energies:
@@ -258,17 +258,17 @@ class ModeLibrary:
         return self._among.energies(mode, reduced, friction, self._closed_pairs(mode.mask), self.width)
 
     def _slip_rows(self) -> Floats:
-        """Slip speed with the motion of each pair that the switch functions do not hold."""
+        """Slip speed of each pair with the motion, unless the switch functions contain it."""
         return self.slip
 
     def _friction_of(self, mode: ContactMode) -> Complexes | None:
-        """Friction forces on the motion with each coordinate of a mode (n, m), N; None: not counted."""
+        """Friction forces on the motion with each coordinate of a mode (n, m), N; None: omitted."""
         closed = self._closed_pairs(mode.mask)
         friction: Complexes = (self.force_direction - self.gap_jacobian)[closed].T @ mode.switch[closed]
         return friction
 
     def _tabulate(self, mode: ContactMode, row: kernel.ModeTables | None = None) -> None:
-        """Take in a mode, and its tables where they are known."""
+        """Add a mode, with its tables if they are known."""
         self._note_exponents(mode)
         self._tables.add(row or self._tables_of(mode, self.reduced))
 
@@ -297,7 +297,7 @@ class ModeLibrary:
         return tables
 
     def _spared(self, mode: ContactMode) -> Spared | None:
-        """What a mode leaves of the outputs of the open set."""
+        """Outputs of the open set that a mode shares."""
         closed = self._closed_pairs(mode.mask)
         touching = self._among.touching(closed) if self._among and closed and self._n_ahead else None
         if touching is None:
@@ -306,7 +306,7 @@ class ModeLibrary:
 
 
 def padded_width(widest: int, q: int) -> int:
-    """Width of tables for modes of q pairs, up to one of this size; of more pairs the open mode is taken.
+    """Width of tables for modes of q pairs up to this size; for several pairs the size of the open mode.
 
     Closing a gap removes a degree of freedom. It adds a coordinate only where a vibration becomes two decays.
     """

@@ -1,4 +1,4 @@
-"""The tables of a contact mode as the kernels read them."""
+"""The tables of a contact mode, in the form that kernels read."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 Floats = NDArray[np.float64]
-GONE = -40.0  # exponent of what has died away
+GONE = -40.0  # exponent of a decayed coordinate
 NO_ENERGIES = Energies(np.zeros((0, 0)), np.zeros((2, 0), dtype=complex), np.zeros(2))
 
 
 class Spared(NamedTuple):
-    """Eigenmodes of the open set that stay in another one."""
+    """Eigenmodes of the open set that another set shares."""
 
-    first: int  # place of the first of them there
+    first: int  # place of the first one in that set
     modes: NDArray[np.int64]  # places in the open set
     output: Floats  # (2 m, samples o), of the open set
 
@@ -51,19 +51,19 @@ def tabulate(
     Parameters
     ----------
     slip : (q, n)
-        Slip speed of each pair with the motion; none where the switch functions hold it.
+        Slip speed of each pair with the motion; empty where the switch functions contain it.
     energies : Energies, optional
-        Of coordinates padded to `width`; none where nothing is measured.
+        Of coordinates padded to `width`; None where nothing is measured.
     tick : float, s
     sample_level, n_level : int
         As in `mode_library.ModeLibrary`.
     is_measured : bool
-        Slip and outputs are empty where not.
+        Otherwise slip and outputs are empty.
     n_ahead : int
-        Samples whose outputs are read from one set of coordinates; with one, no step may pass a sample. With
-        none, outputs are left to others.
+        Samples whose outputs are read from one set of coordinates. With 1, no step may pass a sample; with 0,
+        outputs are not tabulated.
     spared : Spared, optional
-        Eigenmodes of the open set that stay, and its outputs, where they are known.
+        Shared eigenmodes of the open set and its outputs, where they are known.
     """
     n, m = reduced.stiffness.shape[0], width
     end, n_filled = mode.exponent.size, len(mode.enter)
@@ -139,7 +139,7 @@ def bytes_ahead(tables: kernel.ModeTables, reduced: ReducedModel, n_ahead: int, 
 def mode_of(row: kernel.ModeTables, kind: type[ContactMode], exponents: tuple[Floats, Floats]) -> ContactMode:
     """Return the contact mode that tables (1, ...) and exponents (`mode_library.ModeLibrary.exponents`) hold.
 
-    `kind` is ContactMode or FrictionMode. It is the mode that was tabulated, bit for bit.
+    `kind` is ContactMode or FrictionMode. The result equals the tabulated mode bit for bit.
     """
     (parts, drift), m, q = exponents, int(row.n_eigenmode[0]), row.enter_constant.shape[1]
     rest: dict[str, Any] = {}
@@ -161,7 +161,7 @@ def mode_of(row: kernel.ModeTables, kind: type[ContactMode], exponents: tuple[Fl
 
 
 def _joined(real: Floats, imaginary: Floats) -> Complexes:
-    """Complex numbers of these parts, the signs of zeros included."""
+    """Complex numbers of these parts, including the signs of zeros."""
     joined = np.empty(real.shape, dtype=np.complex128)
     joined.real, joined.imag = real, imaginary
     return joined
@@ -175,7 +175,7 @@ def _outputs_beside(
     interval: float,
     n_ahead: int,
 ) -> Floats:
-    """Output rows as of `_outputs`; those of eigenmodes that stay are copied."""
+    """Output rows as in `_outputs`; those of shared eigenmodes are copied."""
     if spared is None:
         return _outputs(reduced, exponent, motion, interval, n_ahead)
     width, first, last = exponent.size, spared.first, spared.first + spared.modes.size

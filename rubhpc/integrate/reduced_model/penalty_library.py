@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class PressedPairs(ModeLibrary):
-    """What a penalty adds to tables of contact modes: what dampers take and springs hold."""
+    """Part of a penalty in tables of contact modes: loss of dampers and energy of springs."""
 
     _penalty: Penalty
 
@@ -32,9 +32,9 @@ class PressedPairs(ModeLibrary):
 
 
 class PenaltyLibrary(PressedPairs):
-    """Contact modes of pairs that press, by spring and damper, or are lifted; masks hold q bits for each.
+    """Contact modes of pairs that are pressed, by spring and damper, or lifted; masks have q bits for each.
 
-    What dampers take and springs hold is counted with the loss by damping.
+    The loss by damping includes that of the dampers and the energy of the springs.
     """
 
     def __init__(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Penalty(NamedTuple):
-    """The q pairs of a penalty, as reduced coordinates see them."""
+    """The q pairs of a penalty, in reduced coordinates."""
 
     stiffness: float  # N/m
     damping: float  # N s/m
@@ -29,20 +29,20 @@ class Penalty(NamedTuple):
     force_direction: Floats  # (q, n), force of a unit contact force, friction included
 
     def pressed(self, mask: int) -> list[int]:
-        """Pairs that press in a set of states."""
+        """Pressed pairs of a set of states."""
         return [i for i in range(len(self.gap_jacobian)) if mask >> i & 1]
 
     def lifted(self, mask: int) -> list[int]:
-        """Pairs whose gap is still overlapped though the damper has ended their force."""
+        """Lifted pairs: their gap still overlaps, but the damper has ended their force."""
         q = len(self.gap_jacobian)
         return [i for i in range(q) if mask >> q + i & 1]
 
     def damped(self, reduced: ReducedModel, mask: int) -> ReducedModel:
-        """The model with the dampers of the pairs that press; what friction makes of them is no damping."""
+        """The model with the dampers of the pressed pairs, without the friction by their forces."""
         return damped(reduced, self.damping, self.gap_jacobian[self.pressed(mask)])
 
     def stored_energy(self, mode: ContactMode, width: int) -> Floats:
-        """Energy of the springs that press, J, as a form of the coordinates of a mode: (2 width, 2 width)."""
+        """Energy of the pressed springs, J, as a form of the coordinates of a mode: (2 width, 2 width)."""
         return stored_energy(self.stiffness, self.gap_jacobian, self.pressed(mode.mask), mode, width)
 
 
@@ -54,9 +54,9 @@ def solve_penalty_mode(
     known: Solved | None = None,
     bodies: Within | None = None,
 ) -> ContactMode:
-    """Solve the linear system with the pairs of `mask` pressed; bits from q on are those that are lifted.
+    """Solve the linear system with the pairs of `mask` pressed; bits from q on are lifted pairs.
 
-    `opened` is the mode in which every pair is open, `bodies` are those that move in it.
+    `opened` is the mode with every pair open, `bodies` are the bodies in that mode.
     """
     pressed = penalty.pressed(mask)
     mode = pressed_mode(reduced, penalty, pressed, known, bodies) if pressed else opened
@@ -114,14 +114,14 @@ def pressed_mode(
 
 
 def damped(reduced: ReducedModel, damping: float, along: Floats) -> ReducedModel:
-    """Return the model with dampers (N s/m) along gaps (k, n); what friction makes of them is no damping."""
+    """Return the model with dampers (N s/m) along gaps (k, n), without the friction by their forces."""
     return replace(reduced, damping=reduced.damping + damping * along.T @ along)
 
 
 def stored_energy(
     stiffness: float, gap_jacobian: Floats, pressed: list[int], mode: ContactMode, width: int
 ) -> Floats:
-    """Return the energy of springs (N/m) in the pairs that press, J, as a form of a mode's coordinates.
+    """Return the energy of springs (N/m) in the pressed pairs, J, as a form of a mode's coordinates.
 
     It is (2 width, 2 width), for their real and imaginary parts.
     """
@@ -132,7 +132,7 @@ def stored_energy(
 
 
 def overlap_rows(gap_jacobian: Floats, pressed: list[int], mode: ContactMode, width: int) -> Floats:
-    """Return the gaps of the pairs that press by the coordinates of a mode, (pressed, 2 width), m."""
+    """Return the gaps of the pressed pairs by the coordinates of a mode, (pressed, 2 width), m."""
     n = gap_jacobian.shape[1]
     rows = np.zeros((len(pressed), 2, width))
     for row, i in zip(rows, pressed, strict=True):

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 
 def real_times(matrix: Floats, values: Complexes) -> Complexes:
-    """Product of a real matrix (n, m) with complex values (m, k), their parts side by side.
+    """Product of a real matrix (n, m) with complex values (m, k), as one product with both parts.
 
-    NumPy makes the matrix complex first, which takes four times the operations.
+    NumPy would convert the matrix to complex numbers, which takes four times the operations.
     """
     halves = np.ascontiguousarray(values).view(np.float64)
     product: Complexes = np.ascontiguousarray(matrix @ halves).view(np.complex128)

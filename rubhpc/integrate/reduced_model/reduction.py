@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
     Bools = NDArray[np.bool_]
 
-# Static response to a damper, as a share of the mode that it slows, times sqrt(accuracy), that is left out:
-# the mode's exponent errs by the square.
+# Limit of omitted static responses to dampers, relative to the damped mode, times sqrt(accuracy): the error
+# of the mode's exponent is its square.
 LEAST_RESPONSE = 0.1
-UNSEEN = 1e-9  # relative motion or coupling below which a mode is taken for unseen
+UNSEEN = 1e-9  # relative motion or coupling below which a mode counts as unseen
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -106,13 +106,13 @@ def reduce_model(
     *,
     touch: Touch = SMOOTH,
 ) -> ReducedModel:
-    """Reduce a model so that contact and outputs are met to the accuracy asked for.
+    """Reduce a model such that contact and outputs have the requested accuracy.
 
-    The basis of each uncoupled part holds its undamped modes at standstill that `truncation.kept_modes`
-    chooses, and residual attachment modes: the static responses of the others to a unit force on each degree
-    that contact or outputs see, or on those together that a probe sees, and to what dampers and cross-coupled
-    springs draw from the modes kept; of bent stators to what an axial force does where they are bent
-    (`bending_loads`). Gyroscopic and damping terms are then projected. Modes that nothing sees
+    The basis of each uncoupled part consists of the undamped modes at standstill chosen by
+    `truncation.kept_modes`, and of residual attachment modes. These are the static responses of the other
+    modes to a unit force on each degree that contact or outputs see, or on the combination that a probe sees;
+    to the forces of dampers and cross-coupled springs on the kept modes; and, for bent stators, to the axial
+    force on the bent shape (`bending_loads`). Gyroscopic and damping terms are then projected. Unseen modes
     are left out.
 
     Parameters
@@ -122,15 +122,15 @@ def reduce_model(
         Relative, of each signal and force (`truncation.modal_error`); on the packaged rig 1e-3 keeps
         waveforms to about 1e-4.
     free_spin : FreeSpin, optional
-        Where a drive turns the rotor: contacts then see rotations about the mean of rotor and drive.
+        For a driven rotor: contacts then see rotations about the mean of rotor and drive.
     touch : Touch
-        What contacts feel of motion along the rim, which needs more modes.
+        Sensitivity of contacts to motion along the rim, which needs more modes.
 
     Raises
     ------
     InputError
-        Where nothing holds a body: its constant response, on which the modal form of closed contacts rests,
-        does not exist.
+        A body is unconstrained: the modal form of closed contacts needs its static response, which does not
+        exist.
     """
     return reduce_to(model, spin, accuracy, kept_modes(model, spin, accuracy, touch), free_spin)
 
@@ -138,7 +138,7 @@ def reduce_model(
 def reduce_to(
     model: Model, spin: float, accuracy: float, are_kept: list[Bools], free_spin: FreeSpin | None = None
 ) -> ReducedModel:
-    """The same with the modes of each part that are kept (`truncation.kept_modes`)."""
+    """The same with given kept modes of each part (`truncation.kept_modes`)."""
     mass, damping, stiffness, force = whole_system(model, spin)
     degree, output, carrier = degrees_of(model), output_degrees(model), carrier_degrees(model)
     standstill = at_standstill(model)
@@ -180,9 +180,9 @@ def reduce_to(
 def bending_loads(model: Model) -> Floats:
     """Forces on each bent stator, (n_all, n_bent), where a lateral force at its tip meets an axial one.
 
-    An axial force N adds `-N S x` to the forces on a stator, with S its squared slope: a lateral load along
-    all of it, which static responses to forces at the tip do not follow. Here x is its static bending by a
-    lateral force of 1 N at the tip, and N is 1 N.
+    An axial force N adds `-N S x` to the forces on a stator, with S the form of its squared slope: a lateral
+    load along its length, which static responses to tip forces do not represent. Here x is its static bending
+    by a lateral force of 1 N at the tip, and N is 1 N.
     """
     loads = []
     for first, stator, degree in zip(model.stator_start, model.stators, degrees_of(model), strict=True):
@@ -199,12 +199,12 @@ def bending_loads(model: Model) -> Floats:
 
 
 def _attachment_modes(modes: Modes, seen: Ints, patterns: Floats, drawn: Floats, least: float) -> Floats:
-    """Residual attachment modes: static responses of the modes not kept, (n_all, n_shape).
+    """Residual attachment modes: static responses of the omitted modes, (n_all, n_shape).
 
-    They are orthonormal in the mass, and respond to a unit force on each degree seen, to the `patterns`
-    (n_all, n_pattern) of forces and to those combinations of the forces `drawn` (n_all, n_force) from modes
-    at unit velocity whose strain energy is over `least`^2 of that mode's. Proportional damping draws none: it
-    does not couple modes.
+    They are orthonormal in the mass. They are responses to a unit force on each seen degree, to the
+    `patterns` (n_all, n_pattern) of forces, and to combinations of the forces `drawn` (n_all, n_force) by
+    modes at unit velocity whose strain energy is over `least`^2 of that of the mode. Proportional damping
+    gives none: it does not couple modes.
     """
     if not modes.rest_frequency.size:
         return modes.rest
@@ -223,7 +223,7 @@ def _attachment_modes(modes: Modes, seen: Ints, patterns: Floats, drawn: Floats,
 
 
 def _attachments_once() -> Callable[[Modes, Ints, Floats, Floats, float], Floats]:
-    """Return `_attachment_modes` that takes bodies which are alike, as in a ring, once."""
+    """Return `_attachment_modes` with a cache for equal bodies, as in a ring."""
     known: dict[bytes, Floats] = {}
 
     def find(modes: Modes, seen: Ints, patterns: Floats, drawn: Floats, least: float) -> Floats:
@@ -244,7 +244,7 @@ def _attachments_once() -> Callable[[Modes, Ints, Floats, Floats, float], Floats
 
 
 def _visible(seen: Floats, stiffness: Floats, damping: Floats) -> NDArray[np.bool_]:
-    """Coordinates that move a seen degree, or that K or C couple to one that does."""
+    """Coordinates that move a seen degree, or are coupled by K or C to one that does."""
     scale = np.sqrt(np.maximum(np.abs(np.diag(stiffness)), 1.0))
     couples = np.abs(stiffness) > UNSEEN * np.outer(scale, scale)
     couples |= np.abs(damping) > UNSEEN * np.sqrt(np.outer(scale, scale))
@@ -264,7 +264,7 @@ def kernel_bodies(
     law: Law,
     displacement_limit: float,
 ) -> Reduced:
-    """Return the reduced bodies of a case as kernels take them; clearance (q,) and limit in m."""
+    """Return the reduced bodies of a case for kernels; clearance (q,) and limit in m."""
     gap_jacobian, force_direction, slip = directions(reduced, model, friction)
     radius = np.array([stator.radius for stator in model.stators])
     return Reduced(

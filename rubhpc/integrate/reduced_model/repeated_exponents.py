@@ -1,8 +1,8 @@
-"""Eigenvectors of a system in which exponents repeat, as those of many identical stators on one carrier do.
+"""Eigenvectors of a system with repeated exponents, such as many identical stators on one carrier.
 
-A general eigensolver returns as many eigenvectors as an exponent has, but in a direction each that rounding
-chooses: two may all but coincide. Here those of one exponent are replaced by an orthonormal basis of what
-they span, in coordinates in which displacements and rates are of one size.
+A general eigensolver returns all eigenvectors of a repeated exponent, but rounding determines their
+directions: two may nearly coincide. Here the eigenvectors of one exponent are replaced by an orthonormal
+basis of their span, in coordinates in which displacements and rates have equal size.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 ROUNDING = 100 * np.finfo(np.float64).eps  # difference of two equal exponents, over the norm of the system
-LEAST_SPREAD = 1e-7  # of eigenvectors of one exponent, between their least and their greatest direction
-WORST_BALANCED = 1e7  # condition of all eigenvectors; where two exponents merge for good, it is some 1e8
+LEAST_SPREAD = 1e-7  # of eigenvectors of one exponent, least singular value over the greatest
+WORST_BALANCED = 1e7  # condition of all eigenvectors; for a defective system about 1e8
 REAL = 1e-12  # imaginary part of a real exponent, over the greatest
 
 
@@ -36,9 +36,9 @@ def separate(system: Floats) -> tuple[Complexes, Complexes, Complexes] | None:
     Returns
     -------
     exponent : (n,)
-        1/s; those that differ by rounding alone are made equal.
+        1/s; those that differ only by rounding are made equal.
     shape, inverse : (n, n)
-        Shapes as columns, and the inverse of that matrix. None of all where shapes truly coincide, as in
+        Shapes as columns, and the inverse of that matrix. The result is None where shapes coincide, as in
         critical damping.
     """
     balanced, (scale, _) = matrix_balance(system, permute=False, separate=True)
@@ -55,7 +55,7 @@ def separate(system: Floats) -> tuple[Complexes, Complexes, Complexes] | None:
         middle = exponent[group].mean()
         exponent[group] = middle.real if real else middle
         shape[:, group] = directions[:, : group.size]
-        if not real:  # the solver puts a conjugate behind its partner
+        if not real:  # the solver places a conjugate after its partner
             exponent[group + 1], shape[:, group + 1] = exponent[group].conj(), shape[:, group].conj()
     if not np.linalg.cond(shape) < WORST_BALANCED:
         return None
@@ -63,13 +63,13 @@ def separate(system: Floats) -> tuple[Complexes, Complexes, Complexes] | None:
 
 
 def real_ones(exponent: Complexes) -> NDArray[np.bool_]:
-    """Which exponents are real, but for rounding."""
+    """Which exponents are real up to rounding."""
     is_real: NDArray[np.bool_] = np.abs(exponent.imag) <= REAL * np.abs(exponent).max()
     return is_real
 
 
 def _equal(exponent: Complexes, tolerance: float) -> list[NDArray[np.int64]]:
-    """Places of the exponents that repeat, of each apart."""
+    """Places of each group of repeated exponents."""
     near = np.abs(exponent[:, None] - exponent) <= tolerance
     _, group = connected_components(csr_array(near), directed=False)
     places = (np.flatnonzero(group == number) for number in np.unique(group))

@@ -1,4 +1,4 @@
-"""Eigenmodes with one more contact, from those without it: zeros of a secular function."""
+"""Eigenmodes with one more contact, from those without it, by the zeros of a secular function."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Complexes = NDArray[np.complex128]
 
-FEWEST = 28  # coordinates from which this is the quicker way with one contact
-WEAK = 0.25  # an exponent that moves by less than this part of its distance to the next is found from itself
-MOST_STRONG = 0.5  # of the eigenmodes; with more, the whole system is as quick
+FEWEST = 28  # coordinates from which this method is faster for one contact
+WEAK = 0.25  # of the distance to the next exponent: one that moves by less is found from its old value
+MOST_STRONG = 0.5  # of the eigenmodes; with more, solving the whole system is as fast
 PASSES = 12
-CONVERGED = 1e-9  # of a step, whose error Newton's method squares
-SAME = 1e-13  # of an exponent: no distance
+CONVERGED = 1e-9  # relative step, whose error Newton's method squares
+SAME = 1e-13  # of an exponent: nearer ones are equal
 WORST = 1e-8  # cosine between a shape and its inverse below which exponents coincide
 ROUNDING = 8.0 * np.finfo(np.float64).eps
 
 
 class Contact(NamedTuple):
-    """A closed pair, or a slip that sticks."""
+    """A closed pair, or a sticking slip."""
 
-    row: Floats  # (n,), of what is held or pressed, by displacements
+    row: Floats  # (n,), constrained or pressed quantity, by displacements
     force: Floats  # (n,), of a unit contact force
-    stiffness: float = 0.0  # N/m; with neither, `row` is held
+    stiffness: float = 0.0  # N/m; with neither stiffness nor damping, `row` is a constraint
     damping: float = 0.0  # N s/m
 
 
 class Eigenmodes(NamedTuple):
-    """Eigenmodes of n coordinates, one of each pair: `x = Re(shape @ z)`, `z = inverse @ (x, v)`."""
+    """Eigenmodes of n coordinates, one per conjugate pair: `x = Re(shape @ z)`, `z = inverse @ (x, v)`."""
 
     exponent: Complexes  # (m,), 1/s
     shape: Complexes  # (n, m), displacements, doubled for one of a pair
@@ -41,7 +41,7 @@ class Eigenmodes(NamedTuple):
 
 
 def with_contact(modes: Eigenmodes, contact: Contact) -> Eigenmodes | None:
-    """Eigenmodes with one more contact; None where they are not found this way.
+    """Eigenmodes with one more contact; None where the method fails.
 
     With `A` the system without it, `b` the input of its force and `c` its row, the force is that of a
     constraint `c x = 0`, or `-(k + d s) c x`. Exponents are then the zeros of
@@ -50,9 +50,9 @@ def with_contact(modes: Eigenmodes, contact: Contact) -> Eigenmodes | None:
 
     over all exponents `l_j` of A, b and c by its eigenmodes; of a constraint a = 0 and `r_j = c_j b_j`, and
     two zeros are infinite. At a zero s the shape is `inv(s - A) b` and the inverse `c inv(s - A)`. Zeros are
-    kept as distances to an exponent, which makes both as accurate as the eigenmodes of A are (Gu and
-    Eisenstat, SIAM J. Matrix Anal. Appl. 15 (1994) 1266-1276). Converged zeros that differ from one another
-    and are as many as there must be are all of them.
+    represented as distances to an exponent, which makes both as accurate as the eigenmodes of A (Gu and
+    Eisenstat, SIAM J. Matrix Anal. Appl. 15 (1994) 1266-1276). Converged, distinct zeros in the expected
+    number are complete.
     """
     n = len(contact.row)
     is_held = contact.stiffness == 0.0 and contact.damping == 0.0
@@ -90,14 +90,14 @@ def _upper(zeros: Complexes) -> Complexes:
 
 
 def _without_rounding(row: Floats, values: Complexes) -> Complexes:
-    """Products of a row (n,) with values (m, n), zero where only rounding differs from it."""
+    """Products of a row (n,) with values (m, n), with rounding errors set to zero."""
     product = times_real(values, row)
     product[np.abs(product) <= ROUNDING * (np.abs(values) @ np.abs(row))] = 0.0
     return product
 
 
 def _squares(values: Complexes) -> Floats:
-    """Squares of absolute values, without their roots."""
+    """Squares of absolute values."""
     return np.asarray(values.real**2 + values.imag**2)
 
 
@@ -115,12 +115,12 @@ class _Poles(NamedTuple):
 
     upper: Complexes  # (k,)
     every: Complexes  # (p,)
-    turned: Ints  # of the k, those with a conjugate
+    turned: Ints  # poles with a conjugate, among the k
     seen: Complexes  # (p,), c_j
     moved: Complexes  # (p,), b_j
     residue: Complexes  # (p,), r_j
     constant: float  # a
-    apart: Complexes  # (k, p), differences; infinite to itself and to what coincides
+    apart: Complexes  # (k, p), differences; infinite for itself and coinciding poles
     nearest: Floats  # (k,), least distance to another pole
 
     @classmethod
@@ -198,9 +198,9 @@ class _Poles(NamedTuple):
         return np.asarray((1.0 / away).sum(axis=1))
 
     def _start(self, strong: Ints) -> Complexes | None:
-        """Zeros among the strong poles: those of a small system, the others' sum taken as it is at rest.
+        """First zeros among the strong poles: those of a small system, with a constant sum of the others.
 
-        Beyond all other poles their sum is next to nothing.
+        Beyond all other poles their sum is negligible.
         """
         if strong.size > MOST_STRONG * self.upper.size:
             return None
@@ -229,7 +229,7 @@ class _Poles(NamedTuple):
         return np.asarray(np.linalg.eigvals(np.diag(pole) - coupling), dtype=np.complex128)
 
     def shapes(self, zeros: _Zeros) -> tuple[Complexes, Complexes] | None:
-        """Shapes and inverses by the poles' own, (z, p) each; None where they are all but orthogonal."""
+        """Shapes and inverses in terms of those of the poles, (z, p) each; None where nearly orthogonal."""
         inverse = 1.0 / (self.apart[zeros.own] + zeros.distance[:, None])
         value = self.constant + inverse @ self.residue
         right = (-self.seen[zeros.own] / value)[:, None] * self.moved * inverse

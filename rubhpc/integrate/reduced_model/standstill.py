@@ -1,4 +1,4 @@
-"""Undamped modes of a model at standstill, and which of them a reduced model keeps."""
+"""Undamped modes of a model at standstill, and the choice of those that a reduced model keeps."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# Modes up to this multiple of the contact frequency (or the spin, where that is higher), times
-# (1e-3 / accuracy)^(1/4): modes above are kept as static shapes, whose error goes with the fourth
-# power of the frequency ratio.
+# Modes up to this multiple of the contact frequency (or the spin, where that is higher), times (1e-3 /
+# accuracy)^(1/4): modes above are represented by static shapes, with an error of the fourth power of the
+# frequency ratio.
 CUTOFF_RATIO = 10.0
 FEWEST_MODES = 2  # kept of every part, whatever their frequency
-SMALL = 256  # degrees of a body whose modes are kept for other rigs with the same body: 1.5 MB
-FEW_PAIRS = 5  # of which there is little to take apart
-FREE = 1e-12  # square of a frequency over the greatest, below which a mode is free motion
+SMALL = 256  # degrees of a body whose modes are cached for other rigs: 1.5 MB
+FEW_PAIRS = 5  # where separating parts saves little
+FREE = 1e-12  # square of a frequency over the greatest; less is rigid-body motion
 
 
 def cutoff_frequency(model: Model, spin: float, accuracy: float) -> float:
-    """Frequency, rad/s, up to which all modes are kept, and up to which probes show what the full model does.
+    """Frequency, rad/s, up to which all modes are kept and probes agree with the full model.
 
     Ten times the contact frequency (the rotor's inertia on the stator's static stiffness), or the spin where
     that is higher, times `(1e-3 / accuracy)^(1/4)`; infinite for rigid walls.
@@ -44,21 +44,21 @@ def cutoff_frequency(model: Model, spin: float, accuracy: float) -> float:
 
 
 class Part(NamedTuple):
-    """Undamped modes of what mass and stiffness couple, orthonormal in the mass."""
+    """Undamped modes of a part that mass and stiffness couple, orthonormal in the mass."""
 
-    n_seen: int  # of its degrees, and of their combinations, are seen by contact, outputs or probes
+    n_seen: int  # number of degrees and combinations that contact, outputs or probes see
     rows: Ints  # its degrees
     mode: Floats  # (n_all, n)
     frequency: Floats  # (n,), rad/s
 
 
 class Standstill(NamedTuple):
-    """What a model is at every speed."""
+    """Properties of a model that do not depend on the speed."""
 
     stiffness: Floats  # (n_all, n_all), its symmetric part
-    parts: list[Part]  # those that contact or outputs feel
+    parts: list[Part]  # those seen by contact or outputs
     contact_frequency: float  # rad/s
-    groups: list[Ints]  # degrees that nothing couples to others at any speed; all together for few pairs
+    groups: list[Ints]  # degrees that are uncoupled at every speed; one group for few pairs
 
 
 @lru_cache(maxsize=4)
@@ -97,9 +97,9 @@ def at_standstill(model: Model) -> Standstill:
 
 
 def _coupled_degrees(bodies: Sequence[Body]) -> tuple[Ints, Ints]:
-    """Number of the part of each degree (n_all,) that mass and stiffness couple, and all matrices at speed.
+    """Number of the part of each degree (n_all,): coupled by mass and stiffness; by all matrices at speed.
 
-    Bodies that are alike, as in a ring, are looked at once.
+    Equal bodies, as in a ring, are analysed once.
     """
     found: dict[int, list[Ints]] = {}
     numbers: list[list[Ints]] = [[], []]
@@ -118,7 +118,7 @@ def _coupled_degrees(bodies: Sequence[Body]) -> tuple[Ints, Ints]:
 
 @lru_cache(maxsize=16)
 def _eigenmodes(stiffness: bytes, mass: bytes) -> tuple[Floats, Floats]:
-    """Squares of frequencies and modes of matrices (n, n): a body that rigs share is solved once."""
+    """Squares of frequencies and modes of matrices (n, n), cached for bodies that rigs share."""
     n = math.isqrt(len(mass) // 8)
     square, shape = eigh(*(np.frombuffer(matrix).reshape(n, n) for matrix in (stiffness, mass)))
     return square, shape
@@ -146,7 +146,7 @@ def _contact_frequency(parts: list[Part], degree: Ints, model: Model) -> float:
         response = along / square  # to a unit force, mode by mode
         inertia = (response @ response) / (along @ response) ** 2  # of that shape, as that of the first mode
         compliance = mode[axial] @ (mode[axial] / square)
-        if stator.alone is not None:  # an impact meets the stator before the carrier moves
+        if stator.alone is not None:  # an impact acts on the stator before the carrier moves
             tip = stator.alone.axial
             compliance = np.linalg.inv(stator.alone.body.stiffness)[tip, tip]
         highest = max(highest, 1.0 / np.sqrt(inertia * compliance))
@@ -159,7 +159,7 @@ class Modes(NamedTuple):
     rows: Ints  # its degrees
     kept: Floats  # (n_all, n_kept)
     kept_frequency: Floats  # (n_kept,), rad/s
-    rest: Floats  # (n_all, n_rest), which only static shapes represent
+    rest: Floats  # (n_all, n_rest), represented only by static shapes
     rest_frequency: Floats  # (n_rest,), rad/s
 
 
@@ -176,6 +176,6 @@ def modes_below(part: Part, cutoff: float) -> Bools:
 
 
 def completed(part: Part, is_kept: Bools) -> Bools:
-    """Modes kept (n,), two at least, and all of them where modes and shapes would be as many."""
+    """Kept modes (n,): at least two, and all where modes and shapes would be as many."""
     is_kept = is_kept | (np.arange(is_kept.size) < FEWEST_MODES)
     return is_kept | (np.count_nonzero(is_kept) + part.n_seen >= is_kept.size)

@@ -1,4 +1,4 @@
-"""Eigenmodes of a first-order system, part by part: what nothing couples is solved by itself."""
+"""Eigenmodes of a first-order system; uncoupled parts are solved separately."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
     Solved = dict[bytes, tuple[Complexes, Complexes, Complexes]]  # parts, by their names (`_name_of`)
 
-WORST_CONDITION = 1e11  # of the eigenvectors; beyond it their sum loses its digits, and they are set apart
+WORST_CONDITION = 1e11  # of the eigenvectors; above it their sums lose digits, and they are separated
 SMALL = 64  # states of a part that is kept
 MOST_BYTES = 2**29  # of parts that are kept
 
 
 class KeptParts(dict[bytes, "tuple[Complexes, Complexes, Complexes]"]):
-    """Parts as they are known to `modes_of`, to which it adds those that it solves; the oldest make room."""
+    """Cache of solved parts for `modes_of`, which adds new ones; the oldest are dropped."""
 
     def __init__(self, parts: Solved | None = None) -> None:
         super().__init__()
@@ -35,7 +35,7 @@ class KeptParts(dict[bytes, "tuple[Complexes, Complexes, Complexes]"]):
             self.keep(part, solved)
 
     def keep(self, part: bytes, solved: tuple[Complexes, Complexes, Complexes]) -> None:
-        """Add a part that is new."""
+        """Add a new part."""
         self[part] = solved
         self.n_byte += _size(part, solved)
         while self.n_byte > MOST_BYTES and len(self) > 1:
@@ -50,8 +50,8 @@ def _size(part: bytes, solved: tuple[Complexes, Complexes, Complexes]) -> int:
 def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Complexes, Complexes]:
     """Exponents, shapes and inverse shapes of a first-order system; one of each conjugate pair, doubled.
 
-    What nothing couples is solved by itself: of a ring of stators only those that touch move with the rotor.
-    Parts among those `known`, such as open stators, are not solved again; `KeptParts` keeps the others.
+    Uncoupled parts are solved separately: in a ring only the stators that touch move with the rotor. Parts in
+    `known`, such as open stators, are not solved again; `KeptParts` adds the others.
     """
     n_state = len(system)
     exponents: list[Complexes] = [np.zeros(0, dtype=np.complex128)]  # a mass on a rigid wall has no modes
@@ -75,9 +75,9 @@ def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Co
 
 
 def solve_part(part: Floats) -> tuple[Complexes, Complexes, Complexes]:
-    """Exponents, shapes and inverse shapes of a part of a system that nothing couples to the rest.
+    """Exponents, shapes and inverse shapes of an uncoupled part of a system.
 
-    Small ones, such as an open stator, which is the same at every speed, are not solved again.
+    Small parts are cached, such as an open stator, which is the same at every speed.
     """
     worst = WORST_CONDITION
     return _recalled(part.tobytes(), worst) if len(part) <= SMALL else _solve_part(part, worst)
@@ -110,7 +110,7 @@ def _solve_part(part: Floats, worst: float) -> tuple[Complexes, Complexes, Compl
 
 
 def _inverse(shape: Complexes, worst: float) -> Complexes | None:
-    """Inverse of eigenvectors whose condition is not worse; the bound by Frobenius norms is tried first."""
+    """Inverse of eigenvectors, or None if their condition is worse; Frobenius norms are tried first."""
     try:
         inverse = np.linalg.inv(shape)
     except np.linalg.LinAlgError:
@@ -120,30 +120,30 @@ def _inverse(shape: Complexes, worst: float) -> Complexes | None:
 
 
 def solve_parts(system: Floats) -> Solved:
-    """All parts of a system, solved: what `modes_of` looks up."""
+    """All parts of a system, solved, for `modes_of`."""
     parts = (system[np.ix_(rows, rows)] for rows in _parts(system))
     return {name: solve_part(part) for name, part in {_name_of(part): part for part in parts}.items()}
 
 
 def _name_of(part: Floats) -> bytes:
-    """What a part is known by: its bytes, or of a large one a digest of them."""
+    """Key of a part: its bytes, or their digest if they are many."""
     values = part.tobytes()
     return values if len(part) <= SMALL else blake2b(values, digest_size=32).digest()
 
 
 def parts_of(system: Floats, q: int) -> list[NDArray[np.int64]]:
-    """Rows of each part that nothing couples to the rest; of one pair there is little to take apart."""
+    """Rows of each uncoupled part; all rows for one pair, where separation saves little."""
     return _parts(system) if q > 1 else [np.arange(len(system))]
 
 
 def _parts(system: Floats) -> list[NDArray[np.int64]]:
-    """Rows of each part of a system that nothing couples to the rest."""
+    """Rows of each uncoupled part of a system."""
     return _rows_of_parts((system != 0.0).tobytes(), len(system))
 
 
 @lru_cache(maxsize=32)
 def _rows_of_parts(linked: bytes, n: int) -> list[NDArray[np.int64]]:
-    """The same from which entries (n, n) are not zero."""
+    """The same from the nonzero pattern (n, n)."""
     return coupled_rows(np.frombuffer(linked, dtype=bool).reshape(n, n))
 
 

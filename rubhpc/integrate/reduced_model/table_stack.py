@@ -1,4 +1,4 @@
-"""Tables of contact modes of one width, one after the other, in room that grows."""
+"""Tables of contact modes of one width, stacked in memory that grows."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from rubhpc.integrate.reduced_model.array_room import room_for
 
 MOST_MODES = 1024  # sets of closed contacts of one speed and friction
 FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
-NEXT_ROOM = 16  # for a case that goes on rubbing; then for all, since what is there has to be copied
+NEXT_ROOM = 16  # for a case that keeps rubbing; then for all, because growing copies
 MOST_BYTES = 2**30  # of their tables
-_KEPT = 2**24  # bytes of an array up to which the C library keeps what is freed
+_KEPT = 2**24  # bytes of an array up to which the C library keeps freed memory
 
-# It takes arrays smaller than the largest that was ever freed from its heap, which keeps twice as much
-# (mallopt(3)). Tables were such; without them those of spectra are given back and taken anew in every case.
+# It takes arrays smaller than the largest freed one from its heap, which keeps twice as much (mallopt(3)).
+# Without such tables the memory of spectra would be returned and allocated again in every case.
 np.empty(_KEPT, dtype=np.uint8)
 
 
 class TableStack:
-    """Tables of contact modes of one width, one after the other.
+    """Stacked tables of contact modes of one width.
 
     Attributes
     ----------
     n_most : int
-        ModeTables that there is room for: those of every pair closed by itself, and of as many more sets as
-        `n_most` and `most_bytes` allow.
+        Most modes: those of each pair closed alone, and as many further sets as `n_most` and `most_bytes`
+        allow.
     """
 
     def __init__(self, n_least: int, n_most: int = MOST_MODES, most_bytes: int = MOST_BYTES) -> None:
         self._most_bytes = most_bytes
         self.n_most = max(n_least, n_most)
         self._n_least, self._n_filled, self._n_written = n_least, 0, 0
-        self._vacant: int | None = None  # place for the next one
+        self._vacant: int | None = None  # place for the next mode
         self._room: list[Any] = []
         self._view: Any = None
 
     def add(self, row: Any, count: int = 1) -> None:
-        """Take in the tables of a mode, a named tuple of (1, ...) each, `count` times."""
+        """Add the tables of a mode, a named tuple of (1, ...) each, `count` times."""
         rows: list[Any] = list(row)
         if self._vacant is not None:
             for field, new in zip(self._room, rows, strict=True):
@@ -52,9 +52,9 @@ class TableStack:
             n_room = max(count, min(self._n_least, FIRST_ROOM))
             self._room = [room_for((n_room, *field.shape[1:]), field.dtype) for field in rows]
             self._kind = type(row)
-        elif end > len(self._room[0]):  # memory that is not written yet is not taken
+        elif end > len(self._room[0]):  # unwritten memory is not allocated by the system
             n_room = max(end, min(NEXT_ROOM, self.n_most) if end <= NEXT_ROOM else self.n_most)
-            for i, field in enumerate(self._room):  # one after the other: all at once would take it twice
+            for i, field in enumerate(self._room):  # one by one: all together would need twice the memory
                 self._room[i] = room_for((n_room, *field.shape[1:]), field.dtype)
                 self._room[i][:first] = field[:first]
         for field, new in zip(self._room, rows, strict=True):
@@ -63,16 +63,16 @@ class TableStack:
         self._view = None
 
     def clear(self) -> None:
-        """Give all room back to contact modes to come."""
+        """Free all places for new contact modes."""
         self._n_filled, self._view, self._vacant = 0, None, None
 
     def vacate(self, place: int) -> None:
-        """Give the place of a mode to the next one."""
+        """Free the place of a mode for the next one."""
         self._vacant = place
 
     @property
     def n_byte(self) -> int:
-        """Memory that is held."""
+        """Allocated memory, bytes."""
         return self.n_byte_of_one * self._n_written
 
     def row(self, place: int) -> Any:
@@ -81,7 +81,7 @@ class TableStack:
 
     @property
     def n_byte_of_one(self) -> int:
-        """Memory that the tables of one mode take."""
+        """Memory of the tables of one mode, bytes."""
         return sum(field[0].nbytes for field in self._room)
 
     def view(self) -> Any:

@@ -1,4 +1,4 @@
-"""Contact modes of several stators: what touches moves with the rotor, the rest as with every pair open."""
+"""Contact modes of several stators: touching ones move with the rotor, the others as in the open set."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ Ints = NDArray[np.int64]
 
 
 class Touching(NamedTuple):
-    """What closed pairs couple and the unbalance drives, and the eigenmodes of the open set that stay."""
+    """Coordinates that closed pairs couple or the unbalance drives; shared eigenmodes of the open set."""
 
     pairs: Ints  # (r,), that are closed
     rows: Ints  # (n_own,), reduced coordinates
@@ -66,7 +66,7 @@ class Touching(NamedTuple):
     def among_all(self, own: M, opened: M, n: int, q: int) -> M:
         """The contact mode of all bodies, from that of these alone and that with every pair open.
 
-        Switch functions of open pairs are left at zero. `n` and `q` count the coordinates and pairs of all.
+        Switch functions of open pairs stay zero. `n` and `q` count the coordinates and pairs of all.
         """
         first, states = own.n_eigenmode, _states(self.rows, n)
         m = first + self.spared.size
@@ -94,14 +94,14 @@ class Touching(NamedTuple):
 
 
 class OpenBodies:
-    """Bodies that nothing couples while every pair is open.
+    """Bodies that are uncoupled while every pair is open.
 
     Parameters
     ----------
     opened : ContactMode
         With every pair open.
     seen : (q, n)
-        Not zero where a pair sees or moves a coordinate.
+        Nonzero where a pair sees or moves a coordinate.
     """
 
     def __init__(self, reduced: ReducedModel, opened: ContactMode, seen: Floats) -> None:
@@ -122,7 +122,7 @@ class OpenBodies:
         return OpenBodies(reduced, opened, self._rows)
 
     def touching(self, pairs: Sequence[int] | Ints) -> Touching | None:
-        """What moves together when these pairs are closed; None where that is everything."""
+        """Bodies coupled by closing these pairs; None where these are all."""
         closed = np.array(pairs, dtype=np.int64)
         own = self._driven | self._seen[closed].any(axis=0)
         if own.all():
@@ -170,7 +170,7 @@ class OpenBodies:
         return found
 
     def within(self, rows: Ints | None = None) -> Within:
-        """The bodies of these coordinates, default all, to be closed together."""
+        """The bodies of these coordinates, by default all, for closing contacts among them."""
         return self._closings.within(np.arange(len(self._part)) if rows is None else rows)
 
     @cached_property
@@ -181,14 +181,14 @@ class OpenBodies:
 
     @cached_property
     def _opened_loss(self) -> tuple[Ints, Floats]:
-        """Where energies of the open set are not zero, (2, k), and what they are."""
+        """Places (2, k) and values of the nonzero energies of the open set."""
         loss = self.opened_energies.loss
         at = np.array(np.nonzero(loss))
         return at, loss[tuple(at)]
 
     @cached_property
     def opened_energies(self) -> Energies:
-        """Of the set with every pair open, coordinates as they are; what is alike is computed once."""
+        """Energies of the open set, without padding; those of equal bodies are computed once."""
         opened, n = self.opened, len(self._part)
         found, known = Energies.none(opened.exponent.size), dict[bytes, Energies]()
         for number, rows in enumerate(self._parts):
@@ -279,7 +279,7 @@ def friction_mode_among(
 
 
 def open_bodies(reduced: ReducedModel, model: Model, opened: ContactMode) -> OpenBodies | None:
-    """What several stators are while open; of one there is nothing to spare."""
+    """Open bodies of several stators; None for one stator, where nothing is saved."""
     gap_jacobian, _, slip = reduction.directions(reduced, model, 0.0)
     return OpenBodies(reduced, opened, np.abs(gap_jacobian) + np.abs(slip)) if len(slip) > 1 else None
 
