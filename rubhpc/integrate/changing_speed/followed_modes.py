@@ -67,17 +67,6 @@ def between(values: Sequence[A], place: float) -> A:
     return found
 
 
-def between_all(values: Sequence[Floats], places: Sequence[float]) -> Floats:
-    """The same at several places, the first axis."""
-    middle, *others = values
-    shares = np.array([_shares(place, len(values)) for place in places])
-    found: Floats = np.multiply.outer(shares[:, 0], others[0] - middle)
-    for share, other in zip(shares.T[1:], others[1:], strict=True):
-        found += np.multiply.outer(share, other - middle)
-    found += middle
-    return found
-
-
 def matched(mode: ContactMode, other: ContactMode) -> ContactMode | None:
     """Another speed's mode in the order, lengths and phases of `mode`; None where it is another motion."""
     m = mode.n_eigenmode

@@ -22,9 +22,10 @@ from rubhpc.integrate.record import State
 from rubhpc.kernels.accumulators import Accumulator, Samples  # noqa: TC001 - of a NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from rubhpc.fem.model import Model
+    from rubhpc.integrate.changing_speed.block import Block
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
 
 Floats = NDArray[np.float64]
@@ -102,7 +103,7 @@ class Passing:
 
     def take_several(
         self,
-        setups: Sequence[PieceSetup],
+        block: Block,
         first: int,
         n_sample: int,
         begun: State | Place,
@@ -115,9 +116,9 @@ class Passing:
             return None
         if self._check is not None:
             self._check()
-        room = self._room_for(setups[first].model, n_sample)
+        room = self._room_for(block.model, n_sample)
         left = self._left if goes_on else None
-        march, setup = self._march, setups[first]
+        march, setup = self._march, block[first]
         try:
             library = begin_stretch(march, setup, begun, self._longer(setup, n_sample), left)
         except NoClosedForm:
@@ -125,9 +126,9 @@ class Passing:
         if library is None:
             self._at = setup if march.has_piece_loop else None
             return None
-        found = take_stretch(march, library, setups, first, room, begun, earlier, self._check)
+        found = take_stretch(march, library, block, first, room, begun, earlier, self._check)
         if found is not None:
-            self._left, self._lasted = found.left, setups[first + found.n_piece - 1].interval * n_sample
+            self._left, self._lasted = found.left, float(block.interval[first + found.n_piece - 1]) * n_sample
         return found
 
     def _longer(self, setup: PieceSetup, n_sample: int) -> float:

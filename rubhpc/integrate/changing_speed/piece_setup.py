@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.followed_modes import between, between_all
+from rubhpc.integrate.changing_speed.followed_modes import between
 from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
 from rubhpc.integrate.changing_speed.retuned_modes import Desk, RetunedLibrary
@@ -80,7 +80,7 @@ class HeldMatrices:
         self._libraries: dict[tuple[str, float], RetunedLibrary] = {}
         self._pairs: dict[float, FrictionPairs] = {}
         self._latest: tuple[tuple[float, ...], Model] | None = None  # by what was asked
-        self.first: tuple[tuple[float, ...], list[PieceSetup]] | None = None  # of a case, by what was asked
+        self.first: tuple[tuple[float, ...], object] | None = None  # block of a case, by what was asked
 
     @property
     def n_byte(self) -> int:
@@ -128,19 +128,12 @@ class HeldMatrices:
 
     def at_place(self, within: float, rise: float) -> ReducedModel:
         """The model at a place in the range and of the acceleration; its unbalance is that of the middle."""
-        return self.at_places([within], rise)[0]
-
-    def at_places(self, within: Sequence[float], rise: float) -> list[ReducedModel]:
-        """The same at several places in the range."""
         if not self._beside:
-            return [self.reduced] * len(within)
-        values = {name: between_all(nodes, within) for name, nodes in self._at_nodes.items()}
+            return self.reduced
+        values = {name: between(nodes, within) for name, nodes in self._at_nodes.items()}
         if self.risen is not None and rise:
             values["stiffness"] += rise * (self.risen.stiffness - self.reduced.stiffness)
-        return [
-            with_values(self.reduced, **dict(zip(values, each, strict=True)))
-            for each in zip(*values.values(), strict=True)
-        ]
+        return with_values(self.reduced, **values)
 
     @cached_property
     def _at_nodes(self) -> dict[str, list[Floats]]:

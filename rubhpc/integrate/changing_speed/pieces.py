@@ -8,18 +8,18 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from rubhpc.integrate.changing_speed.block import Block
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
-from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, with_values
 from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE
 from rubhpc.integrate.changing_speed.ripples import Ripples
 from rubhpc.integrate.changing_speed.speed_ranges import SpeedRanges
-from rubhpc.kernels.case_progress import Clock
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup
     from rubhpc.integrate.modal_setup import ModalSetup
 
     Floats = NDArray[np.float64]
@@ -83,7 +83,7 @@ class Pieces:
 
     def blocks(
         self, speed: Floats, acceleration: Floats, angle: Floats, duration: Floats, n_sample: Ints
-    ) -> Iterator[list[PieceSetup]]:
+    ) -> Iterator[Block]:
         """The set-ups of the pieces of a prescribed run-up, together where they share matrices and sag.
 
         As `setup`, (n_piece,) each; `n_sample` are the samples in each piece, the same in those together.
@@ -104,7 +104,7 @@ class Pieces:
             yield self._in_held(held, columns)
             first = last
 
-    def _in_held(self, held: HeldMatrices, columns: Floats, torque: float = 0.0) -> list[PieceSetup]:
+    def _in_held(self, held: HeldMatrices, columns: Floats, torque: float = 0.0) -> Block:
         """The set-ups of pieces that all have the same matrices; columns as the arguments of `setup`.
 
         Their sag is that of the first acceleration and of the mean speed.
@@ -112,6 +112,7 @@ class Pieces:
         speed, acceleration, angle, duration = columns
         asked = (torque, *columns.ravel().tolist())
         if angle[0] == 0.0 and held.first is not None and held.first[0] == asked:
+            assert isinstance(held.first[1], Block)
             return held.first[1]
         model = held.sagging(torque, float(acceleration[0]), float(speed.mean()))
         lag = acceleration * duration**2 / 12.0
@@ -126,30 +127,9 @@ class Pieces:
         speeds = speeds_of(
             speed, factor, growth, tick, held.reduced.spin, held.sample_level, held.reach, rise
         )
-        template, found = held.template, []
-        steady = template.clock
-        longest = np.floor(np.log2(template.step / tick)).astype(int)
+        longest = np.floor(np.log2(held.template.step / tick)).astype(int)
         search_level = np.clip(longest, 0, held.sample_level)
-        lists = (column.tolist() for column in (speed, interval, tick, search_level, growth))
-        models = held.at_places([held.within(spin) for spin in speed.tolist()], rise)
-        for place, (spin, every, resolution, search, grows, pushing, at_place) in enumerate(
-            zip(*lists, force, models, strict=True)
-        ):
-            reduced = with_values(at_place, spin=spin, force=pushing)
-            found.append(
-                with_values(
-                    template,
-                    model=model,
-                    reduced=reduced,
-                    spin=spin,
-                    interval=every,
-                    tick=resolution,
-                    clock=Clock(spin, resolution, *steady[2:4], search, *steady[5:7], grows),
-                    speeds=speeds,
-                    place=place,
-                    _open_tables={},  # which are of this speed alone
-                )
-            )
+        found = Block(held, model, speeds, force, search_level, interval)
         if angle[0] == 0.0:
             held.first = asked, found
         return found

@@ -133,8 +133,8 @@ def integrate_run_up(
     unit, none = unit_rotation(model.rotor), np.zeros(model.rotor.n_dof)
     piece, held_from = 0, times[0]  # since when the matrices are held
     last: tuple[PieceSetup, int] | None = None  # piece of the matrices before, and its samples
-    for setups in pieces.blocks(speeds, accelerations, angles[:-1], durations, sizes):
-        setup, size, block = setups[0], int(sizes[piece]), piece
+    for block in pieces.blocks(speeds, accelerations, angles[:-1], durations, sizes):
+        setup, size, begins_at = block[0], int(sizes[piece]), piece
         if setup.model is not sagging:
             lift_samples(whole[:, begun : cuts[piece]], sagging)
             sagging, begun = setup.model, cuts[piece]
@@ -157,7 +157,7 @@ def integrate_run_up(
             reached = moved(reached, setup, -leant, none)
             if last[0].held is not setup.held:
                 held_from = times[piece]
-        while not reason and (place := piece - block) < len(setups):
+        while not reason and (place := piece - begins_at) < len(block):
             first = int(cuts[piece])
             if reached is None:
                 assert isinstance(initial, Initial)
@@ -166,7 +166,7 @@ def integrate_run_up(
             stretch, before_it, follows = None, (earlier, before[piece]), goes_on or place > 0
             if not late[piece]:
                 stretch = passing.take_several(
-                    setups, place, size, reached, before_it, goes_on=goes_on or place > 0
+                    block, place, size, reached, before_it, goes_on=goes_on or place > 0
                 )
             if stretch is not None:
                 part = min(size, per_revolution)
@@ -177,12 +177,12 @@ def integrate_run_up(
                 n_step += stretch.n_step
                 piece += stretch.n_piece
                 continue
-            passed = passing.take(setups[place], size, reached, before_it, goes_on=follows)
+            passed = passing.take(block[place], size, reached, before_it, goes_on=follows)
             reached, earlier = passed.end, passed.accumulators[-1]
             if late[piece]:  # the inertia of the twist does not follow at once
                 seen = model.probe_rows[2, :, : unit.size] @ unit
                 passed.whole[4 + 3 * model.n_place :, 0] += sudden[piece] * seen
-                reached = moved(reached, setups[place], -late[piece] * unit, none)
+                reached = moved(reached, block[place], -late[piece] * unit, none)
             n_step += passed.n_step
             whole[:, first : first + size] = passed.whole
             for i, accumulator in enumerate(passed.accumulators):
@@ -193,7 +193,7 @@ def integrate_run_up(
             piece += 1
         if reason:
             break
-        last = setups[-1], size
+        last = block.last, size
     lift_samples(whole[:, begun : n_done * per_revolution], sagging)
     n_sample = n_done * per_revolution
     taken = np.unique(np.minimum(cuts, n_sample))

@@ -15,8 +15,9 @@ from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, PAUSED
 from rubhpc.kernels.pieces import PIECE, STANDING, TO_BEGIN, Pieces
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
+    from rubhpc.integrate.changing_speed.block import Block
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 
@@ -59,7 +60,7 @@ def begin_stretch(
 def take_stretch(
     march: EventDrivenMarch,
     library: RetunedLibrary,
-    setups: Sequence[PieceSetup],
+    block: Block,
     first: int,
     samples: Samples,
     begun: Place,
@@ -73,16 +74,16 @@ def take_stretch(
     march : EventDrivenMarch
         Whose case it is, at the beginning of the first of them (`begin_stretch`, whose library this is); it
         stands nowhere afterwards, until it begins again.
-    setups : sequence of PieceSetup
-        Of pieces of the same matrices.
+    block : Block
+        Pieces of the same matrices.
     samples : Samples
         Room for those of one piece.
     begun, earlier
         As in `Passing.take`.
     """
-    speeds, n_piece = setups[first].speeds, len(setups)
+    speeds, n_piece, model = block.speeds, len(block), block.model
     n_row, n_sample = samples.whole.shape
-    part = min(n_sample, setups[first].samples_per_revolution)
+    part = min(n_sample, block.held.template.samples_per_revolution)
     n_part = n_sample // part
     q, n = march.bodies.gap_jacobian.shape
     lasts = n_sample * speeds.interval
@@ -90,20 +91,20 @@ def take_stretch(
         spin=speeds.spin,
         growth=speeds.growth,
         tick=speeds.tick,
-        search_level=np.array([setup.clock.search_level for setup in setups]),
-        force=np.array([setup.reduced.force for setup in setups]),
+        search_level=block.search_level,
+        force=block.force,
         since=np.array([earlier[1] if i == first else lasts[i - 1] for i in range(n_piece)]),
         table=library.tuned(march.met),
         n_room=library.n_room,
         n_sample=n_sample,
         n_part_sample=part,
-        energy_limit=setups[first].energy_limit,
+        energy_limit=block.held.template.energy_limit,
         at=np.array([first, 0, TO_BEGIN, march.mask]),
         moved_by=march.moved_by(-1) if library.follows(march.mask) else 0,
         left=march.reached_in()[1],
         motion=np.zeros((n_piece + 1, 2 * n)),
         pressing=np.zeros((n_piece + 1, q)),
-        seen=np.empty((2, 3 + setups[first].model.n_place)),
+        seen=np.empty((2, 3 + model.n_place)),
         n_step=np.zeros(n_piece, dtype=np.int64),
         whole=np.empty((n_row, n_piece * n_sample)),
     )
@@ -135,6 +136,6 @@ def take_stretch(
         sums=Accumulator._make(field[parts] for field in sums),
         last=Accumulator._make(field[end * n_part] for field in sums),
         n_step=int(pieces.n_step.sum()),
-        end=Place(pieces.motion[end].copy(), setups[first].model.sag, pieces.pressing[end].copy()),
+        end=Place(pieces.motion[end].copy(), model.sag, pieces.pressing[end].copy()),
         left=(march.moved_by(int(pieces.at[STANDING])), pieces.left),
     )
