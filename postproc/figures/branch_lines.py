@@ -44,23 +44,24 @@ def draw_branches(data: xr.Dataset, variable: str, along: str, ax: Axes) -> Axes
     x, _ = displayed(data[along])
     y = data[variable].values.reshape(x.size, -1) * scale.factor
     y = np.sort(y, axis=1)  # which revolution comes first may change along a branch; NaN comes last
-    color = categories("period", data["period"].values)
-    named: set[str] = set()
-    for rows in runs(data):
-        stable = bool(data["stability"].values[rows[0 if rows.size < 2 else 1]])
-        name, shade = color[int(data["period"].values[rows[0]])]
-        label = f"{name}, {'stable' if stable else 'unstable'}"
-        for column in range(int(np.isfinite(y[rows]).any(axis=0).sum())):
-            ax.plot(
-                x[rows],
-                y[rows, column],
-                color=shade,
-                label=None if label in named else label,
-                **_STYLES[stable],
-            )
-            named.add(label)
+    draw_lines(data, x, y, ax)
     mark_events(data, x, y, ax)
     return ax
+
+
+def draw_lines(data: xr.Dataset, x: NDArray[Any], y: NDArray[Any], ax: Axes) -> None:
+    """Draw ordinates (n_point, n) over abscissas (n_point,), named by period and stability for a legend."""
+    color = categories("period", data["period"].values)
+    period, stable = data["period"].values.astype(int), data["stability"].values == 1
+    drawn = [(period[rows[0]], bool(stable[rows[0 if rows.size < 2 else 1]]), rows) for rows in runs(data)]
+    named: set[str] = set()
+    for code, is_stable, rows in sorted(drawn, key=lambda run: (run[0], not run[1])):
+        name, shade = color[code]
+        label = f"{name}, {'stable' if is_stable else 'unstable'}"
+        for column in range(int(np.isfinite(y[rows]).any(axis=0).sum())):
+            first = None if label in named else label
+            ax.plot(x[rows], y[rows, column], color=shade, label=first, **_STYLES[is_stable])
+            named.add(label)
 
 
 def mark_events(data: xr.Dataset, x: NDArray[Any], y: NDArray[Any], ax: Axes) -> list[Line2D]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.figures.branch_lines import mark_events, runs
+from postproc.figures.branch_lines import draw_lines, mark_events
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import categories
 from postproc.store.axes import source
@@ -115,16 +115,7 @@ def draw_moduli(data: xr.Dataset, along: str, ax: Axes) -> Axes:
     x, x_label = displayed(data[along])
     size = np.hypot(data["multiplier_real"].values, data["multiplier_imag"].values)[:, 0]
     ax.axhline(1.0, color="0.6", linewidth=0.8)
-    color = categories("period", data["period"].values)
-    named: set[str] = set()
-    for rows in runs(data):
-        is_stable = bool(data["stability"].values[rows[0 if rows.size < 2 else 1]])
-        name, shade = color[int(data["period"].values[rows[0]])]
-        label = f"{name}, {'stable' if is_stable else 'unstable'}"
-        style = "-" if is_stable else "--"
-        first = None if label in named else label
-        ax.plot(x[rows], size[rows], style, color=shade, linewidth=1.1, label=first)
-        named.add(label)
+    draw_lines(data, x, size[:, None], ax)
     mark_events(data, x, size[:, None], ax)
     top = float(np.nanmax(size))
     highest = 1.06 * max(1.0, min(2.0 * _LARGEST, top))

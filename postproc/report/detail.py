@@ -55,16 +55,16 @@ class Detail:
     signals: tuple[str, ...]
 
     def text(self, kept: Collection[str]) -> str:
-        """What is kept of a store that has these roles, in words."""
+        """Describe what is kept of a store that has these roles."""
         parts = []
         if "waveform" in kept:
             parts.append(
-                f"waveforms of a period (two revolutions at least), at most {self.samples} samples a "
-                f"revolution (of forces, the highest of some); of a motion without a period the orbit of "
-                f"{self.revolutions} revolutions and waveforms of {self.shown}"
+                f"waveforms of one period, two revolutions at least, with at most {self.samples} samples per "
+                f"revolution (of forces, local maxima); for motions without a period, orbits of "
+                f"{self.revolutions} and waveforms of {self.shown} revolutions"
             )
         if {"waveform", "spectrum"} & set(kept):
-            parts.append(f"spectra to beyond their last line above {_FLOOR:.0%}, at most {self.lines} lines")
+            parts.append(f"spectra up to their last line above {_FLOOR:.0%}, at most {self.lines} lines")
         if {"waveform", "section"} & set(kept):
             parts.append("all section points")
         if self.signals != SIGNAL_NAMES:

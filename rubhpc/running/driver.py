@@ -142,7 +142,7 @@ def _run_in(
     try:
         with stopping as watch, ExitStack() as held:
             watch.forward_to(pool.stop)
-            held.enter_context(announced_by(_say_nothing if quiet else _say))
+            held.enter_context(announced_by(_say if pool.rank == 0 and not quiet else _say_nothing))
             resolved = pool.from_first(resolve)
             watch.watch(resolved.output / "STOP", resolved.run.time_limit)
             request = RunRequest(

@@ -397,6 +397,14 @@ def test_compilations_are_announced_and_are_no_time_of_the_run(physics, study, m
     assert first == "compiling kernels, once after an installation: up to a minute"
 
 
+def test_the_first_rank_alone_announces_compilations(physics, study, monkeypatch, capsys):
+    monkeypatch.setattr(job, "_warm_up", lambda *_: compilation.began("advance"))
+    monkeypatch.setattr("rubhpc.integrate.compilation._announced", set())
+    monkeypatch.setattr(Alone, "rank", 1)
+    run(study)
+    assert "compiling" not in capsys.readouterr().out
+
+
 def test_what_another_rank_compiles_is_no_time_of_the_run_either(physics, study, monkeypatch):
     monkeypatch.setattr(job, "_warm_up", lambda *_: time.sleep(0.25))  # for the other rank's kernels
     gathered = Alone.gather

@@ -112,7 +112,7 @@ def _arrays(
             if len(rows[f"{POINT}value"]) >= keys.points:
                 break
             if say is not None:
-                say(f"{len(rows[f'{POINT}value'])} points of {len(branches)} branches recorded")
+                say(f"{len(rows[f'{POINT}value'])} points recorded; branches: {len(branches)}")
             if check is not None:
                 check()
             record = branch.record(i_point)
