@@ -1,17 +1,17 @@
-"""A case that `rubhpc plan` follows part by part, as far as there is time: what it takes, or will take."""
+"""A case that `rubhpc plan` runs part by part, as far as there is time, and the forecast of its time."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from rubhpc.integrate.case import march_of, run_case
+from rubhpc.integrate.case import run_case
 from rubhpc.integrate.following import n_followed
-from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN
-from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS, N_ALL, N_FIRST, N_MOST
+from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS
 from rubhpc.integrate.modal_setup import ModalSetup
-from rubhpc.running.modes_to_come import USUAL, ModesToCome, sum_of_powers
+from rubhpc.running.forecast import Forecast, lengths_behind, n_motion
+from rubhpc.running.modes_to_come import ModesToCome
 
 if TYPE_CHECKING:
     from rubhpc.integrate.record import Record, State
@@ -21,63 +21,11 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Recording
 
 _LONG = 0.25  # s: cases that take less are run twice
-_PATIENCE = 15.0  # s that a part may take in any case: a whip that begins meets 300 contact modes
-_LITTLE = 0.5  # of what a case has taken: as much more is worth knowing better what is to come
-_FIRST, _FIRST_STEPS = 1 / 16, 50_000  # of a case, and predicted steps: its first part
-_LATE = 0.25  # least pace of a part without its contact modes, over that with them
-_REPEATED = 1.25  # revolutions counted over a length: two motions that take over from a tangent align again
-_PROBED = 8  # revolutions at most, of those that show what is left of a case will take
-
-
-class Forecast(NamedTuple):
-    """What a case that has not been run whole will take.
-
-    Attributes
-    ----------
-    seconds, per_revolution : float, s
-        Up to the end of the record, and for each revolution that is followed behind it.
-    least : float, s
-        What it takes at least.
-    modes, fading : float, s
-        Of contact modes that the last doubling of its revolutions met, and their ratio to those of the next.
-    before : float
-        Revolutions by then.
-    n_left : float
-        Revolutions that are left then up to the end of the record.
-    n_behind : int
-        Revolutions behind the record, at least.
-    lengths : tuple of int
-        Revolutions behind a record, of which one is followed (`lengths_behind`).
-    """
-
-    seconds: float
-    per_revolution: float = 0.0
-    least: float = 0.0
-    modes: float = 0.0
-    fading: float = USUAL
-    before: float = 1.0
-    n_left: float = 0.0
-    n_behind: int = 0
-    lengths: tuple[int, ...] = ()
-
-    def whole(self, n_behind: float) -> float:
-        """Time of the case, s, if so many revolutions are followed behind its record.
-
-        Where it still meets contact modes, each doubling of its revolutions is taken to meet a share of those
-        of the last (`ModesToCome`).
-        """
-        n = self._behind(n_behind)
-        left = max(self.n_left + n, 0.0)
-        to_come = self.modes * sum_of_powers(self.fading, math.log2(1.0 + left / self.before))
-        return max(self.least, self.seconds + n * self.per_revolution + to_come)
-
-    def _behind(self, usual: float) -> float:
-        if self.per_revolution == 0.0:
-            return 0.0
-        if self.n_behind < max(self.lengths[:1], default=1):
-            return usual
-        likely = (n for n in self.lengths if n > self.n_behind / _REPEATED)
-        return float(max(next(likely, 0), self.n_behind))
+_PATIENCE = 15.0  # s that a part may always take: a whip that begins meets 300 contact modes
+_LITTLE = 0.5  # of the time taken: so much more is spent for a better forecast
+_FIRST, _FIRST_STEPS = 1 / 16, 50_000  # first part: share of a case, and predicted steps
+_LATE = 0.25  # least time of a part without its contact modes, over that with them
+_PROBED = 8  # most revolutions that are timed for the rest of a case
 
 
 class FollowedCase:
@@ -86,17 +34,17 @@ class FollowedCase:
     Attributes
     ----------
     setup : Setup
-        What it shares with other cases.
+        The set-up that it shares with other cases.
     seconds : float, s
-        What its parts have taken, contact modes included.
+        Time of its parts, including contact modes.
     modes : float, s
-        What contact modes took of it, where it has one stator.
+        Part of it for contact modes, with one stator.
     a_mode : float, s
-        About what a contact mode takes.
+        Approximate time of a contact mode.
     is_whole, is_irregular : bool
-        Whether it was run to its end, and whether it still met new contact modes where it was left.
+        Whether it was run to its end, and whether it still met new contact modes when it was stopped.
     n_behind : int
-        Revolutions that were followed behind the record.
+        Revolutions that were followed after the record.
     record : Record or None
         Of the latest part.
     """
@@ -110,11 +58,11 @@ class FollowedCase:
         self._state: State | None = None
         self._n_motion = n_motion(setup)
         self._n_passed = 0  # revolutions of the transient
-        self._pace = 0.0  # s a revolution of the latest part, without its contact modes
+        self._pace = 0.0  # s per revolution of the latest part, without its contact modes
         self._met = ModesToCome()
         self._part = 1  # revolutions of the first part
-        self._cut = 0.0  # s, after which the next part was cut off, without its contact modes
-        self._cut_behind = 0  # revolutions behind the record by then
+        self._cut = 0.0  # s, after which the next part was stopped, without its contact modes
+        self._cut_behind = 0  # revolutions after the record by then
 
     @property
     def is_in_ring(self) -> bool:
@@ -129,14 +77,14 @@ class FollowedCase:
     def follow(self, steps: float, n_behind: float, limit: float) -> None:
         """Run part by part, each as long as all before, to the end or while `limit` s allow.
 
-        A motion may come to a whip after most of its transient, and then takes twenty times as long.
+        A whip may begin late in the transient, and then takes twenty times as long.
 
         Parameters
         ----------
         steps : float
             Predicted, of the whole case.
         n_behind : float
-            Revolutions that are likely to be followed behind the record.
+            Likely revolutions after the record.
         limit : float, s
         """
         recording, most = self._recording, max(_PATIENCE, limit)
@@ -149,46 +97,46 @@ class FollowedCase:
 
     @property
     def _next(self) -> int:
-        """Revolutions of the next part; 0 where the transient has been passed."""
+        """Revolutions of the next part; 0 after the transient."""
         return min(max(self._part, self._n_passed), self._recording.longest_transient - self._n_passed)
 
     def _is_worth(self, n: float, limit: float) -> bool:
-        """Whether so many revolutions more are within a limit, s, or cost little beside those before."""
+        """Whether so many more revolutions are within a limit, s, or cost little compared with the past."""
         more = self._seconds_of(n)
         return self.seconds + more <= limit or more <= _LITTLE * self.seconds
 
     def _seconds_of(self, n: float) -> float:
-        """About what so many revolutions more take, with the contact modes that they meet."""
+        """Approximate time of so many more revolutions, including the contact modes that they meet."""
         further = max(self._n_passed + n - self._met.revolutions, 0.0)
         return n * self._pace + self.a_mode * self._met.to_come(further)
 
     @property
     def seconds_of_next(self) -> float:
-        """About what `go_on` takes, behind the record nothing."""
+        """Approximate time of `go_on`."""
         return self._seconds_of(self._next or self._recording.revolutions)
 
     def go_on(self, limit: float) -> bool:
-        """Run the next part, as long as all before, or what is left; False where that took over `limit` s."""
+        """Run the next part, as long as all before, or the rest; False where that took over `limit` s."""
         if n := self._next:
             return self._pass(n, limit)
         self.finish(limit)
         return self.is_whole
 
     def run_at_once(self) -> None:
-        """Run it whole; once more where that takes little, for what contact modes take."""
+        """Run it whole; a second time if it is short, to find the time of contact modes."""
         self.finish(math.inf)
         if self.seconds < _LONG and not self.is_in_ring:
             again, _ = self._timed(self._recording, math.inf)
             self.modes = max(self.seconds - again, 0.0)
 
     def forecast(self) -> Forecast:
-        """What it will take, from where it was left."""
+        """Forecast of its time, from where it was stopped."""
         if self.is_whole:
             return Forecast(self.seconds)
         recording = self._recording
         n_left = recording.longest_transient - self._n_passed + recording.revolutions
         least = self.seconds + self._cut
-        if self._cut_behind:  # it was cut off there
+        if self._cut_behind:  # it was stopped there
             behind = self._n_motion * self._cut_behind
             pace = self._cut / (n_left + behind)
             return Forecast(
@@ -210,7 +158,7 @@ class FollowedCase:
         )
 
     def _pass(self, n: int, most: float) -> bool:
-        """Pass some revolutions of the transient; False where that was cut off."""
+        """Pass some revolutions of the transient; False where that was stopped."""
         part = _passing(self._recording, n)
         before, is_first = self.n_solved, self._n_passed == 0
         taken, record = self._timed(part, most)
@@ -235,12 +183,12 @@ class FollowedCase:
         return True
 
     def _meet(self, revolutions: float, n_new: int) -> None:
-        """Take in new contact modes by these revolutions."""
+        """Count new contact modes up to these revolutions."""
         self._met.enter(revolutions, n_new)
         self.is_irregular = self._met.is_growing
 
     def _leave(self, taken: float, before: int) -> None:
-        """Take in a part that was cut off, with so many contact modes solved before: they stay solved."""
+        """Count a part that was stopped, with so many contact modes solved before: they stay solved."""
         n_new = self.n_solved - before
         self._meet(2 * max(self._n_passed, 1), n_new)
         modes = min(n_new * self.a_mode, (1.0 - _LATE) * taken)
@@ -248,7 +196,7 @@ class FollowedCase:
         self._cut = taken - modes
 
     def finish(self, limit: float) -> None:
-        """Run what is left of it at once, unless that takes more than `limit` s."""
+        """Run the rest at once, unless that takes more than `limit` s."""
         recording = self._recording
         if self._n_passed:
             left = recording.longest_transient - self._n_passed
@@ -264,7 +212,7 @@ class FollowedCase:
         self.seconds += taken
 
     def _probe(self) -> float:
-        """Time of a revolution from where it was left, s, as many recorded as in the case."""
+        """Time of a revolution from where it was stopped, s, with the recorded share of the case."""
         recording = self._recording
         n = recording.longest_transient + recording.revolutions
         share = min(max(self._n_passed, 1), _PROBED) / n
@@ -298,31 +246,6 @@ class FollowedCase:
         )
 
 
-def n_motion(setup: Setup) -> int:
-    """Motions that are followed behind the record: one with its tangent, or two side by side."""
-    return 1 if getattr(march_of(setup.scheme, setup), "has_closed_form", False) else 2
-
-
-def lengths_behind(setup: Setup, recording: Recording) -> tuple[int, ...]:
-    """Revolutions for which a motion without a period is followed behind its record, one of these."""
-    if recording.revolutions < LEAST_REVOLUTIONS:
-        return ()
-    known = recording.revolutions // SPAN if n_motion(setup) == 1 else 0  # spans: a tangent has those before
-    return tuple(SPAN * max(N_ALIGNING + n - known, 0) for n in (N_FIRST, N_ALL, N_MOST))
-
-
-def usual_behind(setup: Setup, recording: Recording) -> float:
-    """Revolutions behind the record of a case that takes long, where no other has shown more.
-
-    Set by trial: of six whips in a ring under Coulomb's law the tangents of five were carried over the first
-    length; two motions in short steps showed chaos within theirs.
-    """
-    lengths = lengths_behind(setup, recording)
-    if not lengths:
-        return 0.0
-    return 0.25 * lengths[0] + 0.75 * lengths[1] if n_motion(setup) == 1 else lengths[0]
-
-
 def is_ring(setup: Setup) -> bool:
     """Whether cases meet many sets of contacts."""
     return len(setup.model.stators) > 1
@@ -334,5 +257,5 @@ def n_solved(setup: Setup, case: Case) -> int:
 
 
 def _passing(recording: Recording, n: int) -> Recording:
-    """So many revolutions, the last of them recorded."""
+    """A recording of so many revolutions, the last of them recorded."""
     return replace(recording, transient=n - 1, revolutions=1)

@@ -14,7 +14,8 @@ from rubhpc.integrate.changing_speed.case import RunUpRecord
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.running.case_setup import operation_of, set_up, set_up_for_kernels
-from rubhpc.running.followed_case import FollowedCase, Forecast, is_ring, usual_behind
+from rubhpc.running.followed_case import FollowedCase, is_ring
+from rubhpc.running.forecast import Forecast, usual_behind
 from rubhpc.running.kept_setups import MOST_BYTES
 from rubhpc.running.memory import free_memory, peak_memory
 from rubhpc.running.stopwatch import Stopwatch

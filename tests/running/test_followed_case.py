@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import pytest
 
 from rubhpc.integrate.following import count_followed, n_followed
-from rubhpc.running import followed_case, pilot_cases
-from rubhpc.running.followed_case import FollowedCase, Forecast
+from rubhpc.running import followed_case, forecast, pilot_cases
+from rubhpc.running.followed_case import FollowedCase
+from rubhpc.running.forecast import Forecast
 from rubhpc.running.modes_to_come import ModesToCome
 from rubhpc.study.study import Recording
 
@@ -48,7 +49,7 @@ class Machine:
 
 def followed(monkeypatch, machine, limit, n_stator=16):
     monkeypatch.setattr(followed_case, "run_case", machine.run_case)
-    monkeypatch.setattr(followed_case, "march_of", lambda *_: SimpleNamespace(has_closed_form=True))
+    monkeypatch.setattr(forecast, "march_of", lambda *_: SimpleNamespace(has_closed_form=True))
     setup = SimpleNamespace(model=SimpleNamespace(stators=[None] * n_stator), scheme=None)
     case = SimpleNamespace(clearance=1e-4, friction=0.1, initial=None)
     found = FollowedCase(setup, case, RECORDING, machine)
@@ -189,10 +190,8 @@ def test_length_of_a_tangent_is_that_of_the_cases_that_ran_whole():
 def test_a_tangent_goes_on_from_the_spans_of_the_record(
     revolutions, has_closed_form, lengths, usual, monkeypatch
 ):
-    monkeypatch.setattr(
-        followed_case, "march_of", lambda *_: SimpleNamespace(has_closed_form=has_closed_form)
-    )
+    monkeypatch.setattr(forecast, "march_of", lambda *_: SimpleNamespace(has_closed_form=has_closed_form))
     recording = replace(RECORDING, revolutions=revolutions)
     setup = SimpleNamespace(scheme=None)
-    assert followed_case.lengths_behind(setup, recording) == lengths
-    assert followed_case.usual_behind(setup, recording) == usual
+    assert forecast.lengths_behind(setup, recording) == lengths
+    assert forecast.usual_behind(setup, recording) == usual
