@@ -8,13 +8,14 @@ import numpy as np
 import xarray as xr
 
 from postproc.cases.attractors import NO_MOTION, attractors, start_axes
-from postproc.cases.basin_shares import basin_entropy, fractions, name_of
+from postproc.cases.basin_shares import basin_entropy, fractions
 from postproc.cases.motion_examples import examples
 from postproc.cases.saltelli import is_log
 from postproc.figures.basin_motions import draw_motions, draw_sections
 from postproc.figures.cells import cell_edges, hatch_cells, is_geometric
 from postproc.figures.drawing import Drawing
-from postproc.figures.palette import MOTION_COLORS, NOT_DONE, NOT_SETTLED, REGIME_COLORS
+from postproc.figures.motion_names import colors_of, described, motion_label, motion_name
+from postproc.figures.palette import NOT_DONE, NOT_SETTLED
 from postproc.figures.small_multiples import legend_below
 from postproc.figures.ticks import tick_levels
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
@@ -22,9 +23,8 @@ from postproc.store.select import first_of_rest
 from postproc.store.units import displayed, written_value
 from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
-from rubhpc.schema import DONE, REGIME
+from rubhpc.schema import DONE
 from rubhpc.study.sampling import CASE
-from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -106,7 +106,7 @@ def basins(
     def draw(axes: list[Axes]) -> None:
         draw_basins(shown, across, up, axes[0])
         axes[0].locator_params(axis="x", nbins=6)
-        draw_motions(shown, cases, _colors(shown), axes[1])
+        draw_motions(shown, cases, colors_of(shown), axes[1])
 
     return Drawing(
         shown=shown,
@@ -115,7 +115,7 @@ def basins(
         is_shared=False,
         width=_WIDE_PAIR,
         height=85.0,
-        lines=(*notes, *_described(shown)),
+        lines=(*notes, *described(shown)),
     )
 
 
@@ -166,7 +166,7 @@ def _along(cases: xr.Dataset, axis: str, starts: Sequence[str], tolerance: float
     def draw(axes: list[Axes]) -> None:
         draw_fractions(shown, axis, axes[0])
         axes[0].set_xlabel("")
-        draw_sections(shown, axis, _colors(shown), axes[1])
+        draw_sections(shown, axis, colors_of(shown), axes[1])
 
     return Drawing(
         shown=shown,
@@ -180,7 +180,7 @@ def _along(cases: xr.Dataset, axis: str, starts: Sequence[str], tolerance: float
 
 def draw_basins(data: xr.Dataset, x: str, y: str, ax: Axes) -> Axes:
     """Draw which motion each start reaches: cells over two axes of a grid, or points of a sample."""
-    colors = _colors(data)
+    colors = colors_of(data)
     values, status = data["attractor_reached"], data["status"]
     across, x_label = displayed(data[x])
     up, y_label = displayed(data[y])
@@ -216,10 +216,10 @@ def draw_fractions(data: xr.Dataset, axis: str, ax: Axes) -> Axes:
     """Draw the shares of the motions along an axis as stacked areas, with their 95 % intervals as bars."""
     x, x_label = displayed(data[axis])
     bottom = np.zeros(x.size)
-    for number, color in _colors(data).items():
+    for number, color in colors_of(data).items():
         motion = data.sel(attractor=number)
         share = np.nan_to_num(motion["fraction"].transpose(axis).values)
-        label = f"{number}: {_name(data, number)}"
+        label = f"{number}: {motion_name(data, number)}"
         ax.fill_between(x, bottom, bottom + share, color=color, label=label, linewidth=0.4, edgecolor="white")
         top = bottom + share
         inner = (share > 0.0) & (top < 1.0 - 1e-9)
@@ -255,7 +255,7 @@ def _cells(
     if numbers:
         paint = ListedColormap([*colors.values()])
         ax.pcolormesh(*edges, cells, cmap=paint, vmin=-0.5, vmax=len(numbers) - 0.5, rasterized=True)
-    return [Patch(facecolor=color, label=_legend(data, number)) for number, color in colors.items()]
+    return [Patch(facecolor=color, label=motion_label(data, number)) for number, color in colors.items()]
 
 
 def _scatter(data: xr.Dataset, x: Floats, y: Floats, colors: dict[int, str], ax: Axes) -> list[Artist]:
@@ -263,7 +263,7 @@ def _scatter(data: xr.Dataset, x: Floats, y: Floats, colors: dict[int, str], ax:
     found = data["attractor_reached"].values
     size = float(np.clip(5000.0 / found.size, 3.0, 24.0))
     handles: list[Artist] = [
-        ax.scatter(x[found == n], y[found == n], size, color=color, linewidths=0, label=_legend(data, n))
+        ax.scatter(x[found == n], y[found == n], size, color=color, linewidths=0, label=motion_label(data, n))
         for n, color in colors.items()
     ]
     none = found == NO_MOTION
@@ -272,53 +272,3 @@ def _scatter(data: xr.Dataset, x: Floats, y: Floats, colors: dict[int, str], ax:
             ax.scatter(x[none], y[none], size, color="0.5", marker="x", linewidths=0.6, label="no motion")
         )
     return handles
-
-
-def _colors(data: xr.Dataset) -> dict[int, str]:
-    """Colour of each motion that occurs, by its number."""
-    numbers = [int(n) for n in data["attractor"].values if int(data["count"].sel(attractor=n).max()) > 0]
-    shades = iter(MOTION_COLORS * (len(numbers) // len(MOTION_COLORS) + 1))
-    return {n: REGIME_COLORS[0] if _is_free(data, n) else next(shades) for n in numbers}
-
-
-def _of(data: xr.Dataset, name: str, number: int) -> int:
-    """What a motion is where it occurs; of several settings the most common."""
-    values = data[name].sel(attractor=number).values
-    values = values[data["count"].sel(attractor=number).values > 0]
-    found, n = np.unique(values, return_counts=True)
-    return int(found[n.argmax()])
-
-
-def _is_free(data: xr.Dataset, number: int) -> bool:
-    return REGIME[_of(data, "motion_regime", number)] == "no_contact"
-
-
-def _name(data: xr.Dataset, number: int) -> str:
-    return name_of(_of(data, "motion_regime", number), _of(data, "motion_period", number))
-
-
-def _legend(data: xr.Dataset, number: int) -> str:
-    """Number, name and share of a motion; the share is of one setting."""
-    text = f"{number}: {_name(data, number)}"
-    motion = data.sel(attractor=number)
-    if motion["fraction"].size > 1:
-        return text
-    low, high = (100 * float(motion[f"fraction_{end}"].squeeze()) for end in ("low", "high"))
-    return f"{text}, {100 * float(motion['fraction'].squeeze()):.3g} % ({low:.3g} to {high:.3g})"
-
-
-def _described(data: xr.Dataset) -> list[str]:
-    """A line for each motion, of one setting."""
-    lines = []
-    for number in _colors(data):
-        motion = data.sel(attractor=number)
-        means = []
-        for name in (n for n in _MEASURES if f"mean_{n}" in data):
-            value, about = float(motion[f"mean_{name}"]), data[f"mean_{name}"].attrs
-            scale = scale_for(str(about.get("units", "1")), abs(value))
-            means.append(f"{about.get('long_name', name)} {value * scale.factor:.4g} {scale.unit}")
-        count = f"{int(motion['count'])} of {int(motion['n_start'])} starts"
-        lines.append("; ".join([f"motion {_legend(data, number)}", count, *means]))
-    if left := int(data["n_without_motion"]):
-        lines.append(f"without a motion: {left} starts, not done or not settled")
-    return lines
