@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from rubhpc.case_arguments import CaseArguments, case_of, check_count
+from rubhpc.case_arguments import CaseArguments, case_of, check_count, read_keep
 from rubhpc.errors import InputError, NoPeriodicMotion
+from rubhpc.input.messages import brief
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.integrate.branches.branch import branch_of
 from rubhpc.integrate.branches.branching import Branching
@@ -131,7 +132,7 @@ def branch(
     recording = Recording(
         transient=transient,
         samples_per_revolution=samples_per_revolution,
-        keep=(keep,) if isinstance(keep, str) else tuple(keep),
+        keep=read_keep("branch", keep),
     )
     branching = Branching(Family(operation, along, (first, last)), largest)
     seeds = [_first(branching, first, begin, period, recording)]
@@ -177,11 +178,23 @@ def _range(rig: Rig, along: str, start: float | str, stop: float | str) -> tuple
         raise InputError(f"branch: stop: {stop} equals start; give a range")
     if along in SPEEDS and first * last <= 0.0:
         raise InputError("branch: start: the range contains 0, which is not a valid speed; use one sign only")
+    name, value = ("start", start) if first < last else ("stop", stop)
+    least = min(first, last)
+    if along in ("friction", "clearance_ratio") and least < 0.0:
+        raise InputError(f"branch: {name}: {value} is out of range; {along} must be at least 0")
+    offset = min((stator.clearance_offset for stator in rig.stator), default=0.0)
+    if along == "clearance" and least + offset <= 0.0:
+        problem = f"{least:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
+        raise InputError(f"branch: {name}: {problem}; use a larger one")
     return first, last
 
 
 def _one(rig: Rig, along: str, value: float | str, name: str) -> float:
     """A value on the axis that is varied, SI."""
+    if not isinstance(along, str):
+        raise InputError(
+            f'branch: along: {brief(along)} is not the name of an axis; give one, such as "friction"'
+        )
     check_followed(along, "branch: along")
     try:
         unit = unit_of(along, rig)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -80,6 +80,16 @@ class Case:
     contact_free_amplitude: float  # m; NaN of an unstable rotor
     initial: State | Initial
     note: str  # what is wrong with the rig at this speed, or ""
+
+
+def read_keep(caller: str, keep: object) -> tuple[str, ...]:
+    """Return what a record contains besides its measures; one name needs no list."""
+    names = [keep] if isinstance(keep, str) else keep
+    if not isinstance(names, Iterable):
+        raise InputError(
+            f'{caller}: keep: {brief(keep)} is not a list of names; give one such as ("section",)'
+        )
+    return tuple(names)
 
 
 def pick(arguments: Mapping[str, object]) -> CaseArguments:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rubhpc.case_arguments import CaseArguments, case_of, check_count, read_probes
+from rubhpc.case_arguments import CaseArguments, case_of, check_count, read_keep, read_probes
 from rubhpc.integrate.periodic_motion import find_periodic_motion
 from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
@@ -87,8 +87,6 @@ def periodic(
     """
     check_count("periodic", "period", period, 1, LONGEST)
     check_count("periodic", "repeat", repeat, 1)
-    if isinstance(keep, str):
-        keep = (keep,)
     measured = read_probes("periodic", probes)
     one = case_of(
         "periodic", rig, case, samples_per_revolution=samples_per_revolution, initial=initial, probes=measured
@@ -102,7 +100,7 @@ def periodic(
         recording=Recording(
             transient=transient,
             samples_per_revolution=samples_per_revolution,
-            keep=tuple(keep),
+            keep=read_keep("periodic", keep),
             probe=measured,
         ),
         initial=one.initial,

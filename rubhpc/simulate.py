@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rubhpc.case_arguments import FRICTION, case_of, pick, read_probes
+from rubhpc.case_arguments import FRICTION, case_of, pick, read_keep, read_probes
 from rubhpc.integrate.case import run_case
 from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
@@ -141,8 +141,6 @@ def simulate(
     2
     """
     given = pick(locals())
-    if isinstance(keep, str):
-        keep = (keep,)
     measured = read_probes("simulate", probes)
     case = case_of(
         "simulate",
@@ -158,7 +156,7 @@ def simulate(
         transient_tolerance=transient_tolerance,
         revolutions=revolutions,
         samples_per_revolution=samples_per_revolution,
-        keep=tuple(keep),
+        keep=read_keep("simulate", keep),
         lyapunov=lyapunov,
         probe=measured,
     )

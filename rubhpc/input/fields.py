@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import MISSING, field
+from numbers import Integral
 from typing import Any
 
 from rubhpc.errors import InputError
@@ -153,9 +154,12 @@ def check_fields(owner: Any) -> None:
         Names the field, what is wrong and how to fix it.
     """
     for declared in dataclasses.fields(owner):
-        problem = check_value(declared, getattr(owner, declared.name))
+        value = getattr(owner, declared.name)
+        problem = check_value(declared, value)
         if problem:
             raise FieldError(key_of(declared), problem)
+        if declared.metadata.get("kind") == "count" and isinstance(value, Integral):
+            object.__setattr__(owner, declared.name, int(value))  # numpy's whole numbers
 
 
 def check_value(declared: dataclasses.Field[Any], value: Any) -> str:

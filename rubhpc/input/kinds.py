@@ -6,6 +6,7 @@ A problem is a text, what is wrong and how to fix it, or "" where nothing is; `f
 from __future__ import annotations
 
 import operator
+from numbers import Integral
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rubhpc.errors import InputError, printable
@@ -47,7 +48,8 @@ def _check_quantity(value: object, limits: Limits) -> str:
 
 
 def _parse_series(value: Any, limits: Limits, where: str) -> tuple[float, ...]:
-    values = value if isinstance(value, list | tuple) else [value]
+    listed = value.tolist() if hasattr(value, "tolist") else value  # an array
+    values = listed if isinstance(listed, list | tuple) else [listed]
     return tuple(parse_quantity(v, limits["unit"], f"{where}: value {i}") for i, v in enumerate(values, 1))
 
 
@@ -65,23 +67,23 @@ def _parse_count(value: object, limits: Limits, where: str) -> int | str:
         return value
     if isinstance(value, float) and value.is_integer():
         return int(value)  # an axis holds floats
-    if isinstance(value, bool) or not isinstance(value, int):
+    if isinstance(value, bool) or not isinstance(value, Integral):
         words = "".join(f', or "{word}"' for word in limits["or_words"])
         raise InputError(
             f"{where}: {brief(value)} is not a whole number; write one such as 12, without quotes{words}"
         )
-    return value
+    return int(value)
 
 
 def _check_count(value: object, limits: Limits) -> str:
     if isinstance(value, str) and value in limits["or_words"]:
         return ""
-    if isinstance(value, bool) or not isinstance(value, int):
+    if isinstance(value, bool) or not isinstance(value, Integral):
         words = "".join(f', or "{word}"' for word in limits["or_words"])
         return f"{brief(value)} is not a whole number; give one such as 12{words}"
-    if value < limits["at_least"]:
+    if int(value) < limits["at_least"]:
         return f"{brief(value)} is out of range; it must be at least {limits['at_least']}"
-    if limits["at_most"] is not None and value > limits["at_most"]:
+    if limits["at_most"] is not None and int(value) > limits["at_most"]:
         return f"{brief(value)} is out of range; it must be at most {limits['at_most']}"
     return ""
 

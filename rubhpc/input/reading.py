@@ -102,7 +102,7 @@ def refuse_unknown(table: Mapping[str, object], known: Mapping[str, object], fil
     """Refuse keys that are not known, naming the nearest."""
     for key in table:
         if key not in known:
-            raise InputError(f"{place(file, name, key)}: unknown key; {nearest(key, known)}")
+            raise InputError(f"{place(file, name, str(key))}: unknown key; {nearest(str(key), known)}")
 
 
 def plain(value: Any) -> Any:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
 from rubhpc.input.dotted import replace_keys
-from rubhpc.input.messages import nearest, place
+from rubhpc.input.messages import brief, nearest, place
 from rubhpc.input.reading import build, read_toml
 from rubhpc.rig.python_rig import call_rig_function, python_function
 from rubhpc.rig.rig import Rig
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from os import PathLike
 
 PACKAGED = Path(__file__).parents[1] / "rigs"
@@ -109,4 +109,7 @@ def with_key(rig: Rig, dotted: str, value: object) -> Rig:
 
 def with_keys(rig: Rig, values: Mapping[str, object]) -> Rig:
     """Return the rig with several dotted keys set at once; only the result has to be valid."""
+    if not isinstance(values, Mapping):
+        fix = 'give one such as {"stator.youngs_modulus": "30 GPa"}'
+        raise InputError(f"overrides: {brief(values)} is not a dict; {fix}")
     return replace_keys(rig, values)

@@ -1,5 +1,6 @@
 """One case from its arguments to its record: units, refusals, continuation, divergence, energy."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -88,12 +89,25 @@ def test_overrides_change_the_rig():
         ({"revolutions": 0}, "revolutions"),
         ({"samples_per_revolution": 31}, "samples_per_revolution: 31 is odd"),
         ({"overrides": {"stator.modulus": 1e9}}, "unknown key"),
+        ({"overrides": ["stator.length"]}, "overrides: .* is not a dict; give one such as"),
+        ({"keep": None}, "simulate: keep: None is not a list of names"),
+        ({"revolutions": np.float64(1.5)}, "revolutions: 1.5 is not a whole number"),
     ],
 )
 def test_what_cannot_be_used_is_refused_in_one_line(changed, message):
     with pytest.raises(InputError, match=message) as refusal:
         simulate(RIG, **(RUB | changed))
     assert "\n" not in str(refusal.value)
+
+
+def test_numbers_and_arrays_of_numpy_are_taken_as_pythons():
+    table = {"friction_law": "table", "slip_speed": [0.0, 1.0], "friction_ratio": [1.2, 1.0]}
+    counted = {"transient": 1, "revolutions": 2, "samples_per_revolution": 32}
+    arrays = {name: np.array(value) for name, value in table.items() if name != "friction_law"}
+    one = simulate(RIG, **(RUB | table | counted))
+    other = simulate(RIG, **(RUB | table | arrays | {name: np.int64(n) for name, n in counted.items()}))
+    assert same(one, other)
+    assert json.dumps(other.settings) == json.dumps(one.settings)
 
 
 def test_rig_without_stator_is_refused():

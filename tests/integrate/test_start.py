@@ -108,6 +108,8 @@ def test_a_record_goes_on_from_a_start_without_loss_of_energy():
     [
         ({"from": "still"}, r'\[initial\] from: "still" is not available; choose one of "rest"'),
         ({"form": "rest"}, "form: unknown key; did you mean from"),
+        ({"velocty": 0.1}, r"velocty: unknown key; did you mean vertical_velocity\?"),
+        ({1: 0.1}, "1: unknown key; choose one of from"),
         ({"impulse_angle": 1.0}, "impulse_angle: there is no impulse; give one"),
         ({"impulse": 1.0, "impulse_node": 99}, "impulse_node: 99 does not move sideways"),
         ({"vertical": "3 kg"}, "vertical: .* is not in m"),

@@ -195,12 +195,22 @@ def test_several_pairs_that_slide_under_coulombs_law_branch_as_pairs_that_slide(
         ({"clearance": 1e-4}, "clearance: varies along the branch"),
         ({"start": "1 kg"}, "branch: start: "),
         ({"normal": "updated"}, "branches need motion in closed form"),
+        ({"stop": "-20 um"}, "branch: stop: -2e-05 m and .* leave no gap"),
+        ({"along": 3}, 'branch: along: 3 is not the name of an axis; give one, such as "friction"'),
+        ({"keep": 1}, "branch: keep: 1 is not a list of names"),
     ],
 )
 def test_bad_arguments_are_refused(arguments, text):
     with pytest.raises(InputError, match=text) as caught:
         rubhpc.branch("mokhtar2017", **CASE | ALONG | arguments)
     assert "\n" not in str(caught.value)
+
+
+def test_a_range_of_negative_friction_is_refused():
+    with pytest.raises(InputError, match=r"stop: -0\.2 is out of range; friction must be at least 0"):
+        rubhpc.branch(
+            "mokhtar2017", along="friction", start=0.3, stop=-0.2, speed_ratio=0.75, clearance="84 um"
+        )
 
 
 @pytest.mark.parametrize("keeps_those_of_both_ends", [True, False])
