@@ -107,8 +107,8 @@ def with_key(rig: Rig, dotted: str, value: object) -> Rig:
     return with_keys(rig, {dotted: value})
 
 
-def with_keys(rig: Rig, values: Mapping[str, object]) -> Rig:
-    """Return the rig with several dotted keys set at once; only the result has to be valid."""
+def with_keys(rig: Rig, values: object) -> Rig:
+    """Return the rig with the dotted keys of a mapping set at once; only the result has to be valid."""
     if not isinstance(values, Mapping):
         fix = 'give one such as {"stator.youngs_modulus": "30 GPa"}'
         raise InputError(f"overrides: {brief(values)} is not a dict; {fix}")
